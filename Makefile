@@ -1,0 +1,35 @@
+# The two commands are `make demo` and `make test`. Everything is made inside this folder (.venv, out/);
+# see .ci/setup.sh for what is looked for and what is installed.
+
+.DEFAULT_GOAL := help
+.PHONY: help demo test bench lint clean ready ready-dev
+
+ARGS ?=
+
+help:  ## this list
+	@echo "make GOAL [ARGS='...' handed to the command] [PYTHON=/path/to/python3.12]"
+	@sed -n 's/^\([a-z]*\):[^#]*## */  \1\t/p' Makefile
+
+demo: ready  ## simulate and focus a scene; the picture is out/demo.png
+	@.venv/bin/sarcl demo $(ARGS)
+
+test: ready  ## the tests
+	@.venv/bin/python -m pytest $(ARGS)
+
+bench: ready  ## speed, printed with the error achieved
+	@.venv/bin/sarcl bench $(ARGS)
+
+lint: ready-dev  ## style, format and types
+	.venv/bin/python -m ruff check .
+	.venv/bin/python -m ruff format --check .
+	.venv/bin/python -m mypy
+
+clean:  ## remove .venv and everything made, but not the pictures in out/
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	find . -name __pycache__ -type d -prune -exec rm -rf {} +
+
+ready:
+	@PYTHON='$(PYTHON)' sh .ci/setup.sh test '$(or $(MAKECMDGOALS),demo)'
+
+ready-dev:
+	@PYTHON='$(PYTHON)' sh .ci/setup.sh dev '$(or $(MAKECMDGOALS),lint)'

@@ -1,0 +1,88 @@
+// Direct backprojection of range profiles onto tiles of pixels.
+//
+//   I(x) = sum_p v_p(x) s~_p(2 delta_p(x)/c) exp(+j 2 pi kappa_p delta_p(x)),   delta = half path - reference range
+//
+// source    DESIGN.md, image equation; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
+// symbols   delta, kappa as in geometry.clh;  s~_p  range profile, interpolated as in interp.clh
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER as in the headers
+//           VECTORS   vectors of pixels a work-item
+//           CHUNK     pulses added in float32 before they join the compensated total
+// reference: sarcl/reference/backproject.py:backproject
+
+#include "common.clh"
+#include "wide.clh"
+#include "geometry.clh"
+#include "interp.clh"
+#include "phase.clh"
+
+// total + error += x: the error of each addition is kept and added back at the end
+inline void add_compensated(__global float *total, __global float *error, size_t i, fv x) {
+    fv a = LOAD(i, total);
+    fv s = a + x, t = s - a;
+    STORE(s, i, total);
+    STORE(LOAD(i, error) + ((a - (s - t)) + (x - t)), i, error);
+}
+
+// global size (work-items a tile, tiles of this block), local size (work-items a tile, 1)
+//   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
+//   table                              interpolation weights, see interp.clh
+//   pulse       (2, N_PULSE, n)        see geometry.clh
+//   constants   (tiles, n, N_CONST)    from tile_constants
+//   tile        (2, 3, n_tiles)        reference points, m about the scene's centre; this block starts at `first`
+//   offsets     (planes, n_offsets)    m; tile k reads from vector k offset_step on (0: all tiles are alike)
+//   used        n_used <= n            pulses that are real; the rest pads the vectors
+//   image       (4, pixels)            totals re, im and their errors re, im; tiles in a row
+//   skipped     (tiles)                pulses that see no pixel of the tile
+__kernel void backproject(__global const float *restrict profiles, int stride, int origin,
+                          __global const float *restrict table, __global const float *restrict pulse, int n,
+                          int n_used, __global const float *restrict constants,
+                          __global const float *restrict tile, int n_tiles, int first,
+                          __global const float *restrict offsets, int n_offsets, int offset_step,
+                          __global float *restrict image, ulong pixels, __global int *restrict skipped) {
+    int k = first + get_global_id(1), per_tile = get_global_size(0) * VECTORS;
+    __global const float *c = constants + get_global_id(1) * (size_t)n * N_CONST;
+    offset x[VECTORS];
+#pragma unroll
+    for (int r = 0; r < VECTORS; r++) {
+        x[r] = load_offset(offsets, (size_t)k * offset_step + get_global_id(0) * VECTORS + r, n_offsets);
+        about_centre(&x[r], tile, k, n_tiles);
+    }
+    int missed = 0;
+    for (int start = 0; start < n_used; start += CHUNK) {
+        fv re[VECTORS], im[VECTORS];
+#pragma unroll
+        for (int r = 0; r < VECTORS; r++) re[r] = im[r] = 0;
+        int stop = min(start + CHUNK, n_used);
+        for (int p = start; p < stop; p++) {
+            __global const float *record = c + (size_t)p * N_CONST;
+            int state = as_int(record[C_STATE]);
+            if (state == OUTSIDE) {
+                missed++;
+                continue;
+            }
+            __global const float *row = profiles + 2 * ((size_t)p * stride + origin);
+#pragma unroll
+            for (int r = 0; r < VECTORS; r++) {
+                place at = locate(record, pulse, p, n, x[r]);
+                fv v = 1;
+                if (state == CROSSING) v = keep_inside(record, &at);
+                fv g, h, sine, cosine;
+                look_up(row, at.base, at.t, table, &g, &h);
+                sincos_turns(at.turn, &sine, &cosine);
+                if (state == CROSSING) {
+                    g *= v;
+                    h *= v;
+                }
+                re[r] = fma(g, cosine, fma(-h, sine, re[r]));
+                im[r] = fma(g, sine, fma(h, cosine, im[r]));
+            }
+        }
+#pragma unroll
+        for (int r = 0; r < VECTORS; r++) {
+            size_t i = (size_t)k * per_tile + get_global_id(0) * VECTORS + r;
+            add_compensated(image, image + 2 * pixels, i, re[r]);
+            add_compensated(image + pixels, image + 3 * pixels, i, im[r]);
+        }
+    }
+    if (get_global_id(0) == 0) skipped[k] += missed;
+}

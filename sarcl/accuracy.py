@@ -1,0 +1,194 @@
+"""Error formulas: numbers in, numbers out. Every bound is a worst case, relative, and small errors add.
+
+docs/accuracy.md derives each; tests/test_accuracy.py measures each.
+"""
+
+from __future__ import annotations
+
+import functools
+from dataclasses import dataclass
+
+import numpy as np
+
+from .check import SPEED_OF_LIGHT
+
+U32 = 2.0**-24  # unit roundoff of float32
+# Root mean square of what rounding turns to float32 (twice) and the sine and cosine polynomials add, rad.
+ANGLE = 3e-7
+
+# Polynomial terms of each half (even, odd) of a tap's weight: enough that the fit errs less than the kernel.
+TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
+
+# Relative cost of one contribution with so many taps, measured on PoCL (bench/backproject.py).
+TAP_COST = {2: 1.0, 4: 1.5, 6: 1.9, 8: 2.45}
+
+
+@dataclass(frozen=True, eq=False)
+class Interpolator:
+    """A kernel of `taps` samples for profiles `oversample` times finer than 1/bandwidth.
+
+    table   coefficients (taps/2, 2, terms) float32 as kernels/interp.clh reads them
+    error   largest relative error at any frequency in the band and any place between samples
+    """
+
+    taps: int
+    oversample: float
+    table: np.ndarray
+    error: float
+
+    def weights(self, z: np.ndarray) -> np.ndarray:
+        """Weights of all taps at z in [-1/2, 1/2]: (..., taps), float64."""
+        return _weights(self.taps, self.table, z)
+
+    def transform(self, nu: np.ndarray) -> np.ndarray:
+        """Fourier transform of the kernel at nu cycles a sample; spectra are divided by it."""
+        return _transform(self.taps, self.table, nu)
+
+
+@functools.lru_cache(maxsize=256)
+def interpolator(taps: int, oversample: float) -> Interpolator:
+    """The hat (2 taps) or a Kaiser-Bessel kernel, deconvolved: a type-2 nonuniform FFT in range.
+
+    The Kaiser-Bessel shape is pi taps (1 - 1/(2 oversample)), the transform's edge at the first alias.
+    """
+    table = np.zeros((1, 2, 1), np.float32) if taps == 2 else _kaiser_bessel(taps, oversample)
+    nu = np.linspace(0, 0.5 / oversample, 33)
+    z = np.linspace(-0.5, 0.5, 65)
+    # what the taps make of exp(j 2 pi nu t), over what they should: worst at the band's edge
+    place = np.arange(taps) - (taps - 1) / 2
+    waves = np.exp(2j * np.pi * nu[:, None, None] * (place - z[:, None]))
+    made = (waves * _weights(taps, table, z)).sum(axis=-1) / _transform(taps, table, nu)[:, None]
+    return Interpolator(taps, oversample, table, float(np.abs(made - 1).max()))
+
+
+def _kaiser_bessel(taps: int, oversample: float) -> np.ndarray:
+    beta = np.pi * taps * (1 - 0.5 / oversample)
+    terms = TERMS[taps]
+    z = np.cos(np.pi * (np.arange(200) + 0.5) / 200) / 2  # Chebyshev points: a fit near minimax
+    out = np.empty((taps // 2, 2, terms))
+    for k in range(taps // 2):
+
+        def psi(z: np.ndarray, k: int = k) -> np.ndarray:
+            x = 2 * (z + (taps - 1) / 2 - k) / taps
+            return np.i0(beta * np.sqrt(np.maximum(1 - x * x, 0))) / np.i0(beta)
+
+        even, odd = (psi(z) + psi(-z)) / 2, (psi(z) - psi(-z)) / (2 * z)
+        powers = (z[:, None] ** 2) ** np.arange(terms)
+        out[k, 0] = np.linalg.lstsq(powers, even, rcond=None)[0]
+        out[k, 1] = np.linalg.lstsq(powers * z[:, None], odd * z, rcond=None)[0]
+    return out.astype(np.float32)
+
+
+def _weights(taps: int, table: np.ndarray, z: np.ndarray) -> np.ndarray:
+    z = np.asarray(z, np.float64)
+    if taps == 2:
+        return np.stack([0.5 - z, 0.5 + z], axis=-1)
+    powers = (z[..., None] ** 2) ** np.arange(table.shape[-1])
+    even, odd = (np.tensordot(powers, table[:, i].astype(np.float64), axes=(-1, -1)) for i in (0, 1))
+    odd = odd * z[..., None]
+    return np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=-1)
+
+
+def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Integral of the kernel times cos(2 pi nu x), by Gauss-Legendre over each tap's stretch."""
+    nu = np.asarray(nu, np.float64)
+    if taps == 2:
+        return np.sinc(nu) ** 2
+    x, gauss = np.polynomial.legendre.leggauss(12)
+    z = x / 2
+    distance = z[:, None] + (taps - 1) / 2 - np.arange(taps)
+    kernel = _weights(taps, table, z) * (gauss / 2)[:, None]
+    waves = np.cos(2 * np.pi * nu[..., None, None] * distance)
+    return (waves * kernel).sum(axis=(-1, -2))
+
+
+def choose_interpolator(
+    error: float, n_samples: int, pairs_per_row: float, max_samples: float
+) -> tuple[Interpolator, int, float]:
+    """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
+
+    The cost of a contribution is in units of one with the hat; making profiles is counted in.
+
+    n_samples      of a row before oversampling
+    pairs_per_row  contributions read from a row: they weigh taps against the length of the FFT
+    max_samples    longest profile that memory allows
+    ValueError names the smallest error there is when none is small enough.
+    """
+    from . import fft
+
+    best: tuple[float, Interpolator, int] | None = None
+    least = np.inf
+    for taps in TERMS:
+        for oversample in (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64):
+            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
+            # and an even length puts delay 0 on a sample
+            length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
+            if length > max_samples and oversample > 2:
+                continue
+            made = interpolator(taps, float(oversample))
+            least = min(least, made.error)
+            # in contributions: half of one per sample and doubling for the FFT, and what long rows lose to caches
+            cost = pairs_per_row * TAP_COST[taps] + length * (0.5 * np.log2(length) + length / 4000)
+            if made.error <= error and (best is None or cost < best[0]):
+                best = cost, made, length
+    if best is None:
+        raise ValueError(f"an interpolation error of {error:.1e} cannot be met; the least is {least:.1e}")
+    return best[1], best[2], best[0] / pairs_per_row
+
+
+def phase_rounding(radius: float, frequency: float, wide: bool) -> float:
+    """Phase error, rad, of differential ranges in float32 over a tile.
+
+    radius     largest distance of a point from its tile's reference, m
+    frequency  largest carrier, Hz
+    wide       the linear term is computed in wide numbers; only its curvature stays float32
+    Five roundings (three products, the series, the product with kappa) of at most u each, on a range of at most
+    `radius`; ANGLE is added.
+    """
+    turns = 2 * frequency / SPEED_OF_LIGHT * radius
+    return (0.0 if wide else 2 * np.pi * turns * 5 * U32) + ANGLE
+
+
+def place_rounding(radius: float, bandwidth: float, wide: bool) -> float:
+    """Phase error, rad, at the band's edge from rounding the place among samples; as `phase_rounding`."""
+    turns = bandwidth / SPEED_OF_LIGHT * radius
+    return 0.0 if wide else 2 * np.pi * turns * 6 * U32
+
+
+def series_error(radius: float, distance: float, frequency: float, order: int) -> float:
+    """Phase error, rad, of the range series cut after `order` (2 or 3; 0 is exact) for points within `radius`.
+
+    The first term left out is a w/(2 R^2) for order 2 and w (4 a^2 - w)/(8 R^3) for order 3, with a^2 + w <= radius^2.
+    """
+    if order == 0:
+        return 0.0
+    if distance <= 2 * radius:
+        return np.inf
+    k = 4 * np.pi * frequency / SPEED_OF_LIGHT
+    ratio = radius / distance
+    rest = 1 / (1 - ratio)  # the later terms, as a geometric series
+    if order == 2:
+        return k * radius * 0.193 * ratio**2 * rest
+    return k * radius * 0.125 * ratio**3 * rest
+
+
+def curvature_rounding(radius: float, distance: float, frequency: float) -> float:
+    """Phase error, rad, of the float32 curvature term, at most radius^2/(2 distance) with four roundings."""
+    k = 4 * np.pi * frequency / SPEED_OF_LIGHT
+    return k * min(radius**2 / (2 * max(distance, 1e-300)), radius) * 4 * U32
+
+
+def range_error(
+    radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int
+) -> float:
+    """Phase error, rad, of differential ranges in range mode 0, 1 or 2 of kernels/phase.clh."""
+    if mode == 2:
+        return phase_rounding(0.0, frequency, True)
+    error = phase_rounding(radius, frequency, mode == 1) + place_rounding(radius, bandwidth, mode == 1)
+    error += series_error(radius, distance, frequency, order)
+    return error + (curvature_rounding(radius, distance, frequency) if mode == 1 else 0.0)
+
+
+def sum_rounding(n_chunk: int, length: int) -> float:
+    """Relative rms error of a float32 sum of n_chunk terms, of complex64 samples and of their FFT of `length`."""
+    return U32 * (np.sqrt(n_chunk) / 4 + 1.5 * np.sqrt(np.log2(max(length, 2))) + 1)

@@ -1,0 +1,91 @@
+"""Checks of user input: every message names the argument, what came, what was wanted and the remedy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact
+
+
+class SarclWarning(UserWarning):
+    """Something the user should know about a result that is still right."""
+
+
+def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+    """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
+
+    ValueError names the argument, its shape or the index of its first NaN or Inf.
+    """
+    try:
+        out = np.array(value, dtype=dtype)
+    except (TypeError, ValueError) as exc:
+        raise ValueError(f"{name} must be numbers that fit {np.dtype(dtype)}, got {value!r:.80} ({exc})") from None
+    wanted = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    if out.ndim != len(shape) or any(
+        isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)
+    ):
+        raise ValueError(f"{name} has shape {out.shape}, wanted {wanted}")
+    if out.size == 0:
+        raise ValueError(f"{name} is empty (shape {out.shape}), wanted {wanted} with at least one element")
+    finite(name, out)
+    out.flags.writeable = False
+    return out
+
+
+def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
+    """Raise ValueError naming the first NaN or Inf in `value`; rows are counted from `first_row`."""
+    good = np.isfinite(value)
+    if not good.all():
+        at = list(np.unravel_index(int(np.argmin(good)), value.shape))
+        bad = value[tuple(at)]
+        if at:
+            at[0] += first_row
+        index = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+        raise ValueError(f"{name}{index} is {bad}; every value must be finite: remove or replace it")
+
+
+def number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> float:
+    """Return `value` as a finite float, greater than `above` and not less than `least`."""
+    try:
+        out = float(value)
+    except (TypeError, ValueError):
+        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    if not np.isfinite(out):
+        raise ValueError(f"{name} is {out}; it must be finite")
+    if above is not None and not out > above:
+        raise ValueError(f"{name} is {out:g}; it must be greater than {above:g}")
+    if least is not None and not out >= least:
+        raise ValueError(f"{name} is {out:g}; it must be at least {least:g}")
+    return out
+
+
+def count(name: str, value: Any, least: int = 1) -> int:
+    """Return `value` as an int of at least `least`; a float with a fraction is refused."""
+    try:
+        out = int(value)
+        whole = out == value
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be a whole number, got {value!r}") from None
+    if not whole or isinstance(value, bool):
+        raise ValueError(f"{name} must be a whole number, got {value!r}")
+    if out < least:
+        raise ValueError(f"{name} is {out}; it must be at least {least}")
+    return out
+
+
+def direction(name: str, value: Any) -> np.ndarray:
+    """Return the unit vector along `value` (3,); a zero vector raises."""
+    v = array(name, value, np.float64, (3,))
+    length = float(np.linalg.norm(v))
+    if length == 0:
+        raise ValueError(f"{name} is (0, 0, 0); a direction needs a length")
+    return np.asarray(v / length)
+
+
+def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
+    """Return `value` if it is one of `allowed`."""
+    if value not in allowed:
+        raise ValueError(f"{name} is {value!r}; choose one of {', '.join(map(repr, allowed))}")
+    return str(value)

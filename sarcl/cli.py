@@ -1,0 +1,209 @@
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE.
+
+Only the parser is here, so that --help answers at once; sarcl/commands.py does the work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import sys
+from typing import Any, NoReturn
+
+EPILOG = """examples:
+  sarcl demo                                            simulate and focus a scene: out/demo.png
+  sarcl simulate scene.toml -o raw.h5 --image image.png
+  sarcl focus raw.h5 -o image.png -o image.h5 --window taylor:35:5
+  sarcl measure image.h5 --near 10 0 0
+
+environment: SARCL_DEVICE (as --device), SARCL_THREADS (of CPU devices).
+exit status: 0 done, 1 something failed, 2 bad input, 3 no OpenCL device that works, 130 interrupted."""
+
+FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED = 1, 2, 3, 130
+
+
+class _Parser(argparse.ArgumentParser):
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    top = _Parser(
+        prog="sarcl",
+        description="Synthetic-aperture-radar echoes and images on any OpenCL device.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
+    common = _Parser(add_help=False)
+    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    common.add_argument("-v", "--verbose", action="store_true", help="say more about what is done")
+    device = _Parser(add_help=False)
+    device.add_argument(
+        "--device", metavar="NAME", help="part of a device's name, its number, cpu or gpu (see sarcl devices)"
+    )
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    def command(name: str, text: str, *parents: argparse.ArgumentParser) -> argparse.ArgumentParser:
+        return commands.add_parser(
+            name, help=text, description=text[0].upper() + text[1:] + ".", parents=[common, *parents]
+        )
+
+    command("devices", "list the OpenCL devices: what works, what does not and why")
+    _demo(command("demo", "simulate the echoes of a scene, focus them and write the picture", device))
+    _simulate(command("simulate", "make the echoes that a scenario file describes", device))
+    _focus(command("focus", "turn echoes into an image", device))
+    measure = command("measure", "measure a point response: resolution and side lobes")
+    measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
+    measure.add_argument(
+        "--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel"
+    )
+    return top
+
+
+def _demo(p: argparse.ArgumentParser) -> None:
+    p.add_argument(
+        "--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)"
+    )
+    p.add_argument("--quick", action="store_true", help="coarser and smaller, in a few seconds")
+    p.add_argument("--seed", type=int, default=0, help="of the ground's random heights (default 0)")
+
+
+def _simulate(p: argparse.ArgumentParser) -> None:
+    p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/scenarios.md")
+    p.add_argument(
+        "-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)"
+    )
+    p.add_argument(
+        "--image",
+        action="append",
+        default=[],
+        metavar="IMAGE",
+        help="focus too and write .png or .h5; repeatable (default, where the scenario has a grid: its name with .png)",
+    )
+    p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
+    p.add_argument(
+        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
+    )
+
+
+def _focus(p: argparse.ArgumentParser) -> None:
+    p.add_argument("raw", nargs="+", metavar="RAW", help="sarcl's .h5 or Gotcha .mat; several are joined")
+    p.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        default=[],
+        metavar="IMAGE",
+        help="image to write, .png or .h5; repeatable (default: RAW's name with .png, here)",
+    )
+    where = p.add_argument_group("grid", "default: chosen from the data, and printed")
+    where.add_argument("--grid", metavar="FILE.toml", help="the [grid.*] table of a scenario file")
+    where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m")
+    where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="pixels")
+    where.add_argument("--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="of rows and columns, m")
+    where.add_argument(
+        "--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="of the plane (default 0 0 1)"
+    )
+    where.add_argument(
+        "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
+    )
+    how = p.add_argument_group("focusing")
+    how.add_argument("--tolerance", type=float, default=1e-3, help="relative error allowed (default 1e-3)")
+    how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
+    how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
+    how.add_argument(
+        "--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G"
+    )
+    rows = p.add_argument_group("data")
+    rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
+    rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
+    rows.add_argument(
+        "--no-autofocus", action="store_true", help="leave out the corrections a Gotcha file holds"
+    )
+    p.add_argument(
+        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
+    )
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from . import __version__
+
+        print(f"sarcl {__version__}")
+        parser.exit()
+
+
+def window(text: str) -> Any:
+    """ "hamming" or "taylor:35:5" as `backproject` takes it."""
+    name, *numbers = text.split(":")
+    try:
+        if name == "taylor" and len(numbers) == 2:
+            return ("taylor", float(numbers[0]), int(numbers[1]))
+    except ValueError:
+        pass
+    if text == "hamming":
+        return text
+    raise argparse.ArgumentTypeError(
+        f"{text!r} is no window; give hamming or taylor:SIDELOBE_DB:NBAR, e.g. taylor:35:5"
+    )
+
+
+def size(text: str) -> float:
+    """ "2G", "500 MB", "1.5GiB" in bytes."""
+    unit = text.strip().lower().removesuffix("b")
+    base = 1024 if unit.endswith("i") else 1000
+    unit = unit.removesuffix("i")
+    power = "kmgt".find(unit[-1:]) + 1 if unit else 0
+    try:
+        value = float(unit[:-1] if power else unit) * base**power
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; give bytes, e.g. 2G, 500M or 1.5GiB")
+    return value
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a command; returns the exit status."""
+    kept: list[str] = []  # files that are complete, for whoever interrupts
+    debug = "--debug" in (sys.argv[1:] if argv is None else argv)
+    try:
+        args = parser().parse_args(argv)
+        from . import commands
+
+        return commands.run(args, kept)
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print(f"sarcl: interrupted; {_kept(kept)}", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has left: `sarcl devices | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except Exception as exc:
+        if debug:
+            raise
+        status = _status(exc)
+        text = " ".join(str(exc).split()) or type(exc).__name__
+        if status == FAILED:
+            text = f"{type(exc).__name__}: {text} (--debug shows where)"
+        print(f"sarcl: error: {text}", file=sys.stderr)
+        return status
+
+
+def _kept(kept: list[str]) -> str:
+    return (
+        f"{' and '.join(kept)} {'is' if len(kept) == 1 else 'are'} complete, nothing else was written"
+        if kept
+        else ("nothing was written")
+    )
+
+
+def _status(exc: Exception) -> int:
+    if any(
+        c.__name__ == "NoDeviceError" for c in type(exc).__mro__
+    ):  # its module need not be loaded for this
+        return NO_DEVICE
+    return BAD_INPUT if isinstance(exc, (ValueError, TypeError, OSError, MemoryError)) else FAILED

@@ -1,0 +1,246 @@
+"""What the commands of sarcl/cli.py do. Every output path is checked before the work starts."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import sys
+import warnings
+from collections.abc import Callable
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from .progress import Bar
+
+if TYPE_CHECKING:
+    from .grid import ImageGrid
+    from .image import Image
+    from .phase_history import PhaseHistory
+    from .report import Report
+
+Kept = list[str]
+Say = Callable[[str], None]
+
+
+def run(args: argparse.Namespace, kept: Kept) -> int:
+    """Run the command in `args`; the names of finished files go to `kept` as they are finished."""
+    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
+    warnings.showwarning = _show_warning
+    command: Callable[[argparse.Namespace, Kept], int] = {
+        "devices": devices,
+        "demo": demo,
+        "simulate": simulate,
+        "focus": focus,
+        "measure": measure,
+    }[args.command]
+    return command(args, kept)
+
+
+def devices(args: argparse.Namespace, kept: Kept) -> int:
+    """Print the table of devices, the one in use marked; 3 where none works."""
+    import sarcl
+
+    from .cl import open_device
+    from .device_table import device_table
+
+    found = sarcl.devices()
+    works = any(d.works for d in found)
+    try:
+        print(device_table(found, open_device().info.index))
+    except sarcl.NoDeviceError as exc:
+        print(device_table(found, None))
+        print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
+    return 0 if works else 3
+
+
+def demo(args: argparse.Namespace, kept: Kept) -> int:
+    """The demo scene, its picture and how long each step took."""
+    from . import demo as scene
+
+    with Bar() as bar:
+        scene.run(
+            args.out,
+            quick=args.quick,
+            device=args.device,
+            seed=args.seed,
+            progress=bar,
+            say=_say(bar),
+            kept=kept,
+        )
+    return 0
+
+
+def simulate(args: argparse.Namespace, kept: Kept) -> int:
+    """Echoes of a scenario, and their image where there is a grid or --image asks for one."""
+    from .cl import open_device
+    from .scenario import load
+
+    scenario = load(args.scenario)
+    stem = Path(args.scenario).stem
+    output = args.output or f"{stem}_raw.h5"
+    images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
+    _check_outputs([output], (".h5", ".hdf5"))
+    _check_outputs(images, (".png", ".h5", ".hdf5"))
+    grid = scenario.build_grid() if scenario.grid is not None else None
+    options: dict[str, Any] = {"device": open_device(args.device)}
+    if args.tolerance is not None:
+        options["tolerance"] = args.tolerance
+    with Bar() as bar:
+        say = _say(bar)
+        raw = scenario.simulate(**options, progress=bar)
+        _say_report("echo", raw.report, say)
+        raw.save(output)
+        kept.append(output)
+        say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
+        if images:
+            raw = _compressed(raw, say)
+            grid = grid or _default_grid(raw, say, {})
+            _focus(
+                lambda out: scenario.focus(raw, grid, out=out, progress=bar, **options),
+                images,
+                args.floor_db,
+                say,
+                kept,
+            )
+    return 0
+
+
+def focus(args: argparse.Namespace, kept: Kept) -> int:
+    """An image from echoes."""
+    import sarcl
+
+    from .cl import open_device
+    from .phase_history import PhaseHistory
+    from .scenario import load
+
+    outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
+    _check_outputs(outputs, (".png", ".h5", ".hdf5"))
+    given = _grid_options(args)
+    grid = None if args.grid is None else load(args.grid).build_grid()
+    raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=not args.no_autofocus)
+    if not isinstance(raw, PhaseHistory):
+        raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
+    if args.polarization is not None or args.channel is not None:
+        raw = raw.select(polarization=args.polarization, channel=args.channel)
+    device = open_device(args.device)
+    with Bar() as bar:
+        say = _say(bar)
+        say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
+        raw = _compressed(raw, say)
+        grid = grid or _default_grid(raw, say, given)
+        _focus(
+            lambda out: sarcl.backproject(
+                raw, grid, tolerance=args.tolerance, window=args.window, wrap=args.wrap,
+                max_bytes=args.max_bytes, out=out, device=device, progress=bar,
+            ),
+            outputs, args.floor_db, say, kept,
+        )  # fmt: skip
+    return 0
+
+
+def measure(args: argparse.Namespace, kept: Kept) -> int:
+    """The point response near a position, or at the brightest pixel, as a table."""
+    import sarcl
+
+    from .image import Image
+    from .point_table import brightest, point_table
+
+    image = sarcl.read(args.image)
+    if not isinstance(image, Image):
+        raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
+    near = brightest(image) if args.near is None else args.near
+    print(point_table(sarcl.measure(image, near=tuple(near)), image.gain))
+    return 0
+
+
+def _check_outputs(paths: list[str], suffixes: tuple[str, ...]) -> None:
+    from .files.paths import check_writable
+
+    for path in paths:
+        if Path(path).suffix.lower() not in suffixes:
+            wanted = " or ".join(s for s in suffixes if s != ".hdf5")
+            raise ValueError(
+                f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}"
+            )
+        check_writable(path)
+    if len({Path(p).resolve() for p in paths}) < len(paths):
+        raise ValueError(f"outputs {', '.join(paths)} name one file twice")
+
+
+def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What the options say of the grid, refused before the data are read where it makes no plane."""
+    from .grid import ImageGrid
+
+    names = ("center", "shape", "spacing", "normal", "x_axis")
+    given = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
+    if args.grid is not None and given:
+        other = next(iter(given)).replace("_", "-")
+        raise ValueError(f"--grid and --{other} both describe the grid; give one or the other")
+    ImageGrid.plane(**{"shape": 1, "spacing": 1.0, **given})
+    return given
+
+
+def _default_grid(raw: PhaseHistory, say: Say, given: dict[str, Any]) -> ImageGrid:
+    from .default_grid import default_grid
+
+    chosen = default_grid(raw, **given)
+    grid = chosen.grid
+    assert grid.spacing is not None and grid.center is not None
+    pixels = f"{grid.shape[0]} x {grid.shape[1]} pixels of {grid.spacing[0]:.4g} x {grid.spacing[1]:.4g} m"
+    say(f"grid: {pixels} about ({', '.join(f'{c:.6g}' for c in grid.center)})")
+    if chosen.why:
+        say(f"      from the data: {chosen.why}")
+    return grid
+
+
+def _compressed(raw: PhaseHistory, say: Say) -> PhaseHistory:
+    import sarcl
+
+    if raw.compressed:
+        return raw
+    say("the echoes still have the pulse's spectrum: compressing them first")
+    return sarcl.compress(raw)
+
+
+def _focus(
+    make: Callable[[str | None], Image], outputs: list[str], floor_db: float, say: Say, kept: Kept
+) -> None:
+    """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
+    file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
+    image = make(file)
+    _say_report("focus", image.report, say)
+    if file is not None:
+        kept.append(file)
+    for path in outputs:
+        if path != file:
+            image.save(path, floor_db=floor_db)
+            kept.append(path)
+        say(f"wrote {path}")
+
+
+def _say_report(what: str, report: Report | None, say: Say) -> None:
+    if report is None:
+        return
+    steps = ", ".join(f"{stage} {s:.1f}" for stage, s in report.seconds.items() if s >= 0.05)
+    error = (
+        "" if report.measured_error is None else f", {report.measured_error:.1e} measured at random places"
+    )
+    say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}{f' ({steps})' if steps else ''}")
+    say(
+        f"{'':{len(what)}}  error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted{error}"
+    )
+    logging.getLogger("sarcl").info("%s", report)
+
+
+def _say(bar: Bar) -> Say:
+    """Print, with the bar out of the way."""
+
+    def say(text: str) -> None:
+        bar.wipe()
+        print(text, flush=True)
+
+    return say
+
+
+def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:
+    print(f"sarcl: warning: {message}", file=sys.stderr)

@@ -1,0 +1,32 @@
+"""Pulse compression."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+
+from .phase_history import PhaseHistory
+from .waveform import Waveform
+
+
+def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistory:
+    """Apply the matched filter conj(P(f)) to uncompressed echoes; compressed ones come back as they are.
+
+    waveform  default raw.waveform. ValueError when there is none: data of unknown pulse cannot be compressed.
+    """
+    if raw.compressed:
+        return raw
+    pulse = waveform or raw.waveform
+    if pulse is None:
+        raise ValueError("raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)")
+    samples = raw.read(0, raw.n_rows)
+    out = np.empty_like(samples)
+    n = np.arange(raw.n_samples)
+    last: tuple[float, float] | None = None
+    for p in range(raw.n_rows):
+        plan = raw.frequency[p], raw.frequency_step[p]
+        if plan != last:  # rows mostly share one frequency plan
+            matched, last = np.conj(pulse.pulse_spectrum(plan[0] + plan[1] * n)), plan
+        out[p] = samples[p] * matched
+    return replace(raw, samples=out, waveform=pulse, compressed=True)

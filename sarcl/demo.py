@@ -1,0 +1,168 @@
+"""The demo: a spotlight pass over an airfield, from mesh to picture. `sarcl demo` runs it."""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from .check import SPEED_OF_LIGHT
+
+if TYPE_CHECKING:
+    from .grid import ImageGrid
+    from .image import Image
+    from .phase_history import PhaseHistory
+    from .trajectory import Trajectory
+    from .waveform import Waveform
+
+CENTER = 9.6e9  # Hz
+GRAZING_DEG = 35.0
+DISTANCE = 10e3  # m
+EXTENT = 62.0  # m of the picture's side
+
+
+@dataclass(frozen=True)
+class Setting:
+    """How finely the scene is looked at: bandwidth Hz, arc rad, pulses, pixels along a side."""
+
+    bandwidth: float
+    arc: float
+    n_pulses: int
+    n_pixels: int
+
+    def waveform(self) -> Waveform:
+        """The pulse."""
+        from .waveform import Waveform
+
+        return Waveform.chirp(center=CENTER, bandwidth=self.bandwidth, duration=2e-6)
+
+    def track(self) -> Trajectory:
+        """A circle's arc beyond the top of the picture, so that shadows fall down the picture."""
+        from .trajectory import Trajectory
+
+        grazing = np.radians(GRAZING_DEG)
+        return Trajectory.circle(
+            radius=DISTANCE * np.cos(grazing),
+            height=DISTANCE * np.sin(grazing),
+            start=np.pi / 2 - self.arc / 2,
+            arc=self.arc,
+            n_pulses=self.n_pulses,
+            prf=100.0,
+        )
+
+    def grid(self) -> ImageGrid:
+        """The ground about the origin."""
+        from .grid import ImageGrid
+
+        return ImageGrid.plane(shape=(self.n_pixels, self.n_pixels), spacing=(EXTENT / self.n_pixels,) * 2)
+
+    @property
+    def edge(self) -> float:
+        """Half a resolution cell, m: longer facets are cut."""
+        cross = SPEED_OF_LIGHT / CENTER / (2 * self.arc * np.cos(np.radians(GRAZING_DEG)))
+        return min(SPEED_OF_LIGHT / (2 * self.bandwidth), cross) / 2
+
+
+FULL = Setting(bandwidth=600e6, arc=0.08, n_pulses=512, n_pixels=640)
+QUICK = Setting(bandwidth=250e6, arc=0.035, n_pulses=192, n_pixels=320)
+
+
+def run(
+    out: Any = "out",
+    *,
+    quick: bool = False,
+    device: Any = None,
+    seed: int = 0,
+    progress: Callable[[str, int, int], None] | None = None,
+    say: Callable[[str], None] = print,
+    kept: list[str] | None = None,
+) -> Image:
+    """Simulate and focus the demo scene; write demo.png, demo_looks.png and demo_raw.h5 into the folder `out`.
+
+    say   is given each line of what happened; kept gets the name of each finished file
+    Returns the image. OSError when `out` cannot be made or written, before any work.
+    """
+    from . import demo_scene
+    from .backproject import backproject
+    from .cl import open_device
+    from .echo import echo
+
+    start = time.perf_counter()
+    kept = [] if kept is None else kept
+    picture, looks, raw_file = _outputs(Path(out))
+    opened = open_device(device)
+    setting = QUICK if quick else FULL
+    clock = _Clock(say)
+    scene = demo_scene.scene(setting.edge, seed)
+    clock.lap("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
+    raw = echo(
+        scene,
+        setting.waveform(),
+        setting.track(),
+        seed=seed,
+        tolerance=TOLERANCE,
+        device=opened,
+        progress=progress,
+    )
+    clock.lap("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
+    image = backproject(raw, setting.grid(), tolerance=TOLERANCE, device=opened, progress=progress)
+    clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
+    for path, result, floor in ((picture, image, FLOOR_DB), (looks, image.multilook((2, 2)), LOOKS_FLOOR_DB)):
+        result.save(path, floor_db=floor)
+        kept.append(str(path))
+    raw.save(raw_file)
+    kept.append(str(raw_file))
+    clock.lap("write", f"{picture}, {looks.name}, {raw_file.name}")
+    say(f"device  {opened.info.name}, {opened.info.platform}")
+    say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")
+    say(f"again   sarcl focus {raw_file} -o image.png --window taylor:35:5")
+    return image
+
+
+TOLERANCE = 1e-2
+FLOOR_DB = -45.0
+LOOKS_FLOOR_DB = -40.0
+
+
+def _outputs(folder: Path) -> tuple[Path, Path, Path]:
+    """The files to write, once it is sure that they can be."""
+    from .files.paths import check_writable
+
+    if folder.exists() and not folder.is_dir():
+        raise NotADirectoryError(f"--out {str(folder)!r} is a file; give a folder")
+    folder.mkdir(parents=True, exist_ok=True)
+    names = folder / "demo.png", folder / "demo_looks.png", folder / "demo_raw.h5"
+    for name in names:
+        check_writable(name)
+    return names
+
+
+def _rate(result: PhaseHistory | Image, unit: str) -> str:
+    """The report's error and rate in words."""
+    report = result.report
+    if report is None:
+        return ""
+    from .progress import rate_text
+
+    error = report.predicted_error if report.measured_error is None else report.measured_error
+    kind = "predicted" if report.measured_error is None else "measured"
+    seconds = sum(report.seconds.values())
+    rate = rate_text(report.contributions_done / seconds) if seconds else ""
+    return f", {rate} {unit}, error {error:.1e} {kind} ({report.tolerance:.0e} allowed)"
+
+
+class _Clock:
+    """Says how long each step took."""
+
+    def __init__(self, say: Callable[[str], None]) -> None:
+        self.say = say
+        self.last = time.perf_counter()
+
+    def lap(self, step: str, what: str) -> None:
+        now = time.perf_counter()
+        self.say(f"{step:7} {now - self.last:6.1f} s  {what}")
+        self.last = now

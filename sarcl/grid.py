@@ -1,0 +1,135 @@
+"""Image grids: where the pixels are."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import check
+
+
+@dataclass(frozen=True, eq=False)
+class ImageGrid:
+    """Pixel positions: a plane (`ImageGrid.plane`) or any points (`ImageGrid.points`).
+
+    shape    of the image
+    center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
+             center + (i - shape[0]//2) spacing[0] y_axis + (j - shape[1]//2) spacing[1] x_axis
+    listed   positions of any points, m shape + (3,), or None
+    """
+
+    shape: tuple[int, ...]
+    center: np.ndarray | None = None
+    spacing: tuple[float, float] | None = None
+    x_axis: np.ndarray | None = None
+    y_axis: np.ndarray | None = None
+    listed: np.ndarray | None = None
+
+    @classmethod
+    def plane(
+        cls,
+        *,
+        center: Any = (0.0, 0.0, 0.0),
+        shape: Any,
+        spacing: Any,
+        normal: Any = (0.0, 0.0, 1.0),
+        x_axis: Any = None,
+    ) -> ImageGrid:
+        """A plane of shape (rows, columns) and spacing (row, column) m about `center`, m (3,).
+
+        Columns run along x_axis (projected on the plane; default: the scene's x, or its y where x is the
+        normal), rows along y_axis = normal x x_axis; row 0 is drawn at the bottom.
+        """
+        center = check.array("center", center, np.float64, (3,))
+        rows, columns = _pair("shape", shape)
+        dy, dx = _pair("spacing", spacing)
+        n = check.direction("normal", normal)
+        if x_axis is None:
+            x_axis = (1.0, 0.0, 0.0) if abs(n[0]) < 0.999 else (0.0, 1.0, 0.0)
+        x = check.direction("x_axis", x_axis)
+        x = x - (x @ n) * n
+        if np.linalg.norm(x) < 1e-6:
+            raise ValueError(f"x_axis {tuple(x_axis)} is along the normal {tuple(n)}; give one that lies in the plane")
+        x /= np.linalg.norm(x)
+        y = np.cross(n, x)
+        for axis in (x, y):
+            axis.flags.writeable = False
+        return cls(
+            shape=(check.count("shape[0]", rows), check.count("shape[1]", columns)),
+            center=center,
+            spacing=(check.number("spacing[0]", dy, above=0), check.number("spacing[1]", dx, above=0)),
+            x_axis=x,
+            y_axis=y,
+        )
+
+    @classmethod
+    def points(cls, positions: Any) -> ImageGrid:
+        """Any positions, m (..., 3); the image has the shape of all axes but the last."""
+        shape = np.shape(positions)
+        if len(shape) < 2 or shape[-1] != 3:
+            raise ValueError(f"positions has shape {shape}, wanted (..., 3) with at least one axis before the last")
+        listed = check.array("positions", positions, np.float64, tuple(f"n{i}" for i in range(len(shape))))
+        return cls(shape=shape[:-1], listed=listed)
+
+    @property
+    def is_plane(self) -> bool:
+        """True for a grid made by `plane`."""
+        return self.listed is None
+
+    @property
+    def size(self) -> int:
+        """Number of pixels."""
+        return int(np.prod(self.shape, dtype=np.int64))
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal of a plane (3,)."""
+        self._need_plane("normal")
+        return np.cross(self.x_axis, self.y_axis)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """All pixel positions, m, float64 shape + (3,)."""
+        if self.listed is not None:
+            return self.listed
+        return self.at(np.arange(self.shape[0])[:, None], np.arange(self.shape[1]))
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lower and upper corner of the box that holds all pixels, m (2, 3)."""
+        if self.listed is not None:
+            p = self.listed.reshape(-1, 3)
+        else:
+            p = self.at(np.array([0, 0, 1, 1]) * (self.shape[0] - 1), np.array([0, 1, 0, 1]) * (self.shape[1] - 1))
+        return np.stack([p.min(axis=0), p.max(axis=0)])
+
+    def at(self, row: Any, column: Any) -> np.ndarray:
+        """Position, m (..., 3), of (fractional) pixel indices of a plane."""
+        self._need_plane("at")
+        assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        i = (np.asarray(row) - self.shape[0] // 2) * self.spacing[0]
+        j = (np.asarray(column) - self.shape[1] // 2) * self.spacing[1]
+        return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
+
+    def index(self, position: Any) -> np.ndarray:
+        """Fractional (row, column) of positions, m (..., 3), projected on a plane: (..., 2)."""
+        self._need_plane("index")
+        assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        d = np.asarray(position, np.float64) - self.center
+        row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
+        return np.stack([row, d @ self.x_axis / self.spacing[1] + self.shape[1] // 2], axis=-1)
+
+    def _need_plane(self, what: str) -> None:
+        if not self.is_plane:
+            raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
+
+
+def _pair(name: str, value: Any) -> tuple[Any, Any]:
+    """A (row, column) pair; one number serves for both."""
+    if np.ndim(value) == 0:
+        return value, value
+    if np.shape(value) != (2,):
+        raise ValueError(f"{name} is {value!r}; wanted (row, column) or one number for both")
+    return value[0], value[1]

@@ -1,0 +1,138 @@
+"""Plans: the cheapest way to meet a tolerance, and what it is predicted to err. Shared by echo and backproject."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import accuracy, cl
+from .accuracy import Interpolator
+from .check import number
+
+LEAST_TOLERANCE = 1e-6  # of complex64 results
+
+# Relative cost of a contribution in the range modes of kernels/phase.clh and by order of the series, and of a
+# tile's constants, measured on PoCL (bench/backproject.py).
+RANGE_COST = {0: 1.0, 1: 1.5, 2: 2.2}
+ORDER_COST = {2: 1.0, 3: 1.05, 0: 1.33}
+TILE_COST = 20.0
+CPU_BYTES = 2**30  # default memory for blocks on a CPU, which shares it with everything else
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """How a result is computed: interpolator and profile length, points a tile, range mode and series order."""
+
+    interpolator: Interpolator
+    length: int
+    per_tile: int
+    range_mode: int
+    order: int
+    predicted_error: float
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": method,
+            "taps": self.interpolator.taps,
+            "profile samples": self.length,
+            "points a tile": self.per_tile,
+            "ranges": ("float32", "wide linear term", "wide")[self.range_mode],
+            "series": f"order {self.order}" if self.order else "exact",
+        }
+
+    def macros(self, bistatic: bool, wrap: bool = False) -> dict[str, int]:
+        """Build-time macros of the kernels' headers."""
+        return {
+            "BISTATIC": int(bistatic),
+            "WRAP": self.length if wrap else 0,
+            "TAPS": self.interpolator.taps,
+            "TERMS": accuracy.TERMS[self.interpolator.taps],
+            "RANGE": self.range_mode,
+            "ORDER": self.order,
+        }
+
+    def components(self, bistatic: bool) -> int:
+        """Floats of a (tile, pulse) record: N_CONST of kernels/geometry.clh."""
+        return 32 if bistatic else 24 if self.range_mode == 1 else 16
+
+
+def cheapest(
+    tolerance: float,
+    tiles: Iterable[tuple[int, float]],
+    *,
+    distance: float,
+    frequency: float,
+    bandwidth: float,
+    n_samples: int,
+    points_per_row: int,
+    max_samples: float,
+    chunk: int,
+) -> Plan:
+    """The cheapest plan whose predicted error is at most `tolerance`.
+
+    tiles        choices of (points a tile, radius of the largest tile in m)
+    distance     smallest from an antenna to the scene, m; frequency the highest, Hz
+    max_samples  longest profile that memory allows; chunk  rows or points summed in float32
+    ValueError names the best tolerance there is.
+    """
+    best: tuple[float, Plan] | None = None
+    least = np.inf
+    for per_tile, radius in tiles:
+        for mode, range_cost in RANGE_COST.items():
+            for order in (2, 3, 0) if mode < 2 else (0,):
+                fixed = accuracy.range_error(radius, distance, frequency, bandwidth, mode, order)
+                fixed += accuracy.sum_rounding(chunk, n_samples)
+                least = min(least, fixed)
+                if fixed > 0.8 * tolerance:
+                    continue
+                try:
+                    interpolator, length, cost = accuracy.choose_interpolator(
+                        tolerance - fixed, n_samples, points_per_row, max_samples
+                    )
+                except ValueError:
+                    continue
+                cost += range_cost - 1 + TILE_COST / per_tile
+                cost += ORDER_COST[order] - 1 if mode < 2 else 0.0
+                if best is None or cost < best[0]:
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error)
+    if best is None or tolerance < LEAST_TOLERANCE:
+        reach = max(LEAST_TOLERANCE, 1.25 * least)
+        raise ValueError(f"tolerance {tolerance:.1e} cannot be met in complex64; the best here is {reach:.1e}")
+    return best[1]
+
+
+def skips(skip: Any, known: tuple[str, ...]) -> set[str]:
+    """The reasons to skip that True, False or a set of names stands for; ValueError lists the known."""
+    if isinstance(skip, bool):
+        return set(known) if skip else set()
+    unknown = {skip} - set(known) if isinstance(skip, str) else set(skip) - set(known)
+    if unknown or isinstance(skip, str):
+        raise ValueError(f"skip is {skip!r}; give True, False or a set of {', '.join(map(repr, known))}")
+    return set(skip)
+
+
+def budget(device: cl.Device, max_bytes: float | None) -> float:
+    """Bytes for blocks on the device: max_bytes, or the default. ValueError below 1 MB."""
+    if max_bytes is None:
+        return min(CPU_BYTES, device.info.memory / 2) if device.is_cpu else device.info.memory / 2
+    return number("max_bytes", max_bytes, least=1e6)
+
+
+class Clock:
+    """Seconds since the last lap, added up by stage."""
+
+    def __init__(self) -> None:
+        import time
+
+        self._now = time.perf_counter
+        self.seconds: dict[str, float] = {}
+        self._last = self._now()
+
+    def lap(self, stage: str) -> None:
+        now = self._now()
+        self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
+        self._last = now

@@ -1,0 +1,38 @@
+"""The image equation, term by term."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..check import SPEED_OF_LIGHT
+from ..phase_history import PhaseHistory
+from .geometry import half_path
+
+
+def backproject(
+    raw: PhaseHistory,
+    points: np.ndarray,
+    sample_weight: np.ndarray | None = None,
+    row_weight: np.ndarray | None = None,
+    wrap: bool = False,
+) -> tuple[np.ndarray, float]:
+    """I(x) = sum_p v_p(x) sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3).
+
+    Returns I complex128 (n,) and the norm it would have if contributions had random phases.
+    """
+    n = np.arange(raw.n_samples)
+    sample_weight = np.ones(raw.n_samples) if sample_weight is None else sample_weight
+    row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
+    image, power = np.zeros(len(points), np.complex128), 0.0
+    for p in range(raw.n_rows):
+        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
+        seen = wrap | (abs(delay) <= 1 / (2 * raw.frequency_step[p]))
+        samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
+        # the carrier's turns are reduced in extended precision, the rest in float64
+        first = (raw.frequency[p] * delay) % 1
+        step = (raw.frequency_step[p] * delay) % 1
+        turns = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
+        profile = (np.exp(2j * np.pi * turns) * samples).sum(axis=1) * seen
+        image += profile
+        power += float((abs(profile) ** 2).sum())
+    return image, float(np.sqrt(power))

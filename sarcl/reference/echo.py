@@ -1,0 +1,41 @@
+"""The echo equation, term by term."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..check import SPEED_OF_LIGHT
+from .geometry import half_path
+
+
+def facet_amplitudes(
+    centers: np.ndarray,
+    normals: np.ndarray,
+    strengths: np.ndarray,
+    two_sided: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
+) -> np.ndarray:
+    """strength sqrt(cos_tx cos_rx) of facets lit and seen from their outside; two-sided ones turn to the light."""
+    to_tx, to_rx = tx - centers, rx - centers
+    cos_tx = (normals * to_tx).sum(axis=1) / np.linalg.norm(to_tx, axis=1)
+    cos_rx = (normals * to_rx).sum(axis=1) / np.linalg.norm(to_rx, axis=1)
+    turn = np.where(two_sided & (cos_tx < 0), -1.0, 1.0)
+    return strengths * np.sqrt(np.maximum(turn * cos_tx, 0) * np.maximum(turn * cos_rx, 0))
+
+
+def echo(
+    points: np.ndarray,
+    amplitudes: np.ndarray,
+    frequencies: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray,
+    reference_range: float,
+) -> np.ndarray:
+    """sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) at frequencies (n,), one antenna pair, m (3,): complex128 (n,)."""
+    delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, points, reference_range)
+    out = np.zeros(len(frequencies), np.complex128)
+    for n, f in enumerate(frequencies):
+        turns = ((np.longdouble(f) * delay) % 1).astype(np.float64)
+        out[n] = (amplitudes * np.exp(-2j * np.pi * turns)).sum()
+    return out

@@ -1,0 +1,53 @@
+"""Report: what a verb did, to what accuracy, in how long."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from types import MappingProxyType
+from typing import Any
+
+
+@dataclass(frozen=True, eq=False)
+class Report:
+    """What was done to make a result.
+
+    plan                   the choices made, name -> value
+    tolerance              relative L2 error asked for
+    predicted_error        bound from the error formulas, <= tolerance
+    measured_error         against the exact sum at random outputs, or None when not checked
+    contributions_done     pulse x pixel (or pulse x scatterer) pairs computed
+    contributions_skipped  reason -> pairs left out
+    seconds                stage -> s
+    device                 the device's name
+    seed                   of the random numbers, or None
+    """
+
+    plan: Mapping[str, Any] = field(default_factory=dict)
+    tolerance: float = 0.0
+    predicted_error: float = 0.0
+    measured_error: float | None = None
+    contributions_done: int = 0
+    contributions_skipped: Mapping[str, int] = field(default_factory=dict)
+    seconds: Mapping[str, float] = field(default_factory=dict)
+    device: str = ""
+    seed: int | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("plan", "contributions_skipped", "seconds"):
+            object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
+
+    def to_dict(self) -> dict[str, Any]:
+        """The report as plain numbers and strings, ready for JSON."""
+        plain = {k: getattr(self, k) for k in self.__dataclass_fields__}
+        return {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in plain.items()}
+
+    def __str__(self) -> str:
+        lines = [f"device      {self.device}"]
+        lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
+        error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
+        lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
+        lines.append(f"done        {self.contributions_done:.3e} contributions")
+        lines += [f"skipped     {n:.3e} {why}" for why, n in self.contributions_skipped.items() if n]
+        lines.append("seconds     " + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()))
+        return "\n".join(lines)

@@ -1,0 +1,147 @@
+"""From a scene to what a kernel adds up: points, and facets cut, moved, lit and weighed."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import scene as scenes
+from .check import SPEED_OF_LIGHT, number
+from .geometry import Antennas
+from .scene import Scene
+from .shadow import visible
+from .waveform import Waveform
+
+
+@dataclass(frozen=True, eq=False)
+class Scatterers:
+    """Points, m (n, 3), with complex amplitudes (n,), or with normals (n, 3), strengths and two_sided (n,)."""
+
+    positions: np.ndarray
+    amplitudes: np.ndarray | None = None
+    normals: np.ndarray | None = None
+    strengths: np.ndarray | None = None
+    two_sided: np.ndarray | None = None
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    @property
+    def has_normals(self) -> bool:
+        """True for facets."""
+        return self.normals is not None
+
+    def planes(self, order: np.ndarray) -> np.ndarray:
+        """Rows of numbers as kernels/echo.cl reads them, float32, in `order`; repeats at its end are blank."""
+        if self.amplitudes is not None:
+            out = np.stack([self.amplitudes.real, self.amplitudes.imag])[:, order]
+        else:
+            assert self.strengths is not None and self.normals is not None
+            out = np.concatenate([[self.strengths, self.two_sided], self.normals.T])[:, order]
+        out[0, len(self) :] = 0
+        if self.amplitudes is not None:
+            out[1, len(self) :] = 0
+        return out.astype(np.float32)
+
+    def seen_by(self, tx: np.ndarray, rx: np.ndarray) -> np.ndarray:
+        """Complex amplitudes for one antenna pair, m (3,): the float64 twin of the kernel's."""
+        if self.amplitudes is not None:
+            return self.amplitudes
+        from .reference.echo import facet_amplitudes
+
+        return facet_amplitudes(self.positions, self.normals, self.strengths, self.two_sided, tx, rx)
+
+
+def prepare(
+    scene: Scene,
+    waveform: Waveform,
+    antennas: Antennas,
+    *,
+    shadows: bool,
+    seed: int,
+    skips: set[str],
+    max_edge: float | str | None,
+    device: Any,
+) -> tuple[list[Scatterers], dict[str, int]]:
+    """The scene's points and facets, ready to spread, and what was left out: reason -> pairs with pulses."""
+    n_pulses = len(antennas.tx)
+    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
+    parts = []
+    if len(scene.positions):
+        keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
+        left_out["zero reflectivity"] += int((~keep).sum()) * n_pulses
+        if keep.any():
+            parts.append(Scatterers(scene.positions[keep], amplitudes=scene.amplitudes[keep]))
+    if len(scene.triangles):
+        edge = resolution_edge(waveform, antennas, scene) if max_edge == "auto" else max_edge
+        if edge is not None:
+            scene = scene.split(number("max_edge", edge, above=0))
+        # heights come before anything is left out, so that a facet's height does not depend on its neighbours
+        heights = np.random.Generator(np.random.Philox(seed)).standard_normal(len(scene.triangles))
+        normals = scenes.normals(scene.triangles)
+        centers = scene.triangles.mean(axis=1) + (heights * scene.roughness)[:, None] * normals
+        keep = np.ones(len(centers), bool)
+        if "zero reflectivity" in skips:
+            keep &= scene.reflectivity != 0
+            left_out["zero reflectivity"] += int((~keep).sum()) * n_pulses
+        if "facing away" in skips:
+            away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
+            left_out["facing away"] = int(away.sum()) * n_pulses
+            keep &= ~away
+        if shadows:
+            dark = keep & ~_seen(scene.triangles, antennas, device)
+            left_out["shadowed"] = int(dark.sum()) * n_pulses
+            keep &= ~dark
+        if keep.any():
+            strength = 2 * np.sqrt(np.pi) * waveform.center / SPEED_OF_LIGHT
+            parts.append(
+                Scatterers(
+                    centers[keep],
+                    normals=normals[keep],
+                    strengths=strength * (scene.reflectivity * scenes.areas(scene.triangles))[keep],
+                    two_sided=scene.two_sided[keep],
+                )
+            )
+    return parts, left_out
+
+
+def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
+    """Half the finer of range and cross-range resolution at the scene's centre, m."""
+    range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth)
+    look = antennas.tx - scene.center
+    look = look / np.linalg.norm(look, axis=1, keepdims=True)
+    turn = 2 * np.arcsin(min(1.0, float(np.linalg.norm(look - look[0], axis=1).max()) / 2))
+    cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
+    return min(range_cell, cross_cell) / 2
+
+
+def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> np.ndarray:
+    """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
+
+    n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene.
+    """
+    middle = (centers.min(axis=0) + centers.max(axis=0)) / 2
+    radius = float(np.linalg.norm(centers - middle, axis=1).max())
+    out = np.zeros(len(centers), bool)
+    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+        look = ends - middle
+        distance = np.linalg.norm(look, axis=1)
+        if distance.min() <= radius:
+            continue  # inside the scene every direction is possible
+        look = look / distance[:, None]
+        mean = look.mean(axis=0)
+        # a shift of the point by `radius` turns the direction by at most asin(radius/distance)
+        spread = np.linalg.norm(look - mean, axis=1).max() + np.pi / 2 * radius / distance.min()
+        out |= normals @ mean + spread < 0
+    return out
+
+
+def _seen(triangles: np.ndarray, antennas: Antennas, device: Any) -> np.ndarray:
+    """Facets that both antennas see at mid-aperture."""
+    middle = len(antennas.tx) // 2
+    seen = visible(triangles, antennas.tx[middle], device=device)
+    if antennas.rx is not None:
+        seen &= visible(triangles, antennas.rx[middle], device=device)
+    return seen

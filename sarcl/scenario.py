@@ -1,0 +1,213 @@
+"""Scenario files: a simulation as TOML, its tables and keys the Python names. See docs/scenarios.md."""
+
+from __future__ import annotations
+
+import re
+import tomllib
+from collections.abc import Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from . import schema, toml_write
+from .schema import Where
+
+if TYPE_CHECKING:
+    from .grid import ImageGrid
+    from .image import Image
+    from .phase_history import PhaseHistory
+    from .scene import Scene
+    from .trajectory import Trajectory
+    from .waveform import Waveform
+
+# Arguments that may be complex, which TOML has no word for: a list of [real, imaginary] pairs.
+COMPLEX = {"amplitudes", "signal"}
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What to simulate and how to focus it, as tables of plain values: `Scenario(...)` or `load("FILE.toml")`.
+
+    waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
+    trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
+    receiver     the same for a receiver of its own, or None
+    scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
+    grid         {"plane": {...}} or {"points": {...}}, or an ImageGrid
+    echo         arguments of `sarcl.echo`;  backproject  arguments of `sarcl.backproject`
+    folder       mesh files are named relative to it
+
+    All are optional until they are used. Nouns become tables; arrays and tuples become lists. ValueError
+    names the file, line and table of an unknown or missing key, a wrong type, or a value that a noun refuses.
+    """
+
+    waveform: Any = None
+    trajectory: Any = None
+    receiver: Any = None
+    scene: Any = None
+    grid: Any = None
+    echo: Any = None
+    backproject: Any = None
+    folder: Path = Path()
+    where: Where = field(default_factory=Where, repr=False)
+
+    def __post_init__(self) -> None:
+        from .scenario_tables import plain, table_of
+
+        object.__setattr__(self, "folder", Path(self.folder))
+        for name in schema.SECTIONS:
+            value = getattr(self, name)
+            if value is not None:
+                value = plain(table_of(value))
+                schema.check_section(name, value, self.where)
+                object.__setattr__(self, name, value)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The sections that are there, as nested dicts and lists."""
+        return {n: getattr(self, n) for n in schema.SECTIONS if getattr(self, n) is not None}
+
+    def dumps(self) -> str:
+        """The scenario as TOML; `loads` gives the same tables, floats to the last bit."""
+        return toml_write.dumps(self.tables)
+
+    def save(self, path: Any) -> None:
+        """Write it to a file. Mesh files keep their names, so they must lie as before relative to the new file."""
+        from .files import paths
+
+        with paths.atomic(path) as part:
+            part.write_text(self.dumps(), encoding="utf-8")
+
+    def build_waveform(self) -> Waveform:
+        """The Waveform."""
+        return self._one("waveform")
+
+    def build_track(self) -> Trajectory:
+        """The transmitter's Trajectory."""
+        return self._one("trajectory")
+
+    def build_receiver(self) -> Trajectory | None:
+        """The receiver's Trajectory, None where it moves with the transmitter."""
+        return None if self.receiver is None else self._one("receiver")
+
+    def build_grid(self) -> ImageGrid:
+        """The ImageGrid."""
+        return self._one("grid")
+
+    def build_scene(self) -> Scene:
+        """The Scene: the sum of its tables, in the order they first appear."""
+        parts = [
+            self._call(path, table, schema.calls("scene")[kind])
+            for kind, value in self._section("scene").items()
+            for path, table in schema.tables_of("scene", kind, value)
+        ]
+        for part in parts[1:]:
+            parts[0] = parts[0] + part
+        return parts[0]
+
+    def simulate(self, **options: Any) -> PhaseHistory:
+        """Echoes of the scene. `options` are arguments of `sarcl.echo` that come before those in [echo]."""
+        import sarcl
+
+        pieces = (self.build_scene(), self.build_waveform(), self.build_track())
+        given = self._options("echo", options)
+        with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
+            return sarcl.echo(*pieces, receiver=self.build_receiver(), **given)
+
+    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Any) -> Image:
+        """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
+        import sarcl
+
+        given = self._options("backproject", options)
+        if grid is None:
+            grid = self.build_grid()
+        with self.where.blame(
+            ("backproject",), {k: v for k, v in given.items() if k not in options}, always=False
+        ):
+            return sarcl.backproject(raw, grid, **given)
+
+    def _section(self, name: str) -> dict[str, Any]:
+        table = getattr(self, name)
+        if table is None:
+            kinds = [k for k in schema.calls(name) if k]
+            more = f"{name}.{kinds[0]}"
+            raise ValueError(f"{self.where.name}: there is no {name}; add a [{more}] table")
+        return table
+
+    def _one(self, name: str) -> Any:
+        table = self._section(name)
+        known = schema.calls(name)
+        kind = next(iter(table))
+        if kind in known:
+            return self._call((name, kind), table[kind], known[kind])
+        return self._call((name,), table, known[""])
+
+    def _call(self, path: schema.Path, table: Mapping[str, Any], call: schema.Call) -> Any:
+        renamed = {new: old for old, new in schema.RENAMED.items()}
+        with self.where.blame(path, table):
+            given = {renamed.get(k, k): _argument(k, v) for k, v in table.items()}
+            if "mesh" in given:
+                given["mesh"] = self.folder / given["mesh"]
+            return call(**given)
+
+    def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of a verb: a list there is a pair or a choice with parameters, so a tuple."""
+        table = getattr(self, name) or {}
+        return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
+
+
+def load(path: Any) -> Scenario:
+    """Read a scenario file; mesh files are found relative to its folder.
+
+    ValueError names file and line of what is not TOML, or not a scenario. FileNotFoundError when it is missing.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as exc:
+        raise ValueError(f"{path}: byte {exc.start} is not UTF-8 text; a scenario is a TOML file") from None
+    except FileNotFoundError:
+        raise FileNotFoundError(
+            f"scenario file {str(path)!r} does not exist; check the name and the folder"
+        ) from None
+    except IsADirectoryError:
+        raise IsADirectoryError(f"{str(path)!r} is a folder; give the TOML file in it") from None
+    return loads(text, name=str(path), folder=path.parent)
+
+
+def loads(text: str, *, name: str = "scenario", folder: Any = ".") -> Scenario:
+    """A scenario from TOML text; `name` stands for the file in messages. Raises as `load` does."""
+    from .toml_lines import locate
+
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as exc:
+        raise ValueError(_syntax(name, text, str(exc))) from None
+    where = Where(name, locate(text.replace("\r\n", "\n")))
+    for section, value in tables.items():
+        if section not in schema.SECTIONS:
+            what = "table" if isinstance(value, (dict, list)) else "key"
+            raise ValueError(
+                f"{where.text((), section)} {schema.unknown(section, list(schema.SECTIONS), what)}"
+            )
+    return Scenario(**tables, folder=folder, where=where)
+
+
+def _syntax(name: str, text: str, message: str) -> str:
+    """tomllib's message with its line where an editor looks for it."""
+    match = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)", message)
+    line = int(match[1]) if match and match[1] else text.rstrip().count("\n") + 1
+    column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
+    said = message[: match.start()] if match else message
+    return f"{name}:{line}: {said}{column}; this is not valid TOML"
+
+
+def _argument(key: str, value: Any) -> Any:
+    """A value as its call wants it: pairs of a complex key become complex numbers."""
+    if key in COMPLEX and isinstance(value, list) and value and all(isinstance(v, list) for v in value):
+        for i, pair in enumerate(value):
+            if len(pair) != 2 or not all(isinstance(v, (int, float)) for v in pair):
+                raise ValueError(f"{key}[{i}] is {pair}; a complex number is a pair [real, imaginary]")
+        return np.asarray(value, np.float64) @ (1, 1j)
+    return value

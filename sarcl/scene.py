@@ -1,0 +1,275 @@
+"""Scenes: point scatterers and triangular facets."""
+
+from __future__ import annotations
+
+import logging
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from . import check
+
+log = logging.getLogger(__name__)
+
+# Amplitude reflectivity at normal incidence by material name; a number may be given in place of a name.
+MATERIALS = {"metal": 1.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Point scatterers and triangular facets in one Cartesian frame, m. Scenes add: ``ground + tank``.
+
+    positions     points, m (n, 3)
+    amplitudes    complex (n,); |amplitude|^2 is the radar cross section, m^2
+    triangles     facet corners, m (k, 3, 3), counter-clockwise seen from outside
+    reflectivity  amplitude reflectivity of each facet, 0 to 1 (k,)
+    roughness     standard deviation of each facet's height, m (k,): `echo` moves every facet along its normal
+                  by a seeded Gaussian height, which makes speckle once it exceeds about a quarter wavelength
+    two_sided     facets that reflect from both sides (k,): open sheets, and meshes that are not watertight
+    """
+
+    positions: np.ndarray
+    amplitudes: np.ndarray
+    triangles: np.ndarray
+    reflectivity: np.ndarray
+    roughness: np.ndarray
+    two_sided: np.ndarray
+
+    def __post_init__(self) -> None:
+        n, k = len(self.positions), len(self.triangles)
+        if n + k == 0:
+            raise ValueError("scene is empty; give it at least one point or facet")
+        shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,)}
+        for name in self.__dataclass_fields__:
+            value = np.asarray(getattr(self, name))
+            wanted = shapes.get(name, (k,))
+            if value.shape != wanted:
+                raise ValueError(f"scene {name} has shape {value.shape}, wanted {wanted}")
+            check.finite(f"scene {name}", value)
+            value = value.view()
+            value.flags.writeable = False
+            object.__setattr__(self, name, value)
+
+    @classmethod
+    def points(cls, positions: Any, amplitudes: Any = 1.0) -> Scene:
+        """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
+        positions = check.array("positions", positions, np.float64, ("n", 3))
+        amplitudes = np.asarray(amplitudes)
+        if amplitudes.ndim == 0:
+            amplitudes = np.full(len(positions), amplitudes)
+        amplitudes = check.array("amplitudes", amplitudes, np.complex128, (len(positions),))
+        return cls(positions, amplitudes, *_no_facets())
+
+    @classmethod
+    def facets(
+        cls, triangles: Any, *, material: str | float = "metal", roughness: Any = 0.0, two_sided: Any = True
+    ) -> Scene:
+        """Facets from their corners, m (k, 3, 3). Facets of no area are left out and counted in the log.
+
+        ValueError when there are none, a corner is not finite, or every facet has zero area.
+        """
+        triangles = check.array("triangles", triangles, np.float64, ("n_facets", 3, 3))
+        k = len(triangles)
+        roughness = np.broadcast_to(check.array("roughness", roughness, np.float64, np.shape(roughness)), (k,))
+        if (roughness < 0).any():
+            raise ValueError(f"roughness is {roughness.min():g} m; a standard deviation cannot be negative")
+        longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+        # A needle thinner than 1e-12 of its length has no area that float64 corners could carry.
+        solid = 2 * areas(triangles) > 1e-12 * longest**2
+        if not solid.any():
+            raise ValueError(f"all {k} facets are degenerate (zero area); nothing would reflect: check the mesh")
+        if not solid.all():
+            log.info("left out %d of %d facets: zero area", k - solid.sum(), k)
+        return cls(
+            *_no_points(),
+            triangles[solid],
+            np.full(int(solid.sum()), _reflectivity(material)),
+            roughness[solid],
+            np.broadcast_to(np.asarray(two_sided, bool), (k,))[solid],
+        )
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: Any,
+        *,
+        material: str | float = "metal",
+        scale: float = 1.0,
+        position: Any = (0.0, 0.0, 0.0),
+        rotation: Any = None,
+        max_edge: float | None = None,
+        roughness: float = 0.0,
+    ) -> Scene:
+        """A mesh file (or trimesh.Trimesh) of any format trimesh reads: corner -> rotation(scale corner) + position.
+
+        scale     m per unit of the file
+        position  m (3,)
+        rotation  matrix (3, 3), rotation vector (3,) in rad, or one angle about z in rad
+        max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
+
+        A mesh that is not watertight reflects from both sides of its facets, so that its winding does not
+        matter. FileNotFoundError, ValueError: file missing, unreadable, without faces, corners not finite.
+        """
+        scale = check.number("scale", scale, above=0)
+        position = check.array("position", position, np.float64, (3,))
+        mesh = _load_mesh(mesh)
+        triangles = np.asarray(mesh.triangles, np.float64) * scale @ _rotation(rotation).T + position
+        scene = cls.facets(triangles, material=material, roughness=roughness, two_sided=not mesh.is_watertight)
+        return scene if max_edge is None else scene.split(max_edge)
+
+    @classmethod
+    def from_heights(
+        cls, x: Any, y: Any, z: Any, *, material: str | float = "metal", roughness: Any = 0.0
+    ) -> Scene:
+        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a grid cell, facing up.
+
+        roughness  m, one number or one per cell (n_y - 1, n_x - 1)
+        """
+        x = check.array("x", x, np.float64, ("n_x",))
+        y = check.array("y", y, np.float64, ("n_y",))
+        z = check.array("z", z, np.float64, (len(y), len(x)))
+        for name, axis in (("x", x), ("y", y)):
+            if len(axis) < 2 or not (np.diff(axis) > 0).all():
+                raise ValueError(f"{name} must hold at least two increasing values: a cell needs an extent")
+        corner = np.stack([*np.meshgrid(x, y), z], axis=-1)
+        sw, se, nw, ne = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
+        triangles = np.stack([np.stack([sw, se, ne], axis=2), np.stack([sw, ne, nw], axis=2)], axis=2)
+        cells = (len(y) - 1, len(x) - 1)
+        roughness = np.broadcast_to(np.asarray(roughness, np.float64), cells)
+        return cls.facets(
+            triangles.reshape(-1, 3, 3), material=material, roughness=np.repeat(roughness, 2), two_sided=False
+        )
+
+    def __add__(self, other: Scene) -> Scene:
+        if not isinstance(other, Scene):
+            return NotImplemented
+        return Scene(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in self.__dataclass_fields__))
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lower and upper corner of the box that holds everything, m (2, 3)."""
+        corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
+        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+
+    @property
+    def center(self) -> np.ndarray:
+        """Centre of that box, m (3,)."""
+        return self.bounds.mean(axis=0)
+
+    def split(self, max_edge: float, max_facets: int = 50_000_000) -> Scene:
+        """The same surface with facets bisected at their longest edge until none is longer than max_edge, m.
+
+        MemoryError when more than `max_facets` would be needed.
+        """
+        max_edge = check.number("max_edge", max_edge, above=0)
+        done: list[tuple[np.ndarray, ...]] = []
+        names = ("triangles", "reflectivity", "roughness", "two_sided")
+        part = tuple(getattr(self, n) for n in names)
+        n_done = 0
+        while len(part[0]):
+            edges = np.linalg.norm(np.roll(part[0], -1, axis=1) - part[0], axis=2)
+            long = edges.max(axis=1) > max_edge
+            done.append(tuple(a[~long] for a in part))
+            n_done += len(done[-1][0])
+            if n_done + 2 * long.sum() > max_facets:
+                raise MemoryError(
+                    f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
+                    "take a smaller scene, a larger max_edge or a coarser resolution"
+                )
+            part = tuple(np.concatenate([a, b]) for a, b in _bisect(tuple(a[long] for a in part), edges[long]))
+        return replace(self, **{n: np.concatenate([d[i] for d in done]) for i, n in enumerate(names)})
+
+
+def areas(triangles: np.ndarray) -> np.ndarray:
+    """Area of each triangle (k, 3, 3), m^2 (k,)."""
+    return np.linalg.norm(_cross(triangles), axis=-1) / 2
+
+
+def normals(triangles: np.ndarray) -> np.ndarray:
+    """Outward unit normal of each triangle (k, 3, 3): (k, 3)."""
+    n = _cross(triangles)
+    return n / np.linalg.norm(n, axis=-1, keepdims=True)
+
+
+def _cross(t: np.ndarray) -> np.ndarray:
+    return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+
+
+def _bisect(part: tuple[np.ndarray, ...], edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+    """Both halves of every facet, cut at the middle of its longest edge; attributes are repeated."""
+    start = edges.argmax(axis=1)
+    row = np.arange(len(start))
+    a, b, c = (part[0][row, (start + i) % 3] for i in range(3))
+    middle = (a + b) / 2
+    halves = np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+    return [halves, *((x, x) for x in part[1:])]
+
+
+def _no_facets() -> tuple[np.ndarray, ...]:
+    return np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool)
+
+
+def _no_points() -> tuple[np.ndarray, ...]:
+    return np.zeros((0, 3)), np.zeros(0, np.complex128)
+
+
+def _reflectivity(material: str | float) -> float:
+    if isinstance(material, str):
+        if material not in MATERIALS:
+            known = ", ".join(map(repr, MATERIALS))
+            raise ValueError(f"material is {material!r}; known are {known}, or give a reflectivity from 0 to 1")
+        return MATERIALS[material]
+    value = check.number("material", material, least=0)
+    if value > 1:
+        raise ValueError(f"material is {value:g}; an amplitude reflectivity lies between 0 and 1")
+    return value
+
+
+def _rotation(rotation: Any) -> np.ndarray:
+    """Matrix (3, 3) of a rotation given as a matrix, a rotation vector in rad, an angle about z, or None."""
+    if rotation is None:
+        return np.eye(3)
+    if np.ndim(rotation) == 0:
+        rotation = (0.0, 0.0, check.number("rotation", rotation))
+    if np.ndim(rotation) == 1:
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_rotvec(check.array("rotation", rotation, np.float64, (3,))).as_matrix()
+    matrix = check.array("rotation", rotation, np.float64, (3, 3))
+    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-9) or np.linalg.det(matrix) < 0:
+        raise ValueError("rotation is a matrix that does not rotate: its rows must be orthonormal, determinant +1")
+    return matrix
+
+
+def _load_mesh(mesh: Any) -> Any:
+    """A trimesh.Trimesh from a path or an object, its parts joined."""
+    from pathlib import Path
+
+    import trimesh
+
+    if isinstance(mesh, (str, Path)):
+        path = Path(mesh)
+        if not path.is_file():
+            raise FileNotFoundError(f"mesh file {str(path)!r} does not exist")
+        known = sorted(trimesh.available_formats())
+        if path.suffix.lower().lstrip(".") not in known:
+            raise ValueError(f"mesh file {path.name!r}: unknown format {path.suffix!r}; known are {', '.join(known)}")
+        try:
+            # process=False: merging and reordering corners is not needed and hides what the file holds
+            loaded = trimesh.load_scene(path, process=False)
+            mesh = loaded.to_mesh() if loaded.geometry else trimesh.Trimesh()
+        except Exception as exc:
+            raise ValueError(
+                f"mesh file {path.name!r} cannot be read as {path.suffix}: {exc or type(exc).__name__}"
+            ) from exc
+    if not hasattr(mesh, "triangles"):
+        raise TypeError(f"mesh is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
+    if len(mesh.faces) == 0:
+        raise ValueError("mesh has no faces; nothing would reflect: check the file and how it was exported")
+    check.finite("mesh vertices", np.asarray(mesh.vertices))
+    if not mesh.is_watertight:
+        welded = mesh.copy()
+        welded.merge_vertices(merge_tex=True, merge_norm=True)
+        return welded
+    return mesh

@@ -1,0 +1,102 @@
+"""What a viewpoint can see of a scene's facets."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from . import cl
+
+# A facet hides what lies deeper by more than this share of the hidden facet's own size: coplanar and touching
+# neighbours, and sheets modelled twice, do not hide one another.
+BIAS = 0.01
+
+
+def visible(triangles: np.ndarray, viewpoint: np.ndarray, *, device: Any = None) -> np.ndarray:
+    """True (k,) for facets, m (k, 3, 3), whose centroid nothing hides from `viewpoint`, m (3,).
+
+    Every facet hides what is behind it, from both sides. ValueError when the viewpoint is not in front of all
+    facets (the projection would fold over).
+    """
+    if len(triangles) == 0:
+        return np.ones(0, bool)
+    projected = project(triangles, viewpoint)
+    rays, facets = _rays(projected), _facets(projected)
+    start, member, ray_cell = _bin(projected, rays)
+    opened = cl.open_device(device)
+    kernel = opened.kernel("shadow.cl", "hidden")
+    out = opened.empty(4 * len(triangles))
+    buffers = [opened.upload(a) for a in (rays.astype(np.float32), ray_cell, facets, start, member)]
+    opened.run(kernel, (len(triangles),), None, *buffers, len(triangles), out)
+    return opened.download(out, np.empty(len(triangles), np.int32)) == 0
+
+
+def project(triangles: np.ndarray, viewpoint: np.ndarray) -> np.ndarray:
+    """Corners seen from `viewpoint`: (xi, eta, zeta) in m (k, 3, 3), as kernels/shadow.cl defines them."""
+    corners = triangles.reshape(-1, 3)
+    center = (corners.min(axis=0) + corners.max(axis=0)) / 2
+    sight = center - viewpoint
+    distance = float(np.linalg.norm(sight))
+    ahead = sight / distance if distance else sight
+    aside = np.cross(ahead, np.eye(3)[np.argmin(np.abs(ahead))])
+    aside /= np.linalg.norm(aside) or 1.0
+    d = triangles - viewpoint
+    depth = d @ ahead
+    if not depth.min() > 1e-6 * distance:
+        raise ValueError(
+            "an antenna at mid-aperture stands among or beside the facets, where one projection cannot tell what "
+            "hides what; pass shadows=False or move the track away from the scene"
+        )
+    scale = distance / depth
+    # R0 - R0^2/depth without cancellation
+    zeta = (depth - distance) * scale
+    return np.stack([d @ aside * scale, d @ np.cross(ahead, aside) * scale, zeta], axis=-1)
+
+
+def _rays(projected: np.ndarray) -> np.ndarray:
+    """Centroid and depth allowance of every facet: (4, k)."""
+    size = np.sqrt(((projected - np.roll(projected, 1, axis=1)) ** 2).sum(axis=-1)).max(axis=1)
+    # float32 resolves places to 1e-7 of the scene
+    floor = 4e-7 * float(np.abs(projected).max())
+    return np.concatenate([projected.mean(axis=1).T, np.maximum(BIAS * size, floor)[None]])
+
+
+def _facets(projected: np.ndarray) -> np.ndarray:
+    """Corner 0, barycentric gradients and depth gradient of every facet: (9, k) float32; edge-on ones hide nothing."""
+    a, b, c = projected[:, 0], projected[:, 1] - projected[:, 0], projected[:, 2] - projected[:, 0]
+    twice_area = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
+    edge_on = np.abs(twice_area) < 1e-9 * np.maximum((b**2).sum(axis=1), (c**2).sum(axis=1))
+    inverse = 1 / np.where(edge_on, 1.0, twice_area)
+    b1 = np.stack([c[:, 1], -c[:, 0]]) * inverse
+    b2 = np.stack([-b[:, 1], b[:, 0]]) * inverse
+    slope = b[:, 2] * b1 + c[:, 2] * b2
+    out = np.concatenate([a.T, b1, b2, slope]).astype(np.float32)
+    # no point has both coordinates >= 0 where both gradients vanish and corner 0 is infinitely deep
+    out[2:3, edge_on] = np.inf
+    out[3:, edge_on] = 0
+    return out
+
+
+def _bin(projected: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Facets by the square cells of the (xi, eta) plane they touch: start (cells + 1,), member, cell of each ray."""
+    low, high = projected[..., :2].min(axis=1), projected[..., :2].max(axis=1)
+    origin, extent = low.min(axis=0), (high.max(axis=0) - low.min(axis=0)).max()
+    typical = float(np.quantile((high - low).max(axis=1), 0.9))
+    side = max(2 * typical, float(extent) / 2048, np.finfo(np.float64).tiny)
+    first = ((low - origin) / side).astype(np.int64)
+    last = ((high - origin) / side).astype(np.int64)
+    across = int(last[:, 0].max()) + 1
+    cells = across * (int(last[:, 1].max()) + 1)
+    count = last - first + 1
+    each = count[:, 0] * count[:, 1]
+    facet = np.repeat(np.arange(len(each)), each)
+    within = np.arange(len(facet)) - np.repeat(np.cumsum(each) - each, each)
+    column = first[facet, 0] + within % count[facet, 0]
+    row = first[facet, 1] + within // count[facet, 0]
+    cell = row * across + column
+    order = np.argsort(cell, kind="stable")
+    start = np.zeros(cells + 1, np.int32)
+    start[1:] = np.cumsum(np.bincount(cell, minlength=cells))
+    at = ((rays[:2].T - origin) / side).astype(np.int64)
+    return start, facet[order].astype(np.int32), (at[:, 1] * across + at[:, 0]).astype(np.int32)

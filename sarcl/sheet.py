@@ -1,0 +1,118 @@
+"""The paper a picture is drawn on: frame, axes with round ticks, title."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+PAPER, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
+
+
+class Sheet:
+    """White paper with a frame of (width, height) pixels for the data, axes about it and a title over it.
+
+    across, up   (label, value at the low edge, value at the high edge, least tick step) of the two axes
+    side         room right of the frame, in units of the font's size
+    """
+
+    def __init__(self, width: int, height: int, across: Any, up: Any, title: str | None, side: float) -> None:
+        from PIL import Image, ImageDraw, ImageFont
+
+        self.unit = u = int(np.clip(round(max(width, height) / 40), 15, 40))
+        self.line, self.tick = max(1, round(u / 14)), round(u * 0.4)
+        self.font: Any = ImageFont.load_default(u)
+        self.across, self.up = across, up
+        self.across_ticks = self._ticks(across, width, across=True)
+        self.up_ticks = self._ticks(up, height, across=False)
+        widest = max((self.font.getlength(number(t, self.up_ticks[0])) for t in self.up_ticks[1]), default=0)
+        left = round(2 * self.tick + widest + 2.2 * u)
+        top = round(2.6 * u if title else 1.2 * u)
+        self.frame = (left, top, left + width, top + height)
+        size = (left + width + round(side * u), top + height + round(3.7 * u))
+        self.image = Image.new("RGB", size, PAPER)
+        self.image.info["frame"] = self.frame
+        self.draw = ImageDraw.Draw(self.image)
+        if title:
+            # The font that comes with Pillow has one dash.
+            title = " ".join(str(title).split()).translate(dict.fromkeys(map(ord, "‐‑‒–—−"), "-"))
+            room = size[0] - left - 0.5 * u
+            font: Any = ImageFont.load_default(round(1.2 * u))
+            if font.getlength(title) > room:
+                font = self.font
+            while font.getlength(title) > room:
+                title = title[:-2].rstrip() + "…"
+            self.draw.text((left, top - round(0.75 * u)), title, INK, font, anchor="ls")
+
+    def _ticks(self, axis: Any, length: int, across: bool) -> tuple[float, list[float]]:
+        """(step, values) of an axis `length` pixels long, as many as its labels leave room for."""
+        _, low, high, least = axis
+        most = max(length / (4.2 * self.unit), 5.0)
+        while True:
+            step, ticks = ticks_between(low, high, most, least)
+            widest = max((self.font.getlength(number(t, step)) for t in ticks), default=0) if across else 0
+            if (
+                len(ticks) < 2
+                or step / (high - low) * length >= widest + (0.6 if across else 1.2) * self.unit
+            ):
+                return step, ticks
+            most /= 1.5
+
+    def axes(self, grid: bool = False) -> None:
+        """Draw frame, ticks and labels; with `grid`, faint lines at the ticks too."""
+        from PIL import Image, ImageDraw
+
+        left, top, right, bottom = self.frame
+        u, draw, line = self.unit, self.draw, self.line
+        (xlabel, low, high, _), (step, ticks) = self.across, self.across_ticks
+        for t in ticks:
+            x = left + round((t - low) / (high - low) * (right - left))
+            if grid:
+                draw.line([(x, top), (x, bottom - 1)], fill=FAINT, width=line)
+            draw.line([(x, bottom + line), (x, bottom + self.tick)], fill=INK, width=line)
+            draw.text((x, bottom + 1.6 * self.tick), number(t, step), INK, self.font, anchor="mt")
+        draw.text(((left + right) / 2, bottom + 1.9 * u + self.tick), xlabel, INK, self.font, anchor="mt")
+        (ylabel, low, high, _), (step, ticks) = self.up, self.up_ticks
+        for t in ticks:
+            y = bottom - round((t - low) / (high - low) * (bottom - top))
+            if grid:
+                draw.line([(left, y), (right - 1, y)], fill=FAINT, width=line)
+            draw.line([(left - self.tick, y), (left - line - 1, y)], fill=INK, width=line)
+            draw.text((left - 1.7 * self.tick, y), number(t, step), INK, self.font, anchor="rm")
+        self.box(self.frame)
+        turned = Image.new("L", (int(self.font.getlength(ylabel)) + u, 2 * u))
+        middle = (turned.width / 2, turned.height / 2)
+        ImageDraw.Draw(turned).text(middle, ylabel, 255, self.font, anchor="mm")
+        turned = turned.rotate(90, expand=True)
+        self.image.paste(INK, (round(0.2 * u), (top + bottom - turned.height) // 2), turned)
+
+    def box(self, frame: tuple[int, int, int, int]) -> None:
+        """A thin frame just outside `frame`, so that it covers no data."""
+        w = self.line
+        left, top, right, bottom = frame
+        self.draw.rectangle((left - w, top - w, right + w - 1, bottom + w - 1), outline=INK, width=w)
+
+
+def image_axis(n: int, along: int, spacing: Any) -> tuple[str, float, float, float]:
+    """(label, value at the low edge, value at the high edge, least tick step) of axis `along`."""
+    if spacing is None:
+        return ("row", "column")[along], -0.5, n - 0.5, 1.0
+    low = (-(n // 2) - 0.5) * spacing[along]
+    return ("y (m)", "x (m)")[along], low, low + n * spacing[along], 0.0
+
+
+def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> tuple[float, list[float]]:
+    """(step, values): multiples of 1, 2 or 5 10^k in [low, high], about `most` of them."""
+    rough = max((high - low) / most, least)
+    power = 10.0 ** np.floor(np.log10(rough))
+    step = float(power * next(m for m in (1, 2, 5, 10) if m * power >= rough * (1 - 1e-9)))
+    first, last = np.ceil(low / step - 1e-9), np.floor(high / step + 1e-9)
+    return step, [float(k * step) for k in np.arange(first, last + 1)]
+
+
+def number(value: float, step: float) -> str:
+    """A tick's number with the decimals its step needs."""
+    if max(abs(value), step) >= 1e6 or step < 1e-4:
+        return f"{value:.6g}"
+    decimals = max(0, -int(np.floor(np.log10(step) + 1e-9)))
+    return f"{round(value, decimals) + 0.0:.{decimals}f}"

@@ -1,0 +1,111 @@
+"""Scatterers spread into oversampled range profiles, block by block: a type-1 nonuniform FFT in range."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+
+from . import cl, planning, profiles
+from .geometry import Antennas, Tiles, tile_points
+from .planning import Clock, Plan
+from .scatterers import Scatterers
+
+PER_TILE = (256, 64)
+
+
+class Spreader:
+    """Adds scatterers to the samples of every pulse, each kind by the cheapest plan that meets the tolerance."""
+
+    def __init__(
+        self,
+        device: cl.Device,
+        antennas: Antennas,
+        bandwidth: float,
+        n_samples: int,
+        tolerance: float,
+        budget: float,
+        skip: bool,
+    ) -> None:
+        self.device, self.antennas, self.n_samples = device, antennas, n_samples
+        self.bandwidth, self.tolerance, self.budget, self.skip = bandwidth, tolerance, budget, skip
+
+    def add(
+        self, part: Scatterers, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
+    ) -> tuple[Plan, int]:
+        """Add `part` to samples (n_pulses, n_samples); return the plan and how many pairs were gated out."""
+        positions = part.positions
+        center = (positions.min(axis=0) + positions.max(axis=0)) / 2
+        plan, tiles, order = self._plan(part, center)
+        bistatic = self.antennas.rx is not None
+        device, lanes = self.device, self.device.info.vector_width
+        macros = {**plan.macros(bistatic), "FACETS": int(part.has_normals), "TILE": tiles.per_tile}
+        constants_kernel = device.kernel("echo.cl", "tile_constants", **macros)
+        kernel = device.kernel("echo.cl", "spread", **macros)
+        table = device.upload(plan.interpolator.table)
+        references = device.upload(cl.wide(tiles.references.T))
+        radius = device.upload(tiles.radius.astype(np.float32))
+        offsets = device.upload(tiles.offsets)
+        planes = device.upload(part.planes(order))
+        sizes = np.full(tiles.n_tiles, tiles.per_tile)
+        sizes[-1] -= len(order) - len(part)
+        clock.lap("scene")
+
+        stride = plan.length + 2 * profiles.padding(plan.interpolator)
+        record = 4 * plan.components(bistatic)
+        splits = self._splits(tiles)
+        per_pulse = record * tiles.n_tiles + 8 * stride * splits
+        pulses = max(1, int(self.budget / 2 / per_pulse) // lanes) * lanes
+        n_pulses, gated = len(samples), 0
+        for start in range(0, n_pulses, pulses):
+            stop = min(start + pulses, n_pulses)
+            packed = self.antennas.packed(center, plan.length, start, stop, lanes)
+            n, used = packed.shape[2], stop - start
+            pulse = device.upload(packed)
+            constants = device.empty(record * n * tiles.n_tiles)
+            rows, done = device.zeros(8 * splits * used * stride), device.zeros(4 * splits * used)
+            device.run(
+                constants_kernel, (n // lanes, tiles.n_tiles), None,
+                pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
+            )  # fmt: skip
+            device.run(
+                kernel, (used, splits), (1, 1) if device.is_cpu else None,
+                pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], planes,
+                table, rows, stride, stride // 2, done,
+            )  # fmt: skip
+            made = device.download(rows, np.empty((splits, used, stride), np.complex64))
+            clock.lap("echo")
+            total = made[0] if splits == 1 else made.sum(axis=0, dtype=np.complex128).astype(np.complex64)
+            samples[start:stop] += profiles.to_samples(device, total, self.n_samples, plan.interpolator)
+            added = device.download(done, np.empty((splits, used), np.int32)).astype(np.int64).sum()
+            gated += max(0, used * len(part) - int(added) * tiles.per_tile)
+            clock.lap("spectra")
+            if tell:
+                tell(stop * len(part))
+        return plan, gated
+
+    def _plan(self, part: Scatterers, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
+        made = {n: tile_points(part.positions, center, n) for n in PER_TILE}
+        bounds = np.stack([part.positions.min(axis=0), part.positions.max(axis=0)])
+        splits = max(self._splits(tiles) for tiles, _ in made.values())
+        plan = planning.cheapest(
+            self.tolerance,
+            [(n, float(tiles.radius.max())) for n, (tiles, _) in made.items()],
+            distance=self.antennas.distance(bounds),
+            frequency=float(self.antennas.frequency.max()) + self.bandwidth / 2,
+            bandwidth=self.bandwidth,
+            n_samples=self.n_samples,
+            points_per_row=len(part),
+            max_samples=self.budget / 8 / 8,
+            chunk=-(-len(part) // splits),
+        )
+        tiles, order = made[plan.per_tile]
+        return plan, tiles, order
+
+    def _splits(self, tiles: Tiles) -> int:
+        """Partial sums a row: enough work-items for the device, and short enough sums for the tolerance."""
+        for_device = -(-4 * self.device.info.units // len(self.antennas.tx))
+        # float32 sums of n terms err by about sqrt(n)/4 roundings (accuracy.sum_rounding): a tenth of the tolerance
+        longest = max(64.0, (0.1 * self.tolerance * 4 / planning.accuracy.U32) ** 2)
+        for_sums = int(np.ceil(tiles.n_tiles * tiles.per_tile / longest))
+        return int(min(max(for_device, for_sums, 1), tiles.n_tiles, 64))
