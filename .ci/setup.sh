@@ -243,8 +243,11 @@ have_device() {
     status=0
     devices=$($inside -m sarcl devices 2>&1) || status=$?
     [ $status = 0 ] && return
+    if [ $status = 3 ]; then # the table; its own last line says what we are about to say
+        printf '%s\n' "$devices" | grep -v '^sarcl: ' >&2 || true
+        return 1
+    fi
     printf '%s\n' "$devices" >&2
-    [ $status = 3 ] && return 1
     if [ $status -ge 128 ]; then
         stop 1 <<END
 an OpenCL driver crashed while we looked for devices (status $status, its words are above).

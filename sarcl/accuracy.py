@@ -13,6 +13,7 @@ import numpy as np
 from .check import SPEED_OF_LIGHT
 
 U32 = 2.0**-24  # unit roundoff of float32
+LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 # Root mean square of what rounding turns to float32 (twice) and the sine and cosine polynomials add, rad.
 ANGLE = 3e-7
 
@@ -103,7 +104,7 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
 
 
 def choose_interpolator(
-    error: float, n_samples: int, pairs_per_row: float, max_samples: float
+    error: float, n_samples: int, pairs_per_row: float
 ) -> tuple[Interpolator, int, float]:
     """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
 
@@ -111,7 +112,7 @@ def choose_interpolator(
 
     n_samples      of a row before oversampling
     pairs_per_row  contributions read from a row: they weigh taps against the length of the FFT
-    max_samples    longest profile that memory allows
+    The choice never depends on memory, so that results do not.
     ValueError names the smallest error there is when none is small enough.
     """
     from . import fft
@@ -123,7 +124,7 @@ def choose_interpolator(
             # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
             # and an even length puts delay 0 on a sample
             length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
-            if length > max_samples and oversample > 2:
+            if length > max(LONGEST, 2 * n_samples * taps):
                 continue
             made = interpolator(taps, float(oversample))
             least = min(least, made.error)

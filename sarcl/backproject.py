@@ -72,7 +72,7 @@ def backproject(
     opened = cl.open_device(device)
     antennas = antennas_of(raw, wrap)
     budget = planning.budget(opened, max_bytes)
-    plan, tiling = make_plan(raw, antennas, grid, tolerance, budget)
+    plan, tiling = make_plan(raw, antennas, grid, tolerance)
     clock.lap("plan")
 
     with ExitStack() as stack:
@@ -110,7 +110,7 @@ def backproject(
 
 
 def make_plan(
-    raw: PhaseHistory, antennas: Antennas, grid: ImageGrid, tolerance: float, budget: float
+    raw: PhaseHistory, antennas: Antennas, grid: ImageGrid, tolerance: float
 ) -> tuple[Plan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses."""
     tilings = {side**2: GridTiling(grid, side) for side in (32, 16, 8)}
@@ -122,7 +122,6 @@ def make_plan(
         bandwidth=float(raw.bandwidth.max()),
         n_samples=raw.n_samples,
         points_per_row=grid.size,
-        max_samples=budget / 4 / CHUNK / 8,  # profiles of one CHUNK take at most a quarter of the memory
         chunk=CHUNK,
     )
     return plan, tilings[plan.per_tile]
@@ -207,7 +206,8 @@ class _Run:
         stride = self.plan.length + 2 * profiles.padding(self.plan.interpolator)
         # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
         most = 2 if device.is_cpu else 64
-        rows = CHUNK * min(most, max(1, int(budget / 4 / (8 * stride * CHUNK))))
+        fit = int(budget / 4 / (8 * stride))
+        rows = min(most * CHUNK, fit // CHUNK * CHUNK or max(1, fit))
         blocks = self._image_blocks(min(budget / 2, device.info.max_alloc))
         total, done, skipped = raw.n_rows * len(blocks), 0, 0
         if progress:

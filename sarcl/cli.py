@@ -45,7 +45,7 @@ def parser() -> argparse.ArgumentParser:
     )
     commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
 
-    def command(name: str, text: str, *parents: argparse.ArgumentParser) -> argparse.ArgumentParser:
+    def command(name: str, text: str, *parents: _Parser) -> argparse.ArgumentParser:
         return commands.add_parser(
             name, help=text, description=text[0].upper() + text[1:] + ".", parents=[common, *parents]
         )
@@ -80,7 +80,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="IMAGE",
-        help="focus too and write .png or .h5; repeatable (default, where the scenario has a grid: its name with .png)",
+        help="focus too and write .png or .h5; repeatable (default, where there is a grid: FILE.png)",
     )
     p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
     p.add_argument(

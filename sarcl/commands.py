@@ -226,9 +226,8 @@ def _say_report(what: str, report: Report | None, say: Say) -> None:
         "" if report.measured_error is None else f", {report.measured_error:.1e} measured at random places"
     )
     say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}{f' ({steps})' if steps else ''}")
-    say(
-        f"{'':{len(what)}}  error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted{error}"
-    )
+    error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted{error}"
+    say(f"{'':{len(what)}}  {error}")
     logging.getLogger("sarcl").info("%s", report)
 
 

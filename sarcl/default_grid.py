@@ -1,4 +1,4 @@
-"""A grid for data that come without one: where they were aimed, as fine as they resolve, as wide as they see."""
+"""A grid for data that come without one: where they were aimed, as fine and as wide as they tell."""
 
 from __future__ import annotations
 
@@ -39,7 +39,8 @@ def default_grid(
     """A plane (level by default) for phase history, from the data where its owner leaves it open.
 
     center   the point whose range equals reference_range in every row: the origin where it does to within a
-             resolution cell; else by least squares, on z = 0 unless the antennas' directions fix z too; else the origin
+             resolution cell; else by least squares, on z = 0 unless the antennas' directions fix z too;
+             else the origin
     spacing  half the resolution along rows and columns, from the frequencies and directions the data hold
     shape    what the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
     normal, x_axis   as in `ImageGrid.plane`
@@ -120,7 +121,7 @@ def _resolution(raw: PhaseHistory, plane: ImageGrid, n_rows: int) -> tuple[np.nd
     The data hold the spatial frequencies k = 2 f/c times the gradient of range; their extent along an axis
     is 0.886 over the resolution.
     """
-    assert plane.center is not None
+    assert plane.center is not None and plane.x_axis is not None and plane.y_axis is not None
     direction = -_excess(raw, plane.center)[1] @ np.stack([plane.y_axis, plane.x_axis], axis=1)
     low, high = raw.frequency, raw.frequency + raw.bandwidth
     k = np.concatenate([direction * (2 / SPEED_OF_LIGHT * f)[:, None] for f in (low, high)])

@@ -22,7 +22,10 @@ if TYPE_CHECKING:
 CENTER = 9.6e9  # Hz
 GRAZING_DEG = 35.0
 DISTANCE = 10e3  # m
-EXTENT = 62.0  # m of the picture's side
+EXTENT = 50.0  # m of the picture's side
+TOLERANCE = 1e-2
+WINDOW = ("taylor", 35, 5)  # side lobes would fill the shadows
+FLOOR_DB = -45.0
 
 
 @dataclass(frozen=True)
@@ -67,8 +70,8 @@ class Setting:
         return min(SPEED_OF_LIGHT / (2 * self.bandwidth), cross) / 2
 
 
-FULL = Setting(bandwidth=600e6, arc=0.08, n_pulses=512, n_pixels=640)
-QUICK = Setting(bandwidth=250e6, arc=0.035, n_pulses=192, n_pixels=320)
+FULL = Setting(bandwidth=720e6, arc=0.096, n_pulses=400, n_pixels=640)
+QUICK = Setting(bandwidth=330e6, arc=0.044, n_pulses=192, n_pixels=320)
 
 
 def run(
@@ -81,7 +84,7 @@ def run(
     say: Callable[[str], None] = print,
     kept: list[str] | None = None,
 ) -> Image:
-    """Simulate and focus the demo scene; write demo.png, demo_looks.png and demo_raw.h5 into the folder `out`.
+    """Simulate and focus the demo scene; write demo.png and demo_raw.h5 into the folder `out`.
 
     say   is given each line of what happened; kept gets the name of each finished file
     Returns the image. OSError when `out` cannot be made or written, before any work.
@@ -93,7 +96,7 @@ def run(
 
     start = time.perf_counter()
     kept = [] if kept is None else kept
-    picture, looks, raw_file = _outputs(Path(out))
+    picture, raw_file = _outputs(Path(out))
     opened = open_device(device)
     setting = QUICK if quick else FULL
     clock = _Clock(say)
@@ -109,33 +112,30 @@ def run(
         progress=progress,
     )
     clock.lap("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
-    image = backproject(raw, setting.grid(), tolerance=TOLERANCE, device=opened, progress=progress)
+    image = backproject(
+        raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress
+    )
     clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
-    for path, result, floor in ((picture, image, FLOOR_DB), (looks, image.multilook((2, 2)), LOOKS_FLOOR_DB)):
-        result.save(path, floor_db=floor)
-        kept.append(str(path))
+    title = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz, radar beyond the top edge, {GRAZING_DEG:g} deg up"
+    image.save(picture, floor_db=FLOOR_DB, title=title)
+    kept.append(str(picture))
     raw.save(raw_file)
     kept.append(str(raw_file))
-    clock.lap("write", f"{picture}, {looks.name}, {raw_file.name}")
+    clock.lap("write", f"{picture}, {raw_file.name}")
     say(f"device  {opened.info.name}, {opened.info.platform}")
     say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")
-    say(f"again   sarcl focus {raw_file} -o image.png --window taylor:35:5")
+    say(f"echoes  {raw_file.resolve()}; sarcl focus {raw_file} focuses them again")
     return image
 
 
-TOLERANCE = 1e-2
-FLOOR_DB = -45.0
-LOOKS_FLOOR_DB = -40.0
-
-
-def _outputs(folder: Path) -> tuple[Path, Path, Path]:
+def _outputs(folder: Path) -> tuple[Path, Path]:
     """The files to write, once it is sure that they can be."""
     from .files.paths import check_writable
 
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"--out {str(folder)!r} is a file; give a folder")
     folder.mkdir(parents=True, exist_ok=True)
-    names = folder / "demo.png", folder / "demo_looks.png", folder / "demo_raw.h5"
+    names = folder / "demo.png", folder / "demo_raw.h5"
     for name in names:
         check_writable(name)
     return names

@@ -13,33 +13,33 @@ import numpy as np
 
 from .scene import Scene
 
-HALF = 33.0  # of the ground's side
+HALF = 26.5  # of the ground's side
 # Amplitude reflectivities that look like an airfield at X band
-GRASS, ASPHALT, CONCRETE, PAINT = 0.22, 0.05, 0.5, 0.16
+METAL, CONCRETE, GRASS, PAINT, ASPHALT = 0.9, 0.6, 0.22, 0.22, 0.07
 ROUGH = 0.02  # m; over half a wavelength at X band: phases are fully random
 
 
 def scene(edge: float, seed: int = 0) -> Scene:
-    """The whole scene, ground cells cut so that no edge is longer than `edge`, m; objects are left to `echo`."""
+    """The whole scene, the ground in cells whose edges are at most `edge`, m; `echo` cuts the objects."""
     random = np.random.default_rng(seed)
     out = ground(edge, random)
-    out = out + place(aeroplane(), (2.0, -6.5), 118)
-    out = out + place(tank(), (-19.5, -20.5), 35)
-    out = out + place(tank(), (-10.5, -25.0), 35)
-    out = out + place(hangar(), (19.0, 18.0), 14, CONCRETE)
-    out = out + place(tower(), (-12.5, 23.0), 25, CONCRETE)
+    out = out + place(aeroplane(), (3.5, -5.5), 122, METAL)
+    out = out + place(tank(), (-15.5, -12.0), 30, METAL)
+    out = out + place(tank(), (-9.0, -18.5), 30, METAL)
+    out = out + place(hangar(), (14.0, 15.0), 12, CONCRETE)
+    out = out + place(tower(), (-9.5, 15.5), 25, CONCRETE)
     for x, y, height in TREES:
         out = out + tree((x, y, relief(x, y)), height, random)
     return out
 
 
 TREES = (
-    (-27.5, 24.0, 7.5), (-23.0, 26.5, 6.0), (-28.0, 17.5, 6.5), (-22.5, 19.5, 8.5), (-27.0, 10.5, 7.0),
-    (-29.0, 3.5, 6.0), (25.5, -24.5, 7.0), (28.5, -19.0, 5.5), (21.0, -28.5, 6.5),
+    (-20.5, 18.0, 6.5), (-16.5, 20.5, 5.0), (-22.5, 12.0, 5.5), (-18.0, 13.0, 6.0), (-21.5, 6.5, 5.0),
+    (20.5, -19.0, 6.0), (22.5, -13.5, 5.0), (16.0, -22.0, 5.5),
 )  # fmt: skip
 
 
-def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: float = 1.0) -> Scene:
+def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: float) -> Scene:
     """Meshes turned by a heading and set on the ground."""
     position = (*at, float(relief(*at)))
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
@@ -61,7 +61,7 @@ def relief(x: Any, y: Any) -> Any:
 
 def taxiway(x: Any, y: Any) -> Any:
     """Distance from the taxiway's bent middle line, m."""
-    return (y - 3.5 - 6 * np.tanh((x + 4) / 10)) / np.sqrt(1 + (0.6 / np.cosh((x + 4) / 10) ** 2) ** 2)
+    return (y - 1.5 - 5 * np.tanh((x + 3) / 8)) / np.sqrt(1 + (0.62 / np.cosh((x + 3) / 8) ** 2) ** 2)
 
 
 def ground(edge: float, random: np.random.Generator) -> Scene:
@@ -74,15 +74,15 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
     level = GRASS * (1 + 0.35 * patches(x, y, random))
     level[y < relief_edge(x)] *= 1.7  # a field of taller growth
     across = np.abs(taxiway(x, y))
-    level[across < 3.6] = ASPHALT
-    level[across < 0.2] = PAINT
-    level[(np.abs(x - 19) < 9) & (np.abs(y - 12.5) < 6)] = ASPHALT
+    level[across < 3.0] = ASPHALT
+    level[across < 0.18] = PAINT
+    level[(np.abs(x - 14) < 7.5) & (np.abs(y - 10) < 5)] = ASPHALT
     return replace(bare, reflectivity=np.clip(level, 0, 1))
 
 
 def relief_edge(x: np.ndarray) -> np.ndarray:
     """Where the field at the bottom ends, y in m."""
-    return -17.5 - 0.28 * x
+    return -12.5 - 0.3 * x
 
 
 def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.ndarray:
@@ -185,31 +185,31 @@ def tank() -> list[Any]:
     )
     low = [(-1.9, -1.25), (-1.9, 1.25), (0.6, 1.35), (1.6, 0.5), (1.6, -0.5), (0.6, -1.35)]
     turret = hull([(x, y, 1.3) for x, y in low] + [(0.8 * x - 0.1, 0.75 * y, 2.25) for x, y in low])
-    gun = trimesh.creation.cylinder(radius=0.13, height=4.6, sections=12)
+    gun = trimesh.creation.cylinder(radius=0.16, height=4.8, sections=12)
     gun.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), (1, 0, 0.04)))
     gun.apply_translation((3.6, 0, 1.85))
     return [*tracks, body, turret, gun]
 
 
 def hangar() -> list[Any]:
-    """A gabled hall 15 x 10 m, 5 m to the eaves and 7.5 m to the ridge, its ridge along x."""
-    low = [(x, y, z) for x in (-7.5, 7.5) for y in (-5, 5) for z in (0, 5)]
-    return [hull([*low, (-7.5, 0, 7.5), (7.5, 0, 7.5)])]
+    """A gabled hall 12 x 8 m, 4 m to the eaves and 6 m to the ridge, its ridge along x."""
+    low = [(x, y, z) for x in (-6, 6) for y in (-4, 4) for z in (0, 4)]
+    return [hull([*low, (-6, 0, 6), (6, 0, 6)])]
 
 
 def tower() -> list[Any]:
-    """A control tower 14 m high: a shaft, a glazed cab that widens upwards, a mast."""
+    """A control tower 10 m high: a shaft, a glazed cab that widens upwards, a mast."""
     import trimesh
 
     def square(side: float, z: float) -> list[tuple[float, float, float]]:
         return [(side / 2 * sx, side / 2 * sy, z) for sx in (-1, 1) for sy in (-1, 1)]
 
-    mast = trimesh.creation.cylinder(radius=0.15, height=4, sections=8)
-    mast.apply_translation((0, 0, 15.5))
+    mast = trimesh.creation.cylinder(radius=0.15, height=3, sections=8)
+    mast.apply_translation((0, 0, 11))
     return [
-        hull(square(2.6, 0) + square(2.2, 10)),
-        hull(square(3.2, 10) + square(5.0, 13)),
-        hull(square(5.0, 13) + square(3.4, 13.6)),
+        hull(square(2.4, 0) + square(2.0, 7)),
+        hull(square(2.8, 7) + square(4.4, 9.4)),
+        hull(square(4.4, 9.4) + square(3.0, 10)),
         mast,
     ]
 

@@ -9,7 +9,7 @@ HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory
 
 
 def device_table(devices: Sequence[Any], picked: int | None) -> str:
-    """Records of `sarcl.devices()` as a table, a star at the index `picked`, the reason under what does not work."""
+    """`sarcl.devices()` as a table, a star at the index `picked`, the reason under what does not work."""
     from .cl import size_text
 
     rows = [HEAD]

@@ -72,7 +72,7 @@ def echo(
     tx = track.positions
     point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
     reference_range = _half_path(tx, rx, point)
-    near, far = _window(scene, tx, rx, reference_range, range_window)
+    near, far = _window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = _sampling(waveform, near, far, compressed)
     antennas = Antennas(
         tx=tx,
@@ -166,7 +166,7 @@ def _half_path(tx: np.ndarray, rx: np.ndarray, point: np.ndarray) -> np.ndarray:
 
 
 def _window(
-    scene: Scene, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
+    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
 ) -> tuple[float, float]:
     """The range gate (near, far) about the reference, m: as asked, or what holds the scene's box plus 10 %."""
     if asked is not None:
@@ -183,7 +183,8 @@ def _window(
     farthest = _half_path(tx, rx, corners).max(axis=0) - reference_range
     clipped = [np.linalg.norm(e - np.clip(e, low, high), axis=1) for e in (tx, rx)]
     nearest = (clipped[0] + clipped[1]) / 2 - reference_range
-    half = 1.1 * max(float(farthest.max()), -float(nearest.min()), 0.0)
+    least = LEAST_SAMPLES * SPEED_OF_LIGHT / (4 * waveform.bandwidth)
+    half = max(1.1 * float(farthest.max()), -1.1 * float(nearest.min()), least)
     return -half, half
 
 
@@ -192,7 +193,7 @@ def _sampling(waveform: Waveform, near: float, far: float, compressed: bool) -> 
     period = 4 * max(abs(near), abs(far)) / SPEED_OF_LIGHT
     if not compressed:
         period += waveform.duration  # so that pulses at the window's ends do not wrap
-    n_samples = max(LEAST_SAMPLES, int(np.ceil(period * waveform.bandwidth * (1 - 1e-12))))
+    n_samples = max(1, int(np.ceil(period * waveform.bandwidth * (1 - 1e-12))))
     step = waveform.bandwidth / n_samples
     return waveform.center - waveform.bandwidth / 2 + step / 2, step, n_samples
 

@@ -81,12 +81,14 @@ class Tiles:
         return len(self.references)
 
 
-def tile_points(positions: np.ndarray, center: np.ndarray, per_tile: int) -> tuple[Tiles, np.ndarray]:
+def tile_points(
+    positions: np.ndarray, center: np.ndarray, per_tile: int, order: np.ndarray | None = None
+) -> tuple[Tiles, np.ndarray]:
     """Tiles of points, m (n, 3), near one another along a space-filling curve, and the order of the points.
 
-    The order has whole tiles; the last point fills up the last tile.
+    The order has whole tiles; the last point fills up the last tile. Give `order` where it is known.
     """
-    order = morton_order(positions)
+    order = morton_order(positions) if order is None else order
     n_tiles = -(-len(order) // per_tile)
     order = np.concatenate([order, np.repeat(order[-1:], n_tiles * per_tile - len(order))])
     local = (positions[order] - center).reshape(n_tiles, per_tile, 3)

@@ -69,14 +69,13 @@ def cheapest(
     bandwidth: float,
     n_samples: int,
     points_per_row: int,
-    max_samples: float,
     chunk: int,
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     tiles        choices of (points a tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
-    max_samples  longest profile that memory allows; chunk  rows or points summed in float32
+    chunk        rows or points summed in float32
     ValueError names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
@@ -91,7 +90,7 @@ def cheapest(
                     continue
                 try:
                     interpolator, length, cost = accuracy.choose_interpolator(
-                        tolerance - fixed, n_samples, points_per_row, max_samples
+                        tolerance - fixed, n_samples, points_per_row
                     )
                 except ValueError:
                     continue

@@ -28,9 +28,10 @@ def point_table(response: Any, gain: float) -> str:
     """A PointResponse in lines; `gain` is the image's, so that a unit point peaks at 0 dB."""
     x, y, z = response.position
     peak = complex(response.peak) / gain
+    level = 20 * np.log10(max(abs(peak), 1e-300))
     lines = [
         f"position    {x:.4f} {y:.4f} {z:.4f} m",
-        f"peak        {20 * np.log10(max(abs(peak), 1e-300)):.2f} dB (of a unit point), phase {np.angle(peak):.4f} rad",
+        f"peak        {level:.2f} dB (of a unit point), phase {np.angle(peak):.4f} rad",
         "            range        cross-range",
     ]
     for name, values, unit in (

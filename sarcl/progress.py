@@ -22,8 +22,8 @@ class Bar:
     stream  where to draw, default sys.stderr; nothing is drawn unless it is a terminal
     clock   seconds, default time.monotonic
 
-    The line is wiped when a stage ends and when the `with` block ends, however it ends. Drawing happens in the
-    caller's thread and never raises: a lost terminal must not cost a result.
+    The line is wiped when a stage ends and when the `with` block ends, however it ends. Drawing happens in
+    the caller's thread and never raises: a lost terminal must not cost a result.
     """
 
     def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:

@@ -81,7 +81,7 @@ def prepare(
         # heights come before anything is left out, so that a facet's height does not depend on its neighbours
         heights = np.random.Generator(np.random.Philox(seed)).standard_normal(len(scene.triangles))
         normals = scenes.normals(scene.triangles)
-        centers = scene.triangles.mean(axis=1) + (heights * scene.roughness)[:, None] * normals
+        centers = scenes.centroids(scene.triangles) + (heights * scene.roughness)[:, None] * normals
         keep = np.ones(len(centers), bool)
         if "zero reflectivity" in skips:
             keep &= scene.reflectivity != 0

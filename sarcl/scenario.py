@@ -28,7 +28,7 @@ COMPLEX = {"amplitudes", "signal"}
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What to simulate and how to focus it, as tables of plain values: `Scenario(...)` or `load("FILE.toml")`.
+    """What to simulate and how to focus it, as tables of plain values: `Scenario(...)` or `load(path)`.
 
     waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
     trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
@@ -73,7 +73,7 @@ class Scenario:
         return toml_write.dumps(self.tables)
 
     def save(self, path: Any) -> None:
-        """Write it to a file. Mesh files keep their names, so they must lie as before relative to the new file."""
+        """Write it to a file. Mesh files must lie as before, relative to the new file."""
         from .files import paths
 
         with paths.atomic(path) as part:
@@ -160,7 +160,7 @@ class Scenario:
 def load(path: Any) -> Scenario:
     """Read a scenario file; mesh files are found relative to its folder.
 
-    ValueError names file and line of what is not TOML, or not a scenario. FileNotFoundError when it is missing.
+    ValueError names file and line of what is not TOML or not a scenario; FileNotFoundError.
     """
     path = Path(path)
     try:

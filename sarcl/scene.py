@@ -74,7 +74,7 @@ class Scene:
         roughness = np.broadcast_to(check.array("roughness", roughness, np.float64, np.shape(roughness)), (k,))
         if (roughness < 0).any():
             raise ValueError(f"roughness is {roughness.min():g} m; a standard deviation cannot be negative")
-        longest = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+        longest = np.maximum.reduce(edges(triangles))
         # A needle thinner than 1e-12 of its length has no area that float64 corners could carry.
         solid = 2 * areas(triangles) > 1e-12 * longest**2
         if not solid.any():
@@ -168,8 +168,8 @@ class Scene:
         part = tuple(getattr(self, n) for n in names)
         n_done = 0
         while len(part[0]):
-            edges = np.linalg.norm(np.roll(part[0], -1, axis=1) - part[0], axis=2)
-            long = edges.max(axis=1) > max_edge
+            lengths = edges(part[0])
+            long = np.maximum.reduce(lengths) > max_edge
             done.append(tuple(a[~long] for a in part))
             n_done += len(done[-1][0])
             if n_done + 2 * long.sum() > max_facets:
@@ -177,28 +177,40 @@ class Scene:
                     f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
                     "take a smaller scene, a larger max_edge or a coarser resolution"
                 )
-            part = tuple(np.concatenate([a, b]) for a, b in _bisect(tuple(a[long] for a in part), edges[long]))
+            part = tuple(np.concatenate([a, b]) for a, b in _bisect(tuple(a[long] for a in part), lengths[:, long]))
         return replace(self, **{n: np.concatenate([d[i] for d in done]) for i, n in enumerate(names)})
+
+
+def edges(triangles: np.ndarray) -> np.ndarray:
+    """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
+    d = (triangles[:, (i + 1) % 3] - triangles[:, i] for i in range(3))
+    return np.stack([np.sqrt(np.einsum("ij,ij->i", e, e)) for e in d])
 
 
 def areas(triangles: np.ndarray) -> np.ndarray:
     """Area of each triangle (k, 3, 3), m^2 (k,)."""
-    return np.linalg.norm(_cross(triangles), axis=-1) / 2
+    n = _cross(triangles)
+    return np.sqrt(np.einsum("ij,ij->i", n, n)) / 2
+
+
+def centroids(triangles: np.ndarray) -> np.ndarray:
+    """Centroid of each triangle (k, 3, 3), m (k, 3)."""
+    return (triangles[:, 0] + triangles[:, 1] + triangles[:, 2]) / 3
 
 
 def normals(triangles: np.ndarray) -> np.ndarray:
     """Outward unit normal of each triangle (k, 3, 3): (k, 3)."""
     n = _cross(triangles)
-    return n / np.linalg.norm(n, axis=-1, keepdims=True)
+    return n / np.sqrt(np.einsum("ij,ij->i", n, n))[:, None]
 
 
 def _cross(t: np.ndarray) -> np.ndarray:
     return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
 
 
-def _bisect(part: tuple[np.ndarray, ...], edges: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
+def _bisect(part: tuple[np.ndarray, ...], lengths: np.ndarray) -> list[tuple[np.ndarray, np.ndarray]]:
     """Both halves of every facet, cut at the middle of its longest edge; attributes are repeated."""
-    start = edges.argmax(axis=1)
+    start = lengths.argmax(axis=0)
     row = np.arange(len(start))
     a, b, c = (part[0][row, (start + i) % 3] for i in range(3))
     middle = (a + b) / 2

@@ -192,5 +192,5 @@ def _shown(value: Any) -> str:
     if isinstance(value, bool):
         return "true" if value else "false"
     text = repr(value) if isinstance(value, (int, float, str, list)) else str(value)
-    kind = {str: " (a string)", list: " (an array)"}.get(type(value), "")
+    kind = " (a string)" if isinstance(value, str) else " (an array)" if isinstance(value, list) else ""
     return (text if len(text) <= 60 else text[:57] + "...") + kind

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from . import cl
+from .scene import edges
 
 # A facet hides what lies deeper by more than this share of the hidden facet's own size: coplanar and touching
 # neighbours, and sheets modelled twice, do not hide one another.
@@ -56,10 +57,11 @@ def project(triangles: np.ndarray, viewpoint: np.ndarray) -> np.ndarray:
 
 def _rays(projected: np.ndarray) -> np.ndarray:
     """Centroid and depth allowance of every facet: (4, k)."""
-    size = np.sqrt(((projected - np.roll(projected, 1, axis=1)) ** 2).sum(axis=-1)).max(axis=1)
+    size = np.maximum.reduce(edges(projected))
     # float32 resolves places to 1e-7 of the scene
     floor = 4e-7 * float(np.abs(projected).max())
-    return np.concatenate([projected.mean(axis=1).T, np.maximum(BIAS * size, floor)[None]])
+    center = (projected[:, 0] + projected[:, 1] + projected[:, 2]) / 3
+    return np.concatenate([center.T, np.maximum(BIAS * size, floor)[None]])
 
 
 def _facets(projected: np.ndarray) -> np.ndarray:
@@ -80,9 +82,11 @@ def _facets(projected: np.ndarray) -> np.ndarray:
 
 def _bin(projected: np.ndarray, rays: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Facets by the square cells of the (xi, eta) plane they touch: start (cells + 1,), member, cell of each ray."""
-    low, high = projected[..., :2].min(axis=1), projected[..., :2].max(axis=1)
+    # slices, not axis=1: reductions over three corners are ten times slower
+    a, b, c = (projected[:, i, :2] for i in range(3))
+    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
     origin, extent = low.min(axis=0), (high.max(axis=0) - low.min(axis=0)).max()
-    typical = float(np.quantile((high - low).max(axis=1), 0.9))
+    typical = float(np.quantile(np.maximum(*(high - low).T), 0.9))
     side = max(2 * typical, float(extent) / 2048, np.finfo(np.float64).tiny)
     first = ((low - origin) / side).astype(np.int64)
     last = ((high - origin) / side).astype(np.int64)

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import cl, planning, profiles
-from .geometry import Antennas, Tiles, tile_points
+from .geometry import Antennas, Tiles, morton_order, tile_points
 from .planning import Clock, Plan
 from .scatterers import Scatterers
 
@@ -85,7 +85,8 @@ class Spreader:
         return plan, gated
 
     def _plan(self, part: Scatterers, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
-        made = {n: tile_points(part.positions, center, n) for n in PER_TILE}
+        order = morton_order(part.positions)
+        made = {n: tile_points(part.positions, center, n, order) for n in PER_TILE}
         bounds = np.stack([part.positions.min(axis=0), part.positions.max(axis=0)])
         splits = max(self._splits(tiles) for tiles, _ in made.values())
         plan = planning.cheapest(
@@ -96,7 +97,6 @@ class Spreader:
             bandwidth=self.bandwidth,
             n_samples=self.n_samples,
             points_per_row=len(part),
-            max_samples=self.budget / 8 / 8,
             chunk=-(-len(part) // splits),
         )
         tiles, order = made[plan.per_tile]

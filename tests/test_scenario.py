@@ -1,16 +1,13 @@
-"""Scenario files: the Python names as TOML, mistakes located by file and line, and back again without loss."""
+"""Scenario files: the Python names as TOML, mistakes located by line, and back without loss."""
 
 import inspect
-import math
-import tomllib
 
 import numpy as np
 import pytest
 
 import sarcl
-from sarcl import schema, toml_write
+from sarcl import schema
 from sarcl.scenario import Scenario, load, loads
-from sarcl.toml_lines import locate
 
 TEXT = """\
 # a spotlight pass
@@ -97,7 +94,8 @@ def test_mesh_files_are_found_beside_the_scenario(tmp_path, monkeypatch):
 
 
 def test_scenes_add_in_the_order_of_the_file():
-    text = "[[scene.from_heights]]\nx = [0, 1]\ny = [0, 1]\nz = [[0, 0], [0, 0]]\n[[scene.points]]\npositions = [[0, 0, 5]]\n"
+    text = "[[scene.from_heights]]\nx = [0, 1]\ny = [0, 1]\nz = [[0, 0], [0, 0]]\n"
+    text += "[[scene.points]]\npositions = [[0, 0, 5]]\n"
     scene = loads(text).build_scene()
     assert len(scene.triangles) == 2 and len(scene.positions) == 1
 
@@ -245,25 +243,6 @@ def test_dumps_and_loads_give_the_same_tables():
     assert loads(scenario.dumps()).tables == scenario.tables
 
 
-def test_floats_come_back_to_the_last_bit_and_strings_with_every_character():
-    tables = {
-        "a": {
-            "floats": [0.1, 1e-300, -0.0, math.pi, 9.6e9, 5e-324, 1.7976931348623157e308, math.inf],
-            "text": 'quote " backslash \\ tab \t newline \n bell \x07 delete \x7f ä 🛰',
-            "flags": [True, False],
-            "whole": 2**53 + 1,
-            "empty": [],
-            "nested": [[[1.5, 2]], [["x", {"deep key": 1}]]],
-            "a key.with dots": 1,
-            "long": list(np.linspace(0, 1, 100)),
-        },
-        "b": {"rows": [{"x": 1}, {"y": {"z": 2}}], "none": {}},
-    }
-    text = toml_write.dumps(tables)
-    assert tomllib.loads(text) == tables
-    assert math.copysign(1, tomllib.loads(text)["a"]["floats"][2]) == -1
-
-
 def test_nouns_dump_to_tables_that_give_equal_nouns():
     waveform, track, _, scene, grid = build(TEXT)
     terrain = sarcl.Scene.from_heights(
@@ -285,8 +264,6 @@ def test_nouns_dump_to_tables_that_give_equal_nouns():
 def test_what_toml_cannot_say_is_refused():
     with pytest.raises(ValueError, match="prf is None"):
         Scenario(trajectory={"line": {"start": [0, 0, 1], "velocity": [1, 0, 0], "prf": None, "n_pulses": 2}})
-    with pytest.raises(TypeError, match=r"a\.b\[1\] is a complex"):
-        toml_write.dumps({"a": {"b": [1, 2j]}})
 
 
 def test_a_saved_scenario_loads(tmp_path):
@@ -295,72 +272,6 @@ def test_a_saved_scenario_loads(tmp_path):
     assert load(tmp_path / "again.toml").tables == scenario.tables
 
 
-# ---- lines
-
-
-def test_lines_are_found_through_everything_toml_allows():
-    text = '''\
-# [comment]
-top = 1  # = 2
-"quoted.key" = """
-[not.a.table] = "
-x = 1 \\""" still """
-a.b . "c d" = {x = [1, {y = 2}], 'z' = "}"}
-
-[t]  # [[no]]
-list = [ # ]
-  [1, 2], # 3
-  {deep = 'a#b'},
-]
-when = 1979-05-27 07:32:00Z
-[[rows]]
-x = 1
-[rows.sub]
-k = \'\'\'
-\'\'\'
-[[rows]]
-
-x = 2
-[ "\\u0061\\"b" . c ]
-'''
-    tomllib.loads(text)
-    found = locate(text)
-    for path, number in {
-        ("top",): 2,
-        ("quoted.key",): 3,
-        ("a",): 6,
-        ("a", "b", "c d"): 6,
-        ("a", "b", "c d", "x", 1, "y"): 6,
-        ("t",): 8,
-        ("t", "list"): 9,
-        ("t", "list", 1, "deep"): 11,
-        ("t", "when"): 13,
-        ("rows", 0): 14,
-        ("rows", 0, "x"): 15,
-        ("rows", 0, "sub", "k"): 17,
-        ("rows", 1): 19,
-        ("rows", 1, "x"): 21,
-        ('a"b', "c"): 22,
-    }.items():
-        assert found[path] == number, path
-    assert not any("not" in p or "no" in p for p in found)
-
-
 def test_windows_line_ends_count_once():
-    with pytest.raises(ValueError, match="^f.toml:8: "):
+    with pytest.raises(ValueError, match=r"^f\.toml:8: "):
         loads(TEXT.replace("radius", "radios").replace("\n", "\r\n"), name="f.toml")
-
-
-def test_every_key_of_every_table_is_located():
-    def walk(path, value):
-        if isinstance(value, dict):
-            for k, v in value.items():
-                assert (*path, k) in found
-                walk((*path, k), v)
-        elif isinstance(value, list) and value and all(isinstance(v, dict) for v in value):
-            for i, v in enumerate(value):
-                assert (*path, i) in found
-                walk((*path, i), v)
-
-    found = locate(TEXT)
-    walk((), tomllib.loads(TEXT))

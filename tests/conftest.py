@@ -1,0 +1,42 @@
+"""Fixtures: every OpenCL device on the machine, with and without float64, and the folder of outside data."""
+
+from __future__ import annotations
+
+import os
+from pathlib import Path
+
+import pytest
+
+from sarcl import cl
+
+
+def _devices():
+    """Every working device, and each once more as one without float64."""
+    found = []
+    for info in cl.devices():
+        if info.works:
+            name = f"{info.index}-{info.kind}"
+            found.append(pytest.param((info.index, True), id=name))
+            if info.fp64:
+                found.append(pytest.param((info.index, False), id=f"{name}-no-fp64"))
+    if not found:
+        reason = f"no OpenCL device works. {cl.REMEDY}"
+        found.append(pytest.param(None, id="none", marks=pytest.mark.xfail(reason=reason, run=False, strict=True)))
+    return found
+
+
+@pytest.fixture(params=_devices())
+def device(request):
+    """An open device; a kernel that fails on it fails the test."""
+    index, fp64 = request.param
+    opened = cl.open_device(index)
+    return opened if fp64 else opened.without_fp64()
+
+
+@pytest.fixture(scope="session")
+def data_folder():
+    """Measured data that nobody here made: SARCL_DATA, or ../shared/data beside the repository."""
+    folder = Path(os.environ.get("SARCL_DATA") or Path(__file__).parents[2] / "shared" / "data")
+    if not folder.is_dir():
+        pytest.skip(f"no data folder {folder.name!r}: set SARCL_DATA")
+    return folder
