@@ -16,12 +16,10 @@ class SarclWarning(UserWarning):
 def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
     """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
 
-    ValueError names the argument, its shape or the index of its first NaN or Inf.
+    The result is a read-only copy in C order: the caller's array stays as it is. ValueError names the argument,
+    its shape or the index of its first NaN or Inf.
     """
-    try:
-        out = np.array(value, dtype=dtype)
-    except (TypeError, ValueError) as exc:
-        raise ValueError(f"{name} must be numbers that fit {np.dtype(dtype)}, got {value!r:.80} ({exc})") from None
+    out = converted(name, value, dtype)
     wanted = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
     if out.ndim != len(shape) or any(
         isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)
@@ -32,6 +30,24 @@ def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np
     finite(name, out)
     out.flags.writeable = False
     return out
+
+
+def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
+    """A copy of `value` as an array of `dtype` in C order; ValueError where that would change what it says."""
+    wanted = np.dtype(dtype)
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "biufcO":
+            raise TypeError(f"type {given.dtype}")
+        if given.dtype.kind == "c" and wanted.kind != "c":
+            raise TypeError(f"type {given.dtype}: take the real part or the modulus")
+        if np.ma.is_masked(value):
+            raise TypeError(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
+        if wanted.kind in "iu" and given.dtype.kind == "f" and not (given == np.rint(given)).all():
+            raise TypeError("not all are whole numbers")
+        return np.array(given, dtype=wanted, order="C")
+    except (TypeError, ValueError, OverflowError) as exc:
+        raise ValueError(f"{name} must be numbers that fit {wanted}, got {value!r:.80} ({exc})") from None
 
 
 def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
@@ -49,9 +65,11 @@ def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
 def number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> float:
     """Return `value` as a finite float, greater than `above` and not less than `least`."""
     try:
+        if isinstance(value, (str, bytes, bool, np.bool_)):
+            raise TypeError
         out = float(value)
-    except (TypeError, ValueError):
-        raise ValueError(f"{name} must be a number, got {value!r}") from None
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be a number, got {value!r:.80}") from None
     if not np.isfinite(out):
         raise ValueError(f"{name} is {out}; it must be finite")
     if above is not None and not out > above:
@@ -68,7 +86,7 @@ def count(name: str, value: Any, least: int = 1) -> int:
         whole = out == value
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be a whole number, got {value!r}") from None
-    if not whole or isinstance(value, bool):
+    if not whole or isinstance(value, (bool, np.bool_)):
         raise ValueError(f"{name} must be a whole number, got {value!r}")
     if out < least:
         raise ValueError(f"{name} is {out}; it must be at least {least}")
@@ -78,10 +96,10 @@ def count(name: str, value: Any, least: int = 1) -> int:
 def direction(name: str, value: Any) -> np.ndarray:
     """Return the unit vector along `value` (3,); a zero vector raises."""
     v = array(name, value, np.float64, (3,))
-    length = float(np.linalg.norm(v))
-    if length == 0:
+    if not v.any():
         raise ValueError(f"{name} is (0, 0, 0); a direction needs a length")
-    return np.asarray(v / length)
+    v = v / np.abs(v).max()  # first, so that squares neither overflow nor vanish
+    return np.asarray(v / np.linalg.norm(v))
 
 
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:

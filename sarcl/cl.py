@@ -195,7 +195,7 @@ class Device:
                 ) from None
         with self._explain("a context"):
             self.context = pyopencl.Context([raw])
-            self.queue = pyopencl.CommandQueue(self.context)
+            self.queue = pyopencl.CommandQueue(self.context, raw)
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
 
     @property

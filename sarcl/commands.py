@@ -117,7 +117,7 @@ def focus(args: argparse.Namespace, kept: Kept) -> int:
     _check_outputs(outputs, (".png", ".h5", ".hdf5"))
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
-    raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=not args.no_autofocus)
+    raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
     if not isinstance(raw, PhaseHistory):
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
     if args.polarization is not None or args.channel is not None:

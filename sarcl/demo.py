@@ -116,7 +116,8 @@ def run(
         raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress
     )
     clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
-    title = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz, radar beyond the top edge, {GRAZING_DEG:g} deg up"
+    band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
+    title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
     image.save(picture, floor_db=FLOOR_DB, title=title)
     kept.append(str(picture))
     raw.save(raw_file)
@@ -152,7 +153,7 @@ def _rate(result: PhaseHistory | Image, unit: str) -> str:
     kind = "predicted" if report.measured_error is None else "measured"
     seconds = sum(report.seconds.values())
     rate = rate_text(report.contributions_done / seconds) if seconds else ""
-    return f", {rate} {unit}, error {error:.1e} {kind} ({report.tolerance:.0e} allowed)"
+    return f", {unit} {rate}, error {error:.1e} {kind} ({report.tolerance:.0e} allowed)"
 
 
 class _Clock:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -27,6 +28,16 @@ class ImageGrid:
     y_axis: np.ndarray | None = None
     listed: np.ndarray | None = None
 
+    def __post_init__(self) -> None:
+        if (self.listed is None) == (self.spacing is None):
+            raise ValueError(
+                "a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points"
+            )
+        for name in ("center", "x_axis", "y_axis", "listed"):
+            value = getattr(self, name)
+            if value is not None and value.flags.writeable:
+                object.__setattr__(self, name, check.array(name, value, np.float64, value.shape))
+
     @classmethod
     def plane(
         cls,
@@ -51,26 +62,29 @@ class ImageGrid:
         x = check.direction("x_axis", x_axis)
         x = x - (x @ n) * n
         if np.linalg.norm(x) < 1e-6:
-            raise ValueError(f"x_axis {tuple(x_axis)} is along the normal {tuple(n)}; give one that lies in the plane")
+            raise ValueError(
+                f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane"
+            )
         x /= np.linalg.norm(x)
-        y = np.cross(n, x)
-        for axis in (x, y):
-            axis.flags.writeable = False
         return cls(
             shape=(check.count("shape[0]", rows), check.count("shape[1]", columns)),
             center=center,
             spacing=(check.number("spacing[0]", dy, above=0), check.number("spacing[1]", dx, above=0)),
             x_axis=x,
-            y_axis=y,
+            y_axis=np.cross(n, x),
         )
 
     @classmethod
     def points(cls, positions: Any) -> ImageGrid:
         """Any positions, m (..., 3); the image has the shape of all axes but the last."""
-        shape = np.shape(positions)
-        if len(shape) < 2 or shape[-1] != 3:
-            raise ValueError(f"positions has shape {shape}, wanted (..., 3) with at least one axis before the last")
-        listed = check.array("positions", positions, np.float64, tuple(f"n{i}" for i in range(len(shape))))
+        listed = check.converted("positions", positions, np.float64)
+        shape = listed.shape
+        if len(shape) < 2 or shape[-1] != 3 or 0 in shape:
+            raise ValueError(
+                f"positions has shape {shape}, wanted (..., 3) with at least one axis before the last, none zero"
+            )
+        check.finite("positions", listed)
+        listed.flags.writeable = False
         return cls(shape=shape[:-1], listed=listed)
 
     @property
@@ -81,7 +95,7 @@ class ImageGrid:
     @property
     def size(self) -> int:
         """Number of pixels."""
-        return int(np.prod(self.shape, dtype=np.int64))
+        return math.prod(self.shape)
 
     @property
     def normal(self) -> np.ndarray:
@@ -124,6 +138,10 @@ class ImageGrid:
     def _need_plane(self, what: str) -> None:
         if not self.is_plane:
             raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
+
+
+def _text(vector: Any) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in vector) + ")"
 
 
 def _pair(name: str, value: Any) -> tuple[Any, Any]:

@@ -1,11 +1,10 @@
 """Point response: where a reflector is, how sharp it is and how high its side lobes stand.
 
-    value(x)   I(x) between pixels: the carrier exp(j 2 pi k.x), k = -f (u_T + u_R)/c turns/m with u from x to the antennas,
-               is taken off the pixels, a Kaiser-windowed sinc interpolates along rows and columns, the carrier is put back
-    range      direction in the grid's plane in which the two-way path grows fastest, -(u_T + u_R) projected on the plane
-    cross      the direction in the plane that is perpendicular to it
+    range        the direction on the grid's plane in which the two-way path grows fastest: its gradient, projected
+    cross-range  the direction on the plane that is perpendicular to it
 
-docs/measure.md states the conventions; reference/quality.py measures an exact image by brute force.
+Cuts along both go through the interpolated peak (surface.py). docs/measure.md states every convention;
+reference/quality.py measures an exact image by brute force.
 """
 
 from __future__ import annotations
@@ -18,13 +17,12 @@ import numpy as np
 
 from . import check
 from .image import Image
+from .surface import Surface, path_gradient
 
-REACH = 10.0  # side lobes count within so many IRW of the peak
+REACH = 10.0  # IRW on each side in which side lobes count
 LEAST_REACH = 3.0
-CHIP = 64  # pixels a side whose spectrum tells how much of the sampling rate the response fills
-BAND = 0.42  # cycles a pixel that the response may fill: the interpolator needs the rest of 0.5 to stay short
-FALL = 1e-2  # the band ends where the spectrum's density stays below this part of its largest
-STEP = 1 / 32  # of an IRW, between points of a cut
+STEPS = 32  # points of a cut in one IRW
+NAMES = "range", "cross-range"
 
 
 @dataclass(frozen=True, eq=False)
@@ -33,11 +31,11 @@ class PointResponse:
 
     position  of the interpolated peak, m (3,)
     irw       width at half power (-3.01 dB), m
-    pslr      highest lobe outside the first nulls over the peak, dB of power
+    pslr      highest lobe outside the first nulls over the peak, dB
     islr      energy outside the first nulls, within +-`reach` IRW, over the energy between the nulls, dB
-    peak      complex value of the image at `position`, in the unit of its data; peak/gain is the amplitude
-    gain      the image's gain
-    reach     IRW on each side that PSLR and ISLR cover: 10, or what the image holds
+    peak      complex value of the image at `position`, in the unit of its data
+    gain      the image's gain: |peak/gain|^2 is the point's radar cross section, m^2
+    reach     IRW on each side that pslr and islr cover: 10, or what the image holds
     """
 
     position: np.ndarray
@@ -49,20 +47,21 @@ class PointResponse:
     reach: tuple[float, float] = (REACH, REACH)
 
     def __str__(self) -> str:
-        x, y, z = self.position
         amplitude = abs(self.peak) / self.gain
-        level = 20 * np.log10(amplitude)
-        rows = (("IRW at -3.01 dB", self.irw, ".4f", "m"), ("PSLR", self.pslr, ".2f", "dB"), ("ISLR", self.islr, ".2f", "dB"))
-        return "\n".join(
-            [
-                f"position         ({x:.4f}, {y:.4f}, {z:.4f}) m",
-                f"peak             {abs(self.peak):.6g}, phase {np.angle(self.peak):.4f} rad",
-                f"peak/gain        {amplitude:.6g}, RCS {level:.2f} dBsm",
-                f"{'':15}{'range':>12}{'cross-range':>14}",
-                *(f"{name:15}{a:>12{form}}{b:>14{form}} {unit}" for name, (a, b), form, unit in rows),
-                f"{'lobes within +-':15}{self.reach[0]:>12.1f}{self.reach[1]:>14.1f} IRW",
-            ]
+        rows = (
+            ("IRW, half power", self.irw, ".4f", "m"),
+            ("PSLR", self.pslr, ".2f", "dB"),
+            ("ISLR", self.islr, ".2f", "dB"),
+            ("lobes within +-", self.reach, ".1f", "IRW"),
         )
+        lines = [
+            f"position         {_place(self.position, 4)} m",
+            f"peak             {abs(self.peak):.6g} at {np.angle(self.peak):.4f} rad",
+            f"peak/gain        {amplitude:.6g}, RCS {20 * np.log10(amplitude):.2f} dBsm",
+            f"{'':15}{NAMES[0]:>12}{NAMES[1]:>14}",
+            *(f"{name:15}{a:>12{form}}{b:>14{form}} {unit}" for name, (a, b), form, unit in rows),
+        ]
+        return "\n".join(lines)
 
 
 def measure(image: Image, near: Any = None) -> PointResponse:
@@ -70,157 +69,80 @@ def measure(image: Image, near: Any = None) -> PointResponse:
 
     image  with frequency (Hz) and tx, rx (m; rx None is tx); of its data only what is needed is read
     near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it is
-           measured. Default: the brightest pixel, looked for in blocks of rows
+           measured. Default: the brightest pixel
 
-    Cuts through the interpolated peak run along range and cross-range projected on the grid. IRW is the half-power
-    width; PSLR is the highest lobe outside the first nulls; ISLR takes the main lobe from null to null and all within
-    +-10 IRW, or as far as the image reaches. A uniform aperture has -13.26 and -10.22 dB.
+    Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR is the highest lobe
+    outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or as far as
+    the image holds both sides. A uniform aperture has 0.886, -13.26 dB and -10.22 dB.
     ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or Inf, a
-    `near` outside of the grid or without a peak, a response closer than 3 IRW to the border or in a stronger one's
-    side lobes, and a grid coarser than the resolution: one where the response fills more than +-0.42 cycles a pixel.
+    `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the response of a
+    stronger one, and a grid coarser than the resolution: where the response fills more than +-0.42 cycles a pixel.
+    Source: DESIGN.md's image equation for the carrier, TRUTH.md for the figures.
     """
     _refuse(image)
     row, column = _brightest(image) if near is None else _peak_near(image, near)
-    surface, axes = _surface(image, row, column)
-    step = min(image.grid.spacing or ()) / 4
-    position = _climb(surface, surface.grid.at(row, column), axes, step)
-    peak = complex(surface(position[None])[0])
-    cuts = [
-        _cut(lambda t, a=axis: np.abs(surface(position + np.multiply.outer(t, a))) ** 2, surface.room(position, axis), step, name)
-        for axis, name in zip(axes, ("range", "cross-range"), strict=True)
-    ]
-    for cut, axis, name in zip(cuts, axes, ("range", "cross-range"), strict=True):
-        if cut.pslr >= 0:
-            x, y, z = position + cut.lobe * axis
+    axes = _axes(image, row, column)
+    surface = Surface.about(image, row, column)
+    assert image.grid.spacing is not None
+    step = min(image.grid.spacing) / 4
+    position = _climb(surface, image.grid.at(row, column), axes, step)
+
+    def cut(axis: np.ndarray, name: str) -> _Cut:
+        def power(t: np.ndarray) -> np.ndarray:
+            return np.abs(surface(position + t[:, None] * axis)) ** 2
+
+        made = _cut(power, surface.room(position, axis), step, name)
+        if made.pslr >= 0:
+            stronger = position + made.lobe * axis
             raise ValueError(
-                f"the peak at {_place(position)} lies in the response of something {cut.pslr:.1f} dB stronger, "
-                f"{abs(cut.lobe):.3g} m away in {name}; measure that one with near=({x:.3f}, {y:.3f}, {z:.3f})"
+                f"the peak at {_place(position)} lies in the response of something {made.pslr:.1f} dB stronger, "
+                f"{abs(made.lobe):.3g} m away in {name}; measure that with near={_place(stronger)}"
             )
+        return made
+
+    along, across = (cut(axis, name) for axis, name in zip(axes, NAMES, strict=True))
     position.flags.writeable = False
-    irw, pslr, islr, reach = (tuple(getattr(c, n) for c in cuts) for n in ("irw", "pslr", "islr", "reach"))
-    return PointResponse(position, irw, pslr, islr, peak, image.gain, reach)
+    return PointResponse(
+        position=position,
+        irw=(along.irw, across.irw),
+        pslr=(along.pslr, across.pslr),
+        islr=(along.islr, across.islr),
+        peak=complex(surface(position[None])[0]),
+        gain=image.gain,
+        reach=(along.reach, across.reach),
+    )
 
 
 def _refuse(image: Image) -> None:
     if not image.is_complex:
-        raise ValueError("the image is detected (multilooked): its phase is gone; measure the complex image instead")
+        raise ValueError("the image is detected (multilooked), its phase is gone; measure the complex image")
     if not image.grid.is_plane:
-        raise ValueError("the grid lists its points; cuts need a plane: focus on an ImageGrid.plane")
+        raise ValueError("the grid lists its points and has no rows to cut along; focus on an ImageGrid.plane")
     for name, what in (("frequency", "the centre frequency, Hz"), ("tx", "the antenna at mid-aperture, m (3,)")):
         if getattr(image, name) is None:
-            raise ValueError(f"image.{name} is None; the carrier follows from it: set {name} to {what}, with replace()")
+            raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {what}")
 
 
-@dataclass(frozen=True, eq=False)
-class _Surface:
-    """The image between its pixels: called with positions m (n, 3), returns I complex128 (n,).
-
-    carrier  turns a row and turns a column
-    taps     pixels a side that a value is made of, even
-    """
-
-    image: Image
-    carrier: tuple[float, float]
-    taps: int
-
-    @property
-    def grid(self) -> Any:
-        return self.image.grid
-
-    def __call__(self, position: np.ndarray) -> np.ndarray:
-        index = self.grid.index(position)
-        first = np.floor(index).astype(int) - self.taps // 2 + 1
-        low, high = first.min(axis=0), first.max(axis=0) + self.taps
-        chip = _baseband(self.image, self.carrier, low, high)
-        taken = first[:, :, None] + np.arange(self.taps)  # (n, 2, taps)
-        weight = _kernel(index[:, :, None] - taken, self.taps)
-        rows, columns = np.moveaxis(taken - low[:, None], 1, 0)
-        values = np.einsum("na,nb,nab->n", weight[:, 0], weight[:, 1], chip[rows[:, :, None], columns[:, None, :]])
-        return values * np.exp(2j * np.pi * (index @ np.array(self.carrier)))
-
-    def room(self, position: np.ndarray, axis: np.ndarray) -> float:
-        """How far a cut may run along +-axis before it wants pixels outside of the image, m."""
-        here = self.grid.index(position)
-        slope = np.abs(self.grid.index(position + axis) - here)
-        ahead = np.array(self.grid.shape) - 1 - self.taps // 2 - here
-        behind = here - (self.taps // 2 - 1)
-        with np.errstate(divide="ignore"):
-            return float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
-
-
-def _kernel(distance: np.ndarray, taps: int) -> np.ndarray:
-    """sinc under a Kaiser window of 90 dB, `taps` pixels wide."""
-    inside = np.maximum(1 - (2 * distance / taps) ** 2, 0)
-    return np.sinc(distance) * np.i0(8.96 * np.sqrt(inside)) / np.i0(8.96)
-
-
-def _baseband(image: Image, carrier: tuple[float, float], low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Pixels low ... high - 1 (row, column) without their carrier, complex128."""
-    chip = np.asarray(image.data[low[0] : high[0], low[1] : high[1]]).astype(np.complex128)
-    if not np.isfinite(chip).all():
-        i, j = np.argwhere(~np.isfinite(chip))[0] + low
-        raise ValueError(f"image data[{i}, {j}] is {chip[i - low[0], j - low[1]]}; every value must be finite")
-    for axis in (0, 1):
-        turns = carrier[axis] * np.arange(low[axis], high[axis])
-        chip *= np.expand_dims(np.exp(-2j * np.pi * turns), 1 - axis)
-    return chip
-
-
-def _surface(image: Image, row: int, column: int) -> tuple[_Surface, tuple[np.ndarray, np.ndarray]]:
-    """The image about a pixel, and the unit vectors of range and cross-range on its plane."""
-    grid = image.grid
-    x = grid.at(row, column)
-    antennas = (image.tx, image.tx if image.rx is None else image.rx)
-    toward = sum(check.direction("from the point to the antenna", a - x) for a in antennas)
-    along = -(toward - (toward @ grid.normal) * grid.normal)
-    if np.linalg.norm(along) < 1e-3:
-        raise ValueError("the antennas stand straight above the grid: range has no direction on it; tilt the grid")
-    range_axis = along / np.linalg.norm(along)
-    turns = -image.frequency / check.SPEED_OF_LIGHT * toward
-    carrier = (float(turns @ grid.y_axis) * grid.spacing[0], float(turns @ grid.x_axis) * grid.spacing[1])
-    band = _band(image, carrier, row, column)
-    # Kaiser's rule for 90 dB and a transition from +-band to its alias, 1 - 2 band cycles a pixel
-    surface = _Surface(image, carrier, 2 * int(np.ceil(2.86 / (1 - 2 * band))))
-    return surface, (range_axis, np.cross(grid.normal, range_axis))
-
-
-def _band(image: Image, carrier: tuple[float, float], row: int, column: int) -> float:
-    """Largest frequency, cycles a pixel, that a response fills along rows or columns."""
-    at, shape = np.array([row, column]), np.array(image.grid.shape)
-    half = np.minimum(CHIP // 2, np.minimum(at, shape - 1 - at))
-    if half.min() < 8:
-        raise ValueError(
-            f"the peak at pixel ({row}, {column}) of an image of {tuple(shape)} lies {half.min()} pixels from the "
-            "border; a point response needs at least 8, and 3 resolution cells: focus a larger grid about it"
-        )
-    chip = _baseband(image, carrier, at - half, at + half + 1)
-    for axis in (0, 1):  # a Hann taper, so that what leaves the chip does not leak over the band
-        chip *= np.expand_dims(np.cos(np.pi * np.arange(-half[axis], half[axis] + 1) / (2 * half[axis] + 2)) ** 2, 1 - axis)
-    power = np.abs(np.fft.fft2(chip)) ** 2
-    bands = []
-    for axis, name in ((0, "row"), (1, "column")):
-        density = power.sum(axis=1 - axis)
-        filled = np.abs(np.fft.fftfreq(len(density)))[density > FALL * density.max()].max()
-        if filled > BAND:
-            spacing = image.grid.spacing[axis]  # type: ignore[index]
-            raise ValueError(
-                f"the grid is coarser than the resolution along its {name}s: at a spacing of {spacing:g} m the response "
-                f"fills +-{filled:.2f} of +-0.5 cycles a pixel, measuring needs +-{BAND}; focus again with a {name} "
-                f"spacing of at most {spacing / 2:g} m (or check image.frequency, tx and rx)"
-            )
-        bands.append(filled)
-    return float(max(bands))
+def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors of range and cross-range on the plane, at a pixel."""
+    normal = image.grid.normal
+    gradient = path_gradient(image, image.grid.at(row, column))
+    along = gradient - (gradient @ normal) * normal
+    length = np.linalg.norm(along)
+    if length < 1e-3:
+        raise ValueError("the antennas stand straight above the grid, where range has no direction; tilt the grid")
+    return along / length, np.cross(normal, along / length)
 
 
 def _brightest(image: Image) -> tuple[int, int]:
     """Pixel of the largest modulus; rows are read in blocks."""
     best, at = 0.0, None
     n_rows, n_columns = image.grid.shape
-    step = max(1, 2**22 // n_columns)
-    for first in range(0, n_rows, step):
-        block = np.asarray(image.data[first : first + step])
-        check.finite("image data", block, first_row=first)
-        level = np.abs(block)
+    block = max(1, 2**22 // n_columns)
+    for first in range(0, n_rows, block):
+        part = np.asarray(image.data[first : first + block])
+        check.finite("image data", part, first_row=first)
+        level = np.abs(part)
         i = int(level.argmax())
         if level.flat[i] > best:
             best, at = float(level.flat[i]), (first + i // n_columns, i % n_columns)
@@ -231,22 +153,114 @@ def _brightest(image: Image) -> tuple[int, int]:
 
 def _peak_near(image: Image, near: Any) -> tuple[int, int]:
     """Pixel of the highest peak within two resolution cells of `near`; a cell is what its own half power spans."""
-    grid = image.grid
-    place = grid.index(check.array("near", near, np.float64, (3,)))
-    shape = np.array(grid.shape)
-    start = np.rint(place).astype(int)
+    near = check.array("near", near, np.float64, (3,))
+    shape = np.array(image.grid.shape)
+    index = image.grid.index(near)
+    start = np.rint(index).astype(int)
     if (start < 0).any() or (start >= shape).any():
-        raise ValueError(
-            f"near {_place(np.asarray(near, float))} falls on pixel ({place[0]:.1f}, {place[1]:.1f}), outside of the image of {grid.shape}"
-        )
-    radius = 2
+        raise ValueError(f"near {_place(near)} is pixel {_place(index, 1)}, outside of the image of {image.grid.shape}")
+    radius = np.array([2, 2])
     while True:
-        # one pixel more than is searched, so that a peak on the search's edge is told from a slope
-        low, high = np.maximum(start - radius - 1, 0), np.minimum(start + radius + 2, shape)
+        low, high = np.maximum(start - 4 * radius, 0), np.minimum(start + 4 * radius + 1, shape)
         level = np.abs(np.asarray(image.data[low[0] : high[0], low[1] : high[1]]))
-        check.finite("image data near the point", level)
-        ring = np.pad(level, 1, constant_values=-1)
-        peaks = np.all([level >= ring[1 + i : ring.shape[0] - 1 + i, 1 + j : ring.shape[1] - 1 + j] for i in (-1, 0, 1) for j in (-1, 0, 1)], axis=0)
-        del peaks
-        break
-    raise NotImplementedError
+        if not np.isfinite(level).all():
+            raise ValueError(f"image data are NaN or Inf near {_place(near)}; every value must be finite")
+        a, b = np.maximum(start - radius, 0) - low, start + radius + 1 - low
+        i, j = np.unravel_index(level[a[0] : b[0], a[1] : b[1]].argmax(), level[a[0] : b[0], a[1] : b[1]].shape)
+        i, j = int(i + a[0]), int(j + a[1])
+        if level[i, j] == 0:
+            raise ValueError(f"the image is zero around near {_place(near)}; there is no point to measure")
+        wanted = 2 * np.array([_run(level[:, j], i), _run(level[i], j)])
+        if (wanted <= radius).all():
+            break
+        radius = np.maximum(radius, wanted)
+    if level[i, j] < level[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].max():
+        uphill = image.grid.at(i + low[0], j + low[1])
+        raise ValueError(
+            f"no peak lies within two resolution cells of near {_place(near)}; the image still rises at "
+            f"{_place(uphill)}: move near to the point, or leave it out to measure the brightest"
+        )
+    return i + int(low[0]), j + int(low[1])
+
+
+def _run(level: np.ndarray, at: int) -> int:
+    """Pixels about `at` in one piece where the power is at least half of that at `at`."""
+    below = level**2 < level[at] ** 2 / 2
+    after = below[at:].argmax() if below[at:].any() else len(level) - at
+    before = below[at::-1].argmax() if below[at::-1].any() else at + 1
+    return int(after + before - 1)
+
+
+def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
+    """Position of the maximum near `start`: parabolas through log power at -step, 0, step, on each axis in turn."""
+    x = np.array(start)
+    for _ in range(40):
+        before = x
+        for axis in axes:
+            values = np.abs(surface(x + step * np.array([[-1], [0], [1]]) * axis))
+            left, middle, right = np.log(np.maximum(values, 1e-300))
+            bend = left - 2 * middle + right
+            move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
+            x = x + step * float(np.clip(move, -1, 1)) * axis
+        if np.linalg.norm(x - before) < 1e-5 * step:
+            return x
+        if np.linalg.norm(surface.image.grid.index(x) - surface.image.grid.index(start)) > 3:
+            break
+    raise ValueError(f"no peak was found near {_place(start)}: the image only rises away from it; choose another near")
+
+
+@dataclass(frozen=True)
+class _Cut:
+    irw: float
+    pslr: float
+    islr: float
+    reach: float
+    lobe: float  # where the highest side lobe lies, m from the peak
+
+
+def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, name: str) -> _Cut:
+    """Figures of a cut; power(t) is |I|^2 at t m from the peak, t (n,), known for |t| <= room."""
+    irw = _half_power(power, room, step) + _half_power(lambda t: power(-t), room, step)
+    reach = min(REACH, room / irw)
+    if not reach >= LEAST_REACH:
+        raise ValueError(
+            f"in {name} the image holds less than {LEAST_REACH:g} IRW on each side of the peak; focus a grid that "
+            f"reaches at least {REACH:g} resolution cells beyond it"
+        )
+    n = int(np.ceil(reach * STEPS))
+    t = np.linspace(-reach * irw, reach * irw, 2 * n + 1)
+    p = power(t)
+    rising = np.diff(p) > 0
+    if not (rising[n:].any() and (~rising[:n]).any()):
+        raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW; the image is not focused there")
+    right, left = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
+    inside = np.trapezoid(p[left : right + 1])
+    lobes = np.where((t < t[left]) | (t > t[right]), p, 0)
+    i = int(lobes.argmax())
+    highest, lobe = lobes[i], t[i]
+    if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # the top of a parabola through three points
+        bend = p[i - 1] - 2 * p[i] + p[i + 1]
+        highest -= (p[i - 1] - p[i + 1]) ** 2 / (8 * bend)
+    decibels = 10 * np.log10(np.array([highest / p[n], np.trapezoid(p) / inside - 1]))
+    return _Cut(irw, float(decibels[0]), float(decibels[1]), reach, float(lobe))
+
+
+def _half_power(power: Callable[[np.ndarray], np.ndarray], room: float, step: float) -> float:
+    """Distance, m, at which power(t) first falls to half of power(0); inf if it does not within `room`."""
+    start = 0.0
+    level = power(np.zeros(1))[0] / 2 if room > 0 else 0.0
+    while start < room:
+        t = np.minimum(start + step / 2 * np.arange(33), room)
+        below = power(t) < level
+        if below.any():
+            for _ in range(3):  # ever finer between the last point above and the first one below
+                i = int(below.argmax())
+                t = np.linspace(t[i - 1], t[i], 33)
+                below = power(t) < level
+            return float(t[int(below.argmax())])
+        start = float(t[-1])
+    return np.inf
+
+
+def _place(position: np.ndarray, digits: int = 3) -> str:
+    return "(" + ", ".join(f"{x:.{digits}f}" for x in position) + ")"

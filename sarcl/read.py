@@ -13,12 +13,14 @@ if TYPE_CHECKING:
 READABLE = "sarcl's own HDF5 files (raw.save, image.save) and AFRL Gotcha .mat files (MATLAB 5)"
 
 
-def read(path: Any, *, autofocus: bool = True) -> PhaseHistory | Image:
+def read(path: Any, *, autofocus: bool = False) -> PhaseHistory | Image:
     """Read a file, or several as one phase history, rows in the order given.
 
     What a file is follows from its first bytes, not its name. HDF5 written by sarcl gives the PhaseHistory or
     Image it holds, its samples left in the file until they are used; an AFRL Gotcha .mat gives a
-    PhaseHistory, with the file's autofocus corrections applied where it has them, unless autofocus=False.
+    PhaseHistory, with autofocus=True the file's own corrections (af.r_correct, af.ph_correct) applied where it
+    has them. They are off by default: measured on azimuth 1-2 deg they sharpen the one reflector they were made
+    from, blur the others by 6 % and move the scene by 0.7 m.
     FileNotFoundError names the missing file; ValueError the file that is of no known kind, truncated or
     damaged, or does not fit the others.
     """

@@ -45,6 +45,10 @@ class Waveform:
                 raise ValueError("waveform signal is zero everywhere; it must carry energy")
             object.__setattr__(self, "signal", signal)
             object.__setattr__(self, "rate", check.number("waveform rate", self.rate, above=0))
+        elif self.signal is not None or self.rate is not None:
+            raise ValueError(
+                f"waveform signal and rate go with kind 'sampled', not {self.kind!r}; use Waveform.sampled"
+            )
 
     @classmethod
     def chirp(cls, *, center: float, bandwidth: float, duration: float) -> Waveform:

@@ -425,7 +425,7 @@ def test_the_reference_range_is_the_length_of_the_position(tmp_path):
 def test_autofocus_turns_the_phase_by_ph_correct_less_the_way_of_r_correct(tmp_path):
     data = a_gotcha()
     path = write_gotcha(tmp_path, data)
-    raw, plain = sarcl.read(path), sarcl.read(path, autofocus=False)
+    raw, plain = sarcl.read(path, autofocus=True), sarcl.read(path)
     f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
     r, phase = (data["af"][n].astype(float)[:, None] for n in ("r_correct", "ph_correct"))
     expected = plain.samples * np.exp(1j * (phase - 4 * np.pi * f * r / 299792458))
@@ -443,7 +443,7 @@ def test_without_autofocus_fields_the_samples_are_as_they_are(tmp_path, af):
 def test_one_autofocus_field_alone_is_applied(tmp_path):
     data = a_gotcha()
     del data["af"]["r_correct"]
-    raw = sarcl.read(write_gotcha(tmp_path, data))
+    raw = sarcl.read(write_gotcha(tmp_path, data), autofocus=True)
     turned = data["fp"].T * np.exp(1j * data["af"]["ph_correct"].astype(float))[:, None]
     np.testing.assert_allclose(raw.samples, turned, rtol=3e-7)
 
@@ -564,7 +564,7 @@ def test_gotcha_autofocus_sharpens_the_reflector_it_was_made_from():
         return ranges[profile.argmax(axis=1)].std()
 
     before = straightness(sarcl.read(GOTCHA, autofocus=False), (-15.6, 21.6, 0))
-    after = straightness(sarcl.read(GOTCHA), (-15.2, 22.1, 0))
+    after = straightness(sarcl.read(GOTCHA, autofocus=True), (-15.2, 22.1, 0))
     assert before > 0.015 and after < 0.008
 
 

@@ -41,7 +41,7 @@ import numpy as np
 from .. import check
 
 
-def load(path: Any, autofocus: bool = True) -> dict[str, Any]:
+def load(path: Any, autofocus: bool = False) -> dict[str, Any]:
     """Read one Gotcha file as the arguments of a PhaseHistory.
 
     samples          complex64 (n_pulses, n_frequencies)
