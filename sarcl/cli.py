@@ -119,9 +119,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
-    rows.add_argument(
-        "--autofocus", action="store_true", help="apply the corrections a Gotcha file holds"
-    )
+    rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
     p.add_argument(
         "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
     )

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .progress import Bar
+from .job import Job
 
 if TYPE_CHECKING:
     from .grid import ImageGrid
@@ -18,25 +18,23 @@ if TYPE_CHECKING:
     from .phase_history import PhaseHistory
     from .report import Report
 
-Kept = list[str]
-Say = Callable[[str], None]
 
-
-def run(args: argparse.Namespace, kept: Kept) -> int:
+def run(args: argparse.Namespace, kept: list[str]) -> int:
     """Run the command in `args`; the names of finished files go to `kept` as they are finished."""
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
     warnings.showwarning = _show_warning
-    command: Callable[[argparse.Namespace, Kept], int] = {
+    command: Callable[[argparse.Namespace, Job], int] = {
         "devices": devices,
         "demo": demo,
         "simulate": simulate,
         "focus": focus,
         "measure": measure,
     }[args.command]
-    return command(args, kept)
+    with Job(kept) as job:
+        return command(args, job)
 
 
-def devices(args: argparse.Namespace, kept: Kept) -> int:
+def devices(args: argparse.Namespace, job: Job) -> int:
     """Print the table of devices, the one in use marked; 3 where none works."""
     import sarcl
 
@@ -53,24 +51,23 @@ def devices(args: argparse.Namespace, kept: Kept) -> int:
     return 0 if works else 3
 
 
-def demo(args: argparse.Namespace, kept: Kept) -> int:
+def demo(args: argparse.Namespace, job: Job) -> int:
     """The demo scene, its picture and how long each step took."""
     from . import demo as scene
 
-    with Bar() as bar:
-        scene.run(
-            args.out,
-            quick=args.quick,
-            device=args.device,
-            seed=args.seed,
-            progress=bar,
-            say=_say(bar),
-            kept=kept,
-        )
+    scene.run(
+        args.out,
+        quick=args.quick,
+        device=args.device,
+        seed=args.seed,
+        progress=job.progress,
+        say=job.say,
+        finished=job.finished,
+    )
     return 0
 
 
-def simulate(args: argparse.Namespace, kept: Kept) -> int:
+def simulate(args: argparse.Namespace, job: Job) -> int:
     """Echoes of a scenario, and their image where there is a grid or --image asks for one."""
     from .cl import open_device
     from .scenario import load
@@ -85,27 +82,25 @@ def simulate(args: argparse.Namespace, kept: Kept) -> int:
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
         options["tolerance"] = args.tolerance
-    with Bar() as bar:
-        say = _say(bar)
-        raw = scenario.simulate(**options, progress=bar)
-        _say_report("echo", raw.report, say)
-        raw.save(output)
-        kept.append(output)
-        say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
-        if images:
-            raw = _compressed(raw, say)
-            grid = grid or _default_grid(raw, say, {})
-            _focus(
-                lambda out: scenario.focus(raw, grid, out=out, progress=bar, **options),
-                images,
-                args.floor_db,
-                say,
-                kept,
-            )
+    raw = scenario.simulate(**options, progress=job.progress)
+    job.check()
+    raw.save(output)
+    job.finished(output)
+    _say_report("echo", raw.report, job)
+    job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
+    if images:
+        raw = _compressed(raw, job)
+        grid = grid or _default_grid(raw, job, {})
+        _focus(
+            lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
+            images,
+            args.floor_db,
+            job,
+        )
     return 0
 
 
-def focus(args: argparse.Namespace, kept: Kept) -> int:
+def focus(args: argparse.Namespace, job: Job) -> int:
     """An image from echoes."""
     import sarcl
 
@@ -123,33 +118,29 @@ def focus(args: argparse.Namespace, kept: Kept) -> int:
     if args.polarization is not None or args.channel is not None:
         raw = raw.select(polarization=args.polarization, channel=args.channel)
     device = open_device(args.device)
-    with Bar() as bar:
-        say = _say(bar)
-        say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
-        raw = _compressed(raw, say)
-        grid = grid or _default_grid(raw, say, given)
-        _focus(
-            lambda out: sarcl.backproject(
-                raw, grid, tolerance=args.tolerance, window=args.window, wrap=args.wrap,
-                max_bytes=args.max_bytes, out=out, device=device, progress=bar,
-            ),
-            outputs, args.floor_db, say, kept,
-        )  # fmt: skip
+    job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
+    raw = _compressed(raw, job)
+    grid = grid or _default_grid(raw, job, given)
+    _focus(
+        lambda out: sarcl.backproject(
+            raw, grid, tolerance=args.tolerance, window=args.window, wrap=args.wrap,
+            max_bytes=args.max_bytes, out=out, device=device, progress=job.progress,
+        ),
+        outputs, args.floor_db, job,
+    )  # fmt: skip
     return 0
 
 
-def measure(args: argparse.Namespace, kept: Kept) -> int:
+def measure(args: argparse.Namespace, job: Job) -> int:
     """The point response near a position, or at the brightest pixel, as a table."""
     import sarcl
 
     from .image import Image
-    from .point_table import brightest, point_table
 
     image = sarcl.read(args.image)
     if not isinstance(image, Image):
         raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
-    near = brightest(image) if args.near is None else args.near
-    print(point_table(sarcl.measure(image, near=tuple(near)), image.gain))
+    print(sarcl.measure(image, near=args.near))
     return 0
 
 
@@ -180,65 +171,52 @@ def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
     return given
 
 
-def _default_grid(raw: PhaseHistory, say: Say, given: dict[str, Any]) -> ImageGrid:
+def _default_grid(raw: PhaseHistory, job: Job, given: dict[str, Any]) -> ImageGrid:
     from .default_grid import default_grid
 
     chosen = default_grid(raw, **given)
     grid = chosen.grid
     assert grid.spacing is not None and grid.center is not None
     pixels = f"{grid.shape[0]} x {grid.shape[1]} pixels of {grid.spacing[0]:.4g} x {grid.spacing[1]:.4g} m"
-    say(f"grid: {pixels} about ({', '.join(f'{c:.6g}' for c in grid.center)})")
+    job.say(f"grid: {pixels} about ({', '.join(f'{c:.6g}' for c in grid.center)})")
     if chosen.why:
-        say(f"      from the data: {chosen.why}")
+        job.say(f"      from the data: {chosen.why}")
     return grid
 
 
-def _compressed(raw: PhaseHistory, say: Say) -> PhaseHistory:
+def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
     import sarcl
 
     if raw.compressed:
         return raw
-    say("the echoes still have the pulse's spectrum: compressing them first")
+    job.say("the echoes still have the pulse's spectrum: compressing them first")
     return sarcl.compress(raw)
 
 
-def _focus(
-    make: Callable[[str | None], Image], outputs: list[str], floor_db: float, say: Say, kept: Kept
-) -> None:
+def _focus(make: Callable[[str | None], Image], outputs: list[str], floor_db: float, job: Job) -> None:
     """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
     file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
     image = make(file)
-    _say_report("focus", image.report, say)
     if file is not None:
-        kept.append(file)
+        job.finished(file)
+    _say_report("focus", image.report, job)
     for path in outputs:
         if path != file:
             image.save(path, floor_db=floor_db)
-            kept.append(path)
-        say(f"wrote {path}")
+            job.finished(path)
+        job.say(f"wrote {path}")
 
 
-def _say_report(what: str, report: Report | None, say: Say) -> None:
+def _say_report(what: str, report: Report | None, job: Job) -> None:
     if report is None:
         return
     steps = ", ".join(f"{stage} {s:.1f}" for stage, s in report.seconds.items() if s >= 0.05)
-    error = (
-        "" if report.measured_error is None else f", {report.measured_error:.1e} measured at random places"
-    )
-    say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}{f' ({steps})' if steps else ''}")
-    error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted{error}"
-    say(f"{'':{len(what)}}  {error}")
+    job.say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}" + (steps and f" ({steps})"))
+    error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted"
+    if report.measured_error is not None:
+        error += f", {report.measured_error:.1e} measured at random places"
+    job.say(f"{'':{len(what)}}  {error}")
     logging.getLogger("sarcl").info("%s", report)
-
-
-def _say(bar: Bar) -> Say:
-    """Print, with the bar out of the way."""
-
-    def say(text: str) -> None:
-        bar.wipe()
-        print(text, flush=True)
-
-    return say
 
 
 def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:

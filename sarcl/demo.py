@@ -82,11 +82,11 @@ def run(
     seed: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
     say: Callable[[str], None] = print,
-    kept: list[str] | None = None,
+    finished: Callable[[Path], None] = lambda path: None,
 ) -> Image:
     """Simulate and focus the demo scene; write demo.png and demo_raw.h5 into the folder `out`.
 
-    say   is given each line of what happened; kept gets the name of each finished file
+    say   is called with each line of what happened, finished with each file that is complete
     Returns the image. OSError when `out` cannot be made or written, before any work.
     """
     from . import demo_scene
@@ -95,7 +95,6 @@ def run(
     from .echo import echo
 
     start = time.perf_counter()
-    kept = [] if kept is None else kept
     picture, raw_file = _outputs(Path(out))
     opened = open_device(device)
     setting = QUICK if quick else FULL
@@ -119,9 +118,9 @@ def run(
     band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
     title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
     image.save(picture, floor_db=FLOOR_DB, title=title)
-    kept.append(str(picture))
+    finished(picture)
     raw.save(raw_file)
-    kept.append(str(raw_file))
+    finished(raw_file)
     clock.lap("write", f"{picture}, {raw_file.name}")
     say(f"device  {opened.info.name}, {opened.info.platform}")
     say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")

@@ -1,7 +1,7 @@
 """Point response: where a reflector is, how sharp it is and how high its side lobes stand.
 
-    range        the direction on the grid's plane in which the two-way path grows fastest: its gradient, projected
-    cross-range  the direction on the plane that is perpendicular to it
+    range        on the grid's plane, where the two-way path grows fastest: its gradient, projected
+    cross-range  on the plane, perpendicular to range
 
 Cuts along both go through the interpolated peak (surface.py). docs/measure.md states every convention;
 reference/quality.py measures an exact image by brute force.
@@ -17,10 +17,12 @@ import numpy as np
 
 from . import check
 from .image import Image
-from .surface import Surface, path_gradient
+from .peaks import brightest, peak_near, place
+from .surface import Surface, antennas
 
 REACH = 10.0  # IRW on each side in which side lobes count
 LEAST_REACH = 3.0
+MARGIN = 18  # pixels that the interpolator may want on each side
 STEPS = 32  # points of a cut in one IRW
 NAMES = "range", "cross-range"
 
@@ -55,7 +57,7 @@ class PointResponse:
             ("lobes within +-", self.reach, ".1f", "IRW"),
         )
         lines = [
-            f"position         {_place(self.position, 4)} m",
+            f"position         {place(self.position, 4)} m",
             f"peak             {abs(self.peak):.6g} at {np.angle(self.peak):.4f} rad",
             f"peak/gain        {amplitude:.6g}, RCS {20 * np.log10(amplitude):.2f} dBsm",
             f"{'':15}{NAMES[0]:>12}{NAMES[1]:>14}",
@@ -68,19 +70,20 @@ def measure(image: Image, near: Any = None) -> PointResponse:
     """Position, resolution and side lobes of one point of a complex image on a plane.
 
     image  with frequency (Hz) and tx, rx (m; rx None is tx); of its data only what is needed is read
-    near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it is
-           measured. Default: the brightest pixel
+    near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it
+           is measured. Default: the brightest pixel
 
-    Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR is the highest lobe
-    outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or as far as
-    the image holds both sides. A uniform aperture has 0.886, -13.26 dB and -10.22 dB.
-    ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or Inf, a
-    `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the response of a
-    stronger one, and a grid coarser than the resolution: where the response fills more than +-0.42 cycles a pixel.
+    Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR the highest
+    lobe outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or
+    as far as the image holds both sides. A uniform aperture has -13.26 and -10.22 dB.
+    ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or
+    Inf, a `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the
+    response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
+    than +-0.42 of the +-0.5 cycles a pixel.
     Source: DESIGN.md's image equation for the carrier, TRUTH.md for the figures.
     """
     _refuse(image)
-    row, column = _brightest(image) if near is None else _peak_near(image, near)
+    row, column = brightest(image) if near is None else peak_near(image, near)
     axes = _axes(image, row, column)
     surface = Surface.about(image, row, column)
     assert image.grid.spacing is not None
@@ -95,8 +98,8 @@ def measure(image: Image, near: Any = None) -> PointResponse:
         if made.pslr >= 0:
             stronger = position + made.lobe * axis
             raise ValueError(
-                f"the peak at {_place(position)} lies in the response of something {made.pslr:.1f} dB stronger, "
-                f"{abs(made.lobe):.3g} m away in {name}; measure that with near={_place(stronger)}"
+                f"the peak at {place(position)} lies in the response of something {made.pslr:.1f} dB "
+                f"stronger, {abs(made.lobe):.3g} m away in {name}; measure that with near={place(stronger)}"
             )
         return made
 
@@ -117,8 +120,9 @@ def _refuse(image: Image) -> None:
     if not image.is_complex:
         raise ValueError("the image is detected (multilooked), its phase is gone; measure the complex image")
     if not image.grid.is_plane:
-        raise ValueError("the grid lists its points and has no rows to cut along; focus on an ImageGrid.plane")
-    for name, what in (("frequency", "the centre frequency, Hz"), ("tx", "the antenna at mid-aperture, m (3,)")):
+        raise ValueError("the grid lists its points; cuts need rows and columns: focus on an ImageGrid.plane")
+    wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
+    for name, what in wanted.items():
         if getattr(image, name) is None:
             raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {what}")
 
@@ -126,73 +130,19 @@ def _refuse(image: Image) -> None:
 def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors of range and cross-range on the plane, at a pixel."""
     normal = image.grid.normal
-    gradient = path_gradient(image, image.grid.at(row, column))
+    point = image.grid.at(row, column)
+    gradient = -np.sum(
+        [check.direction("antenna less point", end - point) for end in antennas(image)], axis=0
+    )
     along = gradient - (gradient @ normal) * normal
     length = np.linalg.norm(along)
     if length < 1e-3:
-        raise ValueError("the antennas stand straight above the grid, where range has no direction; tilt the grid")
+        raise ValueError("the antennas stand straight above the grid: range has no direction on it; tilt it")
     return along / length, np.cross(normal, along / length)
 
 
-def _brightest(image: Image) -> tuple[int, int]:
-    """Pixel of the largest modulus; rows are read in blocks."""
-    best, at = 0.0, None
-    n_rows, n_columns = image.grid.shape
-    block = max(1, 2**22 // n_columns)
-    for first in range(0, n_rows, block):
-        part = np.asarray(image.data[first : first + block])
-        check.finite("image data", part, first_row=first)
-        level = np.abs(part)
-        i = int(level.argmax())
-        if level.flat[i] > best:
-            best, at = float(level.flat[i]), (first + i // n_columns, i % n_columns)
-    if at is None:
-        raise ValueError("the image is zero everywhere; there is no point to measure")
-    return at
-
-
-def _peak_near(image: Image, near: Any) -> tuple[int, int]:
-    """Pixel of the highest peak within two resolution cells of `near`; a cell is what its own half power spans."""
-    near = check.array("near", near, np.float64, (3,))
-    shape = np.array(image.grid.shape)
-    index = image.grid.index(near)
-    start = np.rint(index).astype(int)
-    if (start < 0).any() or (start >= shape).any():
-        raise ValueError(f"near {_place(near)} is pixel {_place(index, 1)}, outside of the image of {image.grid.shape}")
-    radius = np.array([2, 2])
-    while True:
-        low, high = np.maximum(start - 4 * radius, 0), np.minimum(start + 4 * radius + 1, shape)
-        level = np.abs(np.asarray(image.data[low[0] : high[0], low[1] : high[1]]))
-        if not np.isfinite(level).all():
-            raise ValueError(f"image data are NaN or Inf near {_place(near)}; every value must be finite")
-        a, b = np.maximum(start - radius, 0) - low, start + radius + 1 - low
-        i, j = np.unravel_index(level[a[0] : b[0], a[1] : b[1]].argmax(), level[a[0] : b[0], a[1] : b[1]].shape)
-        i, j = int(i + a[0]), int(j + a[1])
-        if level[i, j] == 0:
-            raise ValueError(f"the image is zero around near {_place(near)}; there is no point to measure")
-        wanted = 2 * np.array([_run(level[:, j], i), _run(level[i], j)])
-        if (wanted <= radius).all():
-            break
-        radius = np.maximum(radius, wanted)
-    if level[i, j] < level[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].max():
-        uphill = image.grid.at(i + low[0], j + low[1])
-        raise ValueError(
-            f"no peak lies within two resolution cells of near {_place(near)}; the image still rises at "
-            f"{_place(uphill)}: move near to the point, or leave it out to measure the brightest"
-        )
-    return i + int(low[0]), j + int(low[1])
-
-
-def _run(level: np.ndarray, at: int) -> int:
-    """Pixels about `at` in one piece where the power is at least half of that at `at`."""
-    below = level**2 < level[at] ** 2 / 2
-    after = below[at:].argmax() if below[at:].any() else len(level) - at
-    before = below[at::-1].argmax() if below[at::-1].any() else at + 1
-    return int(after + before - 1)
-
-
-def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, np.ndarray], step: float) -> np.ndarray:
-    """Position of the maximum near `start`: parabolas through log power at -step, 0, step, on each axis in turn."""
+def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, ...], step: float) -> np.ndarray:
+    """The maximum near `start`, m (3,): parabolas through log |I| at -step, 0, step, on each axis in turn."""
     x = np.array(start)
     for _ in range(40):
         before = x
@@ -206,7 +156,7 @@ def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, np.ndarr
             return x
         if np.linalg.norm(surface.image.grid.index(x) - surface.image.grid.index(start)) > 3:
             break
-    raise ValueError(f"no peak was found near {_place(start)}: the image only rises away from it; choose another near")
+    raise ValueError(f"no peak was found at {place(start)}: the image only rises away from it")
 
 
 @dataclass(frozen=True)
@@ -224,25 +174,32 @@ def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, na
     reach = min(REACH, room / irw)
     if not reach >= LEAST_REACH:
         raise ValueError(
-            f"in {name} the image holds less than {LEAST_REACH:g} IRW on each side of the peak; focus a grid that "
-            f"reaches at least {REACH:g} resolution cells beyond it"
+            f"in {name} the image holds less than {LEAST_REACH:g} IRW on each side of the peak; focus a grid "
+            f"that reaches {REACH:g} resolution cells and {MARGIN} pixels beyond it"
         )
     n = int(np.ceil(reach * STEPS))
     t = np.linspace(-reach * irw, reach * irw, 2 * n + 1)
     p = power(t)
     rising = np.diff(p) > 0
     if not (rising[n:].any() and (~rising[:n]).any()):
-        raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW; the image is not focused there")
+        raise ValueError(
+            f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused"
+        )
     right, left = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
-    inside = np.trapezoid(p[left : right + 1])
+    inside = _integral(p[left : right + 1])
     lobes = np.where((t < t[left]) | (t > t[right]), p, 0)
     i = int(lobes.argmax())
     highest, lobe = lobes[i], t[i]
     if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # the top of a parabola through three points
         bend = p[i - 1] - 2 * p[i] + p[i + 1]
         highest -= (p[i - 1] - p[i + 1]) ** 2 / (8 * bend)
-    decibels = 10 * np.log10(np.array([highest / p[n], np.trapezoid(p) / inside - 1]))
+    decibels = 10 * np.log10(np.array([highest / p[n], _integral(p) / inside - 1]))
     return _Cut(irw, float(decibels[0]), float(decibels[1]), reach, float(lobe))
+
+
+def _integral(p: np.ndarray) -> float:
+    """Trapezoid rule at unit steps."""
+    return float(p.sum() - (p[0] + p[-1]) / 2)
 
 
 def _half_power(power: Callable[[np.ndarray], np.ndarray], room: float, step: float) -> float:
@@ -260,7 +217,3 @@ def _half_power(power: Callable[[np.ndarray], np.ndarray], room: float, step: fl
             return float(t[int(below.argmax())])
         start = float(t[-1])
     return np.inf
-
-
-def _place(position: np.ndarray, digits: int = 3) -> str:
-    return "(" + ", ".join(f"{x:.{digits}f}" for x in position) + ")"

@@ -17,11 +17,11 @@ def weights(window: Any, n: int) -> np.ndarray:
     window  None (all ones), "hamming" or ("taylor", sidelobe_db, nbar), sidelobe_db > 0 below the main lobe
     n       number of cells
 
-    The continuous window w(u), u in [-1/2, 1/2], is taken at the cells' middles u = (i + 1/2)/n - 1/2, so that its
-    width is that of the band, n cells, whatever n is (sampled from edge to edge it would be n - 1). w(0) = 1; the
-    samples are not scaled further, so their sum is what `Image.gain` counts.
+    The continuous window w(u), |u| <= 1/2, is taken at the cells' middles u = (i + 1/2)/n - 1/2, so that it
+    spans the band of n cells whatever n is (sampled from edge to edge it would span n - 1). w(0) = 1; the
+    samples are not scaled further: `Image.gain` counts their sum.
     ValueError names the window it was given and lists those there are.
-    Source: TRUTH.md for the figures; Carrara, Goodman and Majewski, "Spotlight SAR", 1995, appendix D, for Taylor.
+    Source: Carrara, Goodman and Majewski, "Spotlight Synthetic Aperture Radar", 1995, appendix D.
     """
     n = check.count("n", n)
     name, parameters = _name(window)
@@ -42,7 +42,7 @@ def parse(text: str) -> Any:
         window: Any = (name, *(float(x) for x in rest)) if rest else name
         _name(window)
     except ValueError as exc:
-        raise ValueError(f"window {text!r}: wanted none, hamming or taylor:DB:NBAR such as taylor:35:5 ({exc})") from None
+        raise ValueError(f"window {text!r}: wanted none, hamming or taylor:35:5 (dB, nbar); {exc}") from None
     return window
 
 
@@ -60,7 +60,7 @@ def _name(window: Any) -> tuple[str, tuple[float, ...]]:
 
 
 def _taylor(u: np.ndarray, sidelobe_db: float, nbar: float) -> np.ndarray:
-    """w(u) = 1 + 2 sum_m F_m cos(2 pi m u), over w(0): nbar - 1 side lobes a side near -sidelobe_db, then falling."""
+    """w(u) = 1 + 2 sum_m F_m cos(2 pi m u), over w(0); nbar - 1 lobes a side near -sidelobe_db."""
     a2 = (np.arccosh(10 ** (sidelobe_db / 20)) / np.pi) ** 2
     m = np.arange(1, int(nbar))
     stretch = nbar**2 / (a2 + (nbar - 0.5) ** 2)
@@ -70,6 +70,7 @@ def _taylor(u: np.ndarray, sidelobe_db: float, nbar: float) -> np.ndarray:
     made = (1 + 2 * np.cos(2 * np.pi * u[:, None] * m) @ f) / (1 + 2 * f.sum())
     if (made <= 0).any():
         raise ValueError(
-            f"taylor window of {sidelobe_db:g} dB with nbar {nbar:g} has weights below zero; raise nbar or lower sidelobe_db"
+            f"taylor window of {sidelobe_db:g} dB with nbar {nbar:g} has weights below zero; "
+            "raise nbar or lower sidelobe_db"
         )
     return made

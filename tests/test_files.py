@@ -468,7 +468,7 @@ def test_a_gotcha_correction_of_the_wrong_length_is_named(tmp_path):
     data = a_gotcha()
     data["af"]["r_correct"] = data["af"]["r_correct"][:2]
     with pytest.raises(ValueError, match=r"az001_HH\.mat: r_correct has shape"):
-        sarcl.read(write_gotcha(tmp_path, data))
+        sarcl.read(write_gotcha(tmp_path, data), autofocus=True)
 
 
 @pytest.mark.parametrize("name", ["fp", "freq", "x", "r0"])

@@ -12,7 +12,8 @@ def measure(value: Callable[[np.ndarray], np.ndarray], near: Any, axes: Any, cel
     """Position, irw, pslr, islr and peak of an exact image, pairs in the order of `axes`.
 
     value  complex image (n,) at any positions, m (n, 3)
-    near   within a cell of the peak, m (3,); axes: two unit vectors (2, 3); cells: about the resolution along them, m (2,)
+    near   within a cell of the peak, m (3,)
+    axes   unit vectors, (2, 3); cells: about the resolution along them, m (2,)
     """
     peak = np.array(near, np.float64)
     for zoom in 2.0 ** -np.arange(14):  # the best of 7 x 7 positions, ever closer together
@@ -23,12 +24,13 @@ def measure(value: Callable[[np.ndarray], np.ndarray], near: Any, axes: Any, cel
     for axis, cell in zip(axes, cells, strict=True):
         t = np.linspace(-20 * cell, 20 * cell, 40 * 200 + 1)
         p = np.abs(value(peak + t[:, None] * axis)) ** 2
-        low = np.flatnonzero((p[1:-1] < p[:-2]) & (p[1:-1] < p[2:])) + 1
-        null = low[low < 4000].max(), low[low > 4000].min()
-        main, half = slice(null[0], null[1] + 1), p >= p[4000] / 2
-        out["irw"].append(half[main].sum() * (t[1] - t[0]))
-        near_by = np.abs(t) <= 10 * out["irw"][-1]
-        lobes = p[near_by & ((t < t[null[0]]) | (t > t[null[1]]))]
-        out["pslr"].append(10 * np.log10(lobes.max() / p[4000]))
-        out["islr"].append(10 * np.log10(lobes.sum() / p[main].sum()))
+        top = len(t) // 2
+        nulls = np.flatnonzero((p[1:-1] < p[:-2]) & (p[1:-1] < p[2:])) + 1
+        left, right = nulls[nulls < top].max(), nulls[nulls > top].min()
+        half = np.interp(p[top] / 2, p[left:top], t[left:top])
+        irw = np.interp(-p[top] / 2, -p[top:right], t[top:right]) - half
+        lobes = p[(np.abs(t) <= 10 * irw) & ((t < t[left]) | (t > t[right]))]
+        out["irw"].append(irw)
+        out["pslr"].append(10 * np.log10(lobes.max() / p[top]))
+        out["islr"].append(10 * np.log10(lobes.sum() / p[left : right + 1].sum()))
     return out
