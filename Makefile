@@ -17,7 +17,7 @@ test: ready  ## the tests
 	@.venv/bin/python -m pytest $(ARGS)
 
 bench: ready  ## speed, printed with the error achieved
-	@.venv/bin/sarcl bench $(ARGS)
+	@.venv/bin/python bench/backproject.py $(ARGS)
 
 lint: ready-dev  ## style, format and types
 	.venv/bin/python -m ruff check .

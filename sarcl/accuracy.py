@@ -103,9 +103,7 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     return (waves * kernel).sum(axis=(-1, -2))
 
 
-def choose_interpolator(
-    error: float, n_samples: int, pairs_per_row: float
-) -> tuple[Interpolator, int, float]:
+def choose_interpolator(error: float, n_samples: int, pairs_per_row: float) -> tuple[Interpolator, int, float]:
     """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
 
     The cost of a contribution is in units of one with the hat; making profiles is counted in.
@@ -179,9 +177,7 @@ def curvature_rounding(radius: float, distance: float, frequency: float) -> floa
     return k * min(radius**2 / (2 * max(distance, 1e-300)), radius) * 4 * U32
 
 
-def range_error(
-    radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int
-) -> float:
+def range_error(radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int) -> float:
     """Phase error, rad, of differential ranges in range mode 0, 1 or 2 of kernels/phase.clh."""
     if mode == 2:
         return phase_rounding(0.0, frequency, True)

@@ -16,6 +16,7 @@ from .image import Image
 from .phase_history import PhaseHistory
 from .planning import Clock, Plan, cheapest
 from .report import Report
+from .target import Target
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 VECTORS = 4  # vectors of pixels a work-item
@@ -76,7 +77,7 @@ def backproject(
     clock.lap("plan")
 
     with ExitStack() as stack:
-        target = _Target(grid, out, stack)
+        target = Target(grid, out, stack)
         run = _Run(opened, raw, antennas, plan, tiling, wrap, "range window" in skips)
         shaped = sample_weight * profiles.correction(plan.interpolator, raw.n_samples, plan.length)
         skipped = run.focus(shaped, row_weight, budget, target, clock, progress)
@@ -109,9 +110,7 @@ def backproject(
         return target.image(gain=gain, report=report, **geometry)
 
 
-def make_plan(
-    raw: PhaseHistory, antennas: Antennas, grid: ImageGrid, tolerance: float
-) -> tuple[Plan, GridTiling]:
+def make_plan(raw: PhaseHistory, antennas: Antennas, grid: ImageGrid, tolerance: float) -> tuple[Plan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses."""
     tilings = {side**2: GridTiling(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
@@ -197,7 +196,7 @@ class _Run:
         sample_weight: np.ndarray,
         row_weight: np.ndarray,
         budget: float,
-        target: _Target,
+        target: Target,
         clock: Clock,
         progress: Progress | None,
     ) -> int:
@@ -271,38 +270,6 @@ class _Run:
         return [*blocks, (first, self.tiling.n_bands)]
 
 
-class _Target:
-    """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
-
-    def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack) -> None:
-        self.grid, self.writer = grid, None
-        if out is None:
-            self.data = np.empty(grid.shape, np.complex64)
-        elif isinstance(out, str) or hasattr(out, "__fspath__"):
-            from .files import store
-
-            self.writer = store.image_writer(out, grid, np.complex64)
-            stack.callback(self.writer.abandon)  # does nothing once finished
-            self.data = self.writer.data
-        else:
-            if tuple(out.shape) != tuple(grid.shape) or np.dtype(out.dtype).kind != "c":
-                raise ValueError(f"out has shape {out.shape} and type {out.dtype}, wanted complex of {grid.shape}")
-            self.data = out
-        # listed points arrive along a curve: a file or a caller's array gets them when all are there
-        direct = grid.is_plane or out is None
-        self.flat = self.data if grid.is_plane else np.empty(grid.size, np.complex64)
-        self.copy = not direct or not grid.is_plane
-
-    def finish(self) -> None:
-        if self.copy:
-            self.data[...] = self.flat.reshape(self.grid.shape)
-
-    def image(self, **fields: Any) -> Image:
-        if self.writer is not None:
-            return self.writer.finish(**fields)
-        return Image(self.data, self.grid, **fields)
-
-
 def _measure_error(
     raw: PhaseHistory, grid: ImageGrid, sample_weight: np.ndarray, row_weight: np.ndarray, wrap: bool, data: Any
 ) -> float:
@@ -313,5 +280,9 @@ def _measure_error(
     index = np.unravel_index(picked, grid.shape)
     positions = grid.at(*index) if grid.listed is None else grid.listed[index]
     wanted, spread = exact(raw, positions, sample_weight, row_weight, wrap)
-    got = np.asarray(data)[index] if isinstance(data, np.ndarray) else np.array([data[i] for i in zip(*index, strict=True)])
-    return float(np.linalg.norm(got - wanted) / max(np.linalg.norm(wanted), spread))
+    got = (
+        np.asarray(data)[index]
+        if isinstance(data, np.ndarray)
+        else np.array([data[i] for i in zip(*index, strict=True)])
+    )
+    return float(np.linalg.norm(got - wanted)) / max(float(np.linalg.norm(wanted)), spread)

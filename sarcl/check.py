@@ -16,24 +16,27 @@ class SarclWarning(UserWarning):
 def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
     """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
 
-    The result is a read-only copy in C order: the caller's array stays as it is. ValueError names the argument,
-    its shape or the index of its first NaN or Inf.
+    The result is a read-only copy in C order: the caller's array stays as it is. ValueError names the
+    argument, its shape or the index of its first NaN or Inf.
     """
     out = converted(name, value, dtype)
     wanted = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
-    if out.ndim != len(shape) or any(
-        isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)
-    ):
+    if out.ndim != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)):
         raise ValueError(f"{name} has shape {out.shape}, wanted {wanted}")
     if out.size == 0:
         raise ValueError(f"{name} is empty (shape {out.shape}), wanted {wanted} with at least one element")
     finite(name, out)
-    out.flags.writeable = False
-    return out
+    return sealed(out)
+
+
+def sealed(made: np.ndarray) -> np.ndarray:
+    """`made` itself, read-only from here on: for arrays that nobody else holds, so that no noun copies it."""
+    made.flags.writeable = False
+    return made
 
 
 def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
-    """A copy of `value` as an array of `dtype` in C order; ValueError where that would change what it says."""
+    """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
     wanted = np.dtype(dtype)
     try:
         given = np.asarray(value)
@@ -47,7 +50,8 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
             raise TypeError("not all are whole numbers")
         return np.array(given, dtype=wanted, order="C")
     except (TypeError, ValueError, OverflowError) as exc:
-        raise ValueError(f"{name} must be numbers that fit {wanted}, got {value!r:.80} ({exc})") from None
+        shown = " ".join(repr(value).split())
+        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({exc})") from None
 
 
 def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:

@@ -60,7 +60,7 @@ def _probe() -> tuple[tuple[DeviceInfo, Any], ...]:
         platforms = pyopencl.get_platforms()
     except pyopencl.Error:  # the loader knows no platform
         return ()
-    found = []
+    found: list[tuple[DeviceInfo, Any]] = []
     for platform in platforms:
         try:
             listed = platform.get_devices()
@@ -91,7 +91,7 @@ def _try_device(index: int, platform: Any, device: Any) -> DeviceInfo:
             context = pyopencl.Context([device])
             queue = pyopencl.CommandQueue(context)
             x = np.arange(1, 9, dtype=dtype) ** 2
-            with _quiet():
+            with quiet():
                 program = pyopencl.Program(context, _TRIAL).build([f"-DFP64={int(dtype is np.float64)}"])
             buffer = pyopencl.Buffer(context, pyopencl.mem_flags.COPY_HOST_PTR, hostbuf=x)
             program.trial(queue, x.shape, None, buffer)
@@ -142,8 +142,8 @@ def open_device(choice: Any = None) -> Device:
             raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
         working = matching
     order = {"gpu": 0, "accelerator": 1, "cpu": 2}
-    info, raw = min(working, key=lambda pair: (order[pair[0].kind], -pair[0].units, pair[0].index))
-    return _open(info.index)
+    best = min((i for i, _ in working), key=lambda i: (order[i.kind], -i.units, i.index))
+    return _open(best.index)
 
 
 def _matches(info: DeviceInfo, choice: Any) -> bool:
@@ -165,7 +165,9 @@ def threads() -> int:
     text = os.environ.get("SARCL_THREADS", "")
     if text and not (text.isdigit() and int(text) > 0):
         raise ValueError(f"SARCL_THREADS is {text!r}; give a whole number of at least 1, or unset it")
-    return int(text) if text else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    return (
+        int(text) if text else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
+    )
 
 
 @functools.cache
@@ -220,7 +222,7 @@ class Device:
 
         options = [f"-D{k}={int(v)}" for k, v in sorted(macros.items())]
         try:
-            with _quiet():
+            with quiet():
                 program = pyopencl.Program(self.context, source(file)).build(options)
         except pyopencl.Error as exc:
             raise RuntimeError(
@@ -234,8 +236,8 @@ class Device:
         import pyopencl
 
         array = np.ascontiguousarray(array)
-        flags = pyopencl.mem_flags.READ_ONLY
-        flags |= pyopencl.mem_flags.USE_HOST_PTR if self.is_cpu else pyopencl.mem_flags.COPY_HOST_PTR
+        memory = pyopencl.mem_flags
+        flags = memory.READ_ONLY | (memory.USE_HOST_PTR if self.is_cpu else memory.COPY_HOST_PTR)
         self._check_size(array.nbytes)
         with self._explain("a buffer", array.nbytes):
             return pyopencl.Buffer(self.context, flags, hostbuf=array)
@@ -246,7 +248,7 @@ class Device:
 
         buffer = self.empty(nbytes)
         with self._explain("a buffer", nbytes):
-            pyopencl.enqueue_fill_buffer(self.queue, buffer, np.uint8(0), 0, nbytes)
+            pyopencl.enqueue_fill_buffer(self.queue, buffer, np.zeros(1, np.uint8), 0, nbytes)
         return buffer
 
     def empty(self, nbytes: int) -> Any:
@@ -349,13 +351,11 @@ def wide(values: np.ndarray) -> np.ndarray:
 
 def size_text(nbytes: float) -> str:
     """Bytes as text a person reads: "6.1 GB"."""
-    for unit in ("B", "kB", "MB", "GB"):
-        if nbytes < 1000:
-            break
-        nbytes /= 1000
-    else:
-        unit = "TB"
-    return f"{nbytes:.3g} {unit}"
+    units = ("B", "kB", "MB", "GB", "TB")
+    power = 0
+    while nbytes >= 1000 and power < len(units) - 1:
+        nbytes, power = nbytes / 1000, power + 1
+    return f"{nbytes:.3g} {units[power]}"
 
 
 def _first_line(exc: BaseException) -> str:
@@ -364,7 +364,7 @@ def _first_line(exc: BaseException) -> str:
 
 
 @contextmanager
-def _quiet() -> Iterator[None]:
+def quiet() -> Iterator[None]:
     """Compilers that succeed may still chat; that is not for the user."""
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 import argparse
 import os
+import re
 import sys
 from typing import Any, NoReturn
 
@@ -23,6 +24,10 @@ FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED = 1, 2, 3, 130
 
 
 class _Parser(argparse.ArgumentParser):
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # -1e3 too is a number, not an option
+
     def error(self, message: str) -> NoReturn:
         self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
 
@@ -56,25 +61,19 @@ def parser() -> argparse.ArgumentParser:
     _focus(command("focus", "turn echoes into an image", device))
     measure = command("measure", "measure a point response: resolution and side lobes")
     measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
-    measure.add_argument(
-        "--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel"
-    )
+    measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
     return top
 
 
 def _demo(p: argparse.ArgumentParser) -> None:
-    p.add_argument(
-        "--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)"
-    )
+    p.add_argument("--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)")
     p.add_argument("--quick", action="store_true", help="coarser and smaller, in a few seconds")
     p.add_argument("--seed", type=int, default=0, help="of the ground's random heights (default 0)")
 
 
 def _simulate(p: argparse.ArgumentParser) -> None:
     p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/scenarios.md")
-    p.add_argument(
-        "-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)"
-    )
+    p.add_argument("-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)")
     p.add_argument(
         "--image",
         action="append",
@@ -103,9 +102,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m")
     where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="pixels")
     where.add_argument("--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="of rows and columns, m")
-    where.add_argument(
-        "--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="of the plane (default 0 0 1)"
-    )
+    where.add_argument("--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="of the plane (default 0 0 1)")
     where.add_argument(
         "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
     )
@@ -113,9 +110,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     how.add_argument("--tolerance", type=float, default=1e-3, help="relative error allowed (default 1e-3)")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
     how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
-    how.add_argument(
-        "--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G"
-    )
+    how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
@@ -165,17 +160,17 @@ def size(text: str) -> float:
 
 def main(argv: list[str] | None = None) -> int:
     """Run a command; returns the exit status."""
-    kept: list[str] = []  # files that are complete, for whoever interrupts
+    outputs: Any = {}
     debug = "--debug" in (sys.argv[1:] if argv is None else argv)
     try:
         args = parser().parse_args(argv)
         from . import commands
 
-        return commands.run(args, kept)
+        return commands.run(args, outputs)
     except KeyboardInterrupt:
         if debug:
             raise
-        print(f"sarcl: interrupted; {_kept(kept)}", file=sys.stderr)
+        print(f"sarcl: interrupted; {_kept(outputs)}", file=sys.stderr)
         return INTERRUPTED
     except BrokenPipeError:  # whoever read our output has left: `sarcl devices | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
@@ -191,17 +186,17 @@ def main(argv: list[str] | None = None) -> int:
         return status
 
 
-def _kept(kept: list[str]) -> str:
-    return (
-        f"{' and '.join(kept)} {'is' if len(kept) == 1 else 'are'} complete, nothing else was written"
-        if kept
-        else ("nothing was written")
-    )
+def _kept(outputs: Any) -> str:
+    if not outputs:
+        return "nothing was written"
+    from .job import complete
+
+    names = complete(outputs)
+    verb = "is" if len(names) == 1 else "are"
+    return f"{' and '.join(names)} {verb} complete, nothing else was written" if names else "nothing was written"
 
 
 def _status(exc: Exception) -> int:
-    if any(
-        c.__name__ == "NoDeviceError" for c in type(exc).__mro__
-    ):  # its module need not be loaded for this
+    if any(c.__name__ == "NoDeviceError" for c in type(exc).__mro__):  # its module need not be loaded for this
         return NO_DEVICE
     return BAD_INPUT if isinstance(exc, (ValueError, TypeError, OSError, MemoryError)) else FAILED

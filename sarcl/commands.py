@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from .job import Job
+from .job import Job, Outputs
 
 if TYPE_CHECKING:
     from .grid import ImageGrid
@@ -19,8 +19,8 @@ if TYPE_CHECKING:
     from .report import Report
 
 
-def run(args: argparse.Namespace, kept: list[str]) -> int:
-    """Run the command in `args`; the names of finished files go to `kept` as they are finished."""
+def run(args: argparse.Namespace, outputs: Outputs) -> int:
+    """Run the command in `args`; `outputs` gets what each output path is before the work."""
     logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
     warnings.showwarning = _show_warning
     command: Callable[[argparse.Namespace, Job], int] = {
@@ -30,7 +30,7 @@ def run(args: argparse.Namespace, kept: list[str]) -> int:
         "focus": focus,
         "measure": measure,
     }[args.command]
-    with Job(kept) as job:
+    with Job(outputs) as job:
         return command(args, job)
 
 
@@ -55,6 +55,8 @@ def demo(args: argparse.Namespace, job: Job) -> int:
     """The demo scene, its picture and how long each step took."""
     from . import demo as scene
 
+    for path in scene.outputs(args.out):
+        job.expect(path)
     scene.run(
         args.out,
         quick=args.quick,
@@ -62,7 +64,6 @@ def demo(args: argparse.Namespace, job: Job) -> int:
         seed=args.seed,
         progress=job.progress,
         say=job.say,
-        finished=job.finished,
     )
     return 0
 
@@ -76,8 +77,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
-    _check_outputs([output], (".h5", ".hdf5"))
-    _check_outputs(images, (".png", ".h5", ".hdf5"))
+    _expect(job, [output], (".h5", ".hdf5"))
+    _expect(job, images, (".png", ".h5", ".hdf5"))
     grid = scenario.build_grid() if scenario.grid is not None else None
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
@@ -85,7 +86,6 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     raw = scenario.simulate(**options, progress=job.progress)
     job.check()
     raw.save(output)
-    job.finished(output)
     _say_report("echo", raw.report, job)
     job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
     if images:
@@ -109,7 +109,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     from .scenario import load
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
-    _check_outputs(outputs, (".png", ".h5", ".hdf5"))
+    _expect(job, outputs, (".png", ".h5", ".hdf5"))
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
     raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
@@ -144,16 +144,13 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     return 0
 
 
-def _check_outputs(paths: list[str], suffixes: tuple[str, ...]) -> None:
-    from .files.paths import check_writable
-
+def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...]) -> None:
+    """Refuse outputs that cannot be written."""
     for path in paths:
         if Path(path).suffix.lower() not in suffixes:
             wanted = " or ".join(s for s in suffixes if s != ".hdf5")
-            raise ValueError(
-                f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}"
-            )
-        check_writable(path)
+            raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
+        job.expect(path)
     if len({Path(p).resolve() for p in paths}) < len(paths):
         raise ValueError(f"outputs {', '.join(paths)} name one file twice")
 
@@ -197,13 +194,10 @@ def _focus(make: Callable[[str | None], Image], outputs: list[str], floor_db: fl
     """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
     file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
     image = make(file)
-    if file is not None:
-        job.finished(file)
     _say_report("focus", image.report, job)
     for path in outputs:
         if path != file:
             image.save(path, floor_db=floor_db)
-            job.finished(path)
         job.say(f"wrote {path}")
 
 

@@ -6,6 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from .check import sealed
 from .phase_history import PhaseHistory
 from .waveform import Waveform
 
@@ -17,9 +18,13 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
     """
     if raw.compressed:
         return raw
-    pulse = waveform or raw.waveform
+    pulse = raw.waveform if waveform is None else waveform
     if pulse is None:
-        raise ValueError("raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)")
+        raise ValueError(
+            "raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)"
+        )
+    if not isinstance(pulse, Waveform):
+        raise TypeError(f"waveform is a {type(pulse).__name__}; give a sarcl.Waveform")
     samples = raw.read(0, raw.n_rows)
     out = np.empty_like(samples)
     n = np.arange(raw.n_samples)
@@ -29,4 +34,4 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
         if plan != last:  # rows mostly share one frequency plan
             matched, last = np.conj(pulse.pulse_spectrum(plan[0] + plan[1] * n)), plan
         out[p] = samples[p] * matched
-    return replace(raw, samples=out, waveform=pulse, compressed=True)
+    return replace(raw, samples=sealed(out), waveform=pulse, compressed=True)

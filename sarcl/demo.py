@@ -82,12 +82,11 @@ def run(
     seed: int = 0,
     progress: Callable[[str, int, int], None] | None = None,
     say: Callable[[str], None] = print,
-    finished: Callable[[Path], None] = lambda path: None,
 ) -> Image:
     """Simulate and focus the demo scene; write demo.png and demo_raw.h5 into the folder `out`.
 
-    say   is called with each line of what happened, finished with each file that is complete
-    Returns the image. OSError when `out` cannot be made or written, before any work.
+    say   is called with each line of what happened
+    Returns the image. OSError, before any work, when `out` cannot be made or written.
     """
     from . import demo_scene
     from .backproject import backproject
@@ -95,7 +94,7 @@ def run(
     from .echo import echo
 
     start = time.perf_counter()
-    picture, raw_file = _outputs(Path(out))
+    picture, raw_file = outputs(out)
     opened = open_device(device)
     setting = QUICK if quick else FULL
     clock = _Clock(say)
@@ -111,16 +110,12 @@ def run(
         progress=progress,
     )
     clock.lap("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
-    image = backproject(
-        raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress
-    )
+    image = backproject(raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress)
     clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
     band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
     title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
     image.save(picture, floor_db=FLOOR_DB, title=title)
-    finished(picture)
     raw.save(raw_file)
-    finished(raw_file)
     clock.lap("write", f"{picture}, {raw_file.name}")
     say(f"device  {opened.info.name}, {opened.info.platform}")
     say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")
@@ -128,10 +123,11 @@ def run(
     return image
 
 
-def _outputs(folder: Path) -> tuple[Path, Path]:
-    """The files to write, once it is sure that they can be."""
+def outputs(out: Any) -> tuple[Path, Path]:
+    """The files to write in the folder `out`, which is made where it is missing."""
     from .files.paths import check_writable
 
+    folder = Path(out)
     if folder.exists() and not folder.is_dir():
         raise NotADirectoryError(f"--out {str(folder)!r} is a file; give a folder")
     folder.mkdir(parents=True, exist_ok=True)

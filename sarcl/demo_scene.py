@@ -44,10 +44,7 @@ def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, materi
     position = (*at, float(relief(*at)))
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    parts = [
-        Scene.from_mesh(m, material=material, position=position, rotation=turn, roughness=ROUGH)
-        for m in meshes
-    ]
+    parts = [Scene.from_mesh(m, material=material, position=position, rotation=turn, roughness=ROUGH) for m in meshes]
     for part in parts[1:]:
         parts[0] = parts[0] + part
     return parts[0]
@@ -95,9 +92,7 @@ def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.nda
     return total / np.sqrt(24)
 
 
-def tree(
-    foot: tuple[float, float, float], height: float, random: np.random.Generator, leaves: int = 3500
-) -> Scene:
+def tree(foot: tuple[float, float, float], height: float, random: np.random.Generator, leaves: int = 3500) -> Scene:
     """A crown of leaves: small facets at random in an egg, denser towards its skin."""
     direction = random.normal(size=(leaves, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
@@ -133,9 +128,7 @@ def aeroplane() -> list[Any]:
         root, tip = [(3.2, 0.6), (-2.4, 0.6)], [(-1.9, 11.0), (-3.6, 11.0)]
         parts.append(slab(root, tip, side, up - 0.5, up + 0.5, 0.55, 0.15))
         parts.append(
-            slab(
-                [(-7.6, 0.2), (-10.0, 0.2)], [(-9.4, 4.3), (-10.7, 4.3)], side, up + 0.4, up + 0.6, 0.3, 0.12
-            )
+            slab([(-7.6, 0.2), (-10.0, 0.2)], [(-9.4, 4.3), (-10.7, 4.3)], side, up + 0.4, up + 0.6, 0.3, 0.12)
         )
         engine = trimesh.creation.cylinder(radius=0.75, height=3.2, sections=20)
         engine.apply_transform(trimesh.geometry.align_vectors((0, 0, 1), (1, 0, 0)))
@@ -160,9 +153,7 @@ def aeroplane() -> list[Any]:
     return [*parts, nose, fin]
 
 
-def slab(
-    root: Any, tip: Any, side: int, z_root: float, z_tip: float, thick_root: float, thick_tip: float
-) -> Any:
+def slab(root: Any, tip: Any, side: int, z_root: float, z_tip: float, thick_root: float, thick_tip: float) -> Any:
     """A wing: the hull of two chords (x, y), each of some thickness."""
     corners = [(x, side * y, z_root + s * thick_root / 2) for x, y in root for s in (-1, 1)]
     return hull(corners + [(x, side * y, z_tip + s * thick_tip / 2) for x, y in tip for s in (-1, 1)])
@@ -177,11 +168,7 @@ def tank() -> list[Any]:
         outline = [(-3.4, 0.55), (-2.7, 0.0), (2.6, 0.0), (3.4, 0.6), (3.2, 1.0), (-3.2, 1.0)]
         tracks.append(hull([(x, side * y, z) for x, z in outline for y in (1.15, 1.75)]))
     body = hull(
-        [
-            (x, y, z)
-            for x, z in [(-3.3, 0.5), (-3.1, 1.35), (2.0, 1.35), (3.5, 0.85), (3.0, 0.45)]
-            for y in (-1.5, 1.5)
-        ]
+        [(x, y, z) for x, z in [(-3.3, 0.5), (-3.1, 1.35), (2.0, 1.35), (3.5, 0.85), (3.0, 0.45)] for y in (-1.5, 1.5)]
     )
     low = [(-1.9, -1.25), (-1.9, 1.25), (0.6, 1.35), (1.6, 0.5), (1.6, -0.5), (0.6, -1.35)]
     turret = hull([(x, y, 1.3) for x, y in low] + [(0.8 * x - 0.1, 0.75 * y, 2.25) for x, y in low])

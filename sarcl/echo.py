@@ -57,7 +57,8 @@ def echo(
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto" half a resolution cell, None: left as they are
     max_bytes     memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
-    tolerance     relative L2 error of the samples; check  recompute 256 random samples exactly (None: if it costs < 2 %)
+    tolerance     relative L2 error of the samples
+    check         recompute 256 random samples exactly; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
     Stop and go; spreading loss and gains are left out. Returns a PhaseHistory. ValueError, MemoryError,

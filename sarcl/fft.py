@@ -48,4 +48,5 @@ def _plan(device: cl.Device, shape: tuple[int, ...]) -> tuple[Any, Any]:
     from reikna.fft import FFT
 
     thread = device.reikna_thread()
-    return thread, FFT(Type(np.complex64, shape), axes=(1,)).compile(thread)
+    with cl.quiet():
+        return thread, FFT(Type(np.complex64, shape), axes=(1,)).compile(thread)

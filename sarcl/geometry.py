@@ -135,7 +135,7 @@ class GridTiling:
             rows, columns = grid.shape
             self.n_bands = -(-rows // side)
             self.across = -(-columns // side)
-            inside = (np.arange(side) - (side - 1) / 2)
+            inside = np.arange(side) - (side - 1) / 2
             assert grid.spacing is not None and grid.x_axis is not None and grid.y_axis is not None
             y = inside[:, None, None] * grid.spacing[0] * grid.y_axis
             offsets = (y + inside[:, None] * grid.spacing[1] * grid.x_axis).reshape(-1, 3)
@@ -196,10 +196,10 @@ class GridTiling:
         if self.grid.is_plane:
             rows, columns = self.grid.shape
             s = self.side
-            block = values.reshape(last - first, self.across, s, s).transpose(0, 2, 1, 3)
-            block = block.reshape((last - first) * s, self.across * s)
+            tiled = values.reshape(last - first, self.across, s, s).transpose(0, 2, 1, 3)
+            whole = tiled.reshape((last - first) * s, self.across * s)
             stop = min(last * s, rows)
-            yield slice(first * s, stop), block[: stop - first * s, :columns]
+            yield slice(first * s, stop), whole[: stop - first * s, :columns]
             return
         start = 0
         for band, order in zip(range(first, last), orders, strict=True):

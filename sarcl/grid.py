@@ -30,9 +30,7 @@ class ImageGrid:
 
     def __post_init__(self) -> None:
         if (self.listed is None) == (self.spacing is None):
-            raise ValueError(
-                "a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points"
-            )
+            raise ValueError("a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points")
         for name in ("center", "x_axis", "y_axis", "listed"):
             value = getattr(self, name)
             if value is not None and value.flags.writeable:
@@ -54,17 +52,15 @@ class ImageGrid:
         normal), rows along y_axis = normal x x_axis; row 0 is drawn at the bottom.
         """
         center = check.array("center", center, np.float64, (3,))
-        rows, columns = _pair("shape", shape)
-        dy, dx = _pair("spacing", spacing)
+        rows, columns = pair("shape", shape)
+        dy, dx = pair("spacing", spacing)
         n = check.direction("normal", normal)
         if x_axis is None:
             x_axis = (1.0, 0.0, 0.0) if abs(n[0]) < 0.999 else (0.0, 1.0, 0.0)
         x = check.direction("x_axis", x_axis)
         x = x - (x @ n) * n
         if np.linalg.norm(x) < 1e-6:
-            raise ValueError(
-                f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane"
-            )
+            raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
         x /= np.linalg.norm(x)
         return cls(
             shape=(check.count("shape[0]", rows), check.count("shape[1]", columns)),
@@ -80,12 +76,9 @@ class ImageGrid:
         listed = check.converted("positions", positions, np.float64)
         shape = listed.shape
         if len(shape) < 2 or shape[-1] != 3 or 0 in shape:
-            raise ValueError(
-                f"positions has shape {shape}, wanted (..., 3) with at least one axis before the last, none zero"
-            )
+            raise ValueError(f"positions has shape {shape}, wanted (..., 3) with an axis before the last, none zero")
         check.finite("positions", listed)
-        listed.flags.writeable = False
-        return cls(shape=shape[:-1], listed=listed)
+        return cls(shape=shape[:-1], listed=check.sealed(listed))
 
     @property
     def is_plane(self) -> bool:
@@ -101,6 +94,7 @@ class ImageGrid:
     def normal(self) -> np.ndarray:
         """Unit normal of a plane (3,)."""
         self._need_plane("normal")
+        assert self.x_axis is not None and self.y_axis is not None
         return np.cross(self.x_axis, self.y_axis)
 
     @property
@@ -130,7 +124,9 @@ class ImageGrid:
     def index(self, position: Any) -> np.ndarray:
         """Fractional (row, column) of positions, m (..., 3), projected on a plane: (..., 2)."""
         self._need_plane("index")
-        assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        assert (
+            self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        )
         d = np.asarray(position, np.float64) - self.center
         row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
         return np.stack([row, d @ self.x_axis / self.spacing[1] + self.shape[1] // 2], axis=-1)
@@ -144,7 +140,7 @@ def _text(vector: Any) -> str:
     return "(" + ", ".join(f"{v:g}" for v in vector) + ")"
 
 
-def _pair(name: str, value: Any) -> tuple[Any, Any]:
+def pair(name: str, value: Any) -> tuple[Any, Any]:
     """A (row, column) pair; one number serves for both."""
     if np.ndim(value) == 0:
         return value, value

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import check
-from .grid import ImageGrid
+from .grid import ImageGrid, pair
 from .report import Report
 
 
@@ -17,7 +17,7 @@ from .report import Report
 class Image:
     """An image on a grid.
 
-    data       complex, of grid.shape; real where it is intensity (after `multilook`). May be a file's dataset.
+    data       complex, of grid.shape; real where it is intensity (after `multilook`). May be a file's dataset
     grid       where the pixels are
     gain       sum of all weights that went into a pixel: a unit point gives |data| = gain at its place
     frequency  centre frequency, Hz, and
@@ -34,8 +34,17 @@ class Image:
     report: Report | None = None
 
     def __post_init__(self) -> None:
-        if tuple(self.data.shape) != tuple(self.grid.shape):
-            raise ValueError(f"image data has shape {tuple(self.data.shape)}, its grid {tuple(self.grid.shape)}")
+        if isinstance(self.data, (list, tuple)):
+            object.__setattr__(self, "data", np.asarray(self.data))
+        if tuple(np.shape(self.data)) != tuple(self.grid.shape):
+            raise ValueError(
+                f"image data has shape {tuple(np.shape(self.data))} but its grid {tuple(self.grid.shape)}; "
+                "give one value per pixel"
+            )
+        if np.dtype(self.data.dtype).kind not in "fciu":
+            raise ValueError(f"image data has type {self.data.dtype}, wanted complex or real numbers")
+        if self.frequency is not None:
+            object.__setattr__(self, "frequency", check.number("image frequency", self.frequency, above=0))
         object.__setattr__(self, "gain", check.number("image gain", self.gain, above=0))
         for name in ("tx", "rx"):
             if getattr(self, name) is not None:
@@ -47,11 +56,14 @@ class Image:
         return np.dtype(self.data.dtype).kind == "c"
 
     def decibels(self) -> np.ndarray:
-        """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where there is nothing."""
+        """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where nothing is."""
         data = np.asarray(self.data)
         with np.errstate(divide="ignore"):
             if self.is_complex:
                 return (20 * np.log10(np.abs(data) / self.gain)).astype(np.float32)
+            if (data < 0).any():
+                at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
+                raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
             return (10 * np.log10(data / self.gain**2)).astype(np.float32)
 
     def multilook(self, looks: Any) -> Image:
@@ -61,7 +73,7 @@ class Image:
         """
         if not self.grid.is_plane:
             raise ValueError("multilook is for images on a plane; this grid lists its points")
-        a, b = looks if np.ndim(looks) else (looks, looks)
+        a, b = pair("looks", looks)
         a, b = check.count("looks[0]", a), check.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
         if rows == 0 or columns == 0:
@@ -80,7 +92,7 @@ class Image:
         return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
 
     def show(self, floor_db: float = -50.0) -> Any:
-        """The picture as a PIL.Image, grey in dB from the brightest pixel down to floor_db; notebooks draw it."""
+        """The picture as a PIL.Image, grey in dB from the brightest pixel down to floor_db."""
         return self._picture(floor_db)
 
     def _repr_png_(self) -> bytes:

@@ -1,23 +1,43 @@
-"""One run of a command: its lines, its bar, the files it has finished, and Ctrl-C that is not lost."""
+"""One run of a command: its lines, its bar, the files it is going to write, and Ctrl-C that is not lost."""
 
 from __future__ import annotations
 
+import os
 import signal
 import sys
+from types import FrameType
 from typing import Any
 
+from .files import paths
 from .progress import Bar
+
+Outputs = dict[str, tuple[int, int] | None]
+
+
+def identity(path: Any) -> tuple[int, int] | None:
+    """What tells a file from the one that takes its place; None where there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def complete(outputs: Outputs) -> list[str]:
+    """The paths that hold a new file: they are put in place whole, so it is complete."""
+    return [path for path, before in outputs.items() if identity(path) not in (None, before)]
 
 
 class Job:
-    """Used as `with Job(kept) as job`; kept gets the names of finished files.
+    """Used as `with Job(outputs) as job`; outputs gets the `identity` each output path has before the work.
 
-    Ctrl-C raises KeyboardInterrupt at once, as ever. Python drops it where it arrives in a destructor or in
-    a C library's callback; then the next report of progress, or the next file, raises it again.
+    Ctrl-C raises KeyboardInterrupt at once, as ever, except while an output file is begun or put in its
+    place: then the next report of progress or line does. So it does where Python drops it, in a destructor or
+    a C library's callback; an error that follows from that is a KeyboardInterrupt too.
     """
 
-    def __init__(self, kept: list[str]) -> None:
-        self.kept = kept
+    def __init__(self, outputs: Outputs) -> None:
+        self.outputs = outputs
         self.bar = Bar()
         self.interrupted = False
         self._before: Any = None
@@ -33,11 +53,13 @@ class Job:
             sys.unraisablehook = self._unraisable
         return self
 
-    def __exit__(self, *exc: Any) -> None:
+    def __exit__(self, kind: Any, *_: Any) -> None:
         self.bar.wipe()
         if self._before is not None:
             signal.signal(signal.SIGINT, self._before)
             sys.unraisablehook = self._hook
+        if kind is not None:
+            self.check()
 
     def check(self) -> None:
         """Raise KeyboardInterrupt where Ctrl-C was pressed."""
@@ -55,12 +77,17 @@ class Job:
         self.bar.wipe()
         print(text, flush=True)
 
-    def finished(self, path: Any) -> None:
-        """A file is complete."""
-        self.kept.append(str(path))
+    def expect(self, path: Any) -> None:
+        """This path is going to be written; raises what `paths.check_writable` does where it cannot be."""
+        paths.check_writable(path)
+        self.outputs[str(path)] = identity(path)
 
-    def _interrupt(self, *_: Any) -> None:
+    def _interrupt(self, _: int, frame: FrameType | None) -> None:
         self.interrupted = True
+        while frame is not None:
+            if frame.f_code.co_filename == paths.__file__:
+                return  # a file is being begun or put in its place: not to be cut in two
+            frame = frame.f_back
         raise KeyboardInterrupt
 
     def _unraisable(self, unraisable: Any) -> None:

@@ -34,9 +34,7 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
     index = image.grid.index(near)
     start = np.rint(index).astype(int)
     if (start < 0).any() or (start >= shape).any():
-        raise ValueError(
-            f"near {place(near)} is pixel {place(index, 1)}, outside of the image of {image.grid.shape}"
-        )
+        raise ValueError(f"near {place(near)} is pixel {place(index, 1)}, outside of the image of {image.grid.shape}")
     radius = np.array([2, 2])
     while True:
         low, high = np.maximum(start - 4 * radius, 0), np.minimum(start + 4 * radius + 1, shape)
@@ -70,5 +68,5 @@ def _run(level: np.ndarray, at: int) -> int:
 
 
 def place(position: np.ndarray, digits: int = 3) -> str:
-    """A position as messages write it."""
-    return "(" + ", ".join(f"{x:.{digits}f}" for x in position) + ")"
+    """A position as messages write it; + 0.0 turns a rounded -0 into 0."""
+    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in np.round(position, digits)) + ")"

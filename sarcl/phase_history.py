@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from . import check
+from .rows import in_memory, pick, stack
 
 if TYPE_CHECKING:
     from .report import Report
@@ -30,7 +31,8 @@ PER_ROW = {
 class PhaseHistory:
     """Echoes s (n_rows, n_samples); a row is one (pulse, transmit channel, receive channel, polarisation).
 
-    samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing
+    samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
+                     A writeable array is copied; make it read-only to hand it over as it is
     frequency        of sample 0, Hz, one or per row
     frequency_step   Hz, one or per row, positive
     tx, rx           antenna positions, m (n_rows, 3); rx defaults to tx
@@ -64,19 +66,17 @@ class PhaseHistory:
 
     def __post_init__(self) -> None:
         samples = self.samples
-        if isinstance(samples, (list, tuple)) or (isinstance(samples, np.ndarray) and samples.dtype.kind in "iuf"):
-            samples = np.asarray(samples, np.complex128)
+        if isinstance(samples, (list, tuple)) or (in_memory(samples) and samples.dtype.kind in "iuf"):
+            samples = check.sealed(check.converted("samples", samples, np.complex128))
         if len(np.shape(samples)) != 2 or 0 in samples.shape:
             raise ValueError(f"samples has shape {np.shape(samples)}, wanted (n_rows, n_samples), neither zero")
-        if np.dtype(samples.dtype).kind != "c":
+        if np.dtype(samples.dtype).newbyteorder("=") not in (np.complex64, np.complex128):
             raise ValueError(f"samples has type {samples.dtype}, wanted complex64 or complex128")
-        # A memmap is a file: like every lazy source it is checked as it is read.
-        if isinstance(samples, np.ndarray) and not isinstance(samples, np.memmap):
+        if in_memory(samples):
             check.finite("samples", samples)
-            samples = samples.view()
-            samples.flags.writeable = False
+            if samples.flags.writeable or not samples.dtype.isnative:
+                samples = check.sealed(np.array(samples, samples.dtype.newbyteorder("="), order="C"))
         self._set("samples", samples)
-        n = samples.shape[0]
         for name in ("frequency", "frequency_step", "reference_range"):
             self._set(name, self._rows(name, getattr(self, name), np.float64, (), spread=True))
         if not (self.frequency_step > 0).all():
@@ -93,8 +93,10 @@ class PhaseHistory:
             if getattr(self, name) is not None:
                 self._set(name, self._rows(name, getattr(self, name), dtype, tail, spread=tail == ()))
         if self.weight is not None and (self.weight < 0).any():
-            raise ValueError(f"weight[{int(np.argmin(self.weight))}] is {self.weight.min():g}; it cannot be negative")
-        assert n == self.n_rows
+            bad = int(np.argmin(self.weight))
+            raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
+        if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
+            raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -104,15 +106,14 @@ class PhaseHistory:
         n = self.samples.shape[0]
         if spread and np.ndim(value) == 0:
             value = np.full(n, value)
-        out = np.array(value) if dtype == "U2" else np.array(value, dtype)
+        out = _words(name, value) if dtype == "U2" else check.converted(name, value, dtype)
         if out.ndim != 1 + len(tail) or out.shape[1:] != tail:
             raise ValueError(f"{name} has shape {out.shape}, wanted {(n, *tail)}")
         if len(out) != n:
             raise ValueError(f"samples has {n} rows but {name} has {len(out)}; give one {name} per row")
         if out.dtype.kind in "fc":
             check.finite(name, out)
-        out.flags.writeable = False
-        return out
+        return check.sealed(out)
 
     @property
     def n_rows(self) -> int:
@@ -146,28 +147,33 @@ class PhaseHistory:
 
     def read(self, start: int, stop: int) -> np.ndarray:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
+        if not 0 <= start <= stop <= self.n_rows:
+            raise IndexError(f"rows {start} to {stop} were asked for, but there are {self.n_rows}")
         block = np.asarray(self.samples[start:stop])
         if block.shape != (stop - start, self.n_samples):
-            raise ValueError(f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}")
+            raise ValueError(
+                f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "
+                "its source does not slice as its shape says"
+            )
         check.finite("samples", block, first_row=start)
-        return block
+        return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
 
     def __getitem__(self, rows: Any) -> PhaseHistory:
         """The chosen rows (slice, index array or mask); a lazy source stays lazy."""
-        index = np.arange(self.n_rows)[rows]
-        index = np.atleast_1d(index)
+        index = np.atleast_1d(np.arange(self.n_rows)[rows])
+        if index.ndim != 1:
+            raise IndexError(f"rows are chosen along one axis, the index has {index.ndim}")
         if index.size == 0:
             raise ValueError(f"no row is left of {self.n_rows}; choose at least one")
-        picked = {n: getattr(self, n) for n in ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)}
-        picked = {n: v[index] for n, v in picked.items() if v is not None}
+        names = ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)
+        picked = {n: getattr(self, n)[index] for n in names if getattr(self, n) is not None}
         if self.rx is self.tx:
             picked["rx"] = None
-        samples = self.samples[index] if isinstance(self.samples, np.ndarray) else RowView(self.samples, index)
-        return replace(self, samples=samples, **picked)
+        return replace(self, samples=pick(self.samples, index), **picked)
 
     def select(self, *, polarization: str | None = None, channel: int | None = None) -> PhaseHistory:
         """Rows of one polarisation ("HV") and/or one receive channel. ValueError lists what there is."""
-        keep = np.ones(self.n_rows, bool)
+        keep, where = np.ones(self.n_rows, bool), "these data"
         for name, field, wanted in (
             ("polarization", self.polarization, polarization),
             ("channel", self.rx_channel, channel),
@@ -176,9 +182,11 @@ class PhaseHistory:
                 continue
             if field is None:
                 raise ValueError(f"these data name no {name}; every row is alike")
-            if not (field == wanted).any():
-                raise ValueError(f"{name} {wanted!r} is not in these data; there are {sorted(set(field.tolist()))}")
+            if not (keep & (field == wanted)).any():
+                there = sorted(set(field[keep].tolist()))
+                raise ValueError(f"{name} {wanted!r} is not in {where}; there are {there}")
             keep &= field == wanted
+            where = f"the rows of {name} {wanted!r}"
         return self[keep]
 
     def time_signal(self, oversample: int = 1) -> tuple[np.ndarray, np.ndarray]:
@@ -203,31 +211,30 @@ class PhaseHistory:
         store.save_phase_history(self, path)
 
 
-class RowView:
-    """Chosen rows of a lazy source; reads what a slice asks for, in as few reads as runs of rows allow."""
-
-    def __init__(self, source: Any, index: np.ndarray) -> None:
-        self.source, self.index = source, index
-        self.shape = (len(index), *source.shape[1:])
-        self.dtype = source.dtype
-
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        index = self.index[rows]
-        if len(index) == 0:
-            return np.empty((0, *self.shape[1:]), self.dtype)
-        runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
-        return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
+def _words(name: str, value: Any) -> np.ndarray:
+    """Words (n,) from strings or, as files hold them, bytes."""
+    given = np.asarray(value)
+    if given.dtype.kind == "S":
+        given = np.char.decode(given, "ascii")
+    if not all(isinstance(word, str) for word in given.ravel().tolist()):
+        raise ValueError(f"{name} must be strings such as 'HH', got {value!r:.80}")
+    return given.astype(str)
 
 
 def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     """Rows of several phase histories in one, in order; all need the same number of samples.
 
-    Optional per-row fields are kept where every part has them. ValueError names the part that does not fit.
+    Optional per-row fields and the waveform are kept where every part has them; lazy samples stay lazy.
+    ValueError names the part that does not fit.
     """
+    if isinstance(parts, PhaseHistory):
+        raise TypeError("concatenate takes a list of phase histories, got one; give [raw, ...]")
     parts = list(parts)
     if not parts:
         raise ValueError("concatenate was given no phase history; give at least one")
     for i, part in enumerate(parts):
+        if not isinstance(part, PhaseHistory):
+            raise TypeError(f"part {i} is a {type(part).__name__}; concatenate joins phase histories")
         if part.n_samples != parts[0].n_samples:
             raise ValueError(f"part {i} has {part.n_samples} samples a row, part 0 has {parts[0].n_samples}")
         if part.compressed != parts[0].compressed:
@@ -236,9 +243,20 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     for field in fields(PhaseHistory):
         values = [getattr(p, field.name) for p in parts]
         if field.name == "samples":
-            joined["samples"] = np.concatenate([p.read(0, p.n_rows) for p in parts])
+            joined["samples"] = stack(values)
+        elif field.name in ("waveform", "array"):
+            joined[field.name] = values[0] if all(_alike(v, values[0]) for v in values) else None
         elif isinstance(values[0], np.ndarray) and all(v is not None for v in values):
             joined[field.name] = np.concatenate(values)
-        elif field.name in ("waveform", "array") and all(v is values[0] for v in values):
-            joined[field.name] = values[0]
+    if not parts[0].compressed and joined["waveform"] is None and any(p.waveform for p in parts):
+        raise ValueError("parts that are not compressed have different waveforms; call compress on each first")
+    if all(p.rx is p.tx for p in parts):
+        joined["rx"] = None
     return PhaseHistory(**joined, compressed=parts[0].compressed)
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """True where two waveforms (or None) have equal fields."""
+    if a is None or b is None or type(a) is not type(b):
+        return a is b
+    return a is b or all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))

@@ -41,9 +41,7 @@ def from_samples(
     return profiles
 
 
-def to_samples(
-    device: cl.Device, profiles: np.ndarray, n_samples: int, interpolator: Interpolator
-) -> np.ndarray:
+def to_samples(device: cl.Device, profiles: np.ndarray, n_samples: int, interpolator: Interpolator) -> np.ndarray:
     """Spectra (n, n_samples) of spread profiles (n, length + 2 padding): the adjoint of `from_samples`."""
     pad = padding(interpolator)
     length = profiles.shape[1] - 2 * pad

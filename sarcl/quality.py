@@ -50,6 +50,7 @@ class PointResponse:
 
     def __str__(self) -> str:
         amplitude = abs(self.peak) / self.gain
+        level = round(20 * np.log10(amplitude), 2) + 0.0  # no -0.00
         rows = (
             ("IRW, half power", self.irw, ".4f", "m"),
             ("PSLR", self.pslr, ".2f", "dB"),
@@ -59,7 +60,7 @@ class PointResponse:
         lines = [
             f"position         {place(self.position, 4)} m",
             f"peak             {abs(self.peak):.6g} at {np.angle(self.peak):.4f} rad",
-            f"peak/gain        {amplitude:.6g}, RCS {20 * np.log10(amplitude):.2f} dBsm",
+            f"peak/gain        {amplitude:.6g}, RCS {level:.2f} dBsm",
             f"{'':15}{NAMES[0]:>12}{NAMES[1]:>14}",
             *(f"{name:15}{a:>12{form}}{b:>14{form}} {unit}" for name, (a, b), form, unit in rows),
         ]
@@ -131,9 +132,7 @@ def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors of range and cross-range on the plane, at a pixel."""
     normal = image.grid.normal
     point = image.grid.at(row, column)
-    gradient = -np.sum(
-        [check.direction("antenna less point", end - point) for end in antennas(image)], axis=0
-    )
+    gradient = -np.sum([check.direction("antenna less point", end - point) for end in antennas(image)], axis=0)
     along = gradient - (gradient @ normal) * normal
     length = np.linalg.norm(along)
     if length < 1e-3:
@@ -182,9 +181,7 @@ def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, na
     p = power(t)
     rising = np.diff(p) > 0
     if not (rising[n:].any() and (~rising[:n]).any()):
-        raise ValueError(
-            f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused"
-        )
+        raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused")
     right, left = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
     inside = _integral(p[left : right + 1])
     lobes = np.where((t < t[left]) | (t > t[right]), p, 0)

@@ -51,6 +51,7 @@ class Scatterers:
             return self.amplitudes
         from .reference.echo import facet_amplitudes
 
+        assert self.normals is not None and self.strengths is not None and self.two_sided is not None
         return facet_amplitudes(self.positions, self.normals, self.strengths, self.two_sided, tx, rx)
 
 

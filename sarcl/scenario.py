@@ -122,9 +122,7 @@ class Scenario:
         given = self._options("backproject", options)
         if grid is None:
             grid = self.build_grid()
-        with self.where.blame(
-            ("backproject",), {k: v for k, v in given.items() if k not in options}, always=False
-        ):
+        with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
             return sarcl.backproject(raw, grid, **given)
 
     def _section(self, name: str) -> dict[str, Any]:
@@ -168,9 +166,7 @@ def load(path: Any) -> Scenario:
     except UnicodeDecodeError as exc:
         raise ValueError(f"{path}: byte {exc.start} is not UTF-8 text; a scenario is a TOML file") from None
     except FileNotFoundError:
-        raise FileNotFoundError(
-            f"scenario file {str(path)!r} does not exist; check the name and the folder"
-        ) from None
+        raise FileNotFoundError(f"scenario file {str(path)!r} does not exist; check the name and the folder") from None
     except IsADirectoryError:
         raise IsADirectoryError(f"{str(path)!r} is a folder; give the TOML file in it") from None
     return loads(text, name=str(path), folder=path.parent)
@@ -188,9 +184,7 @@ def loads(text: str, *, name: str = "scenario", folder: Any = ".") -> Scenario:
     for section, value in tables.items():
         if section not in schema.SECTIONS:
             what = "table" if isinstance(value, (dict, list)) else "key"
-            raise ValueError(
-                f"{where.text((), section)} {schema.unknown(section, list(schema.SECTIONS), what)}"
-            )
+            raise ValueError(f"{where.text((), section)} {schema.unknown(section, list(schema.SECTIONS), what)}")
     return Scenario(**tables, folder=folder, where=where)
 
 

@@ -37,27 +37,31 @@ class Scene:
     two_sided: np.ndarray
 
     def __post_init__(self) -> None:
-        n, k = len(self.positions), len(self.triangles)
+        n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
         if n + k == 0:
             raise ValueError("scene is empty; give it at least one point or facet")
         shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,)}
+        dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_}
         for name in self.__dataclass_fields__:
-            value = np.asarray(getattr(self, name))
+            value, dtype = getattr(self, name), dtypes.get(name, np.float64)
+            # What is read-only already needs no copy.
+            if not isinstance(value, np.ndarray) or value.flags.writeable or value.dtype != dtype:
+                value = check.sealed(check.converted(f"scene {name}", value, dtype))
             wanted = shapes.get(name, (k,))
             if value.shape != wanted:
                 raise ValueError(f"scene {name} has shape {value.shape}, wanted {wanted}")
             check.finite(f"scene {name}", value)
-            value = value.view()
-            value.flags.writeable = False
             object.__setattr__(self, name, value)
+        if (self.roughness < 0).any():
+            bad = int(np.argmin(self.roughness))
+            raise ValueError(f"roughness[{bad}] is {self.roughness[bad]:g} m; a standard deviation cannot be negative")
 
     @classmethod
     def points(cls, positions: Any, amplitudes: Any = 1.0) -> Scene:
         """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
         positions = check.array("positions", positions, np.float64, ("n", 3))
-        amplitudes = np.asarray(amplitudes)
-        if amplitudes.ndim == 0:
-            amplitudes = np.full(len(positions), amplitudes)
+        if np.ndim(amplitudes) == 0:
+            amplitudes = [amplitudes] * len(positions)
         amplitudes = check.array("amplitudes", amplitudes, np.complex128, (len(positions),))
         return cls(positions, amplitudes, *_no_facets())
 
@@ -71,9 +75,8 @@ class Scene:
         """
         triangles = check.array("triangles", triangles, np.float64, ("n_facets", 3, 3))
         k = len(triangles)
-        roughness = np.broadcast_to(check.array("roughness", roughness, np.float64, np.shape(roughness)), (k,))
-        if (roughness < 0).any():
-            raise ValueError(f"roughness is {roughness.min():g} m; a standard deviation cannot be negative")
+        roughness = _spread("roughness", roughness, (k,))
+        two_sided = _spread("two_sided", two_sided, (k,), np.bool_)
         longest = np.maximum.reduce(edges(triangles))
         # A needle thinner than 1e-12 of its length has no area that float64 corners could carry.
         solid = 2 * areas(triangles) > 1e-12 * longest**2
@@ -81,13 +84,9 @@ class Scene:
             raise ValueError(f"all {k} facets are degenerate (zero area); nothing would reflect: check the mesh")
         if not solid.all():
             log.info("left out %d of %d facets: zero area", k - solid.sum(), k)
-        return cls(
-            *_no_points(),
-            triangles[solid],
-            np.full(int(solid.sum()), _reflectivity(material)),
-            roughness[solid],
-            np.broadcast_to(np.asarray(two_sided, bool), (k,))[solid],
-        )
+            triangles, roughness, two_sided = (check.sealed(a[solid]) for a in (triangles, roughness, two_sided))
+        reflectivity = np.full(len(triangles), _reflectivity(material))
+        return cls(*_no_points(), triangles, reflectivity, roughness, two_sided)
 
     @classmethod
     def from_mesh(
@@ -101,11 +100,11 @@ class Scene:
         max_edge: float | None = None,
         roughness: float = 0.0,
     ) -> Scene:
-        """A mesh file (or trimesh.Trimesh) of any format trimesh reads: corner -> rotation(scale corner) + position.
+        """A mesh file that trimesh reads, or a trimesh.Trimesh: corner -> rotation(scale corner) + position.
 
         scale     m per unit of the file
         position  m (3,)
-        rotation  matrix (3, 3), rotation vector (3,) in rad, or one angle about z in rad
+        rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
 
         A mesh that is not watertight reflects from both sides of its facets, so that its winding does not
@@ -119,10 +118,8 @@ class Scene:
         return scene if max_edge is None else scene.split(max_edge)
 
     @classmethod
-    def from_heights(
-        cls, x: Any, y: Any, z: Any, *, material: str | float = "metal", roughness: Any = 0.0
-    ) -> Scene:
-        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a grid cell, facing up.
+    def from_heights(cls, x: Any, y: Any, z: Any, *, material: str | float = "metal", roughness: Any = 0.0) -> Scene:
+        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a cell, facing up.
 
         roughness  m, one number or one per cell (n_y - 1, n_x - 1)
         """
@@ -136,7 +133,7 @@ class Scene:
         sw, se, nw, ne = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
         triangles = np.stack([np.stack([sw, se, ne], axis=2), np.stack([sw, ne, nw], axis=2)], axis=2)
         cells = (len(y) - 1, len(x) - 1)
-        roughness = np.broadcast_to(np.asarray(roughness, np.float64), cells)
+        roughness = _spread("roughness", roughness, cells)
         return cls.facets(
             triangles.reshape(-1, 3, 3), material=material, roughness=np.repeat(roughness, 2), two_sided=False
         )
@@ -144,7 +141,8 @@ class Scene:
     def __add__(self, other: Scene) -> Scene:
         if not isinstance(other, Scene):
             return NotImplemented
-        return Scene(*(np.concatenate([getattr(self, n), getattr(other, n)]) for n in self.__dataclass_fields__))
+        names = self.__dataclass_fields__
+        return Scene(*(check.sealed(np.concatenate([getattr(self, n), getattr(other, n)])) for n in names))
 
     @property
     def bounds(self) -> np.ndarray:
@@ -163,6 +161,15 @@ class Scene:
         MemoryError when more than `max_facets` would be needed.
         """
         max_edge = check.number("max_edge", max_edge, above=0)
+        if len(self.triangles) == 0:
+            return self
+        too_many = (
+            f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
+            "take a smaller scene, a larger max_edge or a coarser resolution"
+        )
+        # No facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory.
+        if areas(self.triangles).sum() > max_facets * np.sqrt(3) / 4 * max_edge**2:
+            raise MemoryError(too_many)
         done: list[tuple[np.ndarray, ...]] = []
         names = ("triangles", "reflectivity", "roughness", "two_sided")
         part = tuple(getattr(self, n) for n in names)
@@ -173,12 +180,10 @@ class Scene:
             done.append(tuple(a[~long] for a in part))
             n_done += len(done[-1][0])
             if n_done + 2 * long.sum() > max_facets:
-                raise MemoryError(
-                    f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
-                    "take a smaller scene, a larger max_edge or a coarser resolution"
-                )
+                raise MemoryError(too_many)
             part = tuple(np.concatenate([a, b]) for a, b in _bisect(tuple(a[long] for a in part), lengths[:, long]))
-        return replace(self, **{n: np.concatenate([d[i] for d in done]) for i, n in enumerate(names)})
+        joined = {n: check.sealed(np.concatenate([d[i] for d in done])) for i, n in enumerate(names)}
+        return replace(self, **joined)
 
 
 def edges(triangles: np.ndarray) -> np.ndarray:
@@ -218,12 +223,19 @@ def _bisect(part: tuple[np.ndarray, ...], lengths: np.ndarray) -> list[tuple[np.
     return [halves, *((x, x) for x in part[1:])]
 
 
-def _no_facets() -> tuple[np.ndarray, ...]:
+def _no_facets() -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
     return np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool)
 
 
-def _no_points() -> tuple[np.ndarray, ...]:
+def _no_points() -> tuple[np.ndarray, np.ndarray]:
     return np.zeros((0, 3)), np.zeros(0, np.complex128)
+
+
+def _spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
+    """`value` for every facet or cell: one number for all, or an array of `shape`; read-only."""
+    if np.ndim(value) == 0:
+        return np.broadcast_to(check.array(name, value, dtype, ()), shape)
+    return check.array(name, value, dtype, shape)
 
 
 def _reflectivity(material: str | float) -> float:
@@ -242,6 +254,8 @@ def _rotation(rotation: Any) -> np.ndarray:
     """Matrix (3, 3) of a rotation given as a matrix, a rotation vector in rad, an angle about z, or None."""
     if rotation is None:
         return np.eye(3)
+    if hasattr(rotation, "as_matrix"):
+        rotation = rotation.as_matrix()
     if np.ndim(rotation) == 0:
         rotation = (0.0, 0.0, check.number("rotation", rotation))
     if np.ndim(rotation) == 1:
@@ -249,9 +263,11 @@ def _rotation(rotation: Any) -> np.ndarray:
 
         return Rotation.from_rotvec(check.array("rotation", rotation, np.float64, (3,))).as_matrix()
     matrix = check.array("rotation", rotation, np.float64, (3, 3))
-    if not np.allclose(matrix @ matrix.T, np.eye(3), atol=1e-9) or np.linalg.det(matrix) < 0:
-        raise ValueError("rotation is a matrix that does not rotate: its rows must be orthonormal, determinant +1")
-    return matrix
+    # float32 matrices are orthonormal to 1e-7 only
+    if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise ValueError("rotation is a matrix that does not rotate: its rows must be orthonormal, its determinant +1")
+    left, _, right = np.linalg.svd(matrix)
+    return left @ right
 
 
 def _load_mesh(mesh: Any) -> Any:
@@ -260,28 +276,45 @@ def _load_mesh(mesh: Any) -> Any:
 
     import trimesh
 
+    what = "mesh"
     if isinstance(mesh, (str, Path)):
-        path = Path(mesh)
-        if not path.is_file():
-            raise FileNotFoundError(f"mesh file {str(path)!r} does not exist")
-        known = sorted(trimesh.available_formats())
-        if path.suffix.lower().lstrip(".") not in known:
-            raise ValueError(f"mesh file {path.name!r}: unknown format {path.suffix!r}; known are {', '.join(known)}")
-        try:
-            # process=False: merging and reordering corners is not needed and hides what the file holds
-            loaded = trimesh.load_scene(path, process=False)
-            mesh = loaded.to_mesh() if loaded.geometry else trimesh.Trimesh()
-        except Exception as exc:
-            raise ValueError(
-                f"mesh file {path.name!r} cannot be read as {path.suffix}: {exc or type(exc).__name__}"
-            ) from exc
-    if not hasattr(mesh, "triangles"):
-        raise TypeError(f"mesh is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
+        what = f"mesh file {Path(mesh).name!r}"
+        mesh = _read_mesh(Path(mesh), what)
+    if isinstance(mesh, trimesh.Scene):
+        mesh = mesh.to_mesh() if mesh.geometry else trimesh.Trimesh()
+    if not isinstance(mesh, trimesh.Trimesh):
+        raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
     if len(mesh.faces) == 0:
-        raise ValueError("mesh has no faces; nothing would reflect: check the file and how it was exported")
-    check.finite("mesh vertices", np.asarray(mesh.vertices))
+        raise ValueError(
+            f"{what} has no faces; nothing would reflect: check what the file holds and how it was exported"
+        )
+    check.finite(f"{what} vertices", np.asarray(mesh.vertices))
     if not mesh.is_watertight:
         welded = mesh.copy()
         welded.merge_vertices(merge_tex=True, merge_norm=True)
         return welded
     return mesh
+
+
+def _read_mesh(path: Any, what: str) -> Any:
+    """What trimesh makes of a file."""
+    import trimesh
+
+    if not path.exists():
+        raise FileNotFoundError(f"mesh file {str(path)!r} does not exist; check the name and the folder")
+    if path.is_dir():
+        raise IsADirectoryError(f"mesh file {str(path)!r} is a folder; give the name of a file in it")
+    known = sorted(trimesh.available_formats())
+    if path.suffix.lower().lstrip(".") not in known:
+        raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
+    try:
+        # process=False: merging and reordering corners is not needed and hides what the file holds
+        return trimesh.load_scene(path, process=False)
+    except Exception as exc:
+        # trimesh takes what is no binary file for text, and guesses its encoding with a package we do not need
+        guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
+        why = "neither a whole binary file nor text" if guess else str(exc) or type(exc).__name__
+        raise ValueError(
+            f"{what} cannot be read as {path.suffix} ({why}): it is truncated, damaged or not what its name "
+            "says; export it again"
+        ) from exc

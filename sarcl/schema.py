@@ -116,14 +116,10 @@ def check_section(section: str, table: Any, where: Where) -> None:
             raise ValueError(f"{where.text((section,), kind)} {unknown(kind, kinds, 'table')}")
     if section == "scene":
         if not table:
-            raise ValueError(
-                f"{where.text((section,))} is empty; add a [[scene.points]] or [[scene.from_mesh]] table"
-            )
+            raise ValueError(f"{where.text((section,))} is empty; add a [[scene.points]] or [[scene.from_mesh]] table")
     elif len(table) != 1:
         given = " and ".join(table) or "none"
-        raise ValueError(
-            f"{where.text((section,))} wants exactly one of the tables {', '.join(kinds)}, got {given}"
-        )
+        raise ValueError(f"{where.text((section,))} wants exactly one of the tables {', '.join(kinds)}, got {given}")
     for kind, value in table.items():
         for path, part in tables_of(section, kind, value):
             if not isinstance(part, Mapping):
@@ -163,19 +159,13 @@ def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
     else:
         names = {n.strip() for n in str(parameter.annotation).split("|")} - {"None"}
     if names and names <= set(_TYPES):
-        return (
-            ""
-            if any(_TYPES[n][1](value) for n in names)
-            else " or ".join(_TYPES[n][0] for n in sorted(names))
-        )
+        return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
     good = isinstance(value, (bool, int, float, str, list)) and not _is_table(value)
     return "" if good else "a number, a string, true, false or an array"
 
 
 def _is_table(value: Any) -> bool:
-    return isinstance(value, Mapping) or (
-        isinstance(value, list) and any(isinstance(v, Mapping) for v in value)
-    )
+    return isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(v, Mapping) for v in value))
 
 
 def unknown(key: str, known: list[str], what: str) -> str:

@@ -99,9 +99,7 @@ def _baseband(image: Image, origin: np.ndarray, low: np.ndarray, high: np.ndarra
     chip = np.asarray(image.data[low[0] : high[0], low[1] : high[1]])
     if not np.isfinite(chip).all():
         i, j = np.argwhere(~np.isfinite(chip))[0]
-        raise ValueError(
-            f"image data[{low[0] + i}, {low[1] + j}] is {chip[i, j]}; every value must be finite"
-        )
+        raise ValueError(f"image data[{low[0] + i}, {low[1] + j}] is {chip[i, j]}; every value must be finite")
     place = image.grid.at(np.arange(low[0], high[0])[:, None], np.arange(low[1], high[1]))
     return chip * _carrier(image, origin, place).conj()
 

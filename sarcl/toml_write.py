@@ -62,13 +62,9 @@ def _value(value: Any, name: str) -> str:
         if sum(map(len, parts)) + 2 * len(parts) <= WIDTH:
             return "[" + ", ".join(parts) + "]"
         if all(isinstance(v, (bool, int, float)) for v in value):
-            return (
-                "[\n" + "".join(f"  {', '.join(parts[i : i + 8])},\n" for i in range(0, len(parts), 8)) + "]"
-            )
+            return "[\n" + "".join(f"  {', '.join(parts[i : i + 8])},\n" for i in range(0, len(parts), 8)) + "]"
         return "[\n" + "".join(f"  {p},\n" for p in parts) + "]"
-    raise TypeError(
-        f"{name} is a {type(value).__name__}; TOML holds strings, numbers, true, false, arrays and tables"
-    )
+    raise TypeError(f"{name} is a {type(value).__name__}; TOML holds strings, numbers, true, false, arrays and tables")
 
 
 def _string(text: str) -> str:

@@ -20,7 +20,8 @@ class Waveform:
     kind       "chirp", "tone" or "sampled"
     signal     complex baseband samples (n,), kind "sampled" only; rate their sampling rate, Hz
 
-    The pulse is centred on t = 0. ValueError when a value is not finite or positive, or the band reaches 0 Hz.
+    The pulse is centred on t = 0. ValueError when a value is not finite or positive, or the band reaches
+    0 Hz.
     """
 
     center: float
@@ -66,7 +67,7 @@ class Waveform:
 
     @classmethod
     def sampled(cls, signal: Any, rate: float, center: float) -> Waveform:
-        """Any pulse, from complex baseband samples (n,) taken at `rate` Hz; the sampled band is `rate` wide."""
+        """Any pulse, from complex baseband samples (n,) taken at `rate` Hz; its band is `rate` wide."""
         signal = check.array("waveform signal", signal, np.complex128, ("n",))
         rate = check.number("waveform rate", rate, above=0)
         return cls(center, rate, len(signal) / rate, "sampled", signal, rate)
@@ -74,7 +75,8 @@ class Waveform:
     def pulse_spectrum(self, frequency: Any) -> np.ndarray:
         """Spectrum P of the pulse at `frequency` Hz (n,), complex128, largest modulus 1.
 
-        A chirp's is its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), modulus 1 in the band.
+        A chirp's is its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
+        band and 0 outside.
         """
         f = np.asarray(frequency, dtype=np.float64) - self.center
         if self.kind == "chirp":
@@ -95,10 +97,16 @@ class Waveform:
         out = np.empty(f.shape, np.complex128)
         step = max(1, 2**22 // len(t))
         for i in range(0, f.size, step):
-            out.flat[i : i + step] = np.exp(-2j * np.pi * np.outer(f.ravel()[i : i + step], t)) @ self.signal
+            out.flat[i : i + step] = np.exp(-2j * np.pi * np.outer(f.ravel()[i : i + step], t)) @ self._unit
         return out
+
+    @property
+    def _unit(self) -> np.ndarray:
+        """The signal with a largest part of 1, so that sums of huge values do not overflow."""
+        assert self.signal is not None
+        return self.signal / max(np.abs(self.signal.real).max(), np.abs(self.signal.imag).max())
 
     def _sampled_peak(self) -> float:
         """Largest modulus of the signal's spectrum, on a grid 8 times finer than its length needs."""
-        assert self.signal is not None
-        return float(np.abs(np.fft.fft(self.signal, 8 * len(self.signal))).max())
+        unit = self._unit
+        return float(np.abs(np.fft.fft(unit, 8 * len(unit))).max())

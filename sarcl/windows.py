@@ -71,6 +71,6 @@ def _taylor(u: np.ndarray, sidelobe_db: float, nbar: float) -> np.ndarray:
     if (made <= 0).any():
         raise ValueError(
             f"taylor window of {sidelobe_db:g} dB with nbar {nbar:g} has weights below zero; "
-            "raise nbar or lower sidelobe_db"
+            "lower nbar or raise sidelobe_db"
         )
     return made

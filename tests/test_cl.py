@@ -89,7 +89,9 @@ def test_includes_are_expanded_once_and_lines_point_at_the_files():
     text = cl.source("backproject.cl")
     assert "#include" not in text
     assert text.count('#line 1 "wide.clh"') == 1
-    line = text.split("\n").index("__kernel void backproject(__global const float *restrict profiles, int stride, int origin,")
+    line = text.split("\n").index(
+        "__kernel void backproject(__global const float *restrict profiles, int stride, int origin,"
+    )
     directive = max(i for i, t in enumerate(text.split("\n")[:line]) if t.startswith("#line"))
     number = int(text.split("\n")[directive].split()[1]) + line - directive - 1
     from importlib.resources import files

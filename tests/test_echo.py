@@ -16,9 +16,7 @@ CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=2e-6)
 
 
 def circle(distance=10e3, n_pulses=9, **options):
-    return sarcl.Trajectory.circle(
-        radius=0.8 * distance, height=0.6 * distance, arc=0.07, n_pulses=n_pulses, **options
-    )
+    return sarcl.Trajectory.circle(radius=0.8 * distance, height=0.6 * distance, arc=0.07, n_pulses=n_pulses, **options)
 
 
 def cloud(n=500, extent=15.0, seed=0):

@@ -6,7 +6,8 @@ import threading
 
 import pytest
 
-from sarcl.job import Job
+from sarcl.files import paths
+from sarcl.job import Job, complete
 
 
 @pytest.fixture(autouse=True)
@@ -25,13 +26,13 @@ class Closing:
 
 
 def test_ctrl_c_raises_at_once():
-    with pytest.raises(KeyboardInterrupt), Job([]):
+    with pytest.raises(KeyboardInterrupt), Job({}):
         os.kill(os.getpid(), signal.SIGINT)
         raise AssertionError("it went on")
 
 
 def test_ctrl_c_in_a_destructor_raises_at_the_next_report_of_progress(capsys):
-    with pytest.raises(KeyboardInterrupt), Job([]) as job:
+    with pytest.raises(KeyboardInterrupt), Job({}) as job:
         Closing()
         job.progress("backproject", 1, 2)
         raise AssertionError("it went on")
@@ -39,14 +40,34 @@ def test_ctrl_c_in_a_destructor_raises_at_the_next_report_of_progress(capsys):
 
 
 def test_ctrl_c_in_a_destructor_stops_before_the_next_line(capsys):
-    with pytest.raises(KeyboardInterrupt), Job([]) as job:
+    with pytest.raises(KeyboardInterrupt), Job({}) as job:
         Closing()
         job.say("wrote it")
     assert capsys.readouterr().out == ""
 
 
+def test_ctrl_c_does_not_cut_the_beginning_of_a_file_in_two(tmp_path, monkeypatch):
+    unlink = type(tmp_path).unlink
+
+    def interrupted(path, **options):
+        os.kill(os.getpid(), signal.SIGINT)
+        unlink(path, **options)
+
+    with pytest.raises(KeyboardInterrupt), Job({}) as job:
+        monkeypatch.setattr(type(tmp_path), "unlink", interrupted)
+        paths.check_writable(tmp_path / "a.png")
+        job.progress("echo", 0, 1)
+    assert not list(tmp_path.iterdir())
+
+
+def test_an_error_that_ctrl_c_caused_counts_as_ctrl_c():
+    with pytest.raises(KeyboardInterrupt), Job({}):
+        Closing()
+        raise TypeError("a C library met an exception it did not expect")
+
+
 def test_the_signal_belongs_to_the_caller_again_afterwards():
-    with Job([]):
+    with Job({}):
         pass
     assert signal.getsignal(signal.SIGINT) is signal.default_int_handler
 
@@ -55,7 +76,7 @@ def test_a_command_run_from_a_thread_works():
     lines = []
 
     def run():
-        with Job([]) as job:
+        with Job({}) as job:
             job.progress("echo", 0, 1)
             lines.append("done")
 
@@ -65,8 +86,14 @@ def test_a_command_run_from_a_thread_works():
     assert lines == ["done"]
 
 
-def test_finished_files_are_remembered():
-    kept = []
-    with Job(kept) as job:
-        job.finished("a.png")
-    assert kept == ["a.png"]
+def test_a_file_that_has_taken_its_place_is_complete_and_one_that_was_there_before_is_not(tmp_path):
+    old, new, missing = (tmp_path / name for name in ("old", "new", "missing"))
+    old.write_text("as it was")
+    new.write_text("as it was")
+    outputs = {}
+    with Job(outputs) as job:
+        for path in (old, new, missing):
+            job.expect(path)
+        with paths.atomic(new) as part:
+            part.write_text("whole")
+    assert complete(outputs) == [str(new)]

@@ -105,7 +105,7 @@ def test_half_path_keeps_a_tenth_of_a_nanometre_at_any_distance(device, monkeypa
     random = np.random.default_rng(3)
     points = random.uniform(-500, 500, (801, 3))
     tx = np.array([0.6, -0.3, 0.74]) * distance
-    rx = tx + [20.0, 5.0, 1.0]
+    rx = tx + np.array([20.0, 5.0, 1.0])
     one = np.ones(1)
     reference = one * (np.linalg.norm(tx) + np.linalg.norm(rx)) / 2
     antennas = Antennas(tx[None], rx[None], reference, one * 9.6e9, one, -one, one)

@@ -208,9 +208,7 @@ def test_a_missing_mesh_is_named_with_the_line_of_its_file(tmp_path):
     with pytest.raises(
         FileNotFoundError, match=r"^f\.toml:3: \[\[scene.from_mesh\]\] mesh file '.*none.stl' does not exist"
     ):
-        loads(
-            '[[scene.from_mesh]]\nscale = 1.0\nfile = "none.stl"\n', name="f.toml", folder=tmp_path
-        ).build_scene()
+        loads('[[scene.from_mesh]]\nscale = 1.0\nfile = "none.stl"\n', name="f.toml", folder=tmp_path).build_scene()
 
 
 def test_what_is_not_there_is_asked_for_when_it_is_used():
@@ -229,9 +227,7 @@ def test_files_that_are_no_scenario_are_refused(tmp_path):
 
 
 def test_a_scenario_made_in_python_names_the_table():
-    with pytest.raises(
-        ValueError, match=r"scenario: \[waveform.chirp\] unknown key 'centre'; did you mean 'center'"
-    ):
+    with pytest.raises(ValueError, match=r"scenario: \[waveform.chirp\] unknown key 'centre'; did you mean 'center'"):
         Scenario(waveform={"chirp": {"centre": 1e9, "bandwidth": 1e6, "duration": 1e-6}})
 
 
@@ -256,9 +252,7 @@ def test_nouns_dump_to_tables_that_give_equal_nouns():
         np.testing.assert_array_equal(getattr(again.build_scene(), name), getattr(scene + terrain, name))
     np.testing.assert_array_equal(again.build_grid().positions, grid.positions)
     signal = sarcl.Waveform.sampled([1, 1j, -1], rate=1e6, center=1e9)
-    np.testing.assert_array_equal(
-        loads(Scenario(waveform=signal).dumps()).build_waveform().signal, [1, 1j, -1]
-    )
+    np.testing.assert_array_equal(loads(Scenario(waveform=signal).dumps()).build_waveform().signal, [1, 1j, -1])
 
 
 def test_what_toml_cannot_say_is_refused():

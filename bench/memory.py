@@ -1,0 +1,87 @@
+"""Peak memory of a large backprojection, raw data and image in files.
+
+    python bench/memory.py [--pulses 2048] [--samples 4096] [--size 4096] [--max-bytes 5e8] [--compare]
+
+Prints the peak resident memory above that of an idle process with an open device, in GiB; with --compare also
+the relative difference from the image made in one block.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import resource
+import tempfile
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+import sarcl
+from sarcl import cl
+
+
+def resident() -> float:
+    """Resident memory now, GiB."""
+    pages = int(Path("/proc/self/statm").read_text().split()[1])
+    return pages * resource.getpagesize() / 2**30
+
+
+def peak() -> float:
+    """Largest resident memory so far, GiB."""
+    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 2**20
+
+
+def write_raw(path: Path, n_pulses: int, n_samples: int) -> sarcl.PhaseHistory:
+    """White noise written pulse by pulse, and its phase history read from the file."""
+    random = np.random.default_rng(0)
+    file = h5py.File(path, "w")
+    samples = file.create_dataset("samples", (n_pulses, n_samples), np.complex64)
+    for p in range(n_pulses):
+        samples[p] = random.standard_normal((n_samples, 2)).astype(np.float32).view(np.complex64)[:, 0]
+    track = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.07, n_pulses=n_pulses)
+    return sarcl.PhaseHistory(
+        samples,
+        frequency=9.3e9,
+        frequency_step=600e6 / n_samples,
+        tx=track.positions,
+        reference_range=np.linalg.norm(track.positions, axis=1),
+    )
+
+
+def main() -> None:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--device")
+    parser.add_argument("--pulses", type=int, default=2048)
+    parser.add_argument("--samples", type=int, default=4096)
+    parser.add_argument("--size", type=int, default=4096)
+    parser.add_argument("--tolerance", type=float, default=1e-2)
+    parser.add_argument("--max-bytes", type=float)
+    parser.add_argument("--compare", action="store_true", help="focus again in one block and compare")
+    args = parser.parse_args()
+    cl.open_device(args.device)
+    with tempfile.TemporaryDirectory() as folder:
+        raw = write_raw(Path(folder, "raw.h5"), args.pulses, args.samples)
+        grid = sarcl.ImageGrid.plane(shape=(args.size, args.size), spacing=0.02)
+        options = {"tolerance": args.tolerance, "device": args.device, "check": False}
+        idle = resident()
+        image = sarcl.backproject(raw, grid, max_bytes=args.max_bytes, out=Path(folder, "image.h5"), **options)
+        result = {
+            "peak_above_idle_gib": peak() - idle,
+            "idle_gib": idle,
+            "seconds": sum(image.report.seconds.values()),
+            "contributions": image.report.contributions_done,
+        }
+        if args.compare:
+            whole = sarcl.backproject(raw, grid, max_bytes=16e9, **options)
+            wrong = right = 0.0
+            for start in range(0, args.size, 256):
+                part, other = image.data[start : start + 256], whole.data[start : start + 256]
+                wrong += float((np.abs(part - other) ** 2).sum(dtype=np.float64))
+                right += float((np.abs(other) ** 2).sum(dtype=np.float64))
+            result["relative_difference"] = float(np.sqrt(wrong / right))
+        print(json.dumps(result))
+
+
+if __name__ == "__main__":
+    main()
