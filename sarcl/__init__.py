@@ -13,7 +13,7 @@ Two equations carry everything::
     v_p      1 inside the range window        |tau - tau_ref| <= 1/(2 frequency_step)
     I        data                             Image
 
-nouns    Waveform Trajectory Scene PhaseHistory ImageGrid Image Report
+nouns    Waveform Trajectory Scene PhaseHistory ImageGrid Image Report Scenario
 verbs    echo compress backproject measure read concatenate devices
 """
 
@@ -34,6 +34,7 @@ _HOME = {
     "ImageGrid": "grid",
     "Image": "image",
     "Report": "report",
+    "Scenario": "scenario",
     "echo": "echo",
     "compress": "compress",
     "backproject": "backproject",
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from .quality import measure as measure
     from .read import read as read
     from .report import Report as Report
+    from .scenario import Scenario as Scenario
     from .scene import Scene as Scene
     from .trajectory import Trajectory as Trajectory
     from .waveform import Waveform as Waveform

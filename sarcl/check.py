@@ -42,6 +42,8 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
         given = np.asarray(value)
         if given.dtype.kind not in "biufcO":
             raise TypeError(f"type {given.dtype}")
+        if given.dtype.kind == "O" and any(v is None for v in given.flat):
+            raise TypeError("None is no number")
         if given.dtype.kind == "c" and wanted.kind != "c":
             raise TypeError(f"type {given.dtype}: take the real part or the modulus")
         if np.ma.is_masked(value):

@@ -85,6 +85,8 @@ def echo(
         far=np.full(len(tx), far),
     )
     budget = planning.budget(opened, max_bytes)
+    if progress:
+        progress("scene", 0, 3)
     parts, skipped = scatterers.prepare(
         scene,
         waveform,
@@ -94,6 +96,7 @@ def echo(
         skips=skips,
         max_edge=max_edge,
         device=opened,
+        tell=None if progress is None else lambda n: progress("scene", n, 3),
     )
     if not parts:
         raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")

@@ -11,6 +11,7 @@ import numpy as np
 from . import cl
 from .check import SPEED_OF_LIGHT
 from .grid import ImageGrid
+from .scene import box
 
 WAVE = 2 / SPEED_OF_LIGHT  # turns a metre of half path and a hertz
 
@@ -101,8 +102,8 @@ def tile_points(
 
 def morton_order(positions: np.ndarray) -> np.ndarray:
     """Order of points (n, 3) along the Z curve of the cube that holds them (1024 cells a side and more)."""
-    low = positions.min(axis=0)
-    extent = float((positions.max(axis=0) - low).max()) or 1.0
+    low, high = box(positions)
+    extent = float((high - low).max()) or 1.0
     cell = ((positions - low) * ((2**20 - 1) / extent)).astype(np.uint64)
     code = np.zeros(len(positions), np.uint64)
     for axis in range(3):

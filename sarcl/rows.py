@@ -45,6 +45,9 @@ class Picked:
         runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
         return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
 
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
 
 class Stacked:
     """Rows of several sources one after another; a slice reads only the sources it touches."""
@@ -63,3 +66,6 @@ class Stacked:
             if a < b:
                 out[a - start : b - start] = source[a - first : b - first]
         return out
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -65,8 +66,13 @@ def prepare(
     skips: set[str],
     max_edge: float | str | None,
     device: Any,
+    tell: Callable[[int], object] | None = None,
 ) -> tuple[list[Scatterers], dict[str, int]]:
-    """The scene's points and facets, ready to spread, and what was left out: reason -> pairs with pulses."""
+    """The scene's points and facets, ready to spread, and what was left out: reason -> pairs with pulses.
+
+    tell is called with 1, 2, 3 when facets are cut, culled and lit.
+    """
+    step = tell or (lambda n: None)
     n_pulses = len(antennas.tx)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     parts = []
@@ -79,6 +85,7 @@ def prepare(
         edge = resolution_edge(waveform, antennas, scene) if max_edge == "auto" else max_edge
         if edge is not None:
             scene = scene.split(number("max_edge", edge, above=0))
+        step(1)
         # heights come before anything is left out, so that a facet's height does not depend on its neighbours
         heights = np.random.Generator(np.random.Philox(seed)).standard_normal(len(scene.triangles))
         normals = scenes.normals(scene.triangles)
@@ -91,10 +98,12 @@ def prepare(
             away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
             left_out["facing away"] = int(away.sum()) * n_pulses
             keep &= ~away
+        step(2)
         if shadows:
             dark = keep & ~_seen(scene.triangles, antennas, device)
             left_out["shadowed"] = int(dark.sum()) * n_pulses
             keep &= ~dark
+        step(3)
         if keep.any():
             strength = 2 * np.sqrt(np.pi) * waveform.center / SPEED_OF_LIGHT
             parts.append(
@@ -123,8 +132,8 @@ def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> 
 
     n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene.
     """
-    middle = (centers.min(axis=0) + centers.max(axis=0)) / 2
-    radius = float(np.linalg.norm(centers - middle, axis=1).max())
+    corners = scenes.box(centers)
+    middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
     out = np.zeros(len(centers), bool)
     for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
         look = ends - middle

@@ -148,7 +148,7 @@ class Scene:
     def bounds(self) -> np.ndarray:
         """Lower and upper corner of the box that holds everything, m (2, 3)."""
         corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
-        return np.stack([corners.min(axis=0), corners.max(axis=0)])
+        return box(corners)
 
     @property
     def center(self) -> np.ndarray:
@@ -184,6 +184,12 @@ class Scene:
             part = tuple(np.concatenate([a, b]) for a, b in _bisect(tuple(a[long] for a in part), lengths[:, long]))
         joined = {n: check.sealed(np.concatenate([d[i] for d in done])) for i, n in enumerate(names)}
         return replace(self, **joined)
+
+
+def box(points: np.ndarray) -> np.ndarray:
+    """Lower and upper corner of the box that holds points (n, d): (2, d)."""
+    # column by column: a reduction along the long axis of (n, 3) is several times slower
+    return np.stack([[c.min() for c in points.T], [c.max() for c in points.T]])
 
 
 def edges(triangles: np.ndarray) -> np.ndarray:
@@ -261,7 +267,7 @@ def _rotation(rotation: Any) -> np.ndarray:
     if np.ndim(rotation) == 1:
         from scipy.spatial.transform import Rotation
 
-        return Rotation.from_rotvec(check.array("rotation", rotation, np.float64, (3,))).as_matrix()
+        return Rotation.from_rotvec(check.array("rotation", rotation, np.float64, (3,)).copy()).as_matrix()
     matrix = check.array("rotation", rotation, np.float64, (3, 3))
     # float32 matrices are orthonormal to 1e-7 only
     if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:

@@ -10,6 +10,7 @@ from . import cl, planning, profiles
 from .geometry import Antennas, Tiles, morton_order, tile_points
 from .planning import Clock, Plan
 from .scatterers import Scatterers
+from .scene import box
 
 PER_TILE = (256, 64)
 
@@ -35,7 +36,7 @@ class Spreader:
     ) -> tuple[Plan, int]:
         """Add `part` to samples (n_pulses, n_samples); return the plan and how many pairs were gated out."""
         positions = part.positions
-        center = (positions.min(axis=0) + positions.max(axis=0)) / 2
+        center = box(positions).mean(axis=0)
         plan, tiles, order = self._plan(part, center)
         bistatic = self.antennas.rx is not None
         device, lanes = self.device, self.device.info.vector_width
@@ -55,7 +56,9 @@ class Spreader:
         record = 4 * plan.components(bistatic)
         splits = self._splits(tiles)
         per_pulse = record * tiles.n_tiles + 8 * stride * splits
-        pulses = max(1, int(self.budget / 2 / per_pulse) // lanes) * lanes
+        # enough pulses at once to keep every unit busy, few enough to tell how far it is
+        most = max(64, 16 * device.info.units)
+        pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
         n_pulses, gated = len(samples), 0
         for start in range(0, n_pulses, pulses):
             stop = min(start + pulses, n_pulses)
@@ -87,7 +90,7 @@ class Spreader:
     def _plan(self, part: Scatterers, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
         order = morton_order(part.positions)
         made = {n: tile_points(part.positions, center, n, order) for n in PER_TILE}
-        bounds = np.stack([part.positions.min(axis=0), part.positions.max(axis=0)])
+        bounds = box(part.positions)
         splits = max(self._splits(tiles) for tiles, _ in made.values())
         plan = planning.cheapest(
             self.tolerance,

@@ -21,7 +21,7 @@ from .image import Image
 CHIP = 32  # pixels on each side of the point whose spectrum tells how much of the sampling rate is filled
 LEAST = 8  # pixels on each side without which no spectrum is worth looking at
 BAND = 0.42  # cycles a pixel that may be filled: the kernel's skirts take the rest of 0.5
-FALL = 1e-2  # the band ends where the spectrum's density stays below this part of its largest
+FALL = 4e-3  # the band ends where the spectrum's density stays below this part of its largest
 KAISER = 8.96, 5.715  # shape, and pixels times transition width, of 90 dB by Kaiser's formulas
 
 
@@ -120,7 +120,7 @@ def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[floa
     power = np.abs(np.fft.fft2(chip)) ** 2
     bands = []
     for axis, name in ((0, "row"), (1, "column")):
-        density = power.sum(axis=1 - axis)
+        density = power.max(axis=1 - axis)  # not the sum: a turned band ends in a thin corner
         frequency = np.abs(np.fft.fftfreq(len(density)))
         bands.append(float(frequency[density > FALL * density.max()].max()))
         if bands[-1] > BAND:
