@@ -21,7 +21,7 @@ from .image import Image
 CHIP = 32  # pixels on each side of the point whose spectrum tells how much of the sampling rate is filled
 LEAST = 8  # pixels on each side without which no spectrum is worth looking at
 BAND = 0.42  # cycles a pixel that may be filled: the kernel's skirts take the rest of 0.5
-FALL = 4e-3  # the band ends where the spectrum's density stays below this part of its largest
+FALL = 1e-3  # the band ends where the spectrum's density stays below this part of its largest
 KAISER = 8.96, 5.715  # shape, and pixels times transition width, of 90 dB by Kaiser's formulas
 
 

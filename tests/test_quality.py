@@ -120,8 +120,8 @@ def test_figures_are_those_of_brute_force_on_the_exact_image(case, window):
     got = sarcl.measure(image)
     want = brute_force(seen.value({place: 2.0}), place, _axes(image, 40, 40), seen.cells("ground"))
     np.testing.assert_allclose(got.irw, want["irw"], rtol=2e-4)
-    # an interpolation error of 2e-5 of the peak is 0.02 dB of a lobe at -43 dB, 0.001 dB at -13
-    loose = 0.02 if window else 0.002
+    # an interpolation error of 2e-5 of the peak is 0.03 dB of a lobe at -44.5 dB, 0.001 dB at -13
+    loose = 0.03 if window else 0.002
     np.testing.assert_allclose(got.pslr, want["pslr"], atol=loose)
     np.testing.assert_allclose(got.islr, want["islr"], atol=loose)
     np.testing.assert_allclose(got.position, want["position"], atol=1e-3 * min(got.irw))
@@ -196,6 +196,16 @@ def test_figures_do_not_depend_on_the_spacing(oversample):
     np.testing.assert_allclose(got.irw, seen.cells("ground"), rtol=5e-4)
     np.testing.assert_allclose(got.pslr, (-13.263, -13.285), atol=0.005)
     assert np.linalg.norm(got.position) < 1e-3 * min(got.irw)
+
+
+@pytest.mark.parametrize(("window", "oversample"), [(None, 1.65), ("hamming", 1.3), (TAYLOR, 1.5)])
+def test_a_turned_band_that_is_accepted_is_measured_right(window, oversample):
+    """At 45 degrees the band ends in corners, thin under a window: what is not refused must be within 1 %."""
+    seen = Pass(window=window)
+    straight = sarcl.measure(seen.image(seen.grid(CENTRE), {CENTRE: 1.0}))
+    turned = sarcl.measure(seen.image(seen.grid(CENTRE, turned=45, oversample=oversample), {CENTRE: 1.0}))
+    np.testing.assert_allclose(turned.irw, straight.irw, rtol=2e-3)
+    np.testing.assert_allclose(turned.pslr, straight.pslr, atol=0.4 if window == "hamming" else 0.1)
 
 
 def test_float32_pixels_cost_nothing_that_shows():

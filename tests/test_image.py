@@ -1,0 +1,196 @@
+"""Images: decibels, multilooking with pixels in the right places, and what is refused."""
+
+from __future__ import annotations
+
+import h5py
+import numpy as np
+import pytest
+
+import sarcl
+
+TOLERANCE = {
+    "decibels": 1e-5,  # dB; float32 near 100 dB
+    "mean": 1e-6,  # mean of some ten float32 intensities, relative
+    "position": 1e-9,  # m; float64
+}
+SHAPE = (11, 14)
+GRID = sarcl.ImageGrid.plane(center=(1, -2, 3), shape=SHAPE, spacing=(0.3, 0.7), normal=(1, 2, 5), x_axis=(0, 1, 0))
+
+
+def noise(dtype=np.complex64, seed=0):
+    random = np.random.default_rng(seed)
+    return (random.standard_normal(SHAPE) + 1j * random.standard_normal(SHAPE)).astype(dtype)
+
+
+# decibels
+
+
+def test_a_unit_point_stands_at_zero_decibels():
+    data = np.full(SHAPE, 250 * np.exp(0.3j), np.complex64)
+    assert np.abs(sarcl.Image(data, GRID, gain=250).decibels()).max() <= TOLERANCE["decibels"]
+
+
+def test_decibels_are_20_log10_of_amplitude_and_10_log10_of_intensity():
+    data = noise()
+    db = sarcl.Image(data, GRID, gain=3).decibels()
+    assert db.dtype == np.float32
+    assert np.abs(db - 20 * np.log10(np.abs(data) / 3)).max() <= TOLERANCE["decibels"]
+    detected = sarcl.Image(np.abs(data) ** 2, GRID, gain=3).decibels()
+    assert np.abs(detected - db).max() <= TOLERANCE["decibels"]
+
+
+@pytest.mark.parametrize("dtype", [np.complex64, np.complex128, np.float32, int])
+def test_nothing_is_minus_infinity(dtype):
+    assert (sarcl.Image(np.zeros(SHAPE, dtype), GRID).decibels() == -np.inf).all()
+
+
+def test_a_negative_intensity_is_named():
+    data = np.ones(SHAPE)
+    data[2, 5] = -3
+    with pytest.raises(ValueError, match=r"image data\[2, 5\] is -3; an intensity is not negative"):
+        sarcl.Image(data, GRID).decibels()
+
+
+# multilook
+
+
+@pytest.mark.parametrize("looks", [(1, 1), (2, 2), (3, 4), (5, 1), (1, 14), (11, 14), 4])
+def test_multilook_is_the_mean_intensity_of_blocks_and_cuts_the_remainder(looks):
+    data = noise()
+    image = sarcl.Image(data, GRID, gain=7).multilook(looks)
+    a, b = looks if isinstance(looks, tuple) else (looks, looks)
+    assert image.data.shape == image.grid.shape == (SHAPE[0] // a, SHAPE[1] // b)
+    assert not image.is_complex and image.gain == 7
+    for i in range(image.data.shape[0]):
+        for j in range(image.data.shape[1]):
+            block = data[i * a : (i + 1) * a, j * b : (j + 1) * b]
+            assert image.data[i, j] == pytest.approx((np.abs(block) ** 2).mean(), rel=TOLERANCE["mean"])
+
+
+@pytest.mark.parametrize("looks", [(1, 1), (2, 2), (3, 4), (5, 1), (4, 5), (11, 14)])
+def test_a_looked_pixel_lies_at_the_mean_position_of_its_block(looks):
+    a, b = looks
+    grid = sarcl.Image(noise(), GRID).multilook(looks).grid
+    n, m = grid.shape
+    wanted = GRID.positions[: n * a, : m * b].reshape(n, a, m, b, 3).mean(axis=(1, 3))
+    assert np.abs(grid.positions - wanted).max() <= TOLERANCE["position"]
+    assert grid.spacing == pytest.approx((0.3 * a, 0.7 * b))
+
+
+def test_a_ramp_stays_the_same_ramp():
+    # intensity linear in position: its mean over a block is its value at the block's centre
+    slope = np.array([0.1, 0.2, -0.05])
+    image = sarcl.Image(10 + GRID.positions @ slope, GRID)
+    for looks in ((2, 3), (3, 2), (4, 4)):
+        looked = image.multilook(looks)
+        assert np.abs(looked.data - (10 + looked.grid.positions @ slope)).max() <= TOLERANCE["position"]
+
+
+def test_looking_twice_is_looking_once_with_more():
+    image = sarcl.Image(noise(), GRID)
+    twice, once = image.multilook((2, 2)).multilook((2, 3)), image.multilook((4, 6))
+    assert twice.data == pytest.approx(once.data, rel=TOLERANCE["mean"])
+    assert np.abs(twice.grid.positions - once.grid.positions).max() <= TOLERANCE["position"]
+
+
+def test_multilook_leaves_speckle_of_one_over_root_n():
+    random = np.random.default_rng(1)
+    data = (random.standard_normal((400, 400)) + 1j * random.standard_normal((400, 400))) / np.sqrt(2)
+    looked = sarcl.Image(data, sarcl.ImageGrid.plane(shape=400, spacing=1)).multilook(4).data
+    # mean 1, deviation 1/4 over 10^4 blocks: three standard errors of each
+    assert looked.mean() == pytest.approx(1, abs=3 * 0.25 / 100)
+    assert looked.std() == pytest.approx(0.25, abs=3 * 0.25 / 100)
+
+
+def test_multilook_reads_a_dataset_and_leaves_it_alone(tmp_path):
+    data = noise()
+    with h5py.File(tmp_path / "image.h5", "w") as file:
+        image = sarcl.Image(file.create_dataset("data", data=data), GRID)
+        assert image.multilook(2).data == pytest.approx(sarcl.Image(data, GRID).multilook(2).data)
+        assert (file["data"][...] == data).all()
+
+
+# what an image holds
+
+
+def test_geometry_is_kept_as_read_only_copies():
+    tx = np.array([1.0, 2, 3])
+    image = sarcl.Image(noise(), GRID, frequency=9600000000, tx=tx, rx=[4, 5, 6])
+    tx += 1
+    assert (image.tx == (1, 2, 3)).all() and (image.rx == (4, 5, 6)).all() and image.frequency == 9.6e9
+    with pytest.raises(ValueError, match="read-only"):
+        image.tx[0] = 0
+
+
+def test_lists_are_images_too():
+    grid = sarcl.ImageGrid.plane(shape=(1, 2), spacing=1)
+    assert sarcl.Image([[1j, 2]], grid).is_complex and not sarcl.Image([[1, 2]], grid).is_complex
+
+
+def test_a_line_and_a_volume_are_images_without_a_picture():
+    for shape in ((4,), (2, 3, 4)):
+        image = sarcl.Image(np.ones(shape, complex), sarcl.ImageGrid.points(np.zeros((*shape, 3))))
+        assert image.decibels().shape == shape
+        with pytest.raises(ValueError, match="a picture needs two axes; this image has shape"):
+            image.show()
+
+
+def test_show_and_save_give_a_picture(tmp_path):
+    image = sarcl.Image(noise(), GRID)
+    assert image.show(floor_db=-40).size[0] > 100
+    for name in ("a.png", "A.PNG"):
+        image.save(tmp_path / name, title="noise")
+        assert (tmp_path / name).read_bytes().startswith(b"\x89PNG")
+
+
+@pytest.mark.parametrize("name", ["a.h5", "a.hdf5"])
+def test_a_saved_image_reads_back(tmp_path, name):
+    image = sarcl.Image(noise(), GRID, gain=3, frequency=9.6e9, tx=(1, 2, 3), rx=(4, 5, 6))
+    image.save(tmp_path / name)
+    again = sarcl.read(tmp_path / name)
+    assert (np.asarray(again.data) == image.data).all() and (again.grid.positions == GRID.positions).all()
+    assert (again.gain, again.frequency) == (3, 9.6e9) and (again.tx == image.tx).all()
+
+
+def test_a_one_pixel_image_works(tmp_path):
+    image = sarcl.Image([[1j]], sarcl.ImageGrid.plane(shape=1, spacing=1))
+    assert image.multilook(1).data.tolist() == [[1]] and image.decibels().tolist() == [[0]]
+    image.save(tmp_path / "a.png")
+
+
+def image(data=None, **options):
+    return sarcl.Image(noise() if data is None else data, GRID, **options)
+
+
+BAD = {
+    "other shape": (
+        lambda: image(np.ones((11, 13))),
+        r"image data has shape \(11, 13\) but its grid \(11, 14\); give one value per pixel",
+    ),
+    "no shape": (lambda: image(3), r"image data has shape \(\) but its grid"),
+    "truths": (lambda: image(np.ones(SHAPE, bool)), "image data has type bool, wanted complex or real"),
+    "no gain": (lambda: image(gain=0), "image gain is 0; it must be greater than 0"),
+    "gain not finite": (lambda: image(gain=np.inf), "image gain is inf"),
+    "frequency a word": (lambda: image(frequency="X band"), "image frequency must be a number"),
+    "flat antenna": (lambda: image(tx=(1, 2)), r"tx has shape \(2,\), wanted \(3,\)"),
+    "antenna not finite": (lambda: image(rx=(1, np.nan, 2)), r"rx\[1\] is nan"),
+    "no looks": (lambda: image().multilook(0), r"looks\[0\] is 0; it must be at least 1"),
+    "half a look": (lambda: image().multilook((1, 1.5)), r"looks\[1\] must be a whole number, got 1.5"),
+    "three looks": (lambda: image().multilook((1, 2, 3)), r"looks is \(1, 2, 3\); wanted \(row, column\)"),
+    "too many looks": (lambda: image().multilook((12, 1)), r"looks \(12, 1\) is larger than the image \(11, 14\)"),
+    "looks at a list of points": (
+        lambda: sarcl.Image(np.ones(4), sarcl.ImageGrid.points(np.zeros((4, 3)))).multilook(2),
+        "multilook is for images on a plane",
+    ),
+    "floor above zero": (lambda: image().show(floor_db=5), "floor_db is 5"),
+    "floor not finite": (lambda: image().show(floor_db=np.nan), "floor_db is nan"),
+    "unknown suffix": (lambda: image().save("a.bmp"), r"image path 'a.bmp' ends in '.bmp'; choose '.png' or '.h5'"),
+    "no suffix": (lambda: image().save("picture"), "image path 'picture' ends in ''; choose"),
+}
+
+
+@pytest.mark.parametrize("name", BAD)
+def test_bad_images_say_what_was_wanted(name):
+    make, message = BAD[name]
+    with pytest.raises(ValueError, match=message):
+        make()
