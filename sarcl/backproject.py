@@ -189,6 +189,7 @@ class _Run:
         self.components = plan.components(bistatic)
         self.constants = device.kernel("backproject.cl", "tile_constants", **common)
         self.kernel = device.kernel("backproject.cl", "backproject", **common)
+        self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
 
     def focus(
@@ -230,7 +231,7 @@ class _Run:
                 pulse_host = self.antennas.packed(tiling.center, self.plan.length, start, stop, self.lanes)
                 pulse, n = device.upload(pulse_host), pulse_host.shape[2]
                 clock.lap("profiles")
-                at_once = int(budget / 4 / (4 * self.components * n))
+                at_once = int(min(budget / 4, device.info.max_alloc) / (4 * self.components * n))
                 step = max(1, min(tiles.n_tiles, at_once))
                 constants = device.empty(4 * self.components * n * step)
                 for tile in range(0, tiles.n_tiles, step):
@@ -239,9 +240,9 @@ class _Run:
                         self.constants, (n // self.lanes, count), None,
                         pulse, references, radius, n, tiles.n_tiles, tile, int(self.skip), constants,
                     )  # fmt: skip
-                    per_group = tiles.per_tile // self.lanes // VECTORS
+                    items = tiles.per_tile // self.lanes // VECTORS
                     device.run(
-                        self.kernel, (per_group, count), (per_group, 1),
+                        self.kernel, (items, count), (items, 1) if items <= self.group else None,
                         block, stride, stride // 2, self.table, pulse, n, stop - start, constants, references,
                         tiles.n_tiles, tile, offsets, tiles.offsets.shape[1],
                         0 if tiles.shared else tiles.per_tile // self.lanes, image, np.uint64(pixels), missed,

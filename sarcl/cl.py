@@ -207,7 +207,11 @@ class Device:
 
     def without_fp64(self) -> Device:
         """The same device, its kernels built without float64."""
-        return _without_fp64(self)
+        return _twin(self, fp64=False)
+
+    def one_lane(self) -> Device:
+        """The same device, its kernels built with one lane a work-item, as GPUs run them."""
+        return _twin(self, vector_width=1)
 
     def kernel(self, file: str, name: str, **macros: int) -> Any:
         """Kernel `name` of kernels/`file`, built once for each set of integer macros."""
@@ -316,8 +320,8 @@ class Device:
 
 
 @functools.cache
-def _without_fp64(device: Device) -> Device:
-    return Device(replace(device.info, fp64=False), device._raw)
+def _twin(device: Device, **changes: Any) -> Device:
+    return Device(replace(device.info, **changes), device._raw)
 
 
 @functools.cache

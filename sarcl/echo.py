@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import cl, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, finite, number
+from .check import SPEED_OF_LIGHT, array, choice, finite, number, sealed
 from .geometry import Antennas
 from .phase_history import PhaseHistory
 from .planning import Clock, Plan
@@ -129,7 +129,7 @@ def echo(
         measured = _measure_error(parts, antennas, frequencies, spectrum, samples)
         clock.lap("check")
     return PhaseHistory(
-        samples,
+        sealed(samples),
         frequency=frequency,
         frequency_step=step,
         tx=tx,

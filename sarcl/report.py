@@ -37,6 +37,9 @@ class Report:
         for name in ("plan", "contributions_skipped", "seconds"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
+    def __reduce__(self) -> tuple[Any, ...]:
+        return Report, tuple(self.to_dict().values())  # read-only mappings neither copy nor pickle
+
     def to_dict(self) -> dict[str, Any]:
         """The report as plain numbers and strings, ready for JSON."""
         plain = {k: getattr(self, k) for k in self.__dataclass_fields__}

@@ -128,7 +128,10 @@ class Scene:
         z = check.array("z", z, np.float64, (len(y), len(x)))
         for name, axis in (("x", x), ("y", y)):
             if len(axis) < 2 or not (np.diff(axis) > 0).all():
-                raise ValueError(f"{name} must hold at least two increasing values: a cell needs an extent")
+                raise ValueError(
+                    f"{name} must hold at least two increasing values: a cell needs an extent; turn a falling axis "
+                    "round together with z"
+                )
         corner = np.stack([*np.meshgrid(x, y), z], axis=-1)
         sw, se, nw, ne = corner[:-1, :-1], corner[:-1, 1:], corner[1:, :-1], corner[1:, 1:]
         triangles = np.stack([np.stack([sw, se, ne], axis=2), np.stack([sw, ne, nw], axis=2)], axis=2)

@@ -99,12 +99,17 @@ def _bin(projected: np.ndarray, centers: np.ndarray) -> tuple[np.ndarray, np.nda
     extent = (box(high)[1] - origin).max()
     typical = float(np.quantile(np.maximum(*(high - low).T), 0.9))
     side = max(2 * typical, float(extent) / 2048, np.finfo(np.float64).tiny)
-    first = ((low - origin) / side).astype(np.int64)
-    last = ((high - origin) / side).astype(np.int64)
+    while True:
+        first = ((low - origin) / side).astype(np.int64)
+        last = ((high - origin) / side).astype(np.int64)
+        count = last - first + 1
+        each = count[:, 0] * count[:, 1]
+        # A few large facets among many small ones would fill the memory with entries: wider cells have fewer.
+        if each.sum() <= 2**22 + 16 * len(each):
+            break
+        side *= 2
     across = int(last[:, 0].max()) + 1
     cells = across * (int(last[:, 1].max()) + 1)
-    count = last - first + 1
-    each = count[:, 0] * count[:, 1]
     facet = np.repeat(np.arange(len(each)), each)
     within = np.arange(len(facet)) - np.repeat(np.cumsum(each) - each, each)
     column = first[facet, 0] + within % count[facet, 0]

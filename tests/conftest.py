@@ -11,14 +11,16 @@ from sarcl import cl
 
 
 def _devices():
-    """Every working device, and each once more as one without float64."""
+    """Every working device, each once more without float64, and CPUs once more with one lane, as GPUs run."""
     found = []
     for info in cl.devices():
         if info.works:
             name = f"{info.index}-{info.kind}"
-            found.append(pytest.param((info.index, True), id=name))
+            found.append(pytest.param((info.index, None), id=name))
             if info.fp64:
-                found.append(pytest.param((info.index, False), id=f"{name}-no-fp64"))
+                found.append(pytest.param((info.index, "without_fp64"), id=f"{name}-no-fp64"))
+            if info.vector_width > 1:
+                found.append(pytest.param((info.index, "one_lane"), id=f"{name}-one-lane"))
     if not found:
         reason = f"no OpenCL device works. {cl.REMEDY}"
         found.append(pytest.param(None, id="none", marks=pytest.mark.xfail(reason=reason, run=False, strict=True)))
@@ -28,9 +30,9 @@ def _devices():
 @pytest.fixture(params=_devices())
 def device(request):
     """An open device; a kernel that fails on it fails the test."""
-    index, fp64 = request.param
+    index, twin = request.param
     opened = cl.open_device(index)
-    return opened if fp64 else opened.without_fp64()
+    return getattr(opened, twin)() if twin else opened
 
 
 @pytest.fixture(scope="session")

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import copy
+import pickle
 from dataclasses import replace
 
 import h5py
@@ -25,7 +27,8 @@ def noise(n_rows=6, n_samples=5, dtype=np.complex64, seed=0):
 
 def history(samples=None, **changed):
     samples = noise() if samples is None else samples
-    n = samples.shape[0] if hasattr(samples, "shape") else len(samples)
+    shape = (len(samples),) if isinstance(samples, list) else samples.shape
+    n = shape[0] if shape else 1
     fields = {
         "frequency": 9e9,
         "frequency_step": 1e6,
@@ -163,9 +166,9 @@ def test_select_takes_a_polarisation_a_channel_or_both():
 
 
 SELECTIONS = {
-    "polarisation that is not there": ({"polarization": "VV"}, r"polarization 'VV' is not in these data; there are \['HH', 'HV'\]"),
-    "channel that is not there": ({"channel": 7}, r"channel 7 is not in these data; there are \[0, 1, 2\]"),
-}  # fmt: skip
+    "polarisation": ({"polarization": "VV"}, r"polarization 'VV' is not in these data; there are \['HH', 'HV'\]"),
+    "channel": ({"channel": 7}, r"channel 7 is not in these data; there are \[0, 1, 2\]"),
+}
 
 
 @pytest.mark.parametrize("name", SELECTIONS)
@@ -387,6 +390,16 @@ def test_one_row_of_one_sample_works():
     assert (raw.center_frequency == raw.frequency).all()
 
 
+def test_a_phase_history_travels_to_other_processes_with_its_report():
+    report = sarcl.Report(plan={"taps": 4}, tolerance=1e-3, seconds={"echo": 0.1}, device="a device", seed=3)
+    raw = full(report=report, waveform=sarcl.Waveform.sampled([1, 2j], 1e8, 9e9))
+    for again in (pickle.loads(pickle.dumps(raw)), copy.deepcopy(raw)):
+        assert (again.samples == raw.samples).all() and (again.polarization == raw.polarization).all()
+        assert again.report.to_dict() == report.to_dict() and (again.waveform.signal == [1, 2j]).all()
+        with pytest.raises(TypeError):
+            again.report.plan["taps"] = 5
+
+
 def test_rows_and_fields_that_disagree_are_both_counted():
     message = r"^samples has 700 rows but tx has 720; give one tx per row$"
     with pytest.raises(ValueError, match=message):
@@ -400,7 +413,7 @@ def ragged(*lengths):
 
 
 BAD = {
-    "samples of one axis": ({"samples": np.ones(5, complex)}, r"samples has shape \(5,\), wanted \(n_rows, n_samples\)"),
+    "samples of one axis": ({"samples": np.ones(5, complex)}, r"samples has shape \(5,\), wanted \(n_rows, n_samp"),
     "samples of no axis": ({"samples": np.array(1j)}, r"samples has shape \(\), wanted"),
     "no rows": ({"samples": np.ones((0, 5), complex)}, r"samples has shape \(0, 5\), wanted .* neither zero"),
     "no samples": ({"samples": np.ones((5, 0), complex)}, r"samples has shape \(5, 0\)"),

@@ -184,7 +184,7 @@ ROTATIONS = {
 def test_a_rotation_is_a_matrix_a_vector_or_an_angle_about_z(name):
     rotation, vector = ROTATIONS[name]
     turned, plain = sarcl.Scene.from_mesh(box(), rotation=rotation), sarcl.Scene.from_mesh(box())
-    wanted = Rotation.from_rotvec(vector).apply(plain.triangles.reshape(-1, 3)).reshape(-1, 3, 3)
+    wanted = Rotation.from_rotvec(vector).apply(plain.triangles.reshape(-1, 3).copy()).reshape(-1, 3, 3)
     assert np.abs(turned.triangles - wanted).max() <= TOLERANCE["position"]
 
 
@@ -282,7 +282,7 @@ def test_a_mesh_object_with_a_corner_not_finite_is_refused_by_index(value):
 
 @pytest.mark.parametrize("what", [None, 3, b"tank.stl", [1, 2], trimesh.PointCloud(np.eye(3))], ids=repr)
 def test_what_is_no_mesh_is_refused(what):
-    with pytest.raises(TypeError, match="give a file name or a trimesh.Trimesh"):
+    with pytest.raises(TypeError, match=r"give a file name or a trimesh\.Trimesh"):
         sarcl.Scene.from_mesh(what)
 
 
