@@ -5,6 +5,7 @@
 .PHONY: help demo test bench lint clean ready ready-dev
 
 ARGS ?=
+CODE = sarcl kernels tests bench
 
 help:  ## this list
 	@echo "make GOAL [ARGS='...' handed to the command] [PYTHON=/path/to/python3.12]"
@@ -20,9 +21,8 @@ bench: ready  ## speed, printed with the error achieved
 	@.venv/bin/python bench/backproject.py $(ARGS)
 
 lint: ready-dev  ## style, format and types
-	.venv/bin/python -m ruff check .
-	.venv/bin/python -m ruff format --check .
-	.venv/bin/python -m mypy
+	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \
+	    echo "$$tool"; .venv/bin/python -m $$tool || status=1; done; exit $$status
 
 clean:  ## remove .venv and everything made, but not the pictures in out/
 	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache

@@ -79,9 +79,7 @@ class Machine:
         (self.bin / name).chmod(0o755)
 
     def python(self, version: str = "(3, 12, 1)", name: str = "python3") -> None:
-        self.program(
-            name, PYTHON.format(real=f"'{sys.executable}'", version=version, chmod=shutil.which("chmod"))
-        )
+        self.program(name, PYTHON.format(real=f"'{sys.executable}'", version=version, chmod=shutil.which("chmod")))
 
     def user(self, number: int) -> None:
         self.program("id", f'#!/bin/sh\n[ "$1" = -u ] && echo {number} || echo somebody\n')
@@ -235,9 +233,7 @@ def test_root_installs_a_device_without_asking(machine):
 
 
 def test_sudo_is_used_where_it_needs_no_password(machine):
-    machine.program(
-        "sudo", '#!/bin/sh\n[ "$1" = -n ] || exit 1\nshift\necho "sudo -n" >>"$STATE/calls"\nexec "$@"\n'
-    )
+    machine.program("sudo", '#!/bin/sh\n[ "$1" = -n ] || exit 1\nshift\necho "sudo -n" >>"$STATE/calls"\nexec "$@"\n')
     machine.has("devices", "3")
     status, said = machine.setup()
     assert status == 0, said
@@ -249,11 +245,7 @@ def test_sudo_that_wants_a_password_is_not_used(machine):
     machine.program("sudo", '#!/bin/sh\necho "sudo: a password is required" >&2\nexit 1\n')
     machine.has("devices", "3")
     status, said = machine.setup()
-    assert (
-        status == 3
-        and "sudo apt-get install -y pocl-opencl-icd" in said
-        and "password is required" not in said
-    )
+    assert status == 3 and "sudo apt-get install -y pocl-opencl-icd" in said and "password is required" not in said
 
 
 def test_apt_without_network_says_what_it_needs(machine):
