@@ -1,6 +1,6 @@
 """Write docs/results.md, and the table in README.md, from bench/results/*.json.
 
-    python bench/report.py
+python bench/report.py
 """
 
 from __future__ import annotations

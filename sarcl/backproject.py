@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import cl, planning, profiles
-from .check import SPEED_OF_LIGHT, array, choice, number
+from .check import SPEED_OF_LIGHT, array, choice, instance, number
 from .geometry import Antennas, GridTiling
 from .grid import ImageGrid
 from .image import Image
@@ -59,6 +59,8 @@ def backproject(
     arguments that do not fit. Source: Farooq 2009, section 2.2.2; docs/accuracy.md.
     """
     clock = Clock()
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
     choice("method", method, ("auto", "direct"))
     tolerance = number("tolerance", tolerance, above=0)
     if not raw.compressed:

@@ -108,6 +108,12 @@ def direction(name: str, value: Any) -> np.ndarray:
     return np.asarray(v / np.linalg.norm(v))
 
 
+def instance(name: str, value: Any, kind: type) -> None:
+    """Raise TypeError unless `value` is a `kind`."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} is a {type(value).__name__}; wanted a sarcl.{kind.__name__}")
+
+
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
     """Return `value` if it is one of `allowed`."""
     if value not in allowed:

@@ -20,9 +20,7 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
         return raw
     pulse = raw.waveform if waveform is None else waveform
     if pulse is None:
-        raise ValueError(
-            "raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)"
-        )
+        raise ValueError("raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)")
     if not isinstance(pulse, Waveform):
         raise TypeError(f"waveform is a {type(pulse).__name__}; give a sarcl.Waveform")
     samples = raw.read(0, raw.n_rows)

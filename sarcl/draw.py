@@ -153,9 +153,7 @@ def _line_plot(db: np.ndarray, spacing: Any, floor_db: float, title: str | None)
     along = int(db.shape[0] > 1)  # 1: one column, drawn along its rows
     axis = image_axis(db.size, 1 - along, spacing)
     width, height, fine = 960, 540, 4  # the curve is drawn four times finer, for a smooth edge
-    sheet = Sheet(
-        width, height, axis, ("relative to the maximum (dB)", floor_db, -0.04 * floor_db, 0.0), title, 1.5
-    )
+    sheet = Sheet(width, height, axis, ("relative to the maximum (dB)", floor_db, -0.04 * floor_db, 0.0), title, 1.5)
     sheet.axes(grid=True)
     values = db.ravel()[None, :]
     if values.shape[1] > 10 * width:

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import cl, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, finite, number, sealed
+from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, number, sealed
 from .geometry import Antennas
 from .phase_history import PhaseHistory
 from .planning import Clock, Plan
@@ -20,6 +20,7 @@ from .waveform import Waveform
 
 SKIPS = ("zero reflectivity", "facing away", "range window")
 LEAST_SAMPLES = 64  # of the default range window: a lone point still gets a profile to look at
+LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 Progress = Callable[[str, int, int], None]
 
 
@@ -65,6 +66,9 @@ def echo(
     sarcl.NoDeviceError say what does not fit. Source: DESIGN.md, echo equation.
     """
     clock = Clock()
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        instance(name, value, kind)
+    seed = count("seed", seed, 0)
     opened = cl.open_device(device)
     choice("polarization", polarization, ("HH", "VV"))
     tolerance = number("tolerance", tolerance, above=0)
@@ -75,6 +79,13 @@ def echo(
     reference_range = _half_path(tx, rx, point)
     near, far = _window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = _sampling(waveform, near, far, compressed)
+    try:
+        samples = np.zeros((len(tx), n_samples), np.complex64)
+    except (MemoryError, ValueError):
+        raise MemoryError(
+            f"echoes of {len(tx)} pulses x {n_samples} samples need {cl.size_text(8.0 * n_samples * len(tx))}, more "
+            f"than there is; narrow range_window (now {near:g} to {far:g} m) or split the track"
+        ) from None
     antennas = Antennas(
         tx=tx,
         rx=None if receiver is None else rx,
@@ -100,10 +111,12 @@ def echo(
     )
     if not parts:
         raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")
+    largest = max(part.largest() for part in parts)
+    if largest > LARGEST:
+        raise ValueError(f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}: scale them down")
     clock.lap("scene")
 
     spreader = Spreader(opened, antennas, waveform.bandwidth, n_samples, tolerance, budget, "range window" in skips)
-    samples = np.zeros((len(tx), n_samples), np.complex64)
     total, done, gated = sum(len(p) for p in parts) * len(tx), 0, 0
     if progress:
         progress("echo", 0, total)
@@ -159,6 +172,7 @@ def _receiver(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
     """Receiver positions (n_pulses, 3)."""
     if receiver is None:
         return track.positions
+    instance("receiver", receiver, Trajectory)
     if len(receiver) != len(track):
         raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
     return receiver.positions

@@ -28,15 +28,11 @@ def read(path: Any, *, autofocus: bool = False) -> PhaseHistory | Image:
         from .phase_history import PhaseHistory, concatenate
 
         if not path:
-            raise ValueError(
-                "read was given an empty list of files; give at least one (does the pattern match?)"
-            )
+            raise ValueError("read was given an empty list of files; give at least one (does the pattern match?)")
         parts = [read(p, autofocus=autofocus) for p in path]
         for name, part in zip(path, parts, strict=True):
             if not isinstance(part, PhaseHistory):
-                raise ValueError(
-                    f"{str(name)!r} holds an image; only phase histories are read together: read it alone"
-                )
+                raise ValueError(f"{str(name)!r} holds an image; only phase histories are read together: read it alone")
         return parts[0] if len(parts) == 1 else concatenate(parts)  # type: ignore[arg-type]
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
@@ -75,9 +71,5 @@ def _kind(path: Path) -> str:
         what = "is a CPHD file, which sarcl does not read yet"
     else:
         what = f"starts with {head[:12]!r}, which is no file kind sarcl knows"
-    named = (
-        f" although its name ends in {path.suffix!r}"
-        if path.suffix.lower() in (".h5", ".hdf5", ".mat")
-        else ""
-    )
+    named = f" although its name ends in {path.suffix!r}" if path.suffix.lower() in (".h5", ".hdf5", ".mat") else ""
     raise ValueError(f"{str(path)!r} {what}{named}; sarcl reads {READABLE}")

@@ -34,6 +34,12 @@ class Scatterers:
         """True for facets."""
         return self.normals is not None
 
+    def largest(self) -> float:
+        """Largest amplitude there can be."""
+        values = self.amplitudes if self.amplitudes is not None else self.strengths
+        assert values is not None
+        return float(np.abs(values).max())
+
     def planes(self, order: np.ndarray) -> np.ndarray:
         """Rows of numbers as kernels/echo.cl reads them, float32, in `order`; repeats at its end are blank."""
         if self.amplitudes is not None:
@@ -121,7 +127,13 @@ def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> flo
     """Half the finer of range and cross-range resolution at the scene's centre, m."""
     range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth)
     look = antennas.tx - scene.center
-    look = look / np.linalg.norm(look, axis=1, keepdims=True)
+    distance = np.linalg.norm(look, axis=1, keepdims=True)
+    if not distance.all():
+        raise ValueError(
+            f"the antenna stands at the scene's centre at pulse {int(np.argmin(distance))}, where no resolution can be "
+            "told to cut facets to; pass max_edge=... in metres, or None"
+        )
+    look = look / distance
     turn = 2 * np.arcsin(min(1.0, float(np.linalg.norm(look - look[0], axis=1).max()) / 2))
     cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
     return min(range_cell, cross_cell) / 2

@@ -51,10 +51,7 @@ class Sheet:
         while True:
             step, ticks = ticks_between(low, high, most, least)
             widest = max((self.font.getlength(number(t, step)) for t in ticks), default=0) if across else 0
-            if (
-                len(ticks) < 2
-                or step / (high - low) * length >= widest + (0.6 if across else 1.2) * self.unit
-            ):
+            if len(ticks) < 2 or step / (high - low) * length >= widest + (0.6 if across else 1.2) * self.unit:
                 return step, ticks
             most /= 1.5
 

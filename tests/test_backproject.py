@@ -261,3 +261,10 @@ def test_caller_gets_the_reference_image_for_free():
     # at the centre every row's reference range is the path itself: the sum of all samples
     assert image[0] == pytest.approx(raw.samples.sum(), rel=1e-6)
     assert norm == pytest.approx(np.linalg.norm(raw.samples.sum(axis=1)), rel=1e-6)
+
+
+def test_wrong_kinds_of_argument_are_named():
+    with pytest.raises(TypeError, match=r"grid is a list; wanted a sarcl\.ImageGrid"):
+        sarcl.backproject(noise_history(), [1, 2])
+    with pytest.raises(TypeError, match=r"raw is a ndarray; wanted a sarcl\.PhaseHistory"):
+        sarcl.backproject(np.zeros((3, 3), complex), PLANE)

@@ -261,3 +261,25 @@ def test_antennas_inside_a_box_have_distance_zero():
     inside = Antennas(np.zeros((1, 3)), None, one, one, one, -one, one)
     assert inside.distance(np.array([[-1.0] * 3, [1.0] * 3])) == 0
     assert inside.distance(np.array([[3.0, 0, 0], [4.0, 1, 1]])) == 3
+
+
+def test_wrong_kinds_of_argument_are_named():
+    with pytest.raises(TypeError, match=r"track is a list; wanted a sarcl\.Trajectory"):
+        sarcl.echo(cloud(), CHIRP, [1, 2, 3])
+    with pytest.raises(TypeError, match=r"receiver is a int; wanted a sarcl\.Trajectory"):
+        sarcl.echo(cloud(), CHIRP, circle(), receiver=3)
+    with pytest.raises(ValueError, match="seed is -1"):
+        sarcl.echo(cloud(), CHIRP, circle(), seed=-1)
+
+
+def test_amplitudes_beyond_complex64_and_endless_windows_are_refused():
+    with pytest.raises(ValueError, match=r"amplitudes reach 1e\+38"):
+        sarcl.echo(sarcl.Scene.points([[0, 0, 0]], 1e38), CHIRP, circle())
+    with pytest.raises(MemoryError, match="narrow range_window"):
+        sarcl.echo(cloud(), CHIRP, circle(), range_window=(-1e15, 1e15))
+
+
+def test_an_antenna_at_the_centre_of_facets_asks_for_max_edge():
+    ground = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
+    with pytest.raises(ValueError, match="max_edge="):
+        sarcl.echo(ground, CHIRP, sarcl.Trajectory([0.0], [[0, 0, 0]]), shadows=False)

@@ -248,9 +248,7 @@ def test_every_optional_field_of_the_noun_is_in_the_tests():
 
 def a_grid(kind="plane"):
     if kind == "plane":
-        return sarcl.ImageGrid.plane(
-            center=(1 / 3, 2, 3), shape=(6, 4), spacing=(0.1, 0.2), normal=(0.1, 0, 1)
-        )
+        return sarcl.ImageGrid.plane(center=(1 / 3, 2, 3), shape=(6, 4), spacing=(0.1, 0.2), normal=(0.1, 0, 1))
     return sarcl.ImageGrid.points(np.random.default_rng(3).normal(size=(6, 4, 2, 3)))
 
 

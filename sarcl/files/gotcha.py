@@ -93,9 +93,7 @@ def _struct(path: Path) -> np.void:
         try:
             found = loadmat(file, variable_names=["data"])
         except NotImplementedError:
-            raise ValueError(
-                f"{path.name} is a MATLAB 7.3 file, wanted MATLAB 5; save it again with -v7"
-            ) from None
+            raise ValueError(f"{path.name} is a MATLAB 7.3 file, wanted MATLAB 5; save it again with -v7") from None
         except Exception as exc:  # scipy's parser fails in a dozen ways on a damaged file
             raise ValueError(
                 f"{path.name} cannot be read as a MATLAB 5 file ({str(exc) or type(exc).__name__}); "
@@ -103,14 +101,11 @@ def _struct(path: Path) -> np.void:
             ) from None
     data = found.get("data")
     if data is None:
-        raise ValueError(
-            f"{path.name} has no struct 'data', wanted a Gotcha file; it is truncated or another data set"
-        )
+        raise ValueError(f"{path.name} has no struct 'data', wanted a Gotcha file; it is truncated or another data set")
     if data.dtype.names is None or data.size != 1:
         kind = "a struct" if data.dtype.names else f"{data.dtype}"
         raise ValueError(
-            f"{path.name}: 'data' is {kind} of shape {data.shape}, "
-            "wanted one struct with fp, freq, x, y, z, r0"
+            f"{path.name}: 'data' is {kind} of shape {data.shape}, wanted one struct with fp, freq, x, y, z, r0"
         )
     return data.reshape(-1)[0]
 

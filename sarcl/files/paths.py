@@ -26,35 +26,26 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
             f"cannot write {shown!r}: there is no folder {str(folder)!r}; create it or choose another"
         )
     if not folder.is_dir():
-        raise NotADirectoryError(
-            f"cannot write {shown!r}: {str(folder)!r} is a file, not a folder; choose another"
-        )
+        raise NotADirectoryError(f"cannot write {shown!r}: {str(folder)!r} is a file, not a folder; choose another")
     try:
         mode = target.stat().st_mode
     except FileNotFoundError:
         pass
     except OSError as exc:
-        raise PermissionError(
-            f"cannot write {shown!r}: {exc.strerror}; choose another name or folder"
-        ) from None
+        raise PermissionError(f"cannot write {shown!r}: {exc.strerror}; choose another name or folder") from None
     else:
         if stat.S_ISDIR(mode):
             raise IsADirectoryError(f"cannot write {shown!r}: it is a folder; give the name of a file in it")
         if not stat.S_ISREG(mode):
-            raise PermissionError(
-                f"cannot write {shown!r}: it is a device or a pipe; give the name of a file"
-            )
+            raise PermissionError(f"cannot write {shown!r}: it is a device or a pipe; give the name of a file")
         if not os.access(target, os.W_OK):
-            raise PermissionError(
-                f"cannot write {shown!r}: it is write-protected; chmod u+w it or choose another name"
-            )
+            raise PermissionError(f"cannot write {shown!r}: it is write-protected; chmod u+w it or choose another name")
     # Asking for permission is not enough: root has all of them, even on /proc or a read-only disk. So try.
     try:
         _create_beside(target).unlink()
     except OSError as exc:
         raise PermissionError(
-            f"cannot write {shown!r}: {exc.strerror} in folder {str(folder)!r}; "
-            "choose a folder you may write to"
+            f"cannot write {shown!r}: {exc.strerror} in folder {str(folder)!r}; choose a folder you may write to"
         ) from None
     free = shutil.disk_usage(folder).free
     if n_bytes > free:

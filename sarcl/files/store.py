@@ -32,9 +32,7 @@ def save_phase_history(raw: PhaseHistory, path: Any) -> None:
     from ..phase_history import PER_ROW
 
     if raw.array is not None:
-        raise ValueError(
-            "raw.array cannot be stored in format 1; save replace(raw, array=None) and keep the array"
-        )
+        raise ValueError("raw.array cannot be stored in format 1; save replace(raw, array=None) and keep the array")
     dtype = np.dtype(raw.samples.dtype)
     with (
         paths.atomic(path, raw.n_rows * raw.n_samples * dtype.itemsize) as part,
@@ -82,19 +80,13 @@ def load(path: Any) -> PhaseHistory | Image:
     try:
         kind, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
         if not isinstance(kind, str) or kind not in _LOADERS or version is None:
-            raise ValueError(
-                f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved"
-            )
+            raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
         if version != hdf5.FORMAT:
-            raise ValueError(
-                f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl"
-            )
+            raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
         try:
             return _LOADERS[kind](file)
         except (KeyError, OSError, RuntimeError, TypeError, ValueError, AttributeError) as exc:
-            raise ValueError(
-                f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again"
-            ) from exc
+            raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
     except BaseException:
         file.close()
         raise
