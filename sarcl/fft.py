@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import atexit
 import functools
 from typing import Any
 
@@ -47,6 +48,8 @@ def _plan(device: cl.Device, shape: tuple[int, ...]) -> tuple[Any, Any]:
     from reikna.core import Type
     from reikna.fft import FFT
 
+    # plans hold buffers that must go before the interpreter takes down what frees them
+    atexit.register(_plan.cache_clear)
     thread = device.reikna_thread()
     with cl.quiet():
         return thread, FFT(Type(np.complex64, shape), axes=(1,)).compile(thread)

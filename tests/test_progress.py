@@ -7,6 +7,11 @@ import pytest
 from sarcl.progress import Bar, line, rate_text, time_text
 
 
+@pytest.fixture(autouse=True)
+def a_terminal_that_can_erase_a_line(monkeypatch):
+    monkeypatch.setenv("TERM", "xterm")
+
+
 class Terminal(io.StringIO):
     def isatty(self):
         return True
