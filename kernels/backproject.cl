@@ -15,14 +15,6 @@
 #include "interp.clh"
 #include "phase.clh"
 
-// total + error += x: the error of each addition is kept and added back at the end
-inline void add_compensated(__global float *total, __global float *error, size_t i, fv x) {
-    fv a = LOAD(i, total);
-    fv s = a + x, t = s - a;
-    STORE(s, i, total);
-    STORE(LOAD(i, error) + ((a - (s - t)) + (x - t)), i, error);
-}
-
 // global size (work-items a tile, tiles of this block), local size (work-items a tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
 //   table                              interpolation weights, see interp.clh
@@ -67,7 +59,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                 fv v = 1;
                 if (state == CROSSING) v = keep_inside(record, &at);
                 fv g, h, sine, cosine;
-                look_up(row, at.base, at.t, table, &g, &h);
+                look_up(row, stride, origin, at.base, at.t, table, &g, &h);
                 sincos_turns(at.turn, &sine, &cosine);
                 if (state == CROSSING) {
                     g *= v;

@@ -56,23 +56,42 @@ inline void add_taps(__global float *row, iv j, const fv *w, fv a, fv b) {
 #endif
 }
 
+// Adds a row's sum to its compensated total and clears it, so that long sums of like terms do not drift.
+inline void empty_into_total(__global float *sum, int stride) {
+    __global float *total = sum + 2 * stride, *error = sum + 4 * stride;
+    int whole = 2 * stride / VW;
+    for (int i = 0; i < whole; i++) {
+        add_compensated(total, error, i, LOAD(i, sum));
+        STORE((fv)0.0f, i, sum);
+    }
+    for (int i = whole * VW; i < 2 * stride; i++) {
+        float a = total[i], s = a + sum[i], t = s - a;
+        error[i] += (a - (s - t)) + (sum[i] - t);
+        total[i] = s;
+        sum[i] = 0;
+    }
+}
+
 // global size (pulses of this block, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   scatterers  (6, n_tiles TILE)   points: re, im of amplitude; facets: strength, two-sided (1 or 0), normal
-//   rows        (splits, n_used, stride, 2)   zeroed by the caller; delay 0 stands at sample `origin`
-//   done        (splits, n_used)    scatterer tiles added
+//   last        scatterers in the last tile; the rest of it is blank
+//   flush       tiles added in float32 before they join the compensated total
+//   rows        (splits, n_used, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at sample `origin`
+//   done        (splits, n_used)    scatterers added
 __kernel void spread(__global const float *restrict pulse, int n, int n_used,
                      __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
                      __global const float *restrict offsets, int n_offsets,
                      __global const float *restrict scatterers, __global const float *restrict table,
-                     __global float *restrict rows, int stride, int origin, __global int *restrict done) {
-    int p = get_global_id(0), split = get_global_id(1), count = 0;
-    __global float *row = rows + 2 * (((size_t)split * n_used + p) * stride + origin);
+                     int last, int flush, __global float *rows, int stride, int origin, __global int *restrict done) {
+    int p = get_global_id(0), split = get_global_id(1), count = 0, added = 0;
+    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * stride, *row = sum + 2 * origin;
     for (int k = split; k < n_tiles; k += get_global_size(1)) {
         __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
         if (state == OUTSIDE) continue;
-        count++;
+        int real = k == n_tiles - 1 ? last : TILE;
+        if (state == INSIDE) count += real;
 #if FACETS
         direction u = load_direction(c, C_UX, C_LOW);
 #if BISTATIC
@@ -104,15 +123,20 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
                 fv inside = keep_inside(c, &at);
                 re *= inside;
                 im *= inside;
+                float seen[VW];
+                STORE(inside, 0, seen);
+                for (int l = 0; l < VW; l++) count += seen[l] != 0 && i * VW + l < real;
             }
             fv sine, cosine;
             sincos_turns(at.turn, &sine, &cosine);
             fv a = fma(re, cosine, im * sine), b = fma(im, cosine, -re * sine);
             iv j;
             fv w[TAPS];
-            tap_weights(first_tap(at.t, at.base, &j), table, w);
+            tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
             add_taps(row, j, w, a, b);
         }
+        if (++added % flush == 0) empty_into_total(sum, stride);
     }
+    empty_into_total(sum, stride);
     done[split * n_used + p] = count;
 }

@@ -167,6 +167,7 @@ def antennas_of(raw: PhaseHistory, wrap: bool) -> Antennas:
         frequency_step=raw.frequency_step,
         near=-half,
         far=half,
+        wrap=wrap,
     )
 
 
@@ -288,4 +289,5 @@ def _measure_error(
         if isinstance(data, np.ndarray)
         else np.array([data[i] for i in zip(*index, strict=True)])
     )
-    return float(np.linalg.norm(got - wanted)) / max(float(np.linalg.norm(wanted)), spread)
+    wrong, scale = float(np.linalg.norm(got - wanted)), max(float(np.linalg.norm(wanted)), spread)
+    return wrong / scale if wrong else 0.0

@@ -58,7 +58,8 @@ def echo(
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto" half a resolution cell, None: left as they are
     max_bytes     memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
-    tolerance     relative L2 error of the samples
+    tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
+                  scatterers added with random phases
     check         recompute 256 random samples exactly; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
@@ -227,23 +228,28 @@ def _measure_error(
     spectrum: np.ndarray,
     samples: np.ndarray,
 ) -> float:
-    """Relative error of 256 random samples (16 random rows, 16 frequencies each) against the exact sum."""
+    """Relative error of 256 random samples (16 random rows, 16 frequencies each) against the exact sum.
+
+    Relative to the larger of their norm and the norm they would have if scatterers added with random phases.
+    """
     from .reference.echo import echo as exact
 
     random = np.random.default_rng(0)
     rx = antennas.tx if antennas.rx is None else antennas.rx
-    wrong = right = 0.0
+    wrong = right = random_phases = 0.0
     for p in random.integers(0, len(samples), 16):
         n = random.integers(0, len(frequencies), 16)
-        wanted = np.zeros(16, np.complex128)
+        wanted, power = np.zeros(16, np.complex128), 0.0
         for part in parts:
             delta = _half_path(antennas.tx[p], rx[p], part.positions) - antennas.reference_range[p]
             seen = (delta >= antennas.near[p]) & (delta <= antennas.far[p])
             amplitudes = part.seen_by(antennas.tx[p], rx[p]) * seen
+            power += float((np.abs(amplitudes) ** 2).sum())
             wanted += exact(
                 part.positions, amplitudes, frequencies[n], antennas.tx[p], rx[p], antennas.reference_range[p]
             )
         wanted *= spectrum[n]
         wrong += float((np.abs(samples[p, n] - wanted) ** 2).sum())
         right += float((np.abs(wanted) ** 2).sum())
-    return float(np.sqrt(wrong / right)) if right else 0.0
+        random_phases += power * float((np.abs(spectrum[n]) ** 2).sum())
+    return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0

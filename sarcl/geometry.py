@@ -21,7 +21,7 @@ class Antennas:
     """Antenna positions, m (n, 3), of n rows, and what they mean at the scene's centre.
 
     rx is None where it equals tx. reference_range m, frequency (of zero phase slope) and frequency_step Hz,
-    near and far (range window about the reference, m): each (n,).
+    near and far (range window about the reference, m): each (n,). wrap: profiles repeat instead.
     """
 
     tx: np.ndarray
@@ -31,6 +31,7 @@ class Antennas:
     frequency_step: np.ndarray
     near: np.ndarray
     far: np.ndarray
+    wrap: bool = False
 
     def distance(self, bounds: np.ndarray) -> float:
         """Smallest distance of any antenna from a box (2, 3), m; 0 inside it."""
@@ -52,10 +53,17 @@ class Antennas:
         if self.rx is not None:
             rx = self.rx[rows].astype(np.longdouble) - c
             rx_length = np.sqrt((rx**2).sum(axis=1))
-        delta = (tx_length + rx_length) / 2 - self.reference_range[rows]
+        delta = (tx_length + rx_length) / 2 - self.reference_range[rows]  # longdouble, perhaps thousands of kilometres
         kappa = np.longdouble(2) * self.frequency[rows] / SPEED_OF_LIGHT
         sigma = np.longdouble(2) * self.frequency_step[rows] * length / SPEED_OF_LIGHT
-        components = [*tx.T, tx_length, delta, kappa, sigma, self.near[rows], self.far[rows]]
+        place = delta * sigma
+        if self.wrap:
+            place = place - length * np.rint(place / length)
+        # a centre this far outside the window has no place in a profile; the window test is in metres
+        place = np.clip(place, -(2.0**30), 2.0**30)
+        turn = delta * kappa - np.rint(delta * kappa)
+        near, far = self.near[rows] - delta, self.far[rows] - delta
+        components = [*tx.T, tx_length, turn, place, kappa, sigma, near, far]
         if self.rx is not None:
             components += [*rx.T, rx_length]
         return cl.wide(np.stack(components))
@@ -120,6 +128,11 @@ def morton_order(positions: np.ndarray) -> np.ndarray:
     return np.argsort(code, kind="stable")
 
 
+def _power_of_two(n: int) -> int:
+    """The smallest power of two that is at least n."""
+    return 1 << max(0, n - 1).bit_length()
+
+
 class GridTiling:
     """One global tiling of an image grid, in bands of tiles that make up consecutive rows (or points).
 
@@ -134,12 +147,16 @@ class GridTiling:
         self.center = grid.bounds.mean(axis=0)
         if grid.is_plane:
             rows, columns = grid.shape
-            self.n_bands = -(-rows // side)
-            self.across = -(-columns // side)
-            inside = np.arange(side) - (side - 1) / 2
+            # square tiles, but no higher or wider than a strip needs
+            self.high = min(side, _power_of_two(rows))
+            self.wide = min(side * side // self.high, max(side, _power_of_two(columns)))
+            self.high = side * side // self.wide
+            self.n_bands = -(-rows // self.high)
+            self.across = -(-columns // self.wide)
+            down, right = (np.arange(n) - (n - 1) / 2 for n in (self.high, self.wide))
             assert grid.spacing is not None and grid.x_axis is not None and grid.y_axis is not None
-            y = inside[:, None, None] * grid.spacing[0] * grid.y_axis
-            offsets = (y + inside[:, None] * grid.spacing[1] * grid.x_axis).reshape(-1, 3)
+            y = down[:, None, None] * grid.spacing[0] * grid.y_axis
+            offsets = (y + right[:, None] * grid.spacing[1] * grid.x_axis).reshape(-1, 3)
             self._offsets = cl.wide(offsets.T).reshape(6, -1)
             self._radius = float(np.linalg.norm(offsets, axis=1).max())
         else:
@@ -166,9 +183,9 @@ class GridTiling:
         if self.grid.listed is not None:
             at = slice(index * self.LISTED_BAND, (index + 1) * self.LISTED_BAND)
             return tile_points(self.grid.listed.reshape(-1, 3)[at], self.center, self.per_tile)
-        half = (self.side - 1) / 2
-        columns = np.arange(self.across) * self.side + half
-        references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
+        columns = np.arange(self.across) * self.wide + (self.wide - 1) / 2
+        row = index * self.high + (self.high - 1) / 2
+        references = self.grid.at(np.full(self.across, row), columns) - self.center
         radius = np.full(self.across, self._radius)
         return Tiles(self.per_tile, references, radius, self._offsets, shared=True), None
 
@@ -196,11 +213,11 @@ class GridTiling:
     ) -> Iterator[tuple[Any, np.ndarray]]:
         if self.grid.is_plane:
             rows, columns = self.grid.shape
-            s = self.side
-            tiled = values.reshape(last - first, self.across, s, s).transpose(0, 2, 1, 3)
-            whole = tiled.reshape((last - first) * s, self.across * s)
-            stop = min(last * s, rows)
-            yield slice(first * s, stop), whole[: stop - first * s, :columns]
+            high, wide = self.high, self.wide
+            tiled = values.reshape(last - first, self.across, high, wide).transpose(0, 2, 1, 3)
+            whole = tiled.reshape((last - first) * high, self.across * wide)
+            stop = min(last * high, rows)
+            yield slice(first * high, stop), whole[: stop - first * high, :columns]
             return
         start = 0
         for band, order in zip(range(first, last), orders, strict=True):
@@ -215,9 +232,8 @@ class GridTiling:
         """Real pixels (without padding) of every tile of bands first ... last - 1."""
         if self.grid.is_plane:
             rows, columns = self.grid.shape
-            s = self.side
-            high = np.minimum(np.arange(first + 1, last + 1) * s, rows) - np.arange(first, last) * s
-            wide = np.minimum(np.arange(1, self.across + 1) * s, columns) - np.arange(self.across) * s
+            high = np.minimum(np.arange(first + 1, last + 1) * self.high, rows) - np.arange(first, last) * self.high
+            wide = np.minimum(np.arange(1, self.across + 1) * self.wide, columns) - np.arange(self.across) * self.wide
             return np.outer(high, wide).ravel()
         sizes = []
         for b in range(first, last):

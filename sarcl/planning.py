@@ -10,7 +10,7 @@ import numpy as np
 
 from . import accuracy, cl
 from .accuracy import Interpolator
-from .check import number
+from .check import SPEED_OF_LIGHT, number
 
 LEAST_TOLERANCE = 1e-6  # of complex64 results
 
@@ -94,12 +94,17 @@ def cheapest(
                     )
                 except ValueError:
                     continue
+                sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
+                if mode == 0 and radius * sigma > 2**20:
+                    continue  # places in a tile would not fit float32
                 cost += range_cost - 1 + TILE_COST / per_tile
                 cost += ORDER_COST[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
                     best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error)
     if best is None or tolerance < LEAST_TOLERANCE:
-        reach = max(LEAST_TOLERANCE, 1.25 * least)
+        reach = max(LEAST_TOLERANCE, 1.3 * least)
+        digits = 10.0 ** (np.floor(np.log10(reach)) - 1)
+        reach = np.ceil(reach / digits - 1e-9) * digits  # rounded up: what is printed can be asked for
         raise ValueError(f"tolerance {tolerance:.1e} cannot be met in complex64; the best here is {reach:.1e}")
     return best[1]
 

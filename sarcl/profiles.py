@@ -7,6 +7,8 @@ import numpy as np
 from . import cl, fft
 from .accuracy import Interpolator
 
+LARGEST = 1e34  # of a profile: sums of ten thousand such rows still fit in complex64
+
 
 def padding(interpolator: Interpolator) -> int:
     """Samples kept on each side of a profile, so that taps never leave their row."""
@@ -29,6 +31,12 @@ def from_samples(
     n, n_samples = samples.shape
     spectrum = np.zeros((n, length), np.complex64)
     shaped = samples * weights
+    largest = float(np.abs(shaped).max(initial=0.0)) * n_samples
+    if largest > LARGEST:
+        raise ValueError(
+            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in complex64 hold up "
+            f"to {LARGEST:.0e}: scale the samples down"
+        )
     low = n_samples // 2
     spectrum[:, : n_samples - low] = shaped[:, low:]
     if low:

@@ -92,10 +92,9 @@ def prepare(
         if edge is not None:
             scene = scene.split(number("max_edge", edge, above=0))
         step(1)
-        # heights come before anything is left out, so that a facet's height does not depend on its neighbours
-        heights = np.random.Generator(np.random.Philox(seed)).standard_normal(len(scene.triangles))
         normals = scenes.normals(scene.triangles)
-        centers = scenes.centroids(scene.triangles) + (heights * scene.roughness)[:, None] * normals
+        centers = scenes.centroids(scene.triangles)
+        centers += (random_heights(centers, seed) * scene.roughness)[:, None] * normals
         keep = np.ones(len(centers), bool)
         if "zero reflectivity" in skips:
             keep &= scene.reflectivity != 0
@@ -123,20 +122,48 @@ def prepare(
     return parts, left_out
 
 
+def random_heights(centers: np.ndarray, seed: int) -> np.ndarray:
+    """Standard normal numbers (k,) that depend on the seed and each facet's own place, m (k, 3), alone.
+
+    Neither order nor neighbours matter: adding a facet to a scene leaves the others as they were. Two hashes of the
+    place to a micrometre (splitmix64, Steele, Lea and Flood 2014) give one number by Box and Muller.
+    """
+    with np.errstate(over="ignore"):
+        state = np.full(len(centers), (seed + 1) * 0x9E3779B97F4A7C15 % 2**64, np.uint64)
+        for axis in np.rint(centers.T * 1e6).astype(np.int64).view(np.uint64):
+            state = _mix(state ^ axis)
+        first, second = _mix(state), _mix(state + np.uint64(0x9E3779B97F4A7C15))
+    radius = np.sqrt(-2 * np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
+    return radius * np.cos(2 * np.pi * (second >> np.uint64(11)).astype(np.float64) * 2.0**-53)
+
+
+def _mix(x: np.ndarray) -> np.ndarray:
+    """One step of splitmix64."""
+    x = x + np.uint64(0x9E3779B97F4A7C15)
+    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
+    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
+    return x ^ (x >> np.uint64(31))
+
+
 def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
     """Half the finer of range and cross-range resolution at the scene's centre, m."""
-    range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth)
-    look = antennas.tx - scene.center
-    distance = np.linalg.norm(look, axis=1, keepdims=True)
-    if not distance.all():
-        raise ValueError(
-            f"the antenna stands at the scene's centre at pulse {int(np.argmin(distance))}, where no resolution can be "
-            "told to cut facets to; pass max_edge=... in metres, or None"
-        )
-    look = look / distance
-    turn = 2 * np.arcsin(min(1.0, float(np.linalg.norm(look - look[0], axis=1).max()) / 2))
+    look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
+    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+        distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)
+        if not distance.all():
+            raise ValueError(
+                f"an antenna stands at the scene's centre at pulse {int(np.argmin(distance))}, where no resolution can "
+                "be told to cut facets to; pass max_edge=... in metres, or None"
+            )
+        look += (ends - scene.center) / distance / 2
+    along = float(np.linalg.norm(look, axis=1).max())
+    turn = float(np.linalg.norm(look - look[0], axis=1).max())
+    range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf
     cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
-    return min(range_cell, cross_cell) / 2
+    edge = min(range_cell, cross_cell) / 2
+    if not np.isfinite(edge):
+        raise ValueError("forward scattering resolves nothing to cut facets to; pass max_edge=... in metres, or None")
+    return edge
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> np.ndarray:

@@ -7,6 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import cl, planning, profiles
+from .accuracy import U32
 from .geometry import Antennas, Tiles, morton_order, tile_points
 from .planning import Clock, Plan
 from .scatterers import Scatterers
@@ -48,14 +49,14 @@ class Spreader:
         radius = device.upload(tiles.radius.astype(np.float32))
         offsets = device.upload(tiles.offsets)
         planes = device.upload(part.planes(order))
-        sizes = np.full(tiles.n_tiles, tiles.per_tile)
-        sizes[-1] -= len(order) - len(part)
+        last = tiles.per_tile - (len(order) - len(part))
+        flush = max(1, int(self._terms() / tiles.per_tile))
         clock.lap("scene")
 
         stride = plan.length + 2 * profiles.padding(plan.interpolator)
         record = 4 * plan.components(bistatic)
         splits = self._splits(tiles)
-        per_pulse = record * tiles.n_tiles + 8 * stride * splits
+        per_pulse = record * tiles.n_tiles + 24 * stride * splits
         # enough pulses at once to keep every unit busy, few enough to tell how far it is
         most = max(64, 16 * device.info.units)
         pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
@@ -66,7 +67,7 @@ class Spreader:
             n, used = packed.shape[2], stop - start
             pulse = device.upload(packed)
             constants = device.empty(record * n * tiles.n_tiles)
-            rows, done = device.zeros(8 * splits * used * stride), device.zeros(4 * splits * used)
+            rows, done = device.zeros(24 * splits * used * stride), device.zeros(4 * splits * used)
             device.run(
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
@@ -74,14 +75,14 @@ class Spreader:
             device.run(
                 kernel, (used, splits), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], planes,
-                table, rows, stride, stride // 2, done,
+                table, last, flush, rows, stride, stride // 2, done,
             )  # fmt: skip
-            made = device.download(rows, np.empty((splits, used, stride), np.complex64))
+            made = device.download(rows, np.empty((splits, used, 3, stride), np.complex64))
             clock.lap("echo")
-            total = made[0] if splits == 1 else made.sum(axis=0, dtype=np.complex128).astype(np.complex64)
+            total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
             samples[start:stop] += profiles.to_samples(device, total, self.n_samples, plan.interpolator)
-            added = device.download(done, np.empty((splits, used), np.int32)).astype(np.int64).sum()
-            gated += max(0, used * len(part) - int(added) * tiles.per_tile)
+            added = device.download(done, np.empty((splits, used), np.int32)).sum(dtype=np.int64)
+            gated += used * len(part) - int(added)
             clock.lap("spectra")
             if tell:
                 tell(stop * len(part))
@@ -91,7 +92,6 @@ class Spreader:
         order = morton_order(part.positions)
         made = {n: tile_points(part.positions, center, n, order) for n in PER_TILE}
         bounds = box(part.positions)
-        splits = max(self._splits(tiles) for tiles, _ in made.values())
         plan = planning.cheapest(
             self.tolerance,
             [(n, float(tiles.radius.max())) for n, (tiles, _) in made.items()],
@@ -100,15 +100,15 @@ class Spreader:
             bandwidth=self.bandwidth,
             n_samples=self.n_samples,
             points_per_row=len(part),
-            chunk=-(-len(part) // splits),
+            chunk=min(len(part), max(min(PER_TILE), int(self._terms()))),
         )
         tiles, order = made[plan.per_tile]
         return plan, tiles, order
 
     def _splits(self, tiles: Tiles) -> int:
-        """Partial sums a row: enough work-items for the device, and short enough sums for the tolerance."""
-        for_device = -(-4 * self.device.info.units // len(self.antennas.tx))
-        # float32 sums of n terms err by about sqrt(n)/4 roundings (accuracy.sum_rounding): a tenth of the tolerance
-        longest = max(64.0, (0.1 * self.tolerance * 4 / planning.accuracy.U32) ** 2)
-        for_sums = int(np.ceil(tiles.n_tiles * tiles.per_tile / longest))
-        return int(min(max(for_device, for_sums, 1), tiles.n_tiles, 64))
+        """Partial sums a row: enough work-items for the device."""
+        return int(min(max(1, -(-4 * self.device.info.units // len(self.antennas.tx))), tiles.n_tiles, 64))
+
+    def _terms(self) -> float:
+        """Terms that may join one float32 sum: n like ones err by up to n/2 roundings, a fifth of the tolerance."""
+        return 0.2 * self.tolerance * 2 / U32

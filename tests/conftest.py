@@ -22,14 +22,15 @@ def _devices():
             if info.vector_width > 1:
                 found.append(pytest.param((info.index, "one_lane"), id=f"{name}-one-lane"))
     if not found:
-        reason = f"no OpenCL device works. {cl.REMEDY}"
-        found.append(pytest.param(None, id="none", marks=pytest.mark.xfail(reason=reason, run=False, strict=True)))
+        found.append(pytest.param(None, id="none"))
     return found
 
 
 @pytest.fixture(params=_devices())
 def device(request):
     """An open device; a kernel that fails on it fails the test."""
+    if request.param is None:
+        pytest.fail(f"no OpenCL device works. {cl.REMEDY}")
     index, twin = request.param
     opened = cl.open_device(index)
     return getattr(opened, twin)() if twin else opened

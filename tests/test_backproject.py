@@ -203,6 +203,53 @@ def test_weak_point_beside_a_strong_one_keeps_its_place(device):
     assert image_error(sarcl.backproject(tiny, PLANE, device=device), tiny) <= 1e-3
 
 
+def test_a_tile_far_larger_than_the_window_reads_nothing_beyond_a_profile(device):
+    # pixels 2 km and 200 km apart: places in a tile exceed what float32 counts in samples
+    for spacing, bandwidth in ((2e4, 5e9), (2e5, 6e8)):
+        raw = noise_history(n_rows=3, n_samples=256, distance=1e7, center=20e9, bandwidth=bandwidth)
+        grid = sarcl.ImageGrid.plane(shape=(9, 9), spacing=spacing)
+        for skip in (True, False):
+            image = sarcl.backproject(raw, grid, skip=skip, device=device)
+            assert image_error(image, raw) <= 1e-3
+
+
+def test_a_reference_range_of_zero_loses_no_phase(device):
+    raw = noise_history(n_rows=5, distance=36e6)
+    raw = replace(raw, reference_range=np.zeros(5))
+    image = sarcl.backproject(raw, PLANE, tolerance=1e-5, wrap=True, device=device)
+    assert image_error(image, raw, wrap=True) <= 1e-5
+
+
+def test_strips_and_columns_are_not_padded_to_squares():
+    raw = noise_history(n_rows=2, n_samples=4)
+    for shape in ((1, 100_000), (100_000, 1), (3, 40_000)):
+        grid = sarcl.ImageGrid.plane(shape=shape, spacing=1e-5)
+        image = sarcl.backproject(raw, grid, max_bytes=4e6, tolerance=1e-2)
+        assert image.data.shape == shape
+
+
+def test_an_image_of_nothing_is_zero_and_its_error_zero(device):
+    raw = noise_history(n_rows=3, n_samples=16)
+    raw = replace(raw, samples=np.zeros((3, 16), np.complex64))
+    image = sarcl.backproject(raw, PLANE, check=True, device=device)
+    assert not image.data.any() and image.report.measured_error == 0
+
+
+def test_samples_whose_sums_overflow_are_refused():
+    raw = replace(noise_history(), samples=np.full((40, 48), 1e36, np.complex64))
+    with pytest.raises(ValueError, match="scale the samples down"):
+        sarcl.backproject(raw, PLANE)
+
+
+def test_the_best_tolerance_that_is_named_can_be_asked_for():
+    raw = noise_history(n_rows=1, n_samples=20000)
+    grid = sarcl.ImageGrid.plane(shape=(9, 9), spacing=1.0)
+    with pytest.raises(ValueError, match="best here is") as caught:
+        sarcl.backproject(raw, grid, tolerance=1e-7)
+    named = float(str(caught.value).split()[-1])
+    assert sarcl.backproject(raw, grid, tolerance=named).report.predicted_error <= named
+
+
 BAD = {
     "tolerance zero": ({"tolerance": 0}, "tolerance is 0"),
     "tolerance too small": ({"tolerance": 1e-9}, "best here is 1"),

@@ -144,6 +144,33 @@ def test_scatterers_outside_the_range_window_are_gated_out_and_counted(device):
     assert np.abs(raw.samples - only.samples).max() < 1e-3
 
 
+def test_points_outside_the_window_are_counted_one_by_one(device):
+    track = sarcl.Trajectory.line(start=(8e3, 0, 6e3), velocity=(0, 1, 0), prf=1, n_pulses=2)
+    for n, outside in ((300, 44), (257, 256)):
+        positions = np.zeros((n, 3))
+        positions[:outside, 0] = 100
+        for skip in (True, False):
+            options = {"reference": (0, 0, 0), "range_window": (-20, 20), "skip": skip, "device": device}
+            report = sarcl.echo(sarcl.Scene.points(positions), CHIRP, track, **options).report
+            assert report.contributions_skipped["range window"] == 2 * outside
+            assert report.contributions_done == 2 * (n - outside)
+    both_sides = sarcl.Scene.points([[100.0, 0, 0], [-100.0, 0, 0]])
+    with pytest.raises(ValueError, match="every scatterer is outside"):
+        sarcl.echo(both_sides, CHIRP, track, **options)
+
+
+def test_a_million_equal_echoes_add_up_within_tolerance(device):
+    if device.info.vector_width == 1:
+        pytest.skip("minutes with one lane on a CPU; sums are the same code")
+    track = circle(n_pulses=1)
+    for tolerance in (1e-3, 1e-5):
+        raw = sarcl.echo(
+            sarcl.Scene.points(np.tile([[1.0, 2, 3]], (1_000_000, 1)), 0.1),
+            CHIRP, track, reference=(0, 0, 0), range_window=(-10, 10), tolerance=tolerance, device=device,
+        )  # fmt: skip
+        assert echo_error(raw, np.array([[1.0, 2, 3]]), np.array([1e5])) <= tolerance
+
+
 def test_default_window_holds_the_scene(device):
     scene = cloud(extent=80.0)
     raw = sarcl.echo(scene, CHIRP, circle(), device=device)
@@ -189,6 +216,45 @@ def test_random_heights_follow_the_seed_and_nothing_else(device):
     assert np.linalg.norm(first.samples - again.samples) <= 1e-6 * norm
     assert np.linalg.norm(first.samples - other.samples) > 0.5 * norm
     assert first.report.seed == 1
+
+
+def test_random_heights_are_normal_and_depend_on_place_and_seed_alone():
+    from sarcl.scatterers import random_heights
+
+    random = np.random.default_rng(0)
+    places = random.uniform(-100, 100, (200_000, 3))
+    heights = random_heights(places, 3)
+    # four standard errors of mean, variance and fourth moment, and of the correlation with another seed
+    error = 4 / np.sqrt(len(places))
+    assert abs(heights.mean()) < error
+    assert abs(heights.var() - 1) < error * np.sqrt(2)
+    assert abs((heights**4).mean() - 3) < error * np.sqrt(96)
+    assert abs((heights * random_heights(places, 4)).mean()) < error
+    assert abs((heights[1:] * heights[:-1]).mean()) < error
+    assert np.array_equal(random_heights(places[::-1], 3)[::-1], heights)
+
+
+def test_a_black_facet_leaves_the_rest_of_a_rough_scene_as_it_was(device):
+    axis = np.linspace(-5, 5, 30)
+    ground = sarcl.Scene.from_heights(axis, axis, np.zeros((30, 30)), roughness=0.05)
+    black = sarcl.Scene.facets([[[0, 0, 1], [0.1, 0, 1], [0, 0.1, 1]]], material=0.0)
+    options = {"reference": (0, 0, 0), "range_window": (-10, 10), "shadows": False, "device": device}
+    alone = sarcl.echo(ground, CHIRP, circle(), **options)
+    beside = sarcl.echo(black + ground, CHIRP, circle(), **options)
+    assert np.linalg.norm(alone.samples - beside.samples) <= 1e-6 * np.linalg.norm(alone.samples)
+
+
+def test_a_moving_receiver_is_enough_to_cut_facets_finely():
+    from sarcl.scatterers import resolution_edge
+
+    scene = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
+    still, moving = np.tile([8e3, 0, 6e3], (9, 1)), circle(n_pulses=9).positions
+    one = np.ones(9)
+    narrow = sarcl.Waveform.chirp(center=9.6e9, bandwidth=60e6, duration=1e-6)  # the cross-range cell is the finer
+    both = resolution_edge(narrow, Antennas(moving, None, one, one, one, -one, one), scene)
+    half = resolution_edge(narrow, Antennas(still, moving, one, one, one, -one, one), scene)
+    # one antenna turning makes half the angle
+    assert half == pytest.approx(2 * both, rel=0.01)
 
 
 def test_facets_are_cut_below_half_a_resolution_cell():
