@@ -230,6 +230,11 @@ registry (pypi.org, or the one pip's configuration names): check the network, th
 (https_proxy) and the free space, $again
 END
     fi
+    # A folder sarcl/ in the current one (this checkout, seen from above) would hide an editable package from Python; a
+    # path entry is found before it.
+    for folder in .venv/lib/python3*/site-packages; do
+        if [ -d "$folder" ]; then printf '%s\n' "$root" >"$folder/sarcl-checkout.pth"; fi
+    done
     for name in test "$extra"; do stamp >".venv/.sarcl-$name"; done
     printf '%s\n' "$root" >$place
     rm -f $unfinished

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable
 from contextlib import ExitStack
 from typing import Any
@@ -17,6 +18,8 @@ from .phase_history import PhaseHistory
 from .planning import Clock, Plan, cheapest
 from .report import Report
 from .target import Target
+
+log = logging.getLogger(__name__)
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 VECTORS = 4  # vectors of pixels a work-item
@@ -90,6 +93,8 @@ def backproject(
             "rx": raw.rx[middle],
         }
         pairs = raw.n_rows * grid.size
+        if skipped == pairs:
+            log.warning("no pixel lies inside the range window of any row: the image is zero; check the grid's center")
         seconds = clock.seconds.get("backproject", 0.0)
         exact_seconds = 256 * raw.n_rows * raw.n_samples * 3e-8
         measured = None

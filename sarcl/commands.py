@@ -77,8 +77,9 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
-    _expect(job, [output], (".h5", ".hdf5"))
-    _expect(job, images, (".png", ".h5", ".hdf5"))
+    _expect(job, [output], (".h5", ".hdf5"), [args.scenario])
+    _expect(job, images, (".png", ".h5", ".hdf5"), [args.scenario, output])
+    _check_floor(args.floor_db)
     grid = scenario.build_grid() if scenario.grid is not None else None
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
@@ -109,7 +110,8 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     from .scenario import load
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
-    _expect(job, outputs, (".png", ".h5", ".hdf5"))
+    _expect(job, outputs, (".png", ".h5", ".hdf5"), [*args.raw, *([args.grid] if args.grid else [])])
+    _check_floor(args.floor_db)
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
     raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
@@ -144,15 +146,24 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     return 0
 
 
-def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...]) -> None:
-    """Refuse outputs that cannot be written."""
+def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...], inputs: list[str]) -> None:
+    """Refuse outputs that cannot be written, or would be written over what is read or over one another."""
+    taken = {Path(p).resolve() for p in inputs}
     for path in paths:
+        if Path(path).resolve() in taken:
+            raise ValueError(f"output {path!r} is also read by this command; choose another name")
         if Path(path).suffix.lower() not in suffixes:
             wanted = " or ".join(s for s in suffixes if s != ".hdf5")
             raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
         job.expect(path)
     if len({Path(p).resolve() for p in paths}) < len(paths):
         raise ValueError(f"outputs {', '.join(paths)} name one file twice")
+
+
+def _check_floor(floor_db: float) -> None:
+    """Refuse, before the work, a floor that no picture can have."""
+    if not floor_db < 0:
+        raise ValueError(f"--floor-db is {floor_db:g}; it counts down from the brightest pixel: give e.g. -50")
 
 
 def _grid_options(args: argparse.Namespace) -> dict[str, Any]:

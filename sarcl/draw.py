@@ -17,11 +17,20 @@ THINNEST = 1 / 6  # shorter side over longer side at least: a strip any thinner 
 CURVE = (22, 82, 148)
 
 
-def picture(db: Any, spacing: Any = None, floor_db: float = -50.0, title: str | None = None) -> Picture:
+def picture(
+    db: Any,
+    spacing: Any = None,
+    floor_db: float = -50.0,
+    title: str | None = None,
+    *,
+    origin: tuple[float, float] = (0.0, 0.0),
+    names: tuple[str, str] = ("y", "x"),
+) -> Picture:
     """Draw decibels (rows, columns) in grey, or as a line where there is one row or one column.
 
     db        dB, real; row 0 is drawn at the bottom; -inf is nothing
-    spacing   (row, column) m: axes count metres from pixel [rows//2, columns//2]; None: axes count pixels
+    spacing   (row, column) m; None: axes count pixels
+    origin    (row, column) coordinates, m, of pixel [rows//2, columns//2]; names  what they are called
     floor_db  black, in dB below the brightest pixel, which is white; negative
 
     Returns a PIL.Image; its info["frame"] is the box (left, top, right, bottom) in which the data are drawn.
@@ -45,8 +54,8 @@ def picture(db: Any, spacing: Any = None, floor_db: float = -50.0, title: str | 
         dy, dx = spacing if np.ndim(spacing) else (spacing, spacing)
         spacing = check.number("spacing[0]", dy, above=0), check.number("spacing[1]", dx, above=0)
     if 1 in db.shape and db.size > 1:
-        return _line_plot(db, spacing, floor_db, title)
-    return _grey_image(db, spacing, floor_db, title)
+        return _line_plot(db, (spacing, origin, names), floor_db, title)
+    return _grey_image(db, (spacing, origin, names), floor_db, title)
 
 
 def write_png(picture: Picture, path: Any) -> None:
@@ -117,11 +126,11 @@ def _means(power: np.ndarray, n: int) -> np.ndarray:
     return sums / np.diff(edge)
 
 
-def _grey_image(db: np.ndarray, spacing: Any, floor_db: float, title: str | None) -> Picture:
+def _grey_image(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, title: str | None) -> Picture:
     from PIL import Image
 
-    height, width = drawn_shape(db.shape, spacing)
-    across, up = image_axis(db.shape[1], 1, spacing), image_axis(db.shape[0], 0, spacing)
+    height, width = drawn_shape(db.shape, axes[0])
+    across, up = image_axis(db.shape[1], 1, *axes), image_axis(db.shape[0], 0, *axes)
     ratio = (up[2] - up[1]) / (across[2] - across[1])
     if ratio < THINNEST:
         up = (up[0] + ", stretched", *up[1:])
@@ -147,11 +156,11 @@ def _grey_image(db: np.ndarray, spacing: Any, floor_db: float, title: str | None
     return sheet.image
 
 
-def _line_plot(db: np.ndarray, spacing: Any, floor_db: float, title: str | None) -> Picture:
+def _line_plot(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, title: str | None) -> Picture:
     from PIL import Image, ImageDraw
 
     along = int(db.shape[0] > 1)  # 1: one column, drawn along its rows
-    axis = image_axis(db.size, 1 - along, spacing)
+    axis = image_axis(db.size, 1 - along, *axes)
     width, height, fine = 960, 540, 4  # the curve is drawn four times finer, for a smooth edge
     sheet = Sheet(width, height, axis, ("relative to the maximum (dB)", floor_db, -0.04 * floor_db, 0.0), title, 1.5)
     sheet.axes(grid=True)

@@ -50,6 +50,10 @@ class Image:
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, check.array(name, getattr(self, name), np.float64, (3,)))
 
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.grid.shape))
+        return f"Image({shape} {self.data.dtype} pixels, gain {self.gain:.6g})"
+
     @property
     def is_complex(self) -> bool:
         """True until the image is detected (multilooked)."""
@@ -117,4 +121,14 @@ class Image:
 
         if len(self.grid.shape) != 2:
             raise ValueError(f"a picture needs two axes; this image has shape {tuple(self.grid.shape)}")
-        return picture(self.decibels(), spacing=self.grid.spacing, floor_db=floor_db, title=title)
+        origin, names = (0.0, 0.0), ("y", "x")
+        grid = self.grid
+        if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
+            origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
+            # axes along the scene's own carry its coordinates; others the distance along themselves
+            along = np.eye(3)[1], np.eye(3)[0]
+            if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
+                names = ("along y_axis", "along x_axis")
+        return picture(
+            self.decibels(), spacing=grid.spacing, floor_db=floor_db, title=title, origin=origin, names=names
+        )

@@ -115,6 +115,15 @@ class PhaseHistory:
             check.finite(name, out)
         return check.sealed(out)
 
+    def __repr__(self) -> str:
+        low = self.frequency.min() / 1e9
+        high = (self.frequency + (self.n_samples - 1) * self.frequency_step).max() / 1e9
+        state = "" if self.compressed else ", not compressed"
+        return (
+            f"PhaseHistory({self.n_rows} rows of {self.n_samples} {self.samples.dtype} samples, {low:.6g} to {high:.6g} "
+            f"GHz, swath {self.swath.min():.4g} m{state})"
+        )
+
     @property
     def n_rows(self) -> int:
         """Number of rows."""

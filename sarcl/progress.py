@@ -67,7 +67,8 @@ class Bar:
 
     def _columns(self) -> int:
         try:
-            return max(os.get_terminal_size(self.stream.fileno()).columns, 2)
+            # some terminals do not know their width and say 0
+            return max(os.get_terminal_size(self.stream.fileno()).columns or 80, 2)
         except (OSError, ValueError, AttributeError):
             return 80
 

@@ -60,7 +60,7 @@ class PointResponse:
         lines = [
             f"position         {place(self.position, 4)} m",
             f"peak             {abs(self.peak):.6g} at {np.angle(self.peak):.4f} rad",
-            f"peak/gain        {amplitude:.6g}, RCS {level:.2f} dBsm",
+            f"peak/gain        {amplitude:.6g}, RCS {level:.2f} dBsm if calibrated",
             f"{'':15}{NAMES[0]:>12}{NAMES[1]:>14}",
             *(f"{name:15}{a:>12{form}}{b:>14{form}} {unit}" for name, (a, b), form, unit in rows),
         ]

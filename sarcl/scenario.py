@@ -110,6 +110,7 @@ class Scenario:
         """Echoes of the scene. `options` are arguments of `sarcl.echo` that come before those in [echo]."""
         import sarcl
 
+        self._check_focus()
         pieces = (self.build_scene(), self.build_waveform(), self.build_track())
         given = self._options("echo", options)
         with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
@@ -124,6 +125,14 @@ class Scenario:
             grid = self.build_grid()
         with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
             return sarcl.backproject(raw, grid, **given)
+
+    def _check_focus(self) -> None:
+        """Refuse a window that would be refused only after the echoes are made."""
+        from .windows import weights
+
+        given = self._options("backproject", {})
+        with self.where.blame(("backproject",), given, always=False):
+            weights(given.get("window"), 8)
 
     def _section(self, name: str) -> dict[str, Any]:
         table = getattr(self, name)

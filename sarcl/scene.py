@@ -141,6 +141,10 @@ class Scene:
             triangles.reshape(-1, 3, 3), material=material, roughness=np.repeat(roughness, 2), two_sided=False
         )
 
+    def __repr__(self) -> str:
+        size = " x ".join(f"{s:.4g}" for s in self.bounds[1] - self.bounds[0])
+        return f"Scene({len(self.positions)} points, {len(self.triangles)} facets, {size} m)"
+
     def __add__(self, other: Scene) -> Scene:
         if not isinstance(other, Scene):
             return NotImplemented

@@ -90,12 +90,14 @@ class Sheet:
         self.draw.rectangle((left - w, top - w, right + w - 1, bottom + w - 1), outline=INK, width=w)
 
 
-def image_axis(n: int, along: int, spacing: Any) -> tuple[str, float, float, float]:
+def image_axis(
+    n: int, along: int, spacing: Any, origin: Any = (0.0, 0.0), names: Any = ("y", "x")
+) -> tuple[str, float, float, float]:
     """(label, value at the low edge, value at the high edge, least tick step) of axis `along`."""
     if spacing is None:
         return ("row", "column")[along], -0.5, n - 0.5, 1.0
-    low = (-(n // 2) - 0.5) * spacing[along]
-    return ("y (m)", "x (m)")[along], low, low + n * spacing[along], 0.0
+    low = origin[along] + (-(n // 2) - 0.5) * spacing[along]
+    return f"{names[along]} (m)", low, low + n * spacing[along], 0.0
 
 
 def ticks_between(low: float, high: float, most: float, least: float = 0.0) -> tuple[float, list[float]]:

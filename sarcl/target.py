@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from .cl import size_text
 from .grid import ImageGrid
 from .image import Image
 
@@ -17,7 +18,13 @@ class Target:
     def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack) -> None:
         self.grid, self.writer = grid, None
         if out is None:
-            self.data = np.empty(grid.shape, np.complex64)
+            try:
+                self.data = np.empty(grid.shape, np.complex64)
+            except MemoryError:
+                raise MemoryError(
+                    f"an image of {' x '.join(map(str, grid.shape))} needs {size_text(8.0 * grid.size)} of memory; "
+                    'take a smaller shape, or out="image.h5" to make it in a file'
+                ) from None
         elif isinstance(out, str) or hasattr(out, "__fspath__"):
             from .files import store
 

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from pathlib import Path
 from types import SimpleNamespace
 
 import numpy as np
@@ -205,6 +206,23 @@ def test_an_output_that_cannot_be_written_is_found_before_the_work(raw_file, her
 def test_outputs_of_unknown_kind_or_named_twice_are_refused(raw_file, capsys, no_work):
     assert "ends in '.jpg'; choose a name that ends in .png or .h5" in refused(capsys, "focus", raw_file, "-o", "a.jpg")
     assert "name one file twice" in refused(capsys, "focus", raw_file, "-o", "a.png", "-o", "./a.png")
+
+
+def test_an_output_that_would_replace_an_input_or_another_output_is_refused(raw_file, here, capsys, no_work):
+    before = Path(raw_file).read_bytes()
+    assert "is also read by this command" in refused(capsys, "focus", raw_file, "-o", raw_file)
+    (here / "link.h5").symlink_to(raw_file)
+    assert "is also read by this command" in refused(capsys, "focus", "link.h5", "-o", "link.h5")
+    assert Path(raw_file).read_bytes() == before
+    (here / "s.h5").write_text(SCENARIO)
+    assert "is also read by this command" in refused(capsys, "simulate", "s.h5", "-o", "s.h5")
+    assert (here / "s.h5").read_text() == SCENARIO
+    (here / "s.toml").write_text(SCENARIO)
+    assert "choose another name" in refused(capsys, "simulate", "s.toml", "-o", "a.h5", "--image", "a.h5")
+
+
+def test_a_floor_that_no_picture_can_have_is_refused_before_the_work(raw_file, capsys, no_work):
+    assert "--floor-db is 50" in refused(capsys, "focus", raw_file, "--floor-db", "50")
 
 
 def test_an_unknown_toml_key_is_named_with_its_line(here, capsys, no_work):

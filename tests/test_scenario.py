@@ -269,3 +269,11 @@ def test_a_saved_scenario_loads(tmp_path):
 def test_windows_line_ends_count_once():
     with pytest.raises(ValueError, match=r"^f\.toml:8: "):
         loads(TEXT.replace("radius", "radios").replace("\n", "\r\n"), name="f.toml")
+
+
+def test_a_window_that_is_none_is_named_before_echoes_are_made():
+    def work(*_):
+        raise AssertionError("work began")
+
+    with pytest.raises(ValueError, match=r"f\.toml:28: \[backproject\] .*tailor"):
+        loads(TEXT.replace("taylor", "tailor"), name="f.toml").simulate(progress=work)
