@@ -120,8 +120,8 @@ class PhaseHistory:
         high = (self.frequency + (self.n_samples - 1) * self.frequency_step).max() / 1e9
         state = "" if self.compressed else ", not compressed"
         return (
-            f"PhaseHistory({self.n_rows} rows of {self.n_samples} {self.samples.dtype} samples, {low:.6g} to {high:.6g} "
-            f"GHz, swath {self.swath.min():.4g} m{state})"
+            f"PhaseHistory({self.n_rows} rows of {self.n_samples} {self.samples.dtype} samples, "
+            f"{low:.6g} to {high:.6g} GHz, swath {self.swath.min():.4g} m{state})"
         )
 
     @property
