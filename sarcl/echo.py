@@ -117,14 +117,17 @@ def echo(
         raise ValueError(f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}: scale them down")
     clock.lap("scene")
 
-    spreader = Spreader(opened, antennas, waveform.bandwidth, n_samples, tolerance, budget, "range window" in skips)
+    # points and facets err independently: each gets its share, so that the sum keeps the tolerance
+    share = tolerance / np.sqrt(len(parts))
+    spreader = Spreader(opened, antennas, waveform.bandwidth, n_samples, share, budget, "range window" in skips)
     total, done, gated = sum(len(p) for p in parts) * len(tx), 0, 0
     if progress:
         progress("echo", 0, total)
-    plan: Plan
+    plans: list[Plan] = []
     for part in parts:
         tell = None if progress is None else lambda n, before=done: progress("echo", before + n, total)
         plan, missed = spreader.add(part, samples, clock, tell)
+        plans.append(plan)
         done += len(part) * len(tx)
         gated += missed
     if gated == total:
@@ -156,9 +159,9 @@ def echo(
         waveform=waveform,
         compressed=compressed,
         report=Report(
-            plan={"model": "stop and go", **plan.describe("spread")},
+            plan={"model": "stop and go", **max(plans, key=lambda p: p.predicted_error).describe("spread")},
             tolerance=tolerance,
-            predicted_error=plan.predicted_error,
+            predicted_error=float(np.sqrt(sum(p.predicted_error**2 for p in plans))),
             measured_error=measured,
             contributions_done=total - gated,
             contributions_skipped={**skipped, "range window": gated},

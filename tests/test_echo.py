@@ -290,6 +290,14 @@ def test_an_antenna_on_a_scatterer_is_finite(device):
     assert echo_error(raw, scene.positions, scene.amplitudes) <= 1e-4
 
 
+def test_points_and_facets_together_keep_the_tolerance(device):
+    random = np.random.default_rng(5)
+    triangles = random.uniform(-10, 10, (300, 1, 3)) + random.uniform(-0.02, 0.02, (300, 3, 3))
+    both = cloud(200) + sarcl.Scene.facets(triangles)
+    report = sarcl.echo(both, CHIRP, circle(), tolerance=1e-3, shadows=False, check=True, device=device).report
+    assert report.measured_error <= report.predicted_error <= 1e-3
+
+
 def test_measured_error_is_what_the_report_says(device):
     report = sarcl.echo(cloud(), CHIRP, circle(), tolerance=1e-3, check=True, device=device).report
     assert 0 < report.measured_error <= report.predicted_error <= 1e-3
