@@ -129,18 +129,13 @@ class _Version(argparse.Action):
 
 
 def window(text: str) -> Any:
-    """ "hamming" or "taylor:35:5" as `backproject` takes it."""
-    name, *numbers = text.split(":")
+    """ "none", "hamming" or "taylor:35:5" as `backproject` takes it."""
+    from .windows import parse
+
     try:
-        if name == "taylor" and len(numbers) == 2:
-            return ("taylor", float(numbers[0]), int(numbers[1]))
-    except ValueError:
-        pass
-    if text == "hamming":
-        return text
-    raise argparse.ArgumentTypeError(
-        f"{text!r} is no window; give hamming or taylor:SIDELOBE_DB:NBAR, e.g. taylor:35:5"
-    )
+        return parse(text)
+    except ValueError as exc:
+        raise argparse.ArgumentTypeError(str(exc)) from None
 
 
 def size(text: str) -> float:

@@ -13,8 +13,6 @@ from .check import SPEED_OF_LIGHT
 from .grid import ImageGrid
 from .scene import box
 
-WAVE = 2 / SPEED_OF_LIGHT  # turns a metre of half path and a hertz
-
 
 @dataclass(frozen=True, eq=False)
 class Antennas:

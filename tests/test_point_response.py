@@ -46,6 +46,39 @@ def test_a_point_has_theoretical_width_lobes_place_and_phase(distance, point):
     assert abs(there) == pytest.approx(image.gain, rel=2e-3)
 
 
+@pytest.mark.parametrize("distance", [10e3, 800e3])
+@pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (24.0, 32.0, 0.0)], ids=["centre", "40 m off"])
+def test_phase_of_an_oracle_point_is_kept(distance, point):
+    # echoes from the formula in extended precision, not from sarcl: an error shared by echo and image would show
+    tx, n = spotlight(distance).positions, 1000
+    reference = np.linalg.norm(tx, axis=1)
+    frequency = CENTER - BANDWIDTH / 2 + (np.arange(n) + 0.5) * BANDWIDTH / n
+    path = 2 * (np.sqrt(((tx.astype(np.longdouble) - point) ** 2).sum(axis=1)) - reference)
+    turns = np.outer(path, frequency) / SPEED_OF_LIGHT % 1
+    raw = sarcl.PhaseHistory(
+        np.exp(-2j * np.pi * turns.astype(np.float64)).astype(np.complex64),
+        frequency=frequency[0],
+        frequency_step=BANDWIDTH / n,
+        tx=tx,
+        reference_range=reference,
+    )
+    there = sarcl.backproject(raw, sarcl.ImageGrid.points([point]), tolerance=1e-3)
+    assert abs(np.angle(there.data[0])) <= 5e-3
+    assert abs(there.data[0]) == pytest.approx(there.gain, rel=2e-3)
+    echoes = sarcl.echo(
+        sarcl.Scene.points([point]),
+        sarcl.Waveform.chirp(center=CENTER, bandwidth=BANDWIDTH, duration=2e-6),
+        spotlight(distance),
+        reference=(0, 0, 0),
+        range_window=(-n / 4 * SPEED_OF_LIGHT / BANDWIDTH, n / 4 * SPEED_OF_LIGHT / BANDWIDTH),
+        tolerance=1e-3,
+    )
+    assert echoes.samples.shape == raw.samples.shape
+    error = np.linalg.norm(echoes.samples - raw.samples) / np.linalg.norm(raw.samples)
+    print(f"phase {np.angle(there.data[0]):.1e} rad, echo error {error:.1e}")
+    assert error <= 1e-3
+
+
 # TRUTH.md, impulse response: width in units of c/(2B) and lambda/(2 dtheta) (0.886 without), peak side lobe
 WINDOWS = {"hamming": ("hamming", 1.303, -42.67), "taylor": (("taylor", 35, 5), 1.188, -35.22)}
 
