@@ -4,7 +4,7 @@
 //
 // source    DESIGN.md, image equation; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
 // symbols   delta, kappa as in geometry.clh;  s~_p  range profile, interpolated as in interp.clh
-// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, LOCAL, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers
 //           VECTORS   vectors of pixels a work-item
 //           CHUNK     pulses added in float32 before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
@@ -24,13 +24,18 @@
 //   offsets     (planes, n_offsets)    m; tile k reads from vector k offset_step on (0: all tiles are alike)
 //   used        n_used <= n            pulses that are real; the rest pads the vectors
 //   image       (4, pixels)            totals re, im and their errors re, im; tiles in a row
-//   skipped     (tiles)                pulses that see no pixel of the tile
+//   skipped     (tiles)                pulses in whose window no pixel of the tile is; not used where LOCAL
+//               BEAM: (2, tiles)       and those in whose window they are, but not in the beam
+//   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 __kernel void backproject(__global const float *restrict profiles, int stride, int origin,
                           __global const float *restrict table, __global const float *restrict pulse, int n,
                           int n_used, __global const float *restrict constants,
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
-                          __global float *restrict image, ulong pixels, __global int *restrict skipped) {
+                          __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset) {
+#if LOCAL
+    profiles += 2 * (local_offset + (size_t)get_global_id(1) * n_used * stride);
+#endif
     int k = first + get_global_id(1), per_tile = get_global_size(0) * VECTORS;
     __global const float *c = constants + get_global_id(1) * (size_t)n * N_CONST;
     offset x[VECTORS];
@@ -39,7 +44,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
         x[r] = load_offset(offsets, (size_t)k * offset_step + get_global_id(0) * VECTORS + r, n_offsets);
         about_centre(&x[r], tile, k, n_tiles);
     }
-    int missed = 0;
+    int missed = 0, unlit = 0;
     for (int start = 0; start < n_used; start += CHUNK) {
         fv re[VECTORS], im[VECTORS];
 #pragma unroll
@@ -52,12 +57,21 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                 missed++;
                 continue;
             }
+#if BEAM
+            if (state == UNLIT) {
+                unlit++;
+                continue;
+            }
+#endif
             __global const float *row = profiles + 2 * ((size_t)p * stride + origin);
 #pragma unroll
             for (int r = 0; r < VECTORS; r++) {
                 place at = locate(record, pulse, p, n, x[r]);
                 fv v = 1;
                 if (state == CROSSING) v = keep_inside(record, &at);
+#if BEAM
+                if (state == CROSSING) v *= in_beam(record, x[r]);
+#endif
                 fv g, h, sine, cosine;
                 look_up(row, stride, origin, at.base, at.t, table, &g, &h);
                 sincos_turns(at.turn, &sine, &cosine);
@@ -76,5 +90,12 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
             add_compensated(image + pixels, image + 3 * pixels, i, im[r]);
         }
     }
-    if (get_global_id(0) == 0) skipped[k] += missed;
+#if !LOCAL
+    if (get_global_id(0) == 0) {
+        skipped[k] += missed;
+#if BEAM
+        skipped[n_tiles + k] += unlit;
+#endif
+    }
+#endif
 }

@@ -13,12 +13,16 @@ import numpy as np
 from .check import SPEED_OF_LIGHT
 
 U32 = 2.0**-24  # unit roundoff of float32
+MARGIN = 1.06  # of errors that are taken on a grid of frequencies and places
 LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 # Root mean square of what rounding turns to float32 (twice) and the sine and cosine polynomials add, rad.
 ANGLE = 3e-7
 
 # Polynomial terms of each half (even, odd) of a tap's weight: enough that the fit errs less than the kernel.
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
+
+# The same for lines of pixels, whose weights are not deconvolved.
+LINE_TERMS = {2: 2, 4: 3, 6: 4, 8: 5}
 
 # Relative cost of one contribution with so many taps, measured on PoCL (bench/backproject.py).
 TAP_COST = {2: 1.0, 4: 1.5, 6: 1.9, 8: 2.45}
@@ -59,7 +63,44 @@ def interpolator(taps: int, oversample: float) -> Interpolator:
     place = np.arange(taps) - (taps - 1) / 2
     waves = np.exp(2j * np.pi * nu[:, None, None] * (place - z[:, None]))
     made = (waves * _weights(taps, table, z)).sum(axis=-1) / _transform(taps, table, nu)[:, None]
-    return Interpolator(taps, oversample, table, float(np.abs(made - 1).max()))
+    return Interpolator(taps, oversample, table, MARGIN * float(np.abs(made - 1).max()))
+
+
+def line_interpolator(taps: int, oversample: float) -> Interpolator:
+    """Least-squares weights between samples `oversample` times finer than 1/bandwidth, without deconvolution.
+
+    For profiles whose sample spacing differs from pulse to pulse, so that no one spectrum could be corrected.
+    """
+    steps = 2.0 ** (np.floor(8 * np.log2(min(oversample, 64.0))) / 8)  # few tables serve all spacings
+    return _least_squares(taps, float(steps))
+
+
+@functools.lru_cache(maxsize=256)
+def _least_squares(taps: int, oversample: float) -> Interpolator:
+    terms = LINE_TERMS[taps]
+    z = np.cos(np.pi * (np.arange(48) + 0.5) / 48) / 2
+    weights = least_squares_weights(taps, oversample, z)
+    powers = (z[:, None] ** 2) ** np.arange(terms)
+    out = np.empty((taps // 2, 2, terms))
+    for k in range(taps // 2):
+        mirrored = weights[:, taps - 1 - k]  # w_{taps-1-k}(z) = w_k(-z)
+        out[k, 0] = np.linalg.lstsq(powers, (weights[:, k] + mirrored) / 2, rcond=None)[0]
+        out[k, 1] = np.linalg.lstsq(powers * z[:, None], (weights[:, k] - mirrored) / 2, rcond=None)[0]
+    table = out.astype(np.float32)
+    nu = np.linspace(0, 0.5 / oversample, 33)
+    z = np.linspace(-0.5, 0.5, 65)
+    waves = np.exp(2j * np.pi * nu[:, None, None] * (np.arange(taps) - (taps - 1) / 2 - z[:, None]))
+    made = (waves * _polynomials(table, z)).sum(axis=-1)
+    return Interpolator(taps, oversample, table, MARGIN * float(np.abs(made - 1).max()))
+
+
+def least_squares_weights(taps: int, oversample: float, z: np.ndarray) -> np.ndarray:
+    """Weights (n, taps) that interpolate best at z (n,) what has no frequency above 1/(2 oversample) a sample."""
+    place = np.arange(taps) - (taps - 1) / 2
+    nu = 0.5 / oversample * np.cos(np.pi * (np.arange(40) + 0.5) / 80)  # denser at the band's edge, where errors are
+    angle, wanted = 2 * np.pi * nu[:, None] * place, 2 * np.pi * nu[:, None] * z
+    waves = np.concatenate([np.cos(angle), np.sin(angle)])
+    return np.linalg.lstsq(waves, np.concatenate([np.cos(wanted), np.sin(wanted)]), rcond=None)[0].T
 
 
 def _kaiser_bessel(taps: int, oversample: float) -> np.ndarray:
@@ -81,9 +122,12 @@ def _kaiser_bessel(taps: int, oversample: float) -> np.ndarray:
 
 
 def _weights(taps: int, table: np.ndarray, z: np.ndarray) -> np.ndarray:
-    z = np.asarray(z, np.float64)
     if taps == 2:
         return np.stack([0.5 - z, 0.5 + z], axis=-1)
+    return _polynomials(table, z)
+
+
+def _polynomials(table: np.ndarray, z: np.ndarray) -> np.ndarray:
     powers = (z[..., None] ** 2) ** np.arange(table.shape[-1])
     even, odd = (np.tensordot(powers, table[:, i].astype(np.float64), axes=(-1, -1)) for i in (0, 1))
     odd = odd * z[..., None]
@@ -177,12 +221,23 @@ def curvature_rounding(radius: float, distance: float, frequency: float) -> floa
     return k * min(radius**2 / (2 * max(distance, 1e-300)), radius) * 4 * U32
 
 
+def root_rounding(radius: float, distance: float, frequency: float) -> float:
+    """Phase error, rad, of the exact root in float32 near an antenna.
+
+    What lies across the line of sight is |p|^2 - a^2, rounded to 3 u |p|^2, over a range of at least `distance`.
+    """
+    k = 4 * np.pi * frequency / SPEED_OF_LIGHT
+    return k * 3 * U32 * radius**2 / max(distance, 1e-300)
+
+
 def range_error(radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int) -> float:
     """Phase error, rad, of differential ranges in range mode 0, 1 or 2 of kernels/phase.clh."""
     if mode == 2:
         return phase_rounding(0.0, frequency, True)
     error = phase_rounding(radius, frequency, mode == 1) + place_rounding(radius, bandwidth, mode == 1)
     error += series_error(radius, distance, frequency, order)
+    if order == 0:
+        error += root_rounding(radius, distance, frequency)
     return error + (curvature_rounding(radius, distance, frequency) if mode == 1 else 0.0)
 
 

@@ -2,15 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from . import cl
 from .check import SPEED_OF_LIGHT
-from .grid import ImageGrid
 from .scene import box
 
 
@@ -20,6 +18,8 @@ class Antennas:
 
     rx is None where it equals tx. reference_range m, frequency (of zero phase slope) and frequency_step Hz,
     near and far (range window about the reference, m): each (n,). wrap: profiles repeat instead.
+    beam, unit vectors (n, 3), and beam_angle, rad: only points no more than half the angle off a row's direction, as
+    its transmitter sees them, have a part in it; None: all have.
     """
 
     tx: np.ndarray
@@ -30,11 +30,39 @@ class Antennas:
     near: np.ndarray
     far: np.ndarray
     wrap: bool = False
+    beam: np.ndarray | None = None
+    beam_angle: float = 2 * np.pi
+
+    def picked(self, rows: np.ndarray) -> Antennas:
+        """These rows, in this order."""
+        fields = ("tx", "rx", "reference_range", "frequency", "frequency_step", "near", "far", "beam")
+        whole = {name: getattr(self, name) for name in fields}
+        some: dict[str, Any] = {name: None if value is None else value[rows] for name, value in whole.items()}
+        return replace(self, **some)
 
     def distance(self, bounds: np.ndarray) -> float:
         """Smallest distance of any antenna from a box (2, 3), m; 0 inside it."""
         ends = [self.tx] if self.rx is None else [self.tx, self.rx]
         return min(float(np.linalg.norm(e - np.clip(e, *bounds), axis=1).min()) for e in ends)
+
+    def depth(self, point: np.ndarray) -> np.ndarray:
+        """How far inside its range window every row sees a point, m (n,); negative outside."""
+        ends = [self.tx] if self.rx is None else [self.tx, self.rx]
+        delta = sum(np.linalg.norm(e - point, axis=1) for e in ends) / len(ends) - self.reference_range
+        return np.asarray(np.minimum(delta - self.near, self.far - delta))
+
+    def beam_depth(self, points: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
+        """How far inside the beam the transmitters of `rows` see points, m (3,) or (n, 3); negative outside.
+
+        The distance to the cone's surface, at its tip to the tip.
+        """
+        assert self.beam is not None
+        d, half = points - self.tx[rows], self.beam_angle / 2
+        along = (d * self.beam[rows]).sum(axis=-1)
+        across = np.sqrt(np.maximum((d**2).sum(axis=-1) - along**2, 0))
+        inside = along * np.sin(half) - across * np.cos(half)
+        ahead = along * np.cos(half) + across * np.sin(half) > 0
+        return np.asarray(np.where(ahead, inside, np.copysign(np.hypot(along, across), inside)))
 
     def packed(self, center: np.ndarray, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
         """Per-pulse array (2, components, n) float32 of rows start ... stop - 1 for profiles of `length` samples.
@@ -64,6 +92,9 @@ class Antennas:
         components = [*tx.T, tx_length, turn, place, kappa, sigma, near, far]
         if self.rx is not None:
             components += [*rx.T, rx_length]
+        if self.beam is not None:
+            half = np.full(n, np.longdouble(self.beam_angle) / 2)
+            components += [*self.beam[rows].T.astype(np.longdouble), np.cos(half), np.sin(half)]
         return cl.wide(np.stack(components))
 
 
@@ -86,6 +117,12 @@ class Tiles:
     @property
     def n_tiles(self) -> int:
         return len(self.references)
+
+    def tile_offsets(self, tiles: np.ndarray) -> np.ndarray:
+        """Offsets of these tiles only, (6, n_points)."""
+        if self.shared:
+            return self.offsets
+        return self.offsets.reshape(6, -1, self.per_tile)[:, tiles].reshape(6, -1)
 
 
 def tile_points(
@@ -124,119 +161,3 @@ def morton_order(positions: np.ndarray) -> np.ndarray:
             x = (x | (x << np.uint64(shift))) & np.uint64(mask)
         code |= x << np.uint64(axis)
     return np.argsort(code, kind="stable")
-
-
-def _power_of_two(n: int) -> int:
-    """The smallest power of two that is at least n."""
-    return 1 << max(0, n - 1).bit_length()
-
-
-class GridTiling:
-    """One global tiling of an image grid, in bands of tiles that make up consecutive rows (or points).
-
-    Fixed by the grid and the side alone, so that results do not depend on how many bands are done at once.
-    """
-
-    LISTED_BAND = 2**18  # points a band of a grid without rows
-
-    def __init__(self, grid: ImageGrid, side: int) -> None:
-        self.grid, self.side = grid, side
-        self.per_tile = side * side
-        self.center = grid.bounds.mean(axis=0)
-        if grid.is_plane:
-            rows, columns = grid.shape
-            # square tiles, but no higher or wider than a strip needs
-            self.high = min(side, _power_of_two(rows))
-            self.wide = min(side * side // self.high, max(side, _power_of_two(columns)))
-            self.high = side * side // self.wide
-            self.n_bands = -(-rows // self.high)
-            self.across = -(-columns // self.wide)
-            down, right = (np.arange(n) - (n - 1) / 2 for n in (self.high, self.wide))
-            assert grid.spacing is not None and grid.x_axis is not None and grid.y_axis is not None
-            y = down[:, None, None] * grid.spacing[0] * grid.y_axis
-            offsets = (y + right[:, None] * grid.spacing[1] * grid.x_axis).reshape(-1, 3)
-            self._offsets = cl.wide(offsets.T).reshape(6, -1)
-            self._radius = float(np.linalg.norm(offsets, axis=1).max())
-        else:
-            self.n_bands = -(-grid.size // self.LISTED_BAND)
-            self._radius = max(float(self.band(b)[0].radius.max()) for b in range(self.n_bands))
-
-    @property
-    def radius(self) -> float:
-        """Radius of the largest tile, m."""
-        return self._radius
-
-    def pixels(self, first: int, last: int) -> int:
-        """Pixels, padding included, of bands first ... last - 1."""
-        if self.grid.is_plane:
-            return (last - first) * self.across * self.per_tile
-        return sum(self._padded(b) for b in range(first, last))
-
-    def _padded(self, band: int) -> int:
-        n = min(self.LISTED_BAND, self.grid.size - band * self.LISTED_BAND)
-        return -(-n // self.per_tile) * self.per_tile
-
-    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
-        """Tiles of one band, and for listed points their order within it."""
-        if self.grid.listed is not None:
-            at = slice(index * self.LISTED_BAND, (index + 1) * self.LISTED_BAND)
-            return tile_points(self.grid.listed.reshape(-1, 3)[at], self.center, self.per_tile)
-        columns = np.arange(self.across) * self.wide + (self.wide - 1) / 2
-        row = index * self.high + (self.high - 1) / 2
-        references = self.grid.at(np.full(self.across, row), columns) - self.center
-        radius = np.full(self.across, self._radius)
-        return Tiles(self.per_tile, references, radius, self._offsets, shared=True), None
-
-    def bands(self, first: int, last: int) -> tuple[Tiles, list[np.ndarray | None]]:
-        """Tiles of bands first ... last - 1 in one."""
-        parts = [self.band(b) for b in range(first, last)]
-        tiles = [t for t, _ in parts]
-        offsets = tiles[0].offsets if tiles[0].shared else np.concatenate([t.offsets for t in tiles], axis=1)
-        joined = Tiles(
-            self.per_tile,
-            np.concatenate([t.references for t in tiles]),
-            np.concatenate([t.radius for t in tiles]),
-            offsets,
-            tiles[0].shared,
-        )
-        return joined, [order for _, order in parts]
-
-    def place(self, values: np.ndarray, first: int, last: int, orders: list[np.ndarray | None], out: Any) -> None:
-        """Write tile-ordered values (n,) of bands first ... last - 1 to their pixels in `out`."""
-        for at, block in self._untiled(values, first, last, orders):
-            out[at] = block
-
-    def _untiled(
-        self, values: np.ndarray, first: int, last: int, orders: list[np.ndarray | None]
-    ) -> Iterator[tuple[Any, np.ndarray]]:
-        if self.grid.is_plane:
-            rows, columns = self.grid.shape
-            high, wide = self.high, self.wide
-            tiled = values.reshape(last - first, self.across, high, wide).transpose(0, 2, 1, 3)
-            whole = tiled.reshape((last - first) * high, self.across * wide)
-            stop = min(last * high, rows)
-            yield slice(first * high, stop), whole[: stop - first * high, :columns]
-            return
-        start = 0
-        for band, order in zip(range(first, last), orders, strict=True):
-            assert order is not None
-            n = min(self.LISTED_BAND, self.grid.size - band * self.LISTED_BAND)
-            block = np.empty(n, values.dtype)
-            block[order] = values[start : start + len(order)]
-            start += len(order)
-            yield slice(band * self.LISTED_BAND, band * self.LISTED_BAND + n), block
-
-    def tile_sizes(self, first: int, last: int) -> np.ndarray:
-        """Real pixels (without padding) of every tile of bands first ... last - 1."""
-        if self.grid.is_plane:
-            rows, columns = self.grid.shape
-            high = np.minimum(np.arange(first + 1, last + 1) * self.high, rows) - np.arange(first, last) * self.high
-            wide = np.minimum(np.arange(1, self.across + 1) * self.wide, columns) - np.arange(self.across) * self.wide
-            return np.outer(high, wide).ravel()
-        sizes = []
-        for b in range(first, last):
-            n = min(self.LISTED_BAND, self.grid.size - b * self.LISTED_BAND)
-            full = np.full(self._padded(b) // self.per_tile, self.per_tile)
-            full[-1] -= self._padded(b) - n
-            sizes.append(full)
-        return np.concatenate(sizes)

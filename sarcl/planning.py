@@ -24,7 +24,10 @@ CPU_BYTES = 2**30  # default memory for blocks on a CPU, which shares it with ev
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """How a result is computed: interpolator and profile length, points a tile, range mode and series order."""
+    """How a result is computed: interpolator and profile length, points a tile, range mode and series order.
+
+    cost  of a contribution, relative to one with the hat and ranges in float32
+    """
 
     interpolator: Interpolator
     length: int
@@ -32,6 +35,7 @@ class Plan:
     range_mode: int
     order: int
     predicted_error: float
+    cost: float = 1.0
 
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
@@ -50,14 +54,14 @@ class Plan:
             "BISTATIC": int(bistatic),
             "WRAP": self.length if wrap else 0,
             "TAPS": self.interpolator.taps,
-            "TERMS": accuracy.TERMS[self.interpolator.taps],
+            "TERMS": self.interpolator.table.shape[-1],
             "RANGE": self.range_mode,
             "ORDER": self.order,
         }
 
-    def components(self, bistatic: bool) -> int:
+    def components(self, bistatic: bool, beam: bool = False) -> int:
         """Floats of a (tile, pulse) record: N_CONST of kernels/geometry.clh."""
-        return 32 if bistatic else 24 if self.range_mode == 1 else 16
+        return (32 if bistatic else 24 if self.range_mode == 1 else 16) + 8 * beam
 
 
 def cheapest(
@@ -70,12 +74,13 @@ def cheapest(
     n_samples: int,
     points_per_row: int,
     chunk: int,
+    least_tolerance: float = LEAST_TOLERANCE,
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     tiles        choices of (points a tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
-    chunk        rows or points summed in float32
+    chunk        rows or points summed in float32; least_tolerance: below it none is offered
     ValueError names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
@@ -100,9 +105,9 @@ def cheapest(
                 cost += range_cost - 1 + TILE_COST / per_tile
                 cost += ORDER_COST[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
-                    best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error)
-    if best is None or tolerance < LEAST_TOLERANCE:
-        reach = max(LEAST_TOLERANCE, 1.3 * least)
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error, cost)
+    if best is None or tolerance < least_tolerance:
+        reach = max(least_tolerance, 1.3 * least)
         digits = 10.0 ** (np.floor(np.log10(reach)) - 1)
         reach = np.ceil(reach / digits - 1e-9) * digits  # rounded up: what is printed can be asked for
         raise ValueError(f"tolerance {tolerance:.1e} cannot be met in complex64; the best here is {reach:.1e}")

@@ -22,11 +22,16 @@ def correction(interpolator: Interpolator, n_samples: int, length: int) -> np.nd
 
 
 def from_samples(
-    device: cl.Device, samples: np.ndarray, weights: np.ndarray, interpolator: Interpolator, length: int
+    device: cl.Device,
+    samples: np.ndarray,
+    weights: np.ndarray,
+    interpolator: Interpolator,
+    length: int,
+    pad: int | None = None,
 ) -> np.ndarray:
-    """Profiles (n, length + 2 padding) complex64 of samples (n, n_samples), each times weights (n, n_samples).
+    """Profiles (n, length + 2 pad) complex64 of samples (n, n_samples), each times weights (n, n_samples).
 
-    Delay 0 stands at padding + length/2; the padding repeats the profile's other end.
+    Delay 0 stands at pad + length/2; the padding, by default what taps need, repeats the profile's other end.
     """
     n, n_samples = samples.shape
     spectrum = np.zeros((n, length), np.complex64)
@@ -41,7 +46,7 @@ def from_samples(
     spectrum[:, : n_samples - low] = shaped[:, low:]
     if low:
         spectrum[:, -low:] = shaped[:, :low]
-    pad = padding(interpolator)
+    pad = padding(interpolator) if pad is None else pad
     profiles = np.empty((n, length + 2 * pad), np.complex64)
     profiles[:, pad:-pad] = fft.rows(device, spectrum, inverse=True)
     profiles[:, :pad] = profiles[:, length : length + pad]

@@ -15,9 +15,11 @@ def backproject(
     sample_weight: np.ndarray | None = None,
     row_weight: np.ndarray | None = None,
     wrap: bool = False,
+    beam: tuple[float, np.ndarray] | None = None,
 ) -> tuple[np.ndarray, float]:
     """I(x) = sum_p v_p(x) sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3).
 
+    v_p(x) is 1 in the range window and in the beam: (full angle, rad, and directions, (3,) or (n_rows, 3), from tx).
     Returns I complex128 (n,) and the norm it would have if contributions had random phases.
     """
     n = np.arange(raw.n_samples)
@@ -27,6 +29,11 @@ def backproject(
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
         seen = wrap | (abs(delay) <= 1 / (2 * raw.frequency_step[p]))
+        if beam is not None:
+            toward = np.broadcast_to(beam[1], (raw.n_rows, 3))[p]
+            away = points - raw.tx[p]
+            reach = np.linalg.norm(away, axis=1) * np.linalg.norm(toward)
+            seen = seen & (away @ toward >= np.cos(beam[0] / 2) * reach)
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
         # the carrier's turns are reduced in extended precision, the rest in float64
         first = (raw.frequency[p] * delay) % 1
