@@ -21,10 +21,13 @@ def good_length(n: int) -> int:
 def rows(device: cl.Device, data: np.ndarray, *, inverse: bool = False, engine: str | None = None) -> np.ndarray:
     """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
 
-    engine  "reikna" or "scipy"; default by the kind of device. complex128 always goes to scipy.
+    engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power of
+            two long: its chirps for other lengths err by 1e-16 times the length (measured: 9e-12 at 98 304)
     """
     if engine is None:
-        engine = "scipy" if device.is_cpu or data.dtype != np.complex64 else "reikna"
+        length = data.shape[1]
+        double = data.dtype == np.complex128 and device.info.fp64 and length & (length - 1) == 0
+        engine = "reikna" if not device.is_cpu and (data.dtype == np.complex64 or double) else "scipy"
     if engine == "reikna":
         return _reikna(device, data, inverse)
     import scipy.fft
@@ -36,15 +39,15 @@ def rows(device: cl.Device, data: np.ndarray, *, inverse: bool = False, engine: 
 
 
 def _reikna(device: cl.Device, data: np.ndarray, inverse: bool) -> np.ndarray:
-    thread, compiled = _plan(device, data.shape)
+    thread, compiled = _plan(device, data.shape, data.dtype.char)
     buffer = thread.to_device(np.ascontiguousarray(data))
     compiled(buffer, buffer, inverse)
     out = buffer.get()
-    return out * np.float32(data.shape[1]) if inverse else out
+    return out * out.real.dtype.type(data.shape[1]) if inverse else out
 
 
 @functools.lru_cache(maxsize=16)
-def _plan(device: cl.Device, shape: tuple[int, ...]) -> tuple[Any, Any]:
+def _plan(device: cl.Device, shape: tuple[int, ...], kind: str) -> tuple[Any, Any]:
     from reikna.core import Type
     from reikna.fft import FFT
 
@@ -52,4 +55,4 @@ def _plan(device: cl.Device, shape: tuple[int, ...]) -> tuple[Any, Any]:
     atexit.register(_plan.cache_clear)
     thread = device.reikna_thread()
     with cl.quiet():
-        return thread, FFT(Type(np.complex64, shape), axes=(1,)).compile(thread)
+        return thread, FFT(Type(np.dtype(kind), shape), axes=(1,)).compile(thread)
