@@ -1,33 +1,44 @@
-"""Direct backprojection: every (row, pixel) pair that is not skipped, to a stated tolerance."""
+"""backproject: echoes to an image, to a stated tolerance."""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Callable
-from contextlib import ExitStack
-from typing import Any
+from contextlib import ExitStack, closing
+from typing import Any, overload
 
 import numpy as np
 
-from . import cl, planning, profiles
-from .check import SPEED_OF_LIGHT, array, choice, instance, number
-from .geometry import Antennas, GridTiling
+from . import planning
+from .check import choice, count, instance, number
+from .crew import BLOCKS_EACH, Crew, Local, open_devices
 from .grid import ImageGrid
 from .image import Image
+from .keeper import Keeper
+from .methods import METHODS, Choice, choose
 from .phase_history import PhaseHistory
-from .planning import Clock, Plan, cheapest
+from .pieces import Run, gaps, share
+from .planning import Clock
 from .report import Report
-from .target import Target
+from .target import Strip, Target, extent, is_path
+from .target import count as pixels_in
+from .task import Task, by_reason, make_task
 
 log = logging.getLogger(__name__)
 
-CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
-VECTORS = 4  # vectors of pixels a work-item
-SKIPS = ("range window", "zero weight")
+MOST_FILES = 64  # blocks an image whose finished tiles are kept
 Progress = Callable[[str, int, int], None]
 
 
-def backproject(
+@overload
+def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: None = None, **options: Any) -> Image: ...
+
+
+@overload
+def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: Any, **options: Any) -> Image | None: ...
+
+
+def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result apart, not the options
     raw: PhaseHistory,
     grid: ImageGrid,
     *,
@@ -35,260 +46,221 @@ def backproject(
     method: str = "auto",
     window: Any = None,
     weights: Any = None,
+    beam: Any = None,
     wrap: bool = False,
     skip: Any = True,
     max_bytes: float | None = None,
     out: Any = None,
+    resume: bool | None = None,
+    tile: Any = None,
     check: bool | None = None,
     device: Any = None,
+    cluster: Any = None,
     progress: Progress | None = None,
-) -> Image:
+) -> Image | None:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
 
     raw        PhaseHistory, compressed
     grid       ImageGrid, a plane or any points
     tolerance  L2 error allowed, relative to the larger of |I| and the norm of randomly phased contributions
-    method     "direct", or "auto" for the cheapest there is
+    method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
     window     None, "hamming" or ("taylor", sidelobe_db, nbar): over samples and over rows
     weights    one a row (n_rows,), on top of window and raw.weight
+    beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
+               grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
     wrap       False: a row reaches only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats beyond
-    skip       True, False or a set of reasons ("range window", "zero weight"); the image is the same
-    max_bytes  memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
+    skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data") to leave pairs out
+               unseen instead of finding that they add nothing; the image is the same
+    max_bytes  memory for blocks on each device, default 1 GiB on CPUs, half the memory of a GPU
     out        None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"
+    resume     finished tiles of an image at a path wait in "PATH.parts", where the same call finds them after a
+               kill. None: from the first second on; True: whatever ends the run; False: none, and those there
+               are thrown away
+    tile       (i, n): make piece i of n alone, 1 <= i <= n, and keep its tiles in "PATH.parts"; the piece that
+               completes the image puts it together and returns it, the others return None
     check      recompute 256 random pixels exactly; None: where that costs less than 2 %
-    device     see `sarcl.devices`; progress  called as progress(stage, done, total)
+    device     see `sarcl.devices`; a list of such, or "all", for several at once
+    cluster    a dask.distributed.Client whose workers make the tiles, each on a device of its own
+    progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
     Returns an Image. ValueError: a tolerance that cannot be met (with the best that can), data not compressed,
-    arguments that do not fit. Source: Farooq 2009, section 2.2.2; docs/accuracy.md.
+    arguments that do not fit, tiles of another job in "PATH.parts"; MemoryError: max_bytes too small for a
+    single row. Source: Farooq 2009, section 2.2.2; docs/accuracy.md and docs/large.md.
     """
     clock = Clock()
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
-    choice("method", method, ("auto", "direct"))
+    choice("method", method, METHODS)
     tolerance = number("tolerance", tolerance, above=0)
-    if not raw.compressed:
-        raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
-    skips = planning.skips(skip, SKIPS)
-    sample_weight, row_weight = weigh(raw, window, weights)
-    gain = float(row_weight.sum() * sample_weight.sum())
-    n_all = raw.n_rows
-    if "zero weight" in skips and not row_weight.all():
-        used = np.flatnonzero(row_weight)
-        raw, row_weight = raw[used], row_weight[used]
-    opened = cl.open_device(device)
-    antennas = antennas_of(raw, wrap)
-    budget = planning.budget(opened, max_bytes)
-    plan, tiling = make_plan(raw, antennas, grid, tolerance)
+    piece = _piece(tile, resume, out)
+    task = make_task(raw, grid, window, weights, wrap, skip, beam)
+    crew, chosen = _crew(task, method, tolerance, device, cluster, max_bytes)
     clock.lap("plan")
 
     with ExitStack() as stack:
-        target = Target(grid, out, stack)
-        run = _Run(opened, raw, antennas, plan, tiling, wrap, "range window" in skips)
-        shaped = sample_weight * profiles.correction(plan.interpolator, raw.n_samples, plan.length)
-        skipped = run.focus(shaped, row_weight, budget, target, clock, progress)
-        middle = raw.n_rows // 2
-        geometry = {
-            "frequency": float(np.median(antennas.frequency)),
-            "tx": raw.tx[middle],
-            "rx": raw.rx[middle],
-        }
-        pairs = raw.n_rows * grid.size
-        if skipped == pairs:
-            log.warning("no pixel lies inside the range window of any row: the image is zero; check the grid's center")
-        seconds = clock.seconds.get("backproject", 0.0)
-        exact_seconds = 256 * raw.n_rows * raw.n_samples * 3e-8
+        keeper = None
+        if is_path(out):
+            keeper = Keeper(out, task, chosen, tolerance, True if piece else resume)
+            stack.push(keeper)
+        if piece and keeper:
+            finished = keeper.finished()
+            if finished is not None:
+                return finished
+            _fill(crew, task, chosen, None, keeper, share(chosen.tiling.n_bands, *piece, chosen.unit), clock, progress)
+            if not keeper.complete():
+                return None
+        try:
+            target = Target(grid, out, stack, chosen.dtype)
+        except FileExistsError:
+            if piece:  # the others' tiles and these are being put together by another run
+                return None
+            raise
+        bands = 0, chosen.tiling.n_bands
+        skipped, kept = _fill(crew, task, chosen, target, keeper, bands, clock, progress)
+        if grid.empty is not None and not target.grid.is_plane:
+            target.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
+        target.finish()
+        outside, unlit = by_reason(skipped)
+        no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
+        done = task.pairs - outside - unlit - no_data
+        if done == 0:
+            where, remedy = ("range window", "") if unlit == 0 else ("range window and beam", " and the beam")
+            text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
+            log.warning(text, where, remedy)
         measured = None
-        if check or (check is None and exact_seconds < 0.02 * seconds):
-            measured = _measure_error(raw, grid, sample_weight, row_weight, wrap, target.data)
+        exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
+        if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
+            measured = _measure_error(task, grid, target.data)
             clock.lap("check")
+            if measured > tolerance:
+                raise ValueError(
+                    f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the "
+                    f"error formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it"
+                )
+        plan = chosen.plan.describe(chosen.method)
+        if kept:
+            plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
         report = Report(
-            plan=plan.describe("direct"),
+            plan=plan,
             tolerance=tolerance,
-            predicted_error=plan.predicted_error,
+            predicted_error=chosen.predicted_error,
             measured_error=measured,
-            contributions_done=pairs - skipped,
+            contributions_done=done,
             contributions_skipped={
-                "range window": skipped,
-                "zero weight": (n_all - raw.n_rows) * grid.size,
+                "range window": outside,
+                "beam": unlit,
+                "zero weight": (raw.n_rows - task.raw.n_rows) * grid.size,
+                "no data": no_data,
             },
             seconds=clock.seconds,
-            device=opened.info.name,
+            device=" + ".join(crew.names),
         )
-        return target.image(gain=gain, report=report, **geometry)
+        middle = task.raw.n_rows // 2
+        image = target.image(
+            job=keeper.mark if keeper and keeper.pieces else None,
+            gain=float(task.row_weight.sum() * task.sample_weight.sum()),
+            frequency=float(np.median(task.antennas.frequency)),
+            tx=task.raw.tx[middle],
+            rx=task.raw.rx[middle],
+            report=report,
+        )
+        if keeper:
+            keeper.done()
+        return image
 
 
-def make_plan(raw: PhaseHistory, antennas: Antennas, grid: ImageGrid, tolerance: float) -> tuple[Plan, GridTiling]:
-    """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses."""
-    tilings = {side**2: GridTiling(grid, side) for side in (32, 16, 8)}
-    plan = cheapest(
-        tolerance,
-        [(n, tiling.radius) for n, tiling in tilings.items()],
-        distance=antennas.distance(grid.bounds),
-        frequency=float((raw.frequency + raw.n_samples * raw.frequency_step).max()),
-        bandwidth=float(raw.bandwidth.max()),
-        n_samples=raw.n_samples,
-        points_per_row=grid.size,
-        chunk=CHUNK,
-    )
-    return plan, tilings[plan.per_tile]
+def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
+    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for what does not go together."""
+    if resume is not None:
+        instance("resume", resume, bool)
+    if (tile is not None or resume) and not is_path(out):
+        name = "tile" if tile is not None else "resume"
+        raise ValueError(f'{name} is {tile or resume!r} but out is no path; give out="image.h5": tiles wait beside it')
+    if tile is None:
+        return None
+    if resume is False:
+        raise ValueError("tile and resume=False do not go together: a piece would throw away the other pieces' tiles")
+    if np.shape(tile) != (2,):
+        raise ValueError(f"tile is {tile!r}; wanted (i, n): piece i of n")
+    i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
+    if i > n:
+        raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
+    return i, n
 
 
-def weigh(raw: PhaseHistory, window: Any, weights: Any) -> tuple[np.ndarray, np.ndarray]:
-    """Weights of samples (n_samples,) and rows (n_rows,): window, raw.weight and `weights` together.
+def _crew(
+    task: Task, method: str, tolerance: float, device: Any, cluster: Any, max_bytes: float | None
+) -> tuple[Crew, Choice]:
+    """Who makes the image, and how: one plan for all of them."""
+    if cluster is not None:
+        from .cluster import Cluster, have_lanes
 
-    The rows of each channel and polarisation, in time, share one window over the aperture.
-    """
-    from .windows import weights as window_weights
-
-    rows = np.ones(raw.n_rows)
-    if window is not None:
-        keys = [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
-        when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
-        group = np.zeros(raw.n_rows, np.int64)
-        for key in keys:
-            group = group * (len(np.unique(key)) + 1) + np.unique(key, return_inverse=True)[1]
-        for g in np.unique(group):
-            members = np.flatnonzero(group == g)
-            rows[members[np.argsort(when[members])]] = window_weights(window, len(members))
-    if raw.weight is not None:
-        rows = rows * raw.weight
-    if weights is not None:
-        rows = rows * array("weights", weights, np.float64, (raw.n_rows,))
-    if (rows < 0).any():
-        raise ValueError(f"weights[{int(np.argmin(rows))}] is negative; a weight cannot be")
-    if not rows.any():
-        raise ValueError("every row has weight 0; nothing would be focused")
-    return window_weights(window, raw.n_samples), rows
+        chosen = choose(task, method, tolerance, have_lanes(cluster, device))
+        return Cluster(cluster, task, chosen, device, max_bytes), chosen
+    devices = open_devices(device)
+    budgets = [min(planning.budget(d, max_bytes), d.info.memory) for d in devices]
+    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
+    chosen = choose(task, method, tolerance, lanes, float64)
+    engines = [chosen.on(d, task) for d in devices]
+    return Local(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
 
 
-def antennas_of(raw: PhaseHistory, wrap: bool) -> Antennas:
-    """The geometry of every row; the carrier is the frequency of sample n_samples//2."""
-    half = np.full(raw.n_rows, 1e30) if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
-    return Antennas(
-        tx=raw.tx,
-        rx=None if raw.is_monostatic else raw.rx,
-        reference_range=raw.reference_range,
-        frequency=raw.frequency + raw.n_samples // 2 * raw.frequency_step,
-        frequency_step=raw.frequency_step,
-        near=-half,
-        far=half,
-        wrap=wrap,
-    )
+def _fill(
+    crew: Crew,
+    task: Task,
+    chosen: Choice,
+    target: Target | None,
+    keeper: Keeper | None,
+    bands: Run,
+    clock: Clock,
+    progress: Progress | None,
+) -> tuple[int, int]:
+    """Some bands, into `target` or only into files: (pairs skipped, bands that were in files)."""
+    tiling, n_rows = chosen.tiling, task.raw.n_rows
+    there, skipped = [], 0
+    for run, values, missed in keeper.found(*bands) if keeper else ():
+        if target is not None:
+            target.flat[extent(tiling, *run)] = values
+        there.append(run)
+        skipped += missed
+    todo = gaps(there, *bands)
+    total = n_rows * sum(pixels_in(tiling, *run) for run in todo)
+    said = -1
+
+    def tick(done: int) -> None:
+        nonlocal said
+        if progress and done != said:
+            progress("backproject", done, total)
+            said = done
+
+    def flat_for(first: int, last: int) -> Any:
+        return Strip(tiling, first, last, chosen.dtype) if target is None else target.flat
+
+    pixels = total / max(n_rows, 1)
+    most = pixels / (BLOCKS_EACH * crew.size) if crew.size > 1 else pixels
+    if keeper and keeper.resume is not False:
+        most = min(most, max(pixels / MOST_FILES, crew.least_pixels))
+    clock.lap("files")
+    made = []
+    with closing(crew.work(crew.blocks(todo, most, chosen.unit), flat_for, clock, tick)) as work:
+        for first, last, flat, missed in work:
+            made.append((first, last))
+            skipped += missed
+            if keeper:
+                keeper.keep(first, last, flat, missed)
+                clock.lap("files")
+    if gaps(there + made, *bands):
+        raise RuntimeError(f"bands {gaps(there + made, *bands)} were left out; please report this")
+    return skipped, sum(b - a for a, b in there)
 
 
-class _Run:
-    """The loops over image blocks, row blocks and tiles of one backprojection."""
-
-    def __init__(
-        self,
-        device: cl.Device,
-        raw: PhaseHistory,
-        antennas: Antennas,
-        plan: Plan,
-        tiling: GridTiling,
-        wrap: bool,
-        skip: bool,
-    ) -> None:
-        self.device, self.raw, self.antennas, self.plan, self.tiling = device, raw, antennas, plan, tiling
-        self.skip = skip
-        self.lanes = device.info.vector_width
-        bistatic = antennas.rx is not None
-        common = {**plan.macros(bistatic, wrap), "VECTORS": VECTORS, "CHUNK": CHUNK}
-        self.components = plan.components(bistatic)
-        self.constants = device.kernel("backproject.cl", "tile_constants", **common)
-        self.kernel = device.kernel("backproject.cl", "backproject", **common)
-        self.group = device.max_group(self.kernel)
-        self.table = device.upload(plan.interpolator.table)
-
-    def focus(
-        self,
-        sample_weight: np.ndarray,
-        row_weight: np.ndarray,
-        budget: float,
-        target: Target,
-        clock: Clock,
-        progress: Progress | None,
-    ) -> int:
-        """Fill `target`; return how many pairs were outside the range window in whole tiles."""
-        raw, tiling, device = self.raw, self.tiling, self.device
-        stride = self.plan.length + 2 * profiles.padding(self.plan.interpolator)
-        # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
-        most = 2 if device.is_cpu else 64
-        fit = int(budget / 4 / (8 * stride))
-        rows = min(most * CHUNK, fit // CHUNK * CHUNK or max(1, fit))
-        blocks = self._image_blocks(min(budget / 2, device.info.max_alloc))
-        total, done, skipped = raw.n_rows * len(blocks), 0, 0
-        if progress:
-            progress("backproject", 0, total)
-        for first, last in blocks:
-            tiles, orders = tiling.bands(first, last)
-            sizes = tiling.tile_sizes(first, last)
-            pixels = tiles.n_tiles * tiles.per_tile
-            image, missed = device.zeros(16 * pixels), device.zeros(4 * tiles.n_tiles)
-            references = device.upload(cl.wide(tiles.references.T))
-            offsets = device.upload(tiles.offsets)
-            radius = device.upload(tiles.radius.astype(np.float32))
-            clock.lap("prepare")
-            for start in range(0, raw.n_rows, rows):
-                stop = min(start + rows, raw.n_rows)
-                weights = row_weight[start:stop, None] * sample_weight
-                made = profiles.from_samples(
-                    device, raw.read(start, stop), weights, self.plan.interpolator, self.plan.length
-                )
-                block = device.upload(made)
-                pulse_host = self.antennas.packed(tiling.center, self.plan.length, start, stop, self.lanes)
-                pulse, n = device.upload(pulse_host), pulse_host.shape[2]
-                clock.lap("profiles")
-                at_once = int(min(budget / 4, device.info.max_alloc) / (4 * self.components * n))
-                step = max(1, min(tiles.n_tiles, at_once))
-                constants = device.empty(4 * self.components * n * step)
-                for tile in range(0, tiles.n_tiles, step):
-                    count = min(step, tiles.n_tiles - tile)
-                    device.run(
-                        self.constants, (n // self.lanes, count), None,
-                        pulse, references, radius, n, tiles.n_tiles, tile, int(self.skip), constants,
-                    )  # fmt: skip
-                    items = tiles.per_tile // self.lanes // VECTORS
-                    device.run(
-                        self.kernel, (items, count), (items, 1) if items <= self.group else None,
-                        block, stride, stride // 2, self.table, pulse, n, stop - start, constants, references,
-                        tiles.n_tiles, tile, offsets, tiles.offsets.shape[1],
-                        0 if tiles.shared else tiles.per_tile // self.lanes, image, np.uint64(pixels), missed,
-                    )  # fmt: skip
-                device.finish()
-                clock.lap("backproject")
-                done += stop - start
-                if progress:
-                    progress("backproject", done, total)
-            sums = device.download(image, np.empty((4, pixels), np.float32))
-            values = (sums[0] + sums[2]) + 1j * (sums[1] + sums[3])
-            tiling.place(values.astype(np.complex64), first, last, orders, target.flat)
-            missed_host = device.download(missed, np.empty(tiles.n_tiles, np.int32))
-            skipped += int((missed_host.astype(np.int64) * sizes).sum())
-            clock.lap("write")
-        target.finish()
-        return skipped
-
-    def _image_blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs of bands whose four planes of float32 fit in nbytes."""
-        blocks, first = [], 0
-        for band in range(self.tiling.n_bands):
-            if band > first and 16 * self.tiling.pixels(first, band + 1) > nbytes:
-                blocks.append((first, band))
-                first = band
-        return [*blocks, (first, self.tiling.n_bands)]
-
-
-def _measure_error(
-    raw: PhaseHistory, grid: ImageGrid, sample_weight: np.ndarray, row_weight: np.ndarray, wrap: bool, data: Any
-) -> float:
+def _measure_error(task: Task, grid: ImageGrid, data: Any) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum, as the contract defines it."""
     from .reference.backproject import backproject as exact
 
-    picked = np.sort(np.random.default_rng(0).choice(grid.size, min(256, grid.size), replace=False))
-    index = np.unravel_index(picked, grid.shape)
-    positions = grid.at(*index) if grid.listed is None else grid.listed[index]
-    wanted, spread = exact(raw, positions, sample_weight, row_weight, wrap)
+    index, positions = grid.sample(256, seed=0)
+    beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
+    wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam)
     got = (
         np.asarray(data)[index]
         if isinstance(data, np.ndarray)

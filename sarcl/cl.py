@@ -5,16 +5,20 @@ from __future__ import annotations
 import functools
 import os
 import re
+import time
 import warnings
 from collections.abc import Iterator
 from contextlib import contextmanager
 from dataclasses import dataclass, replace
 from importlib.resources import files
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
+
+STALE = 5.0  # s, after which a lock on the cache of binaries is nobody's
 
 
 class NoDeviceError(RuntimeError):
@@ -369,7 +373,23 @@ def _first_line(exc: BaseException) -> str:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Compilers that succeed may still chat; that is not for the user."""
+    """Round every build. Compilers that succeed may still chat; that is not for the user."""
+    _drop_stale_lock()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
+
+
+def _drop_stale_lock() -> None:
+    """Remove the lock that a killed process has left on pyopencl's cache of binaries.
+
+    pyopencl holds it for milliseconds, but waits a minute for one that nobody holds, and then fails.
+    """
+    import platformdirs
+
+    for lock in Path(platformdirs.user_cache_dir("pyopencl", "pyopencl")).glob("pyopencl-compiler-cache-*/lock"):
+        try:
+            if time.time() - lock.stat().st_mtime > STALE:
+                lock.unlink()
+        except OSError:  # gone already, or somebody else's
+            pass

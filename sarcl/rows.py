@@ -1,4 +1,4 @@
-"""Rows of arrays that may lie in files: picked and stacked without reading them."""
+"""Rows of arrays that may lie in files: picked, stacked, scaled and cut without reading them."""
 
 from __future__ import annotations
 
@@ -66,6 +66,35 @@ class Stacked:
             if a < b:
                 out[a - start : b - start] = source[a - first : b - first]
         return out
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Scaled:
+    """Rows of a source times a factor a row (n,); the source is read, and multiplied, as a slice asks for it."""
+
+    def __init__(self, source: Any, factor: np.ndarray) -> None:
+        self.source, self.factor = source, factor.astype(np.result_type(source.dtype, np.complex64))
+        self.shape, self.dtype = source.shape, self.factor.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factor[rows, None]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Columns:
+    """Columns first ... last - 1 of a source; a slice reads the rows it asks for."""
+
+    def __init__(self, source: Any, first: int, last: int) -> None:
+        self.source, self.columns = source, slice(first, last)
+        self.shape = (source.shape[0], last - first)
+        self.dtype = source.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows])[:, self.columns]
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
         return np.asarray(self[:], dtype)

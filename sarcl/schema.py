@@ -19,7 +19,8 @@ Call = Callable[..., Any]
 # A mesh is a file in a scenario.
 RENAMED = {"mesh": "file"}
 # Arguments that are other sections, or belong to the run and not to the scenario.
-NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid", "out", "device", "progress"}
+NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
+NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
     "int": (

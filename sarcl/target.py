@@ -10,41 +10,90 @@ import numpy as np
 from .cl import size_text
 from .grid import ImageGrid
 from .image import Image
+from .tiling import GridTiling
 
 
 class Target:
     """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
 
-    def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack) -> None:
+    def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
         self.grid, self.writer = grid, None
         if out is None:
+            nbytes = float(grid.size * np.dtype(dtype).itemsize)
             try:
-                self.data = np.empty(grid.shape, np.complex64)
+                self.data = np.empty(grid.shape, dtype)
             except MemoryError:
                 raise MemoryError(
-                    f"an image of {' x '.join(map(str, grid.shape))} needs {size_text(8.0 * grid.size)} of memory; "
+                    f"an image of {' x '.join(map(str, grid.shape))} needs {size_text(nbytes)} of memory; "
                     'take a smaller shape, or out="image.h5" to make it in a file'
                 ) from None
-        elif isinstance(out, str) or hasattr(out, "__fspath__"):
+        elif is_path(out):
             from .files import store
 
-            self.writer = store.image_writer(out, grid, np.complex64)
+            self.writer = store.image_writer(out, grid, dtype, claim=True)
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data
         else:
             if tuple(out.shape) != tuple(grid.shape) or np.dtype(out.dtype).kind != "c":
                 raise ValueError(f"out has shape {out.shape} and type {out.dtype}, wanted complex of {grid.shape}")
+            if np.dtype(out.dtype).itemsize < np.dtype(dtype).itemsize:
+                raise ValueError(f"out has type {out.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
             self.data = out
         # rows of a plane go straight to their place; listed points arrive along a curve and go there at the end
-        self.flat = self.data if grid.is_plane else np.empty(grid.size, np.complex64)
+        self.flat = self.data if grid.is_plane else np.empty(grid.size, dtype)
 
     def finish(self) -> None:
         """Everything has been written to `flat`."""
         if not self.grid.is_plane:
             self.data[...] = self.flat.reshape(self.grid.shape)
 
-    def image(self, **fields: Any) -> Image:
-        """The finished Image; a file appears under its name only now."""
+    def image(self, job: str | None = None, **fields: Any) -> Image:
+        """The finished Image; a file appears under its name, marked with its job, only now."""
         if self.writer is not None:
+            if job is not None:
+                self.writer.mark(job)
             return self.writer.finish(**fields)
         return Image(self.data, self.grid, **fields)
+
+
+class Strip:
+    """The pixels of some bands alone, written as if they were Target.flat: where no whole image is at hand."""
+
+    def __init__(self, tiling: GridTiling, first: int, last: int, dtype: Any) -> None:
+        at = extent(tiling, first, last)
+        self.start = at.start
+        self.values = np.empty((at.stop - at.start, *row_shape(tiling.grid)), dtype)
+
+    def __setitem__(self, at: Any, block: np.ndarray) -> None:
+        rows, *rest = at if isinstance(at, tuple) else (at,)
+        self.values[(slice(rows.start - self.start, rows.stop - self.start), *rest)] = block
+
+
+def is_path(out: Any) -> bool:
+    """True for the name of a file."""
+    return isinstance(out, str) or hasattr(out, "__fspath__")
+
+
+def row_shape(grid: ImageGrid) -> tuple[int, ...]:
+    """Shape of one entry of Target.flat: a row of a plane, or one listed point."""
+    return tuple(grid.shape[1:]) if grid.is_plane else ()
+
+
+def extent(tiling: GridTiling, first: int, last: int) -> slice:
+    """Where bands first ... last - 1 lie in Target.flat."""
+    step, end = (tiling.high, tiling.grid.shape[0]) if tiling.grid.is_plane else (tiling.LISTED_BAND, tiling.grid.size)
+    return slice(first * step, min(last * step, end))
+
+
+def count(tiling: GridTiling, first: int, last: int) -> int:
+    """Real pixels, without padding, of bands first ... last - 1."""
+    at = extent(tiling, first, last)
+    return int((at.stop - at.start) * np.prod(row_shape(tiling.grid), dtype=np.int64))
+
+
+def place_tiles(tiling: GridTiling, values: np.ndarray, band: int, start: int, stop: int, flat: Any) -> None:
+    """Write tile-ordered values (n,) of tiles start ... stop - 1 of one band of a plane to their pixels in `flat`."""
+    rows, columns = extent(tiling, band, band + 1), tiling.grid.shape[1]
+    left, right = start * tiling.wide, min(stop * tiling.wide, columns)
+    block = values.reshape(stop - start, tiling.high, tiling.wide).transpose(1, 0, 2).reshape(tiling.high, -1)
+    flat[rows, left:right] = block[: rows.stop - rows.start, : right - left]

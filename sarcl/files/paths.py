@@ -84,6 +84,43 @@ def commit(part: Path, path: Any) -> None:
     os.replace(part, target)
 
 
+def claim(path: Any, n_bytes: int = 0) -> tuple[Path, int]:
+    """The one work file of `path` and a descriptor that holds its lock: commit or unlink the one, then close the other.
+
+    Its name follows from `path`: what a killed run left there is taken over, so that no such files pile up.
+    FileExistsError while another run holds it; else raises what `check_writable` does.
+    """
+    target = check_writable(path, n_bytes)
+    part = target.parent / f".sarcl-{target.name}.part"
+    while True:
+        lock = os.open(part, os.O_RDWR | os.O_CREAT, 0o666)
+        try:
+            _lock(lock, path)
+            # between opening and locking, the run before may have put this file in its place or removed it
+            if os.path.exists(part) and os.path.samestat(os.fstat(lock), os.stat(part)):
+                return part, lock
+        except BaseException:
+            os.close(lock)
+            raise
+        os.close(lock)
+
+
+def _lock(descriptor: int, path: Any) -> None:
+    """Lock a file without waiting; where the system or the disk knows no locks, nothing happens."""
+    try:
+        import fcntl
+    except ImportError:
+        return
+    try:
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
+    except BlockingIOError:
+        raise FileExistsError(
+            f"cannot write {str(path)!r}: another run is writing it; wait for that one or choose another name"
+        ) from None
+    except OSError:
+        pass
+
+
 def _create_beside(target: Path) -> Path:
     """An empty file of a new, hidden name beside `target`, with the permissions any new file gets."""
     while True:

@@ -8,6 +8,7 @@ asked for.
 
 from __future__ import annotations
 
+import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -97,17 +98,21 @@ class ImageWriter:
 
     data   h5py.Dataset of the grid's shape, zero until written; write whole rows where you can
     finish(...) puts the file in its place; abandon() removes it. As a context manager it abandons what was
-    not finished.
+    not finished. With `claim`, one run at a time makes this file, and takes over what a killed one left.
     """
 
-    def __init__(self, path: Any, grid: ImageGrid, dtype: Any) -> None:
+    def __init__(self, path: Any, grid: ImageGrid, dtype: Any, claim: bool = False) -> None:
         import h5py
 
         self.path, self.grid = Path(path), grid
         dtype = np.dtype(dtype)
-        self._part: Path | None = paths.begin(path, grid.size * dtype.itemsize)
+        nbytes = grid.size * dtype.itemsize
+        self._part: Path | None
+        self._lock: int | None
+        self._part, self._lock = paths.claim(path, nbytes) if claim else (paths.begin(path, nbytes), None)
         try:
-            self._file = h5py.File(self._part, "w")
+            # our own lock is held already, and HDF5's would collide with it
+            self._file = h5py.File(self._part, "w", locking=False if claim else None)
             hdf5.sign(self._file, "image")
             group = self._file.create_group("grid")
             for name in grid.__dataclass_fields__:
@@ -116,6 +121,10 @@ class ImageWriter:
         except BaseException:
             self.abandon()
             raise
+
+    def mark(self, job: str) -> None:
+        """Note which job made this file, for `job_of`."""
+        self._file.attrs["job"] = job
 
     def finish(
         self, *, gain: float = 1.0, frequency: Any = None, tx: Any = None, rx: Any = None, report: Any = None
@@ -139,6 +148,7 @@ class ImageWriter:
             self._file.close()
             paths.commit(self._part, self.path)
             self._part = None
+            self._unlock()
         except BaseException:
             self.abandon()
             raise
@@ -152,6 +162,12 @@ class ImageWriter:
                     self._file.close()
             finally:
                 part.unlink(missing_ok=True)
+                self._unlock()
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
 
     def __enter__(self) -> ImageWriter:
         return self
@@ -160,9 +176,21 @@ class ImageWriter:
         self.abandon()
 
 
-def image_writer(path: Any, grid: ImageGrid, dtype: Any = np.complex64) -> ImageWriter:
+def image_writer(path: Any, grid: ImageGrid, dtype: Any = np.complex64, claim: bool = False) -> ImageWriter:
     """Begin an image file of grid.shape and dtype; raises what `paths.check_writable` does, before work."""
-    return ImageWriter(path, grid, dtype)
+    return ImageWriter(path, grid, dtype, claim)
+
+
+def job_of(path: Any) -> str | None:
+    """The mark of the job that made an image file; None where there is no such file, or no mark in it."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking="best-effort") as file:
+            job = file.attrs.get("job")
+            return job if isinstance(job, str) else None
+    except OSError:
+        return None
 
 
 def _load_phase_history(file: Any) -> PhaseHistory:
