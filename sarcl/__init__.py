@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Scene PhaseHistory ImageGrid Image Report Scenario
-verbs    echo compress backproject measure read concatenate devices
+verbs    echo compress backproject autofocus measure read concatenate devices
 """
 
 import sys
@@ -38,6 +38,9 @@ _HOME = {
     "echo": "echo",
     "compress": "compress",
     "backproject": "backproject",
+    "plan": "forecast",
+    "Forecast": "forecast",
+    "autofocus": "autofocus",
     "measure": "quality",
     "PointResponse": "quality",
     "read": "read",
@@ -49,12 +52,15 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
+    from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
     from .check import SarclWarning as SarclWarning
     from .cl import NoDeviceError as NoDeviceError
     from .cl import devices as devices
     from .compress import compress as compress
     from .echo import echo as echo
+    from .forecast import Forecast as Forecast
+    from .forecast import plan as plan
     from .grid import ImageGrid as ImageGrid
     from .image import Image as Image
     from .phase_history import PhaseHistory as PhaseHistory

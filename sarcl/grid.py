@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -18,7 +19,7 @@ class ImageGrid:
     shape    of the image
     center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
              center + (i - shape[0]//2) spacing[0] y_axis + (j - shape[1]//2) spacing[1] x_axis
-    listed   positions of any points, m shape + (3,), or None
+    listed   positions of any points, m shape + (3,), or None; NaN in all three where a cell is empty
     """
 
     shape: tuple[int, ...]
@@ -34,7 +35,12 @@ class ImageGrid:
         for name in ("center", "x_axis", "y_axis", "listed"):
             value = getattr(self, name)
             if value is not None and value.flags.writeable:
-                object.__setattr__(self, name, check.array(name, value, np.float64, value.shape))
+                made = (
+                    _cells(np.array(value, np.float64))
+                    if name == "listed"
+                    else check.array(name, value, np.float64, value.shape)
+                )
+                object.__setattr__(self, name, made)
 
     @classmethod
     def plane(
@@ -71,14 +77,23 @@ class ImageGrid:
         )
 
     @classmethod
-    def points(cls, positions: Any) -> ImageGrid:
-        """Any positions, m (..., 3); the image has the shape of all axes but the last."""
+    def points(cls, positions: Any, *, valid: Any = None) -> ImageGrid:
+        """Any positions, m (..., 3); the image has the shape of all axes but the last.
+
+        valid  bool, of that shape: False where a cell is empty (a height model without data there), whatever its
+               position; NaN in all three coordinates says the same. Its pixel is 0.
+        ValueError: NaN in one or two coordinates, Inf, no cell that is not empty.
+        """
         listed = check.converted("positions", positions, np.float64)
         shape = listed.shape
         if len(shape) < 2 or shape[-1] != 3 or 0 in shape:
             raise ValueError(f"positions has shape {shape}, wanted (..., 3) with an axis before the last, none zero")
-        check.finite("positions", listed)
-        return cls(shape=shape[:-1], listed=check.sealed(listed))
+        if valid is not None:
+            mask = np.asarray(valid)
+            if mask.dtype != bool or mask.shape != shape[:-1]:
+                raise ValueError(f"valid is {mask.dtype} of shape {mask.shape}, wanted bool of shape {shape[:-1]}")
+            listed[~mask] = np.nan
+        return cls(shape=shape[:-1], listed=_cells(listed))
 
     @property
     def is_plane(self) -> bool:
@@ -90,6 +105,33 @@ class ImageGrid:
         """Number of pixels."""
         return math.prod(self.shape)
 
+    @functools.cached_property
+    def empty(self) -> np.ndarray | None:
+        """True where a cell is empty, bool of the grid's shape; None where no cell is."""
+        if self.listed is None:
+            return None
+        mask = np.isnan(self.listed[..., 0])
+        return check.sealed(mask) if mask.any() else None
+
+    def filled(self) -> ImageGrid:
+        """The grid with a position that is not empty in every empty cell; itself where there is none."""
+        if self.empty is None or self.listed is None:
+            return self
+        listed = self.listed.copy()
+        listed[self.empty] = listed[~self.empty][0]
+        return ImageGrid(shape=self.shape, listed=check.sealed(listed))
+
+    def sample(self, most: int, seed: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        """Up to `most` random pixels, no empty ones: index into an image, and positions, m (n, 3)."""
+        random = np.random.default_rng(seed)
+        if self.empty is None:
+            picked = np.sort(random.choice(self.size, min(most, self.size), replace=False))
+        else:
+            cells = np.flatnonzero(~self.empty)
+            picked = cells[np.sort(random.choice(len(cells), min(most, len(cells)), replace=False))]
+        index = np.unravel_index(picked, self.shape)
+        return index, self.at(*index) if self.listed is None else self.listed[index]
+
     @property
     def normal(self) -> np.ndarray:
         """Unit normal of a plane (3,)."""
@@ -99,16 +141,16 @@ class ImageGrid:
 
     @property
     def positions(self) -> np.ndarray:
-        """All pixel positions, m, float64 shape + (3,)."""
+        """All pixel positions, m, float64 shape + (3,); NaN where a cell is empty."""
         if self.listed is not None:
             return self.listed
         return self.at(np.arange(self.shape[0])[:, None], np.arange(self.shape[1]))
 
     @property
     def bounds(self) -> np.ndarray:
-        """Lower and upper corner of the box that holds all pixels, m (2, 3)."""
+        """Lower and upper corner of the box that holds all pixels but empty ones, m (2, 3)."""
         if self.listed is not None:
-            p = self.listed.reshape(-1, 3)
+            p = self.listed.reshape(-1, 3) if self.empty is None else self.listed[~self.empty]
         else:
             p = self.at(np.array([0, 0, 1, 1]) * (self.shape[0] - 1), np.array([0, 1, 0, 1]) * (self.shape[1] - 1))
         return np.stack([p.min(axis=0), p.max(axis=0)])
@@ -134,6 +176,21 @@ class ImageGrid:
     def _need_plane(self, what: str) -> None:
         if not self.is_plane:
             raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
+
+
+def _cells(positions: np.ndarray) -> np.ndarray:
+    """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor an empty cell's three NaN."""
+    empty = np.isnan(positions).all(axis=-1)
+    if empty.all():
+        raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
+    bad = ~np.isfinite(positions) & ~empty[..., None]
+    if bad.any():
+        at = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        raise ValueError(
+            f"positions[{', '.join(str(int(i)) for i in at)}] is {positions[at]}; give finite positions, and NaN in "
+            "all three coordinates of a cell that is empty"
+        )
+    return check.sealed(positions)
 
 
 def _text(vector: Any) -> str:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from types import MappingProxyType
@@ -37,6 +38,11 @@ class Report:
         for name in ("plan", "contributions_skipped", "seconds"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
+    @property
+    def dynamic_range_db(self) -> float:
+        """How far below the brightest something can be trusted: what is weaker may be error, dB."""
+        return -20 * math.log10(self.predicted_error) if self.predicted_error > 0 else math.inf
+
     def __reduce__(self) -> tuple[Any, ...]:
         return Report, tuple(self.to_dict().values())  # read-only mappings neither copy nor pickle
 
@@ -50,6 +56,10 @@ class Report:
         lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
         lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
+        if self.predicted_error > 0:
+            lines.append(
+                f"contrast    trusted down to {self.dynamic_range_db:.0f} dB below what is bright in the same rows"
+            )
         lines.append(f"done        {self.contributions_done:.3e} contributions")
         lines += [f"skipped     {n:.3e} {why}" for why, n in self.contributions_skipped.items() if n]
         lines.append("seconds     " + ", ".join(f"{k} {v:.2f}" for k, v in self.seconds.items()))

@@ -1,0 +1,66 @@
+"""What an image will take, told before any work."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from cases import noise_history
+
+import sarcl
+from sarcl.cli import main
+
+GRID = sarcl.ImageGrid.plane(shape=(200, 200), spacing=0.2)
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5, 1e-8])
+def test_the_plan_is_the_one_that_is_carried_out(tolerance):
+    raw = noise_history(n_rows=120)
+    forecast = sarcl.plan(raw, GRID, tolerance=tolerance)
+    image = sarcl.backproject(raw, GRID, tolerance=tolerance, check=False)
+    assert forecast.method == image.report.plan["method"]
+    assert forecast.plan == dict(image.report.plan)
+    assert forecast.predicted_error == image.report.predicted_error <= tolerance
+    assert forecast.bytes >= image.data.nbytes
+    assert 0 < forecast.seconds < 60
+
+
+def test_the_next_cheaper_plan_errs_more_and_takes_less():
+    forecast = sarcl.plan(noise_history(n_rows=120), GRID, tolerance=1e-5)
+    error, seconds = forecast.cheaper
+    assert error > forecast.predicted_error and seconds < forecast.seconds
+    assert "next cheaper plan" in str(forecast) and f"{forecast.predicted_error:.1e}" in str(forecast)
+
+
+def test_time_grows_with_the_work_and_memory_with_what_is_allowed():
+    raw = noise_history(n_rows=120)
+    small, large = (sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(n, n), spacing=0.2)) for n in (100, 2000))
+    assert large.seconds > 50 * small.seconds and large.bytes > 50 * small.bytes
+    tight = sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(2000, 2000), spacing=0.2), max_bytes=2e7)
+    assert tight.bytes < large.bytes
+
+
+@pytest.mark.parametrize("tolerance", [0, -1e-3, float("nan"), 1e-30])
+def test_what_backproject_refuses_is_refused(tolerance):
+    raw = noise_history(n_rows=4)
+    for verb in (sarcl.plan, sarcl.backproject):
+        with pytest.raises(ValueError, match="tolerance"):
+            verb(raw, GRID, tolerance=tolerance)
+
+
+def test_dry_run_says_it_and_writes_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raw = noise_history(n_rows=60)
+    raw.save("raw.h5")
+    before = sorted(p.name for p in tmp_path.iterdir())
+    args = ["focus", "raw.h5", "--center", "0", "0", "0", "--shape", "64", "64", "--spacing", "0.2", "0.2", "--dry-run"]
+    assert main(args) == 0
+    out = capsys.readouterr().out
+    assert "error below" in out and ("direct" in out or "factorized" in out)
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_method_is_checked():
+    with pytest.raises(ValueError, match="method is 'fast'"):
+        sarcl.plan(noise_history(n_rows=4), GRID, method="fast")
+    forecast = sarcl.plan(noise_history(n_rows=64), GRID, tolerance=1e-1, method="direct")
+    assert forecast.method == "direct" and np.isfinite(forecast.seconds)
