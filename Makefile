@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench lint clean ready ready-dev
+.PHONY: help demo test bench results lint clean ready ready-dev
 
 ARGS ?=
 CODE = sarcl kernels tests bench
@@ -17,8 +17,11 @@ demo: ready  ## simulate and focus a scene; the picture is out/demo.png
 test: ready  ## the tests
 	@.venv/bin/python -m pytest $(ARGS)
 
-bench: ready  ## speed, printed with the error achieved
-	@.venv/bin/python bench/backproject.py $(ARGS)
+bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
+	@.venv/bin/sarcl bench backproject $(ARGS)
+
+results: ready  ## docs/results.md from bench/results/*.json
+	@.venv/bin/python bench/report.py
 
 lint: ready-dev  ## style, format and types
 	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \

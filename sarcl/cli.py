@@ -1,4 +1,4 @@
-"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE.
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | bench.
 
 Only the parser is here, so that --help answers at once; sarcl/commands.py does the work.
 """
@@ -62,6 +62,7 @@ def parser() -> argparse.ArgumentParser:
     measure = command("measure", "measure a point response: resolution and side lobes")
     measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
     measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
+    _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
     return top
 
 
@@ -108,9 +109,24 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     how = p.add_argument_group("focusing")
     how.add_argument("--tolerance", type=float, default=1e-3, help="relative error allowed (default 1e-3)")
+    how.add_argument(
+        "--method", choices=["auto", "direct", "factorized"], default="auto", help="default auto: the cheapest"
+    )
+    how.add_argument("--dry-run", action="store_true", help="say what it will take, and do nothing")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
     how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
+    large = p.add_argument_group(
+        "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
+    )
+    large.add_argument(
+        "--tile", type=piece, metavar="I/N", help="make piece I of N alone; the last to finish puts the image together"
+    )
+    large.add_argument(
+        "--resume",
+        action=argparse.BooleanOptionalAction,
+        help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start anew",
+    )
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
@@ -118,6 +134,33 @@ def _focus(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
     )
+
+
+def _bench(p: argparse.ArgumentParser) -> None:
+    p.add_argument("what", nargs="?", choices=["backproject"], default="backproject", help="what to measure")
+    p.add_argument("--json", metavar="FILE", help="write every figure, .json")
+    p.add_argument("--picture", metavar="FILE", help="draw rate against error, .png")
+    what = p.add_argument_group("what is measured")
+    what.add_argument("--scenes", nargs="+", choices=["spotlight", "straight"], help="apertures (default both)")
+    what.add_argument("--data", choices=["noise", "points"], help="default noise for spotlight, points for straight")
+    what.add_argument("--sizes", nargs="+", type=int, metavar="N", help="pulses, samples, image side (default 1024)")
+    what.add_argument("--tolerances", nargs="+", type=float, metavar="T", help="default 1e-1 to 1e-6")
+    what.add_argument(
+        "--methods", nargs="+", choices=["direct", "factorized", "auto"], help="default direct factorized"
+    )
+    what.add_argument("--devices", nargs="+", metavar="NAME", help="as --device elsewhere (default all that work)")
+    what.add_argument("--no-fp64", action="store_true", help="each device once more as if it had no float64")
+    peer = p.add_argument_group("peers")
+    peer.add_argument("--peer-python", metavar="PATH", help="a Python that has fastsar (default this one)")
+    peer.add_argument("--peer-backend", choices=["cpu", "cuda", "jax", "auto"], help="fastsar's (default cpu)")
+    peer.add_argument("--no-peers", action="store_true", help="sarcl alone, without NumPy and fastsar")
+    how = p.add_argument_group("how")
+    how.add_argument("--repeats", type=int, metavar="K", help="runs of each, in turns (default 5)")
+    how.add_argument(
+        "--pixels", type=int, metavar="K", help="checked against the exact sum, at least 256 (default 1024)"
+    )
+    how.add_argument("--limit", type=float, metavar="S", help="leave out what would run longer, s (default 120)")
+    how.add_argument("--patience", type=float, metavar="S", help="wait so long for an idle machine, s (default 0)")
 
 
 class _Version(argparse.Action):
@@ -151,6 +194,15 @@ def size(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is no size; give bytes, e.g. 2G, 500M or 1.5GiB")
     return value
+
+
+def piece(text: str) -> tuple[int, int]:
+    """ "2/8": piece 2 of 8."""
+    match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
+    i, n = (int(match[1]), int(match[2])) if match else (1, 0)
+    if not i <= n:
+        raise argparse.ArgumentTypeError(f"{text!r} is no piece; give I/N with I from 1 to N, such as 2/8")
+    return i, n
 
 
 def main(argv: list[str] | None = None) -> int:
@@ -188,7 +240,11 @@ def _kept(outputs: Any) -> str:
 
     names = complete(outputs)
     verb = "is" if len(names) == 1 else "are"
-    return f"{' and '.join(names)} {verb} complete, nothing else was written" if names else "nothing was written"
+    tiles = any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs)
+    rest = (
+        "only finished tiles are kept" if tiles else "nothing was written" if not names else "nothing else was written"
+    )
+    return f"{' and '.join(names)} {verb} complete, {rest}" if names else rest
 
 
 def _status(exc: Exception) -> int:

@@ -29,6 +29,7 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
         "simulate": simulate,
         "focus": focus,
         "measure": measure,
+        "bench": bench,
     }[args.command]
     with Job(outputs) as job:
         return command(args, job)
@@ -105,11 +106,14 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     """An image from echoes."""
     import sarcl
 
-    from .cl import open_device
+    from .crew import open_devices
     from .phase_history import PhaseHistory
     from .scenario import load
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
+    for name in ("tile", "resume"):
+        if getattr(args, name) and all(Path(p).suffix.lower() == ".png" for p in outputs):
+            raise ValueError(f"--{name} keeps tiles beside an image in a file; give -o IMAGE.h5")
     _expect(job, outputs, (".png", ".h5", ".hdf5"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_floor(args.floor_db)
     given = _grid_options(args)
@@ -119,14 +123,18 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
     if args.polarization is not None or args.channel is not None:
         raw = raw.select(polarization=args.polarization, channel=args.channel)
-    device = open_device(args.device)
+    devices = open_devices(args.device)
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
     raw = _compressed(raw, job)
     grid = grid or _default_grid(raw, job, given)
+    how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
+    if args.dry_run:
+        print(sarcl.plan(raw, grid, **how, device=devices[0].info.index))
+        return 0
     _focus(
         lambda out: sarcl.backproject(
-            raw, grid, tolerance=args.tolerance, window=args.window, wrap=args.wrap,
-            max_bytes=args.max_bytes, out=out, device=device, progress=job.progress,
+            raw, grid, **how, out=out, device=devices, progress=job.progress,
+            tile=args.tile, resume=args.resume,
         ),
         outputs, args.floor_db, job,
     )  # fmt: skip
@@ -143,6 +151,32 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     if not isinstance(image, Image):
         raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
     print(sarcl.measure(image, near=args.near))
+    return 0
+
+
+def bench(args: argparse.Namespace, job: Job) -> int:
+    """Run time against achieved error: a table, and where asked JSON and a picture."""
+    from .bench import backproject
+    from .draw import write_png
+
+    if args.json is not None:
+        _expect(job, [args.json], (".json",), [])
+    if args.picture is not None:
+        _expect(job, [args.picture], (".png",), [])
+    names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
+    given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
+
+    def keep(document: dict[str, Any]) -> None:
+        if args.json is not None:
+            backproject.write(document, Path(args.json))
+
+    document = backproject.run(
+        **given, no_fp64=args.no_fp64, with_peers=not args.no_peers, say=job.say, progress=job.progress, keep=keep
+    )
+    if args.picture is not None:
+        from .bench.pareto import picture
+
+        write_png(picture(document["cases"]), args.picture)
     return 0
 
 
@@ -201,10 +235,13 @@ def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
     return sarcl.compress(raw)
 
 
-def _focus(make: Callable[[str | None], Image], outputs: list[str], floor_db: float, job: Job) -> None:
+def _focus(make: Callable[[str | None], Image | None], outputs: list[str], floor_db: float, job: Job) -> None:
     """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
     file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
     image = make(file)
+    if image is None:
+        job.say(f"this piece is finished; its tiles wait in {file}.parts for those of the other pieces")
+        return
     _say_report("focus", image.report, job)
     for path in outputs:
         if path != file:

@@ -179,3 +179,32 @@ def test_cost_grows_much_slower_than_the_cube():
 def test_tolerances_below_complex64_name_the_method_that_meets_them():
     with pytest.raises(ValueError, match="method='direct' can"):
         methods.choose(make_task(noise_on(straight(40)), GRID, None, None, False, True), "factorized", 1e-8)
+
+
+def test_profiles_of_nodes_are_those_of_the_twin(device):
+    from sarcl.check import SPEED_OF_LIGHT
+    from sarcl.factorized import Factorized
+    from sarcl.planning import Clock
+    from sarcl.reference.merge import merge
+    from sarcl.tree import tree_of
+
+    raw = noise_on(straight(120), n_samples=256)
+    task = make_task(raw, GRID, None, None, False, True)
+    plan, tiling = factor_plan.make_plan(task, 1e-3)
+    engine, seen = Factorized(device, task, plan, tiling), []
+    descend = engine._descend
+
+    def spy(down, level, low, high, source, first, *rest):
+        shape = (high - first, engine.nodes[level][2], engine.strides[level])
+        seen.append((level, low, first, device.download(source, np.empty(shape, np.complex64))))
+        descend(down, level, low, high, source, first, *rest)
+
+    engine._descend = spy
+    engine.fill(0, tiling.n_bands, np.empty(GRID.shape, np.complex64), 2**29, Clock(), lambda rows: None)
+    _, low, first, got = next(s for s in seen if s[0] == 0)
+    made, sigma = plan.levels[0], 2 * raw.frequency_step[0] * plan.length / SPEED_OF_LIGHT
+    m = np.arange(2 * made.reach + 1) - made.reach
+    center = tree_of(tiling, 0, tiling.n_bands, plan.factors).centers[0][low] + tiling.center
+    wanted = merge(raw, center, m / sigma, made.thinning.blocks, made.thinning.filter, got.shape[1])
+    error = got[low - first][:, : len(m)] - wanted
+    assert np.linalg.norm(error) <= 1e-3 * np.linalg.norm(wanted)

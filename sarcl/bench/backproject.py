@@ -1,0 +1,206 @@
+"""sarcl bench backproject: run time against ACHIEVED error, sarcl and peers on the same data in one run."""
+
+from __future__ import annotations
+
+import json
+import os
+import platform
+import tempfile
+from collections.abc import Callable, Sequence
+from contextlib import ExitStack
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from .. import __version__, cl
+from ..check import choice, count, number
+from ..methods import METHODS
+from . import baseline, cases, ours, peers, table
+from .contestant import Absent
+from .measure import Paces, alternate, measure
+
+TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
+FORMAT = 2  # of the document
+Document = dict[str, Any]
+
+
+def run(
+    *,
+    scenes: Sequence[str] = cases.SCENES,
+    sizes: Sequence[int] = (1024,),
+    tolerances: Sequence[float] = TOLERANCES,
+    devices: Sequence[Any] | None = None,
+    no_fp64: bool = False,
+    methods: Sequence[str] = ("direct", "factorized"),
+    data: str | None = None,
+    peer_python: str | None = None,
+    peer_backend: str = "cpu",
+    with_peers: bool = True,
+    repeats: int = 5,
+    pixels: int = 1024,
+    limit: float = 120.0,
+    patience: float = 0.0,
+    say: Callable[[str], None] = lambda text: None,
+    progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
+    keep: Callable[[Document], None] = lambda document: None,
+) -> Document:
+    """Measure and return everything that was found, ready for JSON.
+
+    scenes, data   see `cases.make`; sizes: pulses = samples = pixels a side, at least 8
+    devices        as `sarcl.devices` names them; None: every one that works; no_fp64: each once more without float64
+    methods        "direct", "factorized", "auto"
+    peer_python    an interpreter that has fastsar, default this one; peer_backend: which of its backends
+    repeats        runs of each line, the contestants taking turns; pixels: checked against the exact sum, >= 256
+    limit          s: runs expected to last longer are left out
+    patience       s to wait before each run until no other program runs
+    say, progress  lines of text; progress(stage, done, total); keep(document) after every case
+    ValueError for what does not fit, before the work; NoDeviceError.
+    """
+    for scene in scenes:
+        choice("scene", scene, cases.SCENES)
+    for method in methods:
+        choice("method", method, METHODS)
+    wanted = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
+    sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
+    repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
+    limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
+    python = peers.check_python(peer_python)
+    opened = [cl.open_device(d) for d in _listed(devices)]
+    twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
+    opened += twins
+
+    document: Document = {
+        "format": FORMAT,
+        "machine": _machine(),
+        "devices": [_device(d) for d in opened],
+        "peers": [],
+        "cases": [],
+    }
+    with ExitStack() as stack:
+        peer = None
+        if with_peers:
+            try:
+                peer = stack.enter_context(peers.Peer(python))
+                found = {"version": peer.version, "python": peer.python, "backend": peer_backend}
+            except Absent as exc:
+                found = {"absent": f"{exc}; --peer-python PATH names a Python that has it"}
+            document["peers"].append({"name": "fastsar", **found})
+        for line in table.machine_text(document):
+            say(line)
+        folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
+        for scene in scenes:
+            paces: Paces = {}
+            for n in sizes:
+                progress("data", 0, 1)
+                case = cases.make(scene, n, data, pixels)
+                cases.save(case, folder)
+                progress("data", 1, 1)
+                lines = ours.contestants(case, folder, opened, methods, wanted)
+                others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
+                rows = measure(
+                    case,
+                    alternate(lines, others),
+                    repeats=repeats,
+                    limit=limit,
+                    paces=paces,
+                    patience=patience,
+                    tick=lambda done, total: progress("bench", done, total),
+                )
+                result = {
+                    "scene": scene,
+                    "data": case.data,
+                    "n": n,
+                    "pairs": case.pairs,
+                    "pixels": pixels,
+                    "norm": float(np.linalg.norm(case.wanted)) / case.norm,
+                    "rows": rows,
+                }
+                document["cases"].append(result)
+                document["machine"]["load"] = [document["machine"]["load"][0], *_load()]
+                keep(document)
+                say("\n" + table.text(result))
+    growth = table.growth_text(document["cases"])
+    if growth:
+        say("\n" + growth)
+    say("\n" + table.EXPLAINED)
+    return document
+
+
+def _others(case: cases.Case, folder: Path, peer: peers.Peer | None, backend: str, methods: Sequence[str]) -> list[Any]:
+    """The baseline, and the peer where there is one."""
+    found = []
+    if "direct" in methods:
+        found += baseline.contestants(case)
+    if peer is not None:
+        try:
+            peer.load(folder)
+            found += peers.contestants(case, peer, methods, backend)
+        except Absent as exc:
+            lost = str(exc)
+
+            def gone() -> Any:
+                raise Absent(lost)
+
+            found += [peers.Contestant(peer.name, backend, method, "any", gone) for method in methods]
+    return found
+
+
+def _listed(devices: Sequence[Any] | None) -> list[Any]:
+    if devices:
+        return list(dict.fromkeys(devices))
+    return [info.index for info in cl.devices() if info.works] or [None]
+
+
+def _device(device: cl.Device) -> dict[str, Any]:
+    info = device.info
+    return {
+        "index": info.index,
+        "name": info.name,
+        "platform": info.platform,
+        "driver": info.driver,
+        "kind": info.kind,
+        "fp64": info.fp64,
+        "units": info.units,
+    }
+
+
+def _load() -> list[float]:
+    """Processes that wait for a processor, averaged over a minute; empty where the system does not say."""
+    return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else [float("nan")]
+
+
+def _machine() -> dict[str, Any]:
+    processor = platform.processor()
+    try:
+        lines = Path("/proc/cpuinfo").read_text().splitlines()
+        processor = next(line.split(":", 1)[1].strip() for line in lines if line.startswith("model name"))
+    except (OSError, StopIteration):
+        pass
+    return {
+        "processor": processor or platform.machine(),
+        "processors": os.cpu_count(),
+        "threads": cl.threads(),
+        "system": platform.system(),
+        "python": platform.python_version(),
+        "numpy": np.__version__,
+        "sarcl": __version__,
+        "load": _load(),
+    }
+
+
+def write(document: Document, path: Path) -> None:
+    """The document as a JSON file that appears whole."""
+    from ..files import paths
+
+    with paths.atomic(path) as part:
+        part.write_text(json.dumps(document, indent=1, default=_plain) + "\n")
+
+
+def _plain(value: Any) -> Any:
+    """What numpy numbers in a plan are."""
+    if isinstance(value, np.generic):
+        return value.item()
+    if isinstance(value, np.ndarray):
+        return value.tolist()
+    return str(value)

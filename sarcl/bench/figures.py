@@ -1,0 +1,106 @@
+"""What the rows of a benchmark say: rates, ratios at equal or smaller error, cost against size."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+Row = dict[str, Any]
+Result = dict[str, Any]  # a case: scene, data, n, pairs, pixels, rows
+
+
+def best(row: Row, name: str = "form") -> float | None:
+    """The shortest of a row's seconds, or None."""
+    runs = row["seconds"].get(name)
+    return min(runs) if runs else None
+
+
+def middle(row: Row, name: str = "form") -> float | None:
+    """The median of a row's seconds, or None."""
+    runs = row["seconds"].get(name)
+    return float(np.median(runs)) if runs else None
+
+
+def ran(result: Result) -> list[Row]:
+    """The rows that have figures: by method, sarcl's before its peers'."""
+    rows = [row for row in result["rows"] if "absent" not in row and best(row)]
+    return sorted(rows, key=lambda row: (row["method"], not is_ours(row), row["who"], row["device"]))
+
+
+def is_ours(row: Row) -> bool:
+    """A row of sarcl itself."""
+    return bool(row["who"] == "sarcl")
+
+
+def rate(result: Result, row: Row, name: str = "form") -> float:
+    """1e9 pulses x pixels a second, from the shortest run."""
+    return float(result["pairs"] / (best(row, name) or np.nan) / 1e9)
+
+
+def decibels(row: Row) -> float:
+    """Error relative to |I|, dB."""
+    return float(20 * np.log10(max(row["error_of_image"], 1e-30)))
+
+
+def matches(result: Result) -> list[dict[str, Any]]:
+    """Every peer's row beside the fastest of sarcl's that errs no more, on each device: by the peer's method, and
+    by combining pulses where the peer takes all pairs.
+
+    Entries: peer, ours (rows; None where none of sarcl's errs as little), device, method of ours, and ratios
+    peer/sarcl of the shortest form, call, process and cpu and of the median form.
+    """
+    found = []
+    rows = ran(result)
+    for peer in (row for row in rows if not is_ours(row)):
+        rivals = [
+            row for row in rows if is_ours(row) and (row["method"] == peer["method"] or peer["method"] == "direct")
+        ]
+        for device, method in dict.fromkeys((row["device"], row["method"]) for row in rivals):
+            same = [row for row in rivals if (row["device"], row["method"]) == (device, method)]
+            found.append(_match(peer, same, device, method))
+    return found
+
+
+def _match(peer: Row, rivals: list[Row], device: str, method: str) -> dict[str, Any]:
+    entry: dict[str, Any] = {"peer": peer, "device": device, "method": method, "ours": None}
+    able = [row for row in rivals if row["error"] <= peer["error"]]
+    if able:
+        ours = min(able, key=lambda row: best(row) or np.inf)
+        entry["ours"] = ours
+        for name in ("form", "call", "process", "cpu"):
+            theirs, own = best(peer, name), best(ours, name)
+            entry[name] = theirs / own if theirs and own else None
+        theirs, own = middle(peer), middle(ours)
+        entry["median form"] = theirs / own if theirs and own else None
+    return entry
+
+
+def growth(results: list[Result]) -> list[dict[str, Any]]:
+    """Cost against size: for every line measured at two sizes or more, the exponent k of seconds ~ n^k.
+
+    Entries: scene, data, who, device, method, setting, sizes, seconds (shortest form), error (largest), exponent,
+    the slope of a least-squares line through the logarithms.
+    """
+    lines: dict[tuple[str, ...], list[tuple[int, float, float]]] = {}
+    for result in results:
+        for row in ran(result):
+            key = (result["scene"], result["data"], row["who"], row["device"], row["method"], row["setting"])
+            lines.setdefault(key, []).append((result["n"], best(row) or np.nan, row["error"]))
+    found = []
+    names = ("scene", "data", "who", "device", "method", "setting")
+    for line, points in lines.items():
+        points.sort()
+        sizes, seconds = [n for n, _, _ in points], [s for _, s, _ in points]
+        if len(set(sizes)) < 2:
+            continue
+        found.append(
+            {
+                **dict(zip(names, line, strict=True)),
+                "sizes": sizes,
+                "seconds": seconds,
+                "error": max(error for _, _, error in points),
+                "exponent": float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0]),
+            }
+        )
+    return found

@@ -1,0 +1,27 @@
+"""One image in a process of its own: python -m sarcl.bench.once FOLDER OPTIONS, options as JSON."""
+
+from __future__ import annotations
+
+import json
+import sys
+from pathlib import Path
+
+
+def main(folder: str, options: str) -> None:
+    """Read the case in `folder`, open the device, make the image."""
+    import sarcl
+    from sarcl import cl
+    from sarcl.bench import cases
+
+    given = json.loads(options)
+    device = cl.open_device(given["device"])
+    if not given["fp64"]:
+        device = device.without_fp64()
+    raw, grid = cases.load(Path(folder))
+    sarcl.backproject(
+        raw, grid, tolerance=given["tolerance"], method=given["method"], device=device, check=False
+    )  # fmt: skip
+
+
+if __name__ == "__main__":
+    main(*sys.argv[1:])

@@ -1,0 +1,116 @@
+"""docs/results.md and the table in README.md, from the JSON files of `sarcl bench backproject`."""
+
+from __future__ import annotations
+
+import json
+import re
+from pathlib import Path
+from typing import Any
+
+from . import figures, pareto, table
+from .backproject import FORMAT
+
+INTRODUCTION = """# Results
+
+Made by `make results` from the JSON files under bench/results; `make bench` measures, see the
+[notes](#how-to-read-this) at the end.
+
+"""
+README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "of that in kernels"]
+
+
+def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
+    """Write docs/results.md, a picture docs/results-NAME.png for each results/NAME.json, and the README's table.
+
+    docs/results-notes.md, where there is one, ends the page. Returns the files written. ValueError where there is
+    no JSON file, or one of another format.
+    """
+    documents = {path.stem: read(path) for path in sorted(results.glob("*.json"))}
+    if not documents:
+        raise ValueError(f"{results} holds no .json; make one: sarcl bench backproject --json {results}/1.json")
+    written = []
+    page = INTRODUCTION
+    for name, document in documents.items():
+        drawn = any(figures.ran(case) for case in document["cases"])
+        if drawn:
+            picture = docs / f"results-{name}.png"
+            pareto.picture(document["cases"]).save(picture)
+            written.append(picture)
+        page += section(name, document, drawn)
+    page += f"## How to read this\n\n{table.EXPLAINED}\n"
+    notes = docs / "results-notes.md"
+    if notes.exists():
+        page += "\n" + notes.read_text()
+    (docs / "results.md").write_text(page)
+    written.append(docs / "results.md")
+    if readme is not None:
+        block = readme_table(next(iter(documents.values())))
+        text = readme.read_text()
+        new = re.sub(
+            r"<!-- results -->.*?<!-- end of results -->",
+            lambda _: f"<!-- results -->\n{block}<!-- end of results -->",
+            text,
+            flags=re.S,
+        )
+        if block and new != text:
+            readme.write_text(new)
+            written.append(readme)
+    return written
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A document; ValueError where the file is none of this format."""
+    try:
+        document = json.loads(path.read_text())
+        found = document.get("format") if isinstance(document, dict) else None
+    except ValueError as exc:
+        raise ValueError(f"{path} is no JSON ({exc}); measure again: sarcl bench backproject --json {path}") from None
+    if found != FORMAT:
+        raise ValueError(
+            f"{path} has format {found}, wanted {FORMAT}; measure again: sarcl bench backproject --json {path}"
+        )
+    return dict(document)
+
+
+def section(name: str, document: dict[str, Any], drawn: bool) -> str:
+    """One document: machine, picture, tables."""
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in table.machine_text(document)) + "\n"
+    if drawn:
+        text += f"![rate against achieved error, sarcl and its peers](results-{name}.png)\n\n"
+    for case in document["cases"]:
+        text += f"### {table.title(case)}\n\n{table.markdown(table.HEAD, table.body(case))}\n"
+        text += "".join(f"- {line}\n" for line in table.missing(case))
+        matches = table.match_body(case)
+        if matches:
+            text += "\nPeer's seconds over sarcl's, at equal or smaller error:\n\n"
+            text += table.markdown(table.MATCH_HEAD, matches) + "\n"
+        plans = _plans(case)
+        if plans:
+            text += f"How sarcl met each tolerance:\n\n{plans}\n"
+    growth = table.growth_body(document["cases"])
+    if growth:
+        text += f"### {name}: cost against size\n\n{table.markdown(table.GROWTH_HEAD, growth)}\n"
+    return text
+
+
+def _plans(case: figures.Result) -> str:
+    lines = [
+        [table.name(row), row["setting"], f"{row['predicted']:.1e}", ", ".join(f"{k} {v}" for k, v in plan.items())]
+        for row in figures.ran(case)
+        if (plan := row.get("plan"))
+    ]
+    return table.markdown(["", "tolerance", "predicted", "plan"], lines) if lines else ""
+
+
+def readme_table(document: dict[str, Any]) -> str:
+    """sarcl's direct rows of the first case on the first device: whole calls."""
+    case = document["cases"][0]
+    ours = [row for row in figures.ran(case) if figures.is_ours(row) and row["method"] == "direct"]
+    lines = []
+    for row in ours:
+        call, kernel = figures.best(row, "call"), figures.best(row, "kernel")
+        if row["device"] == ours[0]["device"] and call and kernel:
+            rate = figures.rate(case, row, "call")
+            cells = [row["setting"], f"{row['error']:.1e}", f"{row['predicted']:.1e}", f"{call:.2f}", f"{rate:.2f}"]
+            lines.append([*cells, f"{kernel / call:.0%}"])
+    return table.markdown(README_HEAD, lines) if lines else ""
