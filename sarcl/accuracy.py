@@ -147,6 +147,7 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     return (waves * kernel).sum(axis=(-1, -2))
 
 
+@functools.lru_cache(maxsize=4096)
 def choose_interpolator(error: float, n_samples: int, pairs_per_row: float) -> tuple[Interpolator, int, float]:
     """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
 

@@ -19,6 +19,7 @@ THEIRS = [(16, 124, 88), (132, 70, 150), (184, 134, 11), (110, 110, 110), (60, 1
 MARKS = ("square", "diamond", "triangle", "cross")
 
 Series = dict[str, list[figures.Row]]
+Style = tuple[tuple[int, int, int], str]  # colour, mark
 
 
 def picture(cases: list[figures.Result]) -> Picture:
@@ -28,7 +29,8 @@ def picture(cases: list[figures.Result]) -> Picture:
     """
     from PIL import Image
 
-    panels = [_panel(case) for case in cases if figures.ran(case)]
+    styles = _styles(cases)
+    panels = [_panel(case, styles) for case in cases if figures.ran(case)]
     if not panels:
         raise ValueError("no case has a row that ran; there is nothing to draw")
     columns = 1 if len(panels) < 4 else 2
@@ -53,7 +55,7 @@ def series(case: figures.Result) -> Series:
     return found
 
 
-def _panel(case: figures.Result) -> Picture:
+def _panel(case: figures.Result, styles: dict[str, Style]) -> Picture:
     curves = series(case)
     rows = figures.ran(case)
     x = np.log10([row["error"] for row in rows])
@@ -69,28 +71,33 @@ def _panel(case: figures.Result) -> Picture:
         15.5,
     )
     _axes(sheet)
-    for (label, points), (colour, mark) in zip(curves.items(), _styles(curves), strict=True):
+    taken: list[tuple[float, ...]] = []
+    for label, points in curves.items():
+        colour, mark = styles[label]
         places = [_place(sheet, row, case) for row in points]
         if figures.is_ours(points[0]) or points[0]["method"] == "direct":
             sheet.draw.line(places, fill=colour, width=2 * FINE, joint="curve")
         for place, row in zip(places, points, strict=True):
             _mark(sheet, place, mark, colour)
-            _label(sheet, place, row, colour)
+            _label(sheet, place, row, colour, taken)
         _legend(sheet, list(curves).index(label), label, mark, colour)
     return sheet.image
 
 
-def _styles(curves: Series) -> list[tuple[tuple[int, int, int], str]]:
-    """Colour and mark of every curve."""
+def _styles(cases: list[figures.Result]) -> dict[str, Style]:
+    """Colour and mark of every curve, the same in all panels."""
+    found: dict[str, Style] = {}
     ours = theirs = 0
-    found = []
-    for rows in curves.values():
-        if figures.is_ours(rows[0]):
-            found.append((OURS[ours % len(OURS)], "circle"))
-            ours += 1
-        else:
-            found.append((THEIRS[theirs % len(THEIRS)], MARKS[theirs % len(MARKS)]))
-            theirs += 1
+    for case in cases:
+        for label, rows in series(case).items():
+            if label in found:
+                continue
+            if figures.is_ours(rows[0]):
+                found[label] = OURS[ours % len(OURS)], "circle"
+                ours += 1
+            else:
+                found[label] = THEIRS[theirs % len(THEIRS)], MARKS[theirs % len(MARKS)]
+                theirs += 1
     return found
 
 
@@ -148,18 +155,30 @@ def _mark(sheet: Sheet, place: tuple[float, float], mark: str, colour: Any) -> N
         sheet.draw.line([(x - r, y + r), (x + r, y - r)], fill=colour, width=3 * FINE)
 
 
-def _label(sheet: Sheet, place: tuple[float, float], row: figures.Row, colour: Any) -> None:
-    """sarcl's tolerance above its point, the exact peers' upsampling below theirs."""
+def _label(
+    sheet: Sheet, place: tuple[float, float], row: figures.Row, colour: Any, taken: list[tuple[float, ...]]
+) -> None:
+    """sarcl's tolerance above its point, the exact peers' upsampling below theirs; where others stand, the other way.
+
+    taken  boxes of the labels there are; added to
+    """
     from PIL import ImageFont
 
+    above, below = (-8 * FINE, "mb"), (9 * FINE, "mt")
     if figures.is_ours(row):
-        text, shift, anchor = row["setting"].replace("e-0", "e-"), -8 * FINE, "mb"
+        text, ways = row["setting"].replace("e-0", "e-"), (above, below)
     elif row["method"] == "direct":
-        text, shift, anchor = row["setting"].split(";")[0].split(", ")[-1], 9 * FINE, "mt"
+        text, ways = row["setting"].split(";")[0].split(", ")[-1], (below, above)
     else:
         return
-    font = ImageFont.load_default(round(LABEL * sheet.unit))
-    sheet.draw.text((place[0], place[1] + shift), text, colour, font, anchor=anchor)
+    font: Any = ImageFont.load_default(round(LABEL * sheet.unit))
+    for shift, anchor in ways:
+        at = place[0], place[1] + shift
+        box = sheet.draw.textbbox(at, text, font, anchor=anchor)
+        if not any(box[0] < t[2] and t[0] < box[2] and box[1] < t[3] and t[1] < box[3] for t in taken):
+            sheet.draw.text(at, text, colour, font, anchor=anchor)
+            taken.append(box)
+            return
 
 
 def _legend(sheet: Sheet, index: int, label: str, mark: str, colour: Any) -> None:
