@@ -207,16 +207,17 @@ def test_a_direct_peer_is_matched_with_subapertures_too_but_not_the_other_way():
 
 
 def test_the_exponent_of_cost_against_size():
-    results = [
-        result(
-            row("sarcl", 1e-3 * n, n**2.5), row("once", 1e-3, 1.0) if n == 8 else row("sarcl", 1, 1, setting="t"), n=n
-        )
-        for n in (8, 16, 64)
-    ]
-    found = figures.growth(results)
-    line = next(entry for entry in found if entry["setting"] == "s")
-    assert line["exponent"] == pytest.approx(2.5) and line["sizes"] == [8, 16, 64] and line["error"] == 0.064
-    assert not any(entry["who"] == "once" for entry in found)
+    results = []
+    for n in (8, 16, 64):
+        line, other = row("sarcl", 1e-3 * n, n**2.5), row("sarcl", 1e-3, n**3.0, setting="t")
+        line["seconds"]["cpu"] = [n**2.0, 2 * n**2.0]
+        results.append(result(line, other, *([row("once", 1e-3, 1.0)] if n == 8 else []), n=n))
+    found = {(entry["who"], entry["setting"]): entry for entry in figures.growth(results)}
+    line = found["sarcl", "s"]
+    assert line["exponent"] == pytest.approx(2.5) and line["cpu_exponent"] == pytest.approx(2)
+    assert line["sizes"] == [8, 16, 64] and line["error"] == 0.064
+    assert found["sarcl", "t"]["exponent"] == pytest.approx(3) and found["sarcl", "t"]["cpu_exponent"] is None
+    assert len(found) == 2
 
 
 @pytest.mark.parametrize(

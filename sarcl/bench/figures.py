@@ -79,19 +79,22 @@ def _match(peer: Row, rivals: list[Row], device: str, method: str) -> dict[str, 
 def growth(results: list[Result]) -> list[dict[str, Any]]:
     """Cost against size: for every line measured at two sizes or more, the exponent k of seconds ~ n^k.
 
-    Entries: scene, data, who, device, method, setting, sizes, seconds (shortest form), error (largest), exponent,
-    the slope of a least-squares line through the logarithms.
+    Entries: scene, data, who, device, method, setting, sizes, seconds (shortest form), error (largest); exponent,
+    the slope of a least-squares line through the logarithms, and cpu_exponent, that of the processors' seconds (None
+    where they are not known).
     """
-    lines: dict[tuple[str, ...], list[tuple[int, float, float]]] = {}
+    lines: dict[tuple[str, ...], list[tuple[int, float, float, float]]] = {}
     for result in results:
         for row in ran(result):
             key = (result["scene"], result["data"], row["who"], row["device"], row["method"], row["setting"])
-            lines.setdefault(key, []).append((result["n"], best(row) or np.nan, row["error"]))
+            lines.setdefault(key, []).append(
+                (result["n"], best(row) or np.nan, row["error"], best(row, "cpu") or np.nan)
+            )
     found = []
     names = ("scene", "data", "who", "device", "method", "setting")
     for line, points in lines.items():
         points.sort()
-        sizes, seconds = [n for n, _, _ in points], [s for _, s, _ in points]
+        sizes, seconds, errors, busy = (list(column) for column in zip(*points, strict=True))
         if len(set(sizes)) < 2:
             continue
         found.append(
@@ -99,8 +102,13 @@ def growth(results: list[Result]) -> list[dict[str, Any]]:
                 **dict(zip(names, line, strict=True)),
                 "sizes": sizes,
                 "seconds": seconds,
-                "error": max(error for _, _, error in points),
-                "exponent": float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0]),
+                "error": max(errors),
+                "exponent": _slope(sizes, seconds),
+                "cpu_exponent": _slope(sizes, busy) if np.isfinite(busy).all() else None,
             }
         )
     return found
+
+
+def _slope(sizes: list[float], seconds: list[float]) -> float:
+    return float(np.polyfit(np.log(sizes), np.log(seconds), 1)[0])

@@ -23,7 +23,7 @@ HEAD = [
     "Gbp/s",
 ]
 MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
-GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "exponent"]
+GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
 EXPLAINED = (
     "error: relative L2 against the exact sum, as docs/accuracy.md says; of |I|: relative to the image alone. form: "
     "data in memory to finished image, without what can be worked out once for a geometry (sarcl's plan, fastsar's "
@@ -102,6 +102,7 @@ def growth_body(results: list[figures.Result]) -> Cells:
             ", ".join(str(n) for n in entry["sizes"]),
             ", ".join(_seconds(s) for s in entry["seconds"]),
             f"n^{entry['exponent']:.2f}",
+            "" if entry["cpu_exponent"] is None else f"n^{entry['cpu_exponent']:.2f}",
         ]
         for entry in figures.growth(results)
     ]
