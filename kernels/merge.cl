@@ -39,11 +39,8 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
                      __global const float *restrict tile, __global const int *restrict parent,
                      __global const float *restrict table, int n, int n_used, int n_tiles, int first, int reach, int samples, int stride, int origin, __global float *restrict out) {
     size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x, d;
+    point x = load_point(tile, k, n_tiles), d;
     wv r;
-    x.x = w_load1(tile, k, 3 * (size_t)n_tiles);
-    x.y = w_load1(tile + n_tiles, k, 3 * (size_t)n_tiles);
-    x.z = w_load1(tile + 2 * n_tiles, k, 3 * (size_t)n_tiles);
     point T = load_antenna(pulse, P_TX, g, n, 0);
     wv length = w_load(pulse + P_TR * n, g, lo);
 #if BISTATIC

@@ -167,7 +167,6 @@ def choose(
     n_samples: int,
     bandwidth: float,
     highest: float,
-    amplify: float = 1.0,
     source: tuple[Interpolator, int] | None = None,
     sides: tuple[int, ...] = SIDES,
 ) -> LinePlan | None:

@@ -45,7 +45,7 @@ class GatherPass:
         """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
         device = self.device
         parts = [cl.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
-        return Placed(device, tiles, skip, [device.upload(p) for p in parts], 1, self.beam)
+        return Placed(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
 
     def add(
         self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
@@ -89,7 +89,7 @@ class LinePass:
 
     def ready(self, tiles: Tiles, skip: int) -> Placed:
         """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
-        return Placed(self.device, tiles, skip, [self.device.upload(cl.wide(tiles.references.T))], 2, self.beam)
+        return Placed(self.device, tiles, skip, [self.device.upload(cl.wide(tiles.references.T))], self.beam)
 
     def add(
         self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
@@ -112,14 +112,13 @@ class LinePass:
 
 
 class Placed:
-    """Tiles on the device: buffers of a pass, and counts a tile: `counts` of the kernel's own and one more for a beam.
-
-    The first count is of pulses that miss the tile, the last, where there is a beam, of those that do not light it.
+    """Tiles on the device: buffers of a pass, and counts a tile: of pulses that miss it, and of those that do not
+    light it where there is a beam.
     """
 
-    def __init__(self, device: cl.Device, tiles: Tiles, skip: int, buffers: list[Any], counts: int, beam: bool) -> None:
+    def __init__(self, device: cl.Device, tiles: Tiles, skip: int, buffers: list[Any], beam: bool) -> None:
         self.device, self.tiles, self.skip, self.buffers, self.beam = device, tiles, int(skip), buffers, beam
-        self.counts = counts + beam
+        self.counts = 1 + beam
         self.missed = device.zeros(4 * self.counts * tiles.n_tiles)
 
     def skipped(self) -> np.ndarray:
