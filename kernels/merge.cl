@@ -37,7 +37,8 @@
 __kernel void shifts(__global const float *restrict pulse, __global const float *restrict parents,
                      int n_parents,
                      __global const float *restrict tile, __global const int *restrict parent,
-                     __global const float *restrict table, int n, int n_used, int n_tiles, int first, int reach, int samples, int stride, int origin, __global float *restrict out) {
+                     __global const float *restrict table, int n, int n_used, int n_tiles, int first, int reach,
+                     int samples, int stride, int origin, __global float *restrict out) {
     size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
     point x = load_point(tile, k, n_tiles), d;
     wv r;

@@ -114,6 +114,9 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--dry-run", action="store_true", help="say what it will take, and do nothing")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
+    how.add_argument(
+        "--beam", type=float, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
+    )
     how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
     large = p.add_argument_group(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import argparse
 import logging
+import math
 import sys
 import warnings
 from collections.abc import Callable
@@ -128,6 +129,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     raw = _compressed(raw, job)
     grid = grid or _default_grid(raw, job, given)
     how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
+    how["beam"] = None if args.beam is None else math.radians(args.beam)
     if args.dry_run:
         print(sarcl.plan(raw, grid, **how, device=devices[0].info.index))
         return 0

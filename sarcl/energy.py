@@ -44,17 +44,31 @@ def seen(task: Task) -> Energy:
     shaped = 1 / kernel(TAPS, FINER, TERMS).transform(k / length)
     at = near = whole = 0.0
     for row, samples in zip(rows, read, strict=True):
-        half = sum(np.linalg.norm(x - end[row], axis=1) for end in (raw.tx, raw.rx)) / 2
-        turns = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
-        lit = np.full(len(x), True) if task.wrap else np.abs(turns) <= 0.5
-        if task.antennas.beam is not None:
-            lit &= task.antennas.beam_depth(x, int(row)) >= 0
+        turns, lit = _delays(task, x, int(row))
         values, close, all_of_it = _read(samples / scale, shaped, length, turns[lit])
         at, near, whole = at + values, near + close, whole + all_of_it * int(lit.sum())
     if whole == 0:
         return Energy(1.0, 1.0)
     floor = 1e-20 * whole  # every pixel of every row at an exact null: no more can be told
     return Energy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
+
+
+def share(task: Task) -> float:
+    """Share of (row, pixel) pairs in the row's range window and beam, estimated from 64 rows and 256 pixels."""
+    _, x = task.grid.sample(PIXELS, seed=1)
+    rows = np.unique(np.linspace(0, task.raw.n_rows - 1, 64).astype(int))
+    return float(np.mean([_delays(task, x, int(row))[1].mean() for row in rows]))
+
+
+def _delays(task: Task, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
+    """Delays of points, m (m, 3), in turns of a row's window, and whether the row sees them."""
+    raw = task.raw
+    half = sum(np.linalg.norm(x - end[row], axis=1) for end in (raw.tx, raw.rx)) / 2
+    turns = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
+    lit = np.full(len(x), True) if task.wrap else np.abs(turns) <= 0.5
+    if task.antennas.beam is not None:
+        lit &= task.antennas.beam_depth(x, row) >= 0
+    return turns, lit
 
 
 def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarray) -> tuple[float, float, float]:

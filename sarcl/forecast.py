@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import cl, planning
+from . import cl, energy, planning
 from .check import choice, instance, number
 from .grid import ImageGrid
 from .methods import METHODS, Choice, choose
@@ -74,27 +74,27 @@ def plan(
     budget = min(planning.budget(opened, max_bytes), opened.info.memory)
     lanes = opened.info.vector_width > 1
     chosen = choose(task, method, tolerance, lanes, opened.info.fp64)
-    speed = _speed(opened)
-    seconds = task.pairs * chosen.cost / speed
+    seen = task.raw.n_rows * (grid.size if task.grid.empty is None else grid.size - int(task.grid.empty.sum()))
+    unit = seen * energy.share(task) / _speed(opened)  # seconds of the pairs that are not skipped, at cost 1
     return Forecast(
         chosen.method,
         chosen.plan.describe(chosen.method),
-        seconds,
+        unit * chosen.cost,
         _bytes(task, chosen, opened, budget),
         chosen.predicted_error,
-        _cheaper(task, method, tolerance, lanes, chosen, speed),
+        _cheaper(task, method, tolerance, lanes, opened.info.fp64, chosen, unit),
     )
 
 
 def _cheaper(
-    task: Task, method: str, tolerance: float, lanes: bool, chosen: Choice, speed: float
+    task: Task, method: str, tolerance: float, lanes: bool, float64: bool, chosen: Choice, unit: float
 ) -> tuple[float, float] | None:
     """The plan of the smallest error that costs noticeably less."""
     for factor in (2, 3, 10, 30):
         if tolerance * factor < 1:
-            other = choose(task, method, tolerance * factor, lanes)
+            other = choose(task, method, tolerance * factor, lanes, float64)
             if other.cost < 0.95 * chosen.cost:
-                return other.predicted_error, task.pairs * other.cost / speed
+                return other.predicted_error, unit * other.cost
     return None
 
 

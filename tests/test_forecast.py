@@ -33,10 +33,19 @@ def test_the_next_cheaper_plan_errs_more_and_takes_less():
 
 def test_time_grows_with_the_work_and_memory_with_what_is_allowed():
     raw = noise_history(n_rows=120)
-    small, large = (sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(n, n), spacing=0.2)) for n in (100, 2000))
+    small, large = (sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(n, n), spacing=0.2), wrap=True) for n in (100, 2000))
     assert large.seconds > 50 * small.seconds and large.bytes > 50 * small.bytes
     tight = sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(2000, 2000), spacing=0.2), max_bytes=2e7)
     assert tight.bytes < large.bytes
+
+
+def test_what_a_beam_leaves_out_takes_no_time():
+    raw, grid = noise_history(n_rows=120), sarcl.ImageGrid.plane(shape=(400, 400), spacing=0.2)
+    beam = 20 / np.linalg.norm(raw.tx[0])  # a cone of 20 m, the grid has 80
+    whole, lit = (sarcl.plan(raw, grid, method="direct", wrap=True, beam=b) for b in (None, beam))
+    image = sarcl.backproject(raw, grid, method="direct", wrap=True, beam=beam, check=False)
+    assert image.report.contributions_skipped["beam"] > 0.5 * raw.n_rows * grid.size
+    assert lit.seconds < 0.5 * whole.seconds
 
 
 @pytest.mark.parametrize("tolerance", [0, -1e-3, float("nan"), 1e-30])
@@ -64,3 +73,19 @@ def test_method_is_checked():
         sarcl.plan(noise_history(n_rows=4), GRID, method="fast")
     forecast = sarcl.plan(noise_history(n_rows=64), GRID, tolerance=1e-1, method="direct")
     assert forecast.method == "direct" and np.isfinite(forecast.seconds)
+
+
+def test_a_beam_is_given_in_degrees(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raw = noise_history(n_rows=60)
+    raw.save("raw.h5")
+    where = ["--center", "0", "0", "0", "--shape", "96", "96", "--spacing", "0.4", "0.4"]
+    assert main(["focus", "raw.h5", "-o", "image.h5", *where, "--beam", "0.02"]) == 0
+    image = sarcl.read("image.h5")
+    grid = sarcl.ImageGrid.plane(shape=(96, 96), spacing=0.4)
+    wanted = sarcl.backproject(raw, grid, beam=np.radians(0.02))
+    assert image.report.contributions_skipped["beam"] == wanted.report.contributions_skipped["beam"] > 0
+    assert (np.asarray(image.data) == wanted.data).all()
+    for bad in ("0", "-1", "nan", "400"):
+        assert main(["focus", "raw.h5", "-o", "bad.h5", *where, "--beam", bad]) == 2
+        assert "beam" in capsys.readouterr().err

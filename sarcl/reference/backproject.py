@@ -16,24 +16,33 @@ def backproject(
     row_weight: np.ndarray | None = None,
     wrap: bool = False,
     beam: tuple[float, np.ndarray] | None = None,
+    edge: float = 0.0,
 ) -> tuple[np.ndarray, float]:
     """I(x) = sum_p v_p(x) sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3).
 
     v_p(x) is 1 in the range window and in the beam: (full angle, rad, and directions, (3,) or (n_rows, 3), from tx).
+    Points nearer than `edge` to the edge of a window (relative to half of it) or beam (rad) come out NaN: rounding
+    may put them on either side.
+
     Returns I complex128 (n,) and the norm it would have if contributions had random phases.
     """
     n = np.arange(raw.n_samples)
     sample_weight = np.ones(raw.n_samples) if sample_weight is None else sample_weight
     row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
-    image, power = np.zeros(len(points), np.complex128), 0.0
+    image, power = np.zeros(len(points), np.complex128), np.zeros(len(points))
+    clear = np.ones(len(points), bool)
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
-        seen = wrap | (abs(delay) <= 1 / (2 * raw.frequency_step[p]))
+        place = abs(delay) * (2 * raw.frequency_step[p])
+        seen = wrap | (place <= 1)
+        clear &= wrap | (abs(place - 1) >= edge)
         if beam is not None:
             toward = np.broadcast_to(beam[1], (raw.n_rows, 3))[p]
             away = points - raw.tx[p]
             reach = np.linalg.norm(away, axis=1) * np.linalg.norm(toward)
-            seen = seen & (away @ toward >= np.cos(beam[0] / 2) * reach)
+            ahead = away @ toward - np.cos(beam[0] / 2) * reach
+            seen = seen & (ahead >= 0)
+            clear &= abs(ahead) >= edge * max(np.sin(beam[0] / 2), edge) * reach
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
         # the carrier's turns are reduced in extended precision, the rest in float64
         first = (raw.frequency[p] * delay) % 1
@@ -41,5 +50,6 @@ def backproject(
         turns = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
         profile = (np.exp(2j * np.pi * turns) * samples).sum(axis=1) * seen
         image += profile
-        power += float((abs(profile) ** 2).sum())
-    return image, float(np.sqrt(power))
+        power += abs(profile) ** 2
+    image[~clear] = np.nan
+    return image, float(np.sqrt(power[clear].sum()))
