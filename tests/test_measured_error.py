@@ -50,9 +50,7 @@ def test_a_tolerance_that_was_missed_is_said_and_the_image_kept(monkeypatch):
     raw, grid = noise_history(), sarcl.ImageGrid.plane(shape=(24, 24), spacing=0.3)
     try:
         with pytest.warns(sarcl.SarclWarning, match="tolerance 1.0e-04 was missed"):
-            image = sarcl.backproject(
-                raw, sarcl.ImageGrid.plane(shape=(24, 24), spacing=0.3), tolerance=1e-4, check=True
-            )
+            image = sarcl.backproject(raw, grid, tolerance=1e-4, check=True)
     finally:
         accuracy.choose_interpolator.cache_clear()
     assert image.report.measured_error > 1e-4 and image.data.all()
