@@ -47,6 +47,7 @@ _HOME = {
     "devices": "cl",
     "NoDeviceError": "cl",
     "SarclWarning": "check",
+    "ToleranceMissed": "check",
 }
 
 __all__ = sorted(_HOME)
@@ -55,6 +56,7 @@ if TYPE_CHECKING:
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
     from .check import SarclWarning as SarclWarning
+    from .check import ToleranceMissed as ToleranceMissed
     from .cl import NoDeviceError as NoDeviceError
     from .cl import devices as devices
     from .compress import compress as compress

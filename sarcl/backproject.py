@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections.abc import Callable
 from contextlib import ExitStack, closing
 from typing import Any, overload
@@ -11,7 +10,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import planning
-from .check import SarclWarning, choice, count, instance, number
+from .check import ToleranceMissed, choice, count, instance, number
 from .crew import BLOCKS_EACH, Crew, Local, open_devices
 from .grid import ImageGrid
 from .image import Image
@@ -80,15 +79,15 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
                are thrown away
     tile       (i, n): make piece i of n alone, 1 <= i <= n, and keep its tiles in "PATH.parts"; the piece that
                completes the image puts it together and returns it, the others return None
-    check      recompute 256 random pixels exactly; None: where that costs less than 2 %. SarclWarning where the
-               error measured there is more than the tolerance: please report it
+    check      recompute 256 random pixels exactly; None: where that costs less than 2 %
     device     see `sarcl.devices`; a list of such, or "all", for several at once
     cluster    a dask.distributed.Client whose workers make the tiles, each on a device of its own
     progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
     Returns an Image. ValueError: a tolerance that cannot be met (with the best that can), data not compressed,
-    arguments that do not fit, tiles of another job in "PATH.parts"; MemoryError: max_bytes too small for a
-    single row. Source: Farooq 2009, section 2.2.2; docs/accuracy.md and docs/large.md.
+    arguments that do not fit, tiles of another job in "PATH.parts"; ToleranceMissed, a ValueError that holds the
+    finished image: the check measured more than the tolerance; MemoryError: max_bytes too small for a single row.
+    Source: Farooq 2009, section 2.2.2; docs/accuracy.md and docs/large.md.
     """
     clock = Clock()
     instance("raw", raw, PhaseHistory)
@@ -135,12 +134,6 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
             measured = _measure_error(task, grid, target.data)
             clock.lap("check")
-            if measured > tolerance:
-                text = (
-                    f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the "
-                    f"error formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it"
-                )
-                warnings.warn(text, SarclWarning, stacklevel=2)  # the image is kept: hours may be in it
         plan = chosen.plan.describe(chosen.method)
         if kept:
             plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
@@ -170,6 +163,8 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
         )
         if keeper:
             keeper.done()
+        if measured is not None and measured > tolerance:
+            raise ToleranceMissed(tolerance, measured, image)
         return image
 
 

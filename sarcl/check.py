@@ -13,6 +13,18 @@ class SarclWarning(UserWarning):
     """Something the user should know about a result that is still right."""
 
 
+class ToleranceMissed(ValueError):
+    """A finished image errs more than was asked, where it was checked: `image`, `tolerance`, `measured`."""
+
+    def __init__(self, tolerance: float, measured: float, image: Any) -> None:
+        super().__init__(
+            f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the error "
+            f"formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it (the image is kept: "
+            "in its file, or in this error's .image)"
+        )
+        self.tolerance, self.measured, self.image = tolerance, measured, image
+
+
 def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
     """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
 

@@ -38,22 +38,27 @@ def test_the_reference_paths_are_those_of_fifty_digits(distance):
         assert error <= Decimal(1e-19 * min(200.0, distance) + 1e-25 * distance)
 
 
-def test_a_tolerance_that_was_missed_is_said_and_the_image_kept(monkeypatch):
+@pytest.fixture
+def too_small(monkeypatch):
+    """Interpolators that err a thousand times more than they say."""
     honest = accuracy.interpolator
-
-    def too_small(taps, oversample):
-        return replace(honest(taps, oversample), error=honest(taps, oversample).error / 1000)
-
-    monkeypatch.setattr(accuracy, "interpolator", too_small)
+    monkeypatch.setattr(accuracy, "interpolator", lambda *a: replace(honest(*a), error=honest(*a).error / 1000))
     monkeypatch.setattr(line_plan, "choose", lambda *a, **k: None)
     accuracy.choose_interpolator.cache_clear()
+    yield
+    accuracy.choose_interpolator.cache_clear()
+
+
+def test_a_tolerance_that_was_missed_is_an_error_that_keeps_the_image(too_small, tmp_path):
     raw, grid = noise_history(), sarcl.ImageGrid.plane(shape=(24, 24), spacing=0.3)
-    try:
-        with pytest.warns(sarcl.SarclWarning, match="tolerance 1.0e-04 was missed"):
-            image = sarcl.backproject(raw, grid, tolerance=1e-4, check=True)
-    finally:
-        accuracy.choose_interpolator.cache_clear()
-    assert image.report.measured_error > 1e-4 and image.data.all()
+    out = tmp_path / "image.h5"
+    for target in (None, out):
+        with pytest.raises(sarcl.ToleranceMissed, match=r"tolerance 1\.0e-04 was missed") as missed:
+            sarcl.backproject(raw, grid, tolerance=1e-4, check=True, out=target)
+        image = missed.value.image
+        assert isinstance(missed.value, ValueError) and missed.value.measured == image.report.measured_error > 1e-4
+        assert np.asarray(image.data).all()
+    assert (np.asarray(sarcl.read(out).data) == np.asarray(image.data)).all()
 
 
 @pytest.mark.parametrize("distance", [10e3, 36e6])
