@@ -8,8 +8,9 @@
 //   T(m) = s~(m beta/FINE) exp(+j 2 pi kappa m beta/FINE),    W_b(i) = w_b(z_i) exp(+j 2 pi kappa (A_i - (n_i + b) beta/FINE))
 //
 // source    DESIGN.md, image equation. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
-//           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn turns or whose place errs by
-//           more than limit_place samples is added pixel by pixel instead, as are window edges.
+//           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn turns, whose place errs by
+//           more than limit_place samples or whose step is more than limit_step samples a pixel is added pixel by
+//           pixel instead, as are window edges: what was planned is held for every pulse.
 // symbols   i, j      line, and pixel in the line, about the tile's reference pixel (SIDE/2, SIDE/2)
 //           z_i       where A_i lies between samples of T; w_b weights, interp.clh's table form
 //           u, R0, a, w   as in phase.clh
@@ -184,9 +185,9 @@ inline void take_samples(line s, __global const float *restrict row, int stride,
 // Samples, weights and places of a pulse as the `kept`-th of its group; 0: it does not fit, add it pixel by pixel.
 inline int keep(group shared, line s, int kept, __global const float *restrict row, int stride, int origin,
                 __global const float *restrict table, __global const float *restrict weights, float limit_turn,
-                float limit_place, __local float *T, __local float *W, __local int *at) {
+                float limit_place, float limit_step, __local float *T, __local float *W, __local int *at) {
     iv n_i[VECS];
-    if (!fits(shared, s, limit_turn, limit_place)) return 0;
+    if (!(fabs(s.along) <= limit_step) || !fits(shared, s, limit_turn, limit_place)) return 0;
     if (!weigh_lines(shared, s, weights, W + kept * W_SIZE, n_i)) return 0;
     int lowest = 1 << 20, highest = -(1 << 20);
     for (int r = 0; r < SIDE; r++) {
@@ -322,7 +323,7 @@ inline void add_spread(__global float *total, __global float *error, size_t i, i
 __kernel void backproject_lines(__global const float *restrict profiles, int stride, int origin,
                                 __global const float *restrict table, __global const float *restrict weights, int n,
                                 int n_used, __global const float *restrict constants, float step_x, float step_y,
-                                int first, int n_tiles, float limit_turn, float limit_place,
+                                int first, int n_tiles, float limit_turn, float limit_place, float limit_step,
                                 __global float *restrict image, ulong pixels, __global int *restrict skipped,
                                 ulong local_offset) {
     __local float T[GROUP * T_SIZE];
@@ -355,8 +356,10 @@ __kernel void backproject_lines(__global const float *restrict profiles, int str
         for (int f = 0; f < n_fast; f++) {
             line s = load_line(c + (size_t)fast[f] * N_LINE, shared.turned);
             __global const float *row = profiles + 2 * (size_t)fast[f] * stride;
-            if (keep(shared, s, kept, row, stride, origin, table, weights, limit_turn, limit_place, T, W, at)) kept++;
-            else edge[n_edge++] = fast[f];
+            if (keep(shared, s, kept, row, stride, origin, table, weights, limit_turn, limit_place, limit_step, T, W, at))
+                kept++;
+            else
+                edge[n_edge++] = fast[f];
         }
         for (int r = 0; r < SIDE; r++)
             for (int j0 = 0; j0 < SIDE; j0 += SUMS * VW) {

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -12,7 +13,11 @@ from .precise_accuracy import kernel
 from .task import Task
 
 ROWS, PIXELS, MOST = 16, 256, 2**18
+ALL = 2**28  # samples up to which every row is looked at
 TAPS, FINER, TERMS = 12, 4.0, 6  # of a kernel that errs by 1e-11
+
+
+_norms: WeakKeyDictionary[Task, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
 
 
 @dataclass(frozen=True)
@@ -28,29 +33,57 @@ class Energy:
 
 
 def seen(task: Task) -> Energy:
-    """Estimate from up to 16 rows and 256 pixels spread over the grid, exact to 1e-11 of a row's amplitude at a null.
+    """Estimate from 256 pixels in 16 rows spread over the data and in the 16 brightest, exact to 1e-11 of an amplitude.
 
     Energy(1, 1) where no pixel sees anything.
     """
     raw, grid = task.raw, task.grid
+    bright = row_norms(task)
     count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
-    rows = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
+    usual = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
+    best = np.setdiff1d(np.argsort(bright)[-count:], usual)
     _, x = grid.sample(PIXELS, seed=1)
-    read = [raw.read(int(r), int(r) + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in rows]
-    scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read))  # squares of huge samples overflow
+    # the brightest stand for themselves, the others for all that were not looked at
+    stands_for = {int(r): (raw.n_rows - len(best)) / len(usual) for r in usual} | {int(r): 1.0 for r in best}
+    read = {r: raw.read(r, r + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in stands_for}
+    scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read.values()))  # squares must not overflow
     n = raw.n_samples
     k = np.arange(n) - n // 2
     length = fft.good_length(max(4 * n, 48))
     shaped = 1 / kernel(TAPS, FINER, TERMS).transform(k / length)
-    at = near = whole = 0.0
-    for row, samples in zip(rows, read, strict=True):
-        turns, lit = _delays(task, x, int(row))
-        values, close, all_of_it = _read(samples / scale, shaped, length, turns[lit])
-        at, near, whole = at + values, near + close, whole + all_of_it * int(lit.sum())
-    if whole == 0:
+    at = near = lit = 0.0
+    for row, samples in read.items():
+        turns, inside = _delays(task, x, row)
+        values, close = _read(samples / scale, shaped, length, turns[inside])
+        at, near = at + stands_for[row] * values, near + stands_for[row] * close
+        lit += stands_for[row] * int(inside.sum()) / raw.n_rows
+    whole = lit * float(((bright / scale) ** 2).sum())
+    if whole == 0 or near == 0:
         return Energy(1.0, 1.0)
     floor = 1e-20 * whole  # every pixel of every row at an exact null: no more can be told
     return Energy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
+
+
+def row_norms(task: Task) -> np.ndarray:
+    """Norm of the samples of each row as they are weighed, (n_rows,) float64.
+
+    Of more than 2^28 samples (2 GiB), every n-th row alone is read, and stands for those up to the next.
+    """
+    if task in _norms:
+        return _norms[task]
+    raw = task.raw
+    every = -(-raw.n_rows * raw.n_samples // ALL)
+    weight, out = np.repeat(task.sample_weight**2, 2), np.empty(raw.n_rows)
+    step = max(1, 2**20 // raw.n_samples) if every == 1 else 1
+    for start in range(0, raw.n_rows, step * every):
+        samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
+        parts = samples.view(samples.real.dtype).astype(np.float64)
+        largest = float(np.abs(parts).max()) or 1.0  # squares of huge samples overflow
+        parts /= largest
+        norm = largest * np.sqrt(np.square(parts, out=parts) @ weight)
+        out[start : start + step * every] = norm if every == 1 else norm[0]
+    _norms[task] = out * task.row_weight
+    return _norms[task]
 
 
 def share(task: Task) -> float:
@@ -71,8 +104,8 @@ def _delays(task: Task, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray
     return turns, lit
 
 
-def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarray) -> tuple[float, float, float]:
-    """Power of a profile at delays (m,), in turns of the window, added up; around them; and its mean.
+def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarray) -> tuple[float, float]:
+    """Power of a profile at delays (m,), in turns of the window, added up; and around them.
 
     shaped  (n_samples,): what makes up for the kernel's transform
     """
@@ -89,4 +122,4 @@ def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarra
     values = (made.weights(place - first) * profile[taps]).sum(axis=1)
     # what a kernel reads, and a sample more on each side
     around = (first[:, None] + np.arange(-1, made.taps + 1)) % length
-    return float((np.abs(values) ** 2).sum()), float(power[around].mean(axis=1).sum()), float(power.mean())
+    return float((np.abs(values) ** 2).sum()), float(power[around].mean(axis=1).sum())

@@ -35,7 +35,8 @@ class LinePlan:
     """How lines are computed: tile side, samples a pixel, both interpolators, pulses a group and what they may differ.
 
     slope       the curvature moves pixels' places too
-    limit_turn  turns, and limit_place samples: a pulse whose curvature differs by more is added pixel by pixel
+    limit_turn  turns, and limit_place samples: a pulse whose curvature differs by more is added pixel by pixel,
+    limit_step  samples a pixel along a line: as is one that sees more
     cost        of a contribution, relative to one by the hat and float32 ranges
     """
 
@@ -49,6 +50,7 @@ class LinePlan:
     slope: bool
     limit_turn: float
     limit_place: float
+    limit_step: float
     predicted_error: float
     cost: float
 
@@ -151,12 +153,11 @@ def sampled_groups(n_rows: int, group: int, most: int = 24) -> np.ndarray:
     return starts[np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).astype(int))]
 
 
-def corners(grid: ImageGrid) -> np.ndarray:
-    """Centre and corners of a plane, m (5, 3)."""
+def outline(grid: ImageGrid) -> np.ndarray:
+    """Centre, corners and middles of the edges of a plane, m (9, 3)."""
     rows, columns = grid.shape
-    return grid.at(
-        np.array([rows // 2, 0, 0, rows - 1, rows - 1]), np.array([columns // 2, 0, columns - 1, 0, columns - 1])
-    )
+    i, j = np.meshgrid([0, rows // 2, rows - 1], [0, columns // 2, columns - 1], indexing="ij")
+    return grid.at(i.ravel(), j.ravel())
 
 
 def choose(
@@ -186,8 +187,9 @@ def choose(
         starts = sampled_groups(n_rows, group)
         rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
         rx = None if antennas.rx is None else antennas.rx[rows]
-        look = Look.at(corners(grid), antennas.tx[rows], rx, steps(grid))
-        rest = look.rest(side, spacing).reshape(5, len(starts), -1, 5)
+        points = outline(grid)
+        look = Look.at(points, antennas.tx[rows], rx, steps(grid))
+        rest = look.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
         kappa = 2 * highest / SPEED_OF_LIGHT
         turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
         off = 1.1 * moved(rest)
@@ -228,6 +230,6 @@ def choose(
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 best = LinePlan(
                     side, fine, group, line, made, length, order, slope, turn, max(off * sigma, 1e-6),
-                    error + made.error, per_pair,
+                    cells * length / n_samples * (1 + 1e-5), error + made.error, per_pair,
                 )  # fmt: skip
     return best

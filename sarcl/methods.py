@@ -15,6 +15,7 @@ from .tiling import GridTiling
 METHODS = ("auto", "direct", "factorized")
 WORTH = 0.8  # of the direct method's cost, below which sub-apertures are taken
 FLOAT64 = 1.3  # cost of precise_plan.py's unit
+TINY = 1e-35  # of samples, below which pixels come near complex64's smallest numbers
 SMALL = 3e7  # pairs below which looking for sub-apertures takes longer than they save
 
 
@@ -60,6 +61,12 @@ def choose(task: Task, method: str, tolerance: float, lanes: bool = True, float6
         if method == "factorized":
             raise ValueError(f"tolerance {tolerance:.1e} cannot be met with sub-apertures; method='direct' can")
         return _precise(task, tolerance)
+    strongest = float(energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
+    if 0 < strongest < TINY:
+        raise ValueError(
+            f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the samples "
+            f"up, or ask for a tolerance below {LEAST_TOLERANCE:.0e}, which is met in complex128"
+        )
     # errors are relative to what interpolation reads and transforms round, a tolerance to what pixels see
     seen = energy.seen(task)
     near = max(1.0, seen.near if seen.near > 1.25 else 1.0)

@@ -85,7 +85,7 @@ class LinePass:
         self.kernel = device.kernel("lines.cl", "backproject_lines", **macros)
         self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
         self.axes = device.upload(cl.wide(steps(tiling.grid)))
-        self.limits = np.float32(plan.limit_turn), np.float32(plan.limit_place)
+        self.limits = [np.float32(v) for v in (plan.limit_turn, plan.limit_place, plan.limit_step)]
 
     def ready(self, tiles: Tiles, skip: int) -> Placed:
         """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""

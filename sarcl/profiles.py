@@ -48,9 +48,12 @@ def from_samples(
         spectrum[:, -low:] = shaped[:, :low]
     pad = padding(interpolator) if pad is None else pad
     profiles = np.empty((n, length + 2 * pad), np.complex64)
-    profiles[:, pad:-pad] = fft.rows(device, spectrum, inverse=True)
-    profiles[:, :pad] = profiles[:, length : length + pad]
-    profiles[:, -pad:] = profiles[:, pad : 2 * pad]
+    profiles[:, pad:-pad] = made = fft.rows(device, spectrum, inverse=True)
+    if pad <= length:
+        profiles[:, :pad], profiles[:, -pad:] = made[:, length - pad :], made[:, :pad]
+    else:  # several times over
+        profiles[:, :pad] = made[:, np.arange(-pad, 0) % length]
+        profiles[:, -pad:] = made[:, np.arange(pad) % length]
     return profiles
 
 

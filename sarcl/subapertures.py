@@ -143,22 +143,46 @@ def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
 def filter_error(
     track: Track, made: Thinning, center: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
 ) -> float:
-    """Largest error of what the nodes make of a pulse, over sampled pulses and points `radius` from `center`, m (3,).
+    """Largest error of what the nodes make of a pulse, at points `radius` from `center`, m (3,).
 
-    This is the thinning itself, computed for the track as it is, not as a smooth one would be.
+    This is the thinning itself, computed for the track as it is, not as a smooth one would be: in 32 blocks of pulses
+    spread over it and in the 32 where it is roughest.
     """
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     if axes is not None:
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
     points = center + radius * directions
-    full = np.flatnonzero(made.blocks[:, 1] == made.blocks[:, 1].max())  # blocks cut short are no worse
-    picked = made.blocks[full[np.unique(np.linspace(0, len(full) - 1, min(32, len(full))).astype(int))]]
-    count, taps = int(picked[0, 1]), made.filter.shape[1]
-    pulses, nodes = picked[:, :1] + np.arange(count), picked[:, 2:3] + np.arange(taps)
+    blocks, taps = made.blocks, made.filter.shape[1]
+    spread = np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int)
+    rough = roughness(track, made, center)
+    picked = blocks[np.unique(np.concatenate([spread, np.argsort(rough)[-32:]]))]
+    # blocks cut short repeat their last pulse
+    within = np.minimum(np.arange(made.thin), picked[:, 1:2] - 1)
+    pulses, nodes = picked[:, :1] + within, picked[:, 2:3] + np.arange(taps)
     exact = _phases(track, pulses, points, center, frequency)
     known = _phases(made.nodes, nodes, points, center, frequency)
-    return float(np.abs(made.filter[:count].astype(np.float64) @ known - exact).max())
+    filters = made.filter.astype(np.float64)[picked[:, 3:4] + within]
+    return float(np.abs(filters @ known - exact).max())
+
+
+def roughness(track: Track, made: Thinning, center: np.ndarray) -> np.ndarray:
+    """How far directions from `center` to a block's pulses leave the line between the nodes about them: (n_blocks,)."""
+    first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
+    block = np.repeat(np.arange(len(count)), count)
+    row = np.arange(len(block)) - np.repeat(np.cumsum(count) - count, count) + first[block]
+    way = ((row - first[block]) / made.thin)[:, None]
+    worst = np.zeros(len(count))
+    for antenna, ends in zip(track.ends, made.nodes.ends, strict=True):
+        pulses, nodes = _directions(antenna, center), _directions(ends, center)
+        off = pulses[row] - (1 - way) * nodes[node[block]] - way * nodes[node[block] + 1]
+        np.maximum.at(worst, block, np.sqrt(np.einsum("ij,ij->i", off, off)))
+    return worst
+
+
+def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:
+    d = ends - center
+    return d / np.maximum(np.sqrt(np.einsum("ij,ij->i", d, d)), 1e-9)[:, None]
 
 
 def _phases(track: Track, rows: np.ndarray, points: np.ndarray, center: np.ndarray, frequency: float) -> np.ndarray:
