@@ -75,14 +75,15 @@ class Thinning:
 
 def thinned(track: Track, thin: int, taps: int, oversample: float) -> Thinning:
     """Every `thin`-th position of each run, and beyond its ends as many as the filter of `taps` needs."""
-    blocks, runs, parts, first = [], [], [], 0
+    runs, parts, first = [], [], 0
+    blocks: list[np.ndarray] = []
     rx_parts, rows = [], []
     for begin, end in track.runs:
         n = end - begin
         n_blocks = -(-n // thin)
         at = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
-        for b in range(n_blocks):
-            blocks.append((begin + b * thin, min(thin, n - b * thin), first + b, 0))
+        b = np.arange(n_blocks)
+        blocks.append(np.stack([begin + b * thin, np.minimum(thin, n - b * thin), first + b, 0 * b], axis=1))
         places = at * thin
         parts.append(_positions(track.tx[begin:end], places))
         if track.rx is not None:
@@ -100,7 +101,7 @@ def thinned(track: Track, thin: int, taps: int, oversample: float) -> Thinning:
         tuple(runs),
     )
     error = accuracy.line_interpolator(taps, oversample).error
-    return Thinning(nodes, thin, np.array(blocks, np.int32), weights.astype(np.float32), error)
+    return Thinning(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
 
 
 def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -141,43 +142,43 @@ def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
 
 
 def filter_error(
-    track: Track, made: Thinning, center: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
+    track: Track, made: Thinning, centers: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
 ) -> float:
-    """Largest error of what the nodes make of a pulse, at points `radius` from `center`, m (3,).
+    """Largest error of what the nodes make of a pulse, at points `radius` from each of `centers`, m (m, 3).
 
-    This is the thinning itself, computed for the track as it is, not as a smooth one would be: in 32 blocks of pulses
-    spread over it and in the 32 where it is roughest.
+    This is the thinning itself, computed for the track as it is, not as a smooth one would be: for pulses of 32 blocks
+    spread over it, and for the 1024 pulses where it is roughest.
     """
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     if axes is not None:
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
-    points = center + radius * directions
-    blocks, taps = made.blocks, made.filter.shape[1]
-    spread = np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int)
-    rough = roughness(track, made, center)
-    picked = blocks[np.unique(np.concatenate([spread, np.argsort(rough)[-32:]]))]
-    # blocks cut short repeat their last pulse
-    within = np.minimum(np.arange(made.thin), picked[:, 1:2] - 1)
-    pulses, nodes = picked[:, :1] + within, picked[:, 2:3] + np.arange(taps)
-    exact = _phases(track, pulses, points, center, frequency)
-    known = _phases(made.nodes, nodes, points, center, frequency)
-    filters = made.filter.astype(np.float64)[picked[:, 3:4] + within]
-    return float(np.abs(filters @ known - exact).max())
+    blocks = made.blocks
+    spread = np.unique(np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int))
+    within = np.unique(np.linspace(0, made.thin - 1, min(64, made.thin)).astype(int))
+    usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
+    pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
+    block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
+    nodes = block[:, 2:3] + np.arange(made.filter.shape[1])
+    filters, worst = made.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
+    for center in centers:
+        points = center + radius * directions
+        exact = _phases(track, pulses, points, center, frequency)
+        known = _phases(made.nodes, nodes, points, center, frequency)
+        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, known) - exact).max()))
+    return worst
 
 
-def roughness(track: Track, made: Thinning, center: np.ndarray) -> np.ndarray:
-    """How far directions from `center` to a block's pulses leave the line between the nodes about them: (n_blocks,)."""
+def _roughest(track: Track, made: Thinning, center: np.ndarray, most: int = 1024) -> np.ndarray:
+    """Pulses to which directions from `center` leave the line between the nodes about them the most."""
     first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
-    block = np.repeat(np.arange(len(count)), count)
-    row = np.arange(len(block)) - np.repeat(np.cumsum(count) - count, count) + first[block]
-    way = ((row - first[block]) / made.thin)[:, None]
-    worst = np.zeros(len(count))
+    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.thin)[:, None]
+    node, off = np.repeat(node, count), np.zeros(len(track))
     for antenna, ends in zip(track.ends, made.nodes.ends, strict=True):
         pulses, nodes = _directions(antenna, center), _directions(ends, center)
-        off = pulses[row] - (1 - way) * nodes[node[block]] - way * nodes[node[block] + 1]
-        np.maximum.at(worst, block, np.sqrt(np.einsum("ij,ij->i", off, off)))
-    return worst
+        apart = pulses - (1 - way) * nodes[node] - way * nodes[node + 1]
+        off = np.maximum(off, np.einsum("ij,ij->i", apart, apart))
+    return np.argpartition(off, max(len(off) - most, 0))[-most:]
 
 
 def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:

@@ -8,40 +8,48 @@ import sarcl
 from sarcl.reference.backproject import backproject as exact_image
 
 
-def noise_history(
-    *,
-    n_rows=40,
-    n_samples=48,
-    distance=10e3,
-    center=9.6e9,
-    bandwidth=600e6,
-    bistatic=False,
-    arc=0.07,
-    seed=0,
-    **fields,
-):
-    """White noise in every sample, on a slightly random arc at `distance`: nothing is left to chance alignment."""
+def noise_on(tx, rx=None, *, center=9.6e9, bandwidth=300e6, n_samples=96, seed=0, **fields):
+    """White noise in every sample, on any track: nothing is left to chance alignment. Ranges are from the origin."""
     random = np.random.default_rng(seed)
-    angle = arc * (np.arange(n_rows) / max(n_rows - 1, 1) - 0.5)
-    tx = distance * np.stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), np.full(n_rows, 0.714)], axis=1)
-    tx += random.standard_normal((n_rows, 3)) * min(1.0, distance / 100)
-    rx = tx + distance * np.array([0.1, 0.2, 0.0]) if bistatic else None
-    there = np.linalg.norm(tx, axis=1)
-    back = there if rx is None else np.linalg.norm(rx, axis=1)
-    samples = random.standard_normal((n_rows, n_samples)) + 1j * random.standard_normal((n_rows, n_samples))
+    shape = (len(tx), n_samples)
+    samples = random.standard_normal(shape) + 1j * random.standard_normal(shape)
+    back = tx if rx is None else rx
     return sarcl.PhaseHistory(
         samples.astype(np.complex64),
         frequency=center - bandwidth / 2,
         frequency_step=bandwidth / n_samples,
         tx=tx,
         rx=rx,
-        reference_range=(there + back) / 2,
+        reference_range=(np.linalg.norm(tx, axis=1) + np.linalg.norm(back, axis=1)) / 2,
         **fields,
     )
 
 
-def image_error(image, raw, wrap=False, **weights):
-    """L2 error of an image against the exact sum, relative as the accuracy contract says."""
-    wanted, random_norm = exact_image(raw, image.grid.positions.reshape(-1, 3), wrap=wrap, **weights)
-    got = np.asarray(image.data).ravel()
-    return float(np.linalg.norm(got - wanted) / max(np.linalg.norm(wanted), random_norm))
+def noise_history(*, n_rows=40, distance=10e3, bistatic=False, arc=0.07, seed=0, **fields):
+    """White noise on a slightly random arc at `distance`."""
+    random = np.random.default_rng(seed)
+    angle = arc * (np.arange(n_rows) / max(n_rows - 1, 1) - 0.5)
+    tx = distance * np.stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), np.full(n_rows, 0.714)], axis=1)
+    tx += random.standard_normal((n_rows, 3)) * min(1.0, distance / 100)
+    rx = tx + distance * np.array([0.1, 0.2, 0.0]) if bistatic else None
+    return noise_on(tx, rx, seed=random, **{"bandwidth": 600e6, "n_samples": 48, **fields})
+
+
+def straight(n, aperture=60.0, distance=10e3, squint=0.0):
+    """A straight flight line, m (n, 3), its middle `squint` rad from broadside."""
+    y = aperture * (np.arange(n) / (n - 1) - 0.5) + distance * 0.7 * np.tan(squint)
+    return np.stack([np.full(n, -0.7 * distance), y, np.full(n, 0.714 * distance)], axis=1)
+
+
+def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model):
+    """L2 error of an image, relative to the exact sum as the accuracy contract says.
+
+    most   pixels, picked at random, and `among` which, flat indices; by default all
+    model  wrap, weights and beam, as `exact` takes them. Where the sum and all of its parts are zero the error is what
+    the image has instead.
+    """
+    at = np.arange(image.grid.size) if among is None else among
+    at = at if most is None else np.random.default_rng(5).choice(at, min(most, len(at)), replace=False)
+    wanted, random_norm = exact(raw, image.grid.positions.reshape(-1, 3)[at], **model)
+    scale = max(np.linalg.norm(wanted), random_norm)
+    return float(np.linalg.norm(np.asarray(image.data).ravel()[at] - wanted) / (scale or 1.0))

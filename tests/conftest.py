@@ -36,6 +36,14 @@ def device(request):
     return getattr(opened, twin)() if twin else opened
 
 
+@pytest.fixture
+def double(device):
+    """Every device that has float64; the others are refused, as a test of its own says."""
+    if not device.info.fp64:
+        pytest.skip("no float64")
+    return device
+
+
 @pytest.fixture(scope="session")
 def data_folder():
     """Measured data that nobody here made: SARCL_DATA, or ../shared/data beside the repository."""

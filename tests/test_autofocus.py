@@ -185,7 +185,10 @@ def test_points_in_speckle_and_noise():
     assert_as_sharp(better, truth)
 
 
-@pytest.mark.parametrize("tied", [True, False], ids=["from motion", "beside another phase"])
+@pytest.mark.parametrize(
+    "tied",
+    [pytest.param(True, id="from motion", marks=pytest.mark.slow), pytest.param(False, id="beside another phase")],
+)
 def test_a_range_error_of_several_cells_comes_off(tied):
     center, n, bandwidth, side = 3e9, 160, 600e6, 12.0
     cell = SPEED_OF_LIGHT / (2 * bandwidth)

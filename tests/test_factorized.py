@@ -4,44 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from cases import image_error, noise_on, straight
 
 import sarcl
 from sarcl import factor_plan, methods, subapertures
-from sarcl.reference.backproject import backproject as exact
 from sarcl.task import make_task
 
-C = 299792458.0
-
-
-def noise_on(tx, rx=None, *, center=9.6e9, bandwidth=300e6, n_samples=96, seed=0, **fields):
-    """White noise in every sample, on any track."""
-    random = np.random.default_rng(seed)
-    shape = (len(tx), n_samples)
-    samples = random.standard_normal(shape) + 1j * random.standard_normal(shape)
-    back = tx if rx is None else rx
-    return sarcl.PhaseHistory(
-        samples.astype(np.complex64),
-        frequency=center - bandwidth / 2,
-        frequency_step=bandwidth / n_samples,
-        tx=tx,
-        rx=rx,
-        reference_range=(np.linalg.norm(tx, axis=1) + np.linalg.norm(back, axis=1)) / 2,
-        **fields,
-    )
-
-
-def straight(n, aperture=60.0, distance=10e3, squint=0.0):
-    """A straight flight line, its middle `squint` rad from broadside."""
-    y = aperture * (np.arange(n) / (n - 1) - 0.5) + distance * 0.7 * np.tan(squint)
-    return np.stack([np.full(n, -0.7 * distance), y, np.full(n, 0.714 * distance)], axis=1)
-
-
-def error_of(image, raw, wrap=False, most=300):
-    """L2 error at up to `most` random pixels, relative as the accuracy contract says."""
-    at = np.random.default_rng(5).choice(image.data.size, min(most, image.data.size), replace=False)
-    wanted, norm = exact(raw, image.grid.positions.reshape(-1, 3)[at], wrap=wrap)
-    got = np.asarray(image.data).ravel()[at]
-    return float(np.linalg.norm(got - wanted) / max(np.linalg.norm(wanted), norm))
+SLOW = pytest.mark.slow
 
 
 def check(raw, grid, tolerance, *, device=None, **options):
@@ -50,7 +19,7 @@ def check(raw, grid, tolerance, *, device=None, **options):
         raw, grid, tolerance=tolerance, method="factorized", device=device, check=False, **options
     )
     assert image.report.plan["method"] == "factorized"
-    error = error_of(image, raw, wrap=options.get("wrap", False))
+    error = image_error(image, raw, most=150, wrap=options.get("wrap", False))
     assert error <= image.report.predicted_error <= tolerance
     return image
 
@@ -58,17 +27,17 @@ def check(raw, grid, tolerance, *, device=None, **options):
 GRID = sarcl.ImageGrid.plane(shape=(150, 170), spacing=0.25)
 
 
-@pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3])
+@pytest.mark.parametrize("tolerance", [pytest.param(1e-1, marks=SLOW), 1e-2, 1e-3])
 def test_contract_on_every_device(device, tolerance):
     check(noise_on(straight(400)), GRID, tolerance, device=device)
 
 
-@pytest.mark.parametrize("squint", [0.5, 1.0])
+@pytest.mark.parametrize("squint", [pytest.param(0.5, marks=SLOW), 1.0])
 def test_squint(squint):
     check(noise_on(straight(400, squint=squint)), GRID, 1e-2)
 
 
-@pytest.mark.parametrize("distance", [300.0, 10e3, 800e3])
+@pytest.mark.parametrize("distance", [300.0, pytest.param(10e3, marks=SLOW), 800e3])
 def test_error_does_not_depend_on_the_range(distance):
     check(noise_on(straight(400, aperture=6e-3 * distance, distance=distance)), GRID, 1e-2)
 

@@ -18,14 +18,6 @@ from sarcl.reference.backproject import backproject as exact_image
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(9, 11), spacing=(0.9, 0.7))
 
 
-@pytest.fixture
-def double(device):
-    """Every device that has float64; the others are refused, as a test of its own says."""
-    if not device.info.fp64:
-        pytest.skip("no float64")
-    return device
-
-
 @pytest.mark.parametrize("distance", [1.0, 30.0, 10e3, 800e3, 36e6])
 @pytest.mark.parametrize("tolerance, bistatic", [(1e-7, False), (1e-8, True), (1e-9, False), (1e-9, True)])
 def test_error_is_below_prediction_and_prediction_below_tolerance(double, distance, tolerance, bistatic):

@@ -23,13 +23,6 @@ PAIRS = {
 }
 
 
-@pytest.fixture
-def double(device):
-    if not device.info.fp64:
-        pytest.skip("no float64")
-    return device
-
-
 def probe(device, monkeypatch, body, inputs, n_out, header="precise_pairs.clh", **macros):
     """Run `body` on VW lanes of every input at once; returns (n_out, n) float64."""
     lanes = device.info.vector_width

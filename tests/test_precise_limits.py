@@ -20,14 +20,6 @@ from sarcl.reference.backproject import backproject as exact_image
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(9, 11), spacing=(0.9, 0.7))
 
 
-@pytest.fixture
-def double(device):
-    """Every device that has float64; the others are refused, as a test of its own says."""
-    if not device.info.fp64:
-        pytest.skip("no float64")
-    return device
-
-
 def test_wrap_repeats_the_window(double):
     raw = noise_history(n_rows=9, n_samples=16)
     for center in ((9, 0, 0), (5e3, 0, 0)):
