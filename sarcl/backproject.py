@@ -10,7 +10,8 @@ from typing import Any, overload
 import numpy as np
 
 from . import planning
-from .check import ToleranceMissed, choice, count, instance, number
+from .check import ToleranceMissed, choice, count, instance
+from .check import tolerance as allowed_error
 from .crew import BLOCKS_EACH, Crew, Local, open_devices
 from .grid import ImageGrid
 from .image import Image
@@ -93,7 +94,7 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
     choice("method", method, METHODS)
-    tolerance = number("tolerance", tolerance, above=0)
+    tolerance = allowed_error(tolerance)
     piece = _piece(tile, resume, out)
     task = make_task(raw, grid, window, weights, wrap, skip, beam)
     crew, chosen = _crew(task, method, tolerance, device, cluster, max_bytes)

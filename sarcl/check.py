@@ -97,6 +97,14 @@ def number(name: str, value: Any, *, above: float | None = None, least: float | 
     return out
 
 
+def tolerance(value: Any) -> float:
+    """`value` as a relative error an image or echoes may have: above 0 and below 1."""
+    out = number("tolerance", value, above=0)
+    if out >= 1:
+        raise ValueError(f"tolerance is {out:g}; an error of 1 is no image at all: give less, such as 1e-1")
+    return out
+
+
 def count(name: str, value: Any, least: int = 1) -> int:
     """Return `value` as an int of at least `least`; a float with a fraction is refused."""
     try:

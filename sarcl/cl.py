@@ -130,6 +130,7 @@ def open_device(choice: Any = None) -> Device:
     """The device to use: `choice`, else SARCL_DEVICE, else the GPU with most compute units, else a CPU.
 
     choice  a Device (returned as it is), an index, "cpu", "gpu", or any part of a platform's or device's name.
+    SARCL_DEVICE may name several, for `backproject` ("all", or "0,1"): here the first of them that works.
     NoDeviceError lists what there is when nothing works or nothing matches. Never asks.
     """
     if isinstance(choice, Device):
@@ -140,8 +141,10 @@ def open_device(choice: Any = None) -> Device:
     working = [(info, raw) for info, raw in _probe() if info.works]
     if not working:
         raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
-    if choice is not None:
-        matching = [(i, raw) for i, raw in working if _matches(i, choice)]
+    if choice is not None and not (source == "SARCL_DEVICE" and choice.strip().lower() == "all"):
+        names = [n for n in choice.split(",") if n.strip()] if source == "SARCL_DEVICE" else [choice]
+        each = ([(i, raw) for i, raw in working if _matches(i, name)] for name in names)
+        matching = next((found for found in each if found), [])
         if not matching:
             raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
         working = matching

@@ -40,15 +40,15 @@ def devices(args: argparse.Namespace, job: Job) -> int:
     """Print the table of devices, the one in use marked; 3 where none works."""
     import sarcl
 
-    from .cl import open_device
+    from .crew import open_devices
     from .device_table import device_table
 
     found = sarcl.devices()
     works = any(d.works for d in found)
     try:
-        print(device_table(found, open_device().info.index))
+        print(device_table(found, [d.info.index for d in open_devices(None)]))
     except sarcl.NoDeviceError as exc:
-        print(device_table(found, None))
+        print(device_table(found, []))
         print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
     return 0 if works else 3
 
@@ -131,7 +131,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
     how["beam"] = None if args.beam is None else math.radians(args.beam)
     if args.dry_run:
-        print(sarcl.plan(raw, grid, **how, device=devices[0].info.index))
+        print(sarcl.plan(raw, grid, **how, device=devices))
         return 0
     _focus(
         lambda out: sarcl.backproject(

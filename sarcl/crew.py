@@ -76,7 +76,7 @@ def listed(choice: Any) -> list[Any]:
     if isinstance(choice, str) and choice.strip().lower() == "all":
         return [info.index for info in cl.devices() if info.works] or [None]
     if isinstance(choice, str) and "," in choice:
-        return [name.strip() for name in choice.split(",")]
+        return [name.strip() for name in choice.split(",") if name.strip()]
     return list(choice) if isinstance(choice, (list, tuple)) else [choice]
 
 

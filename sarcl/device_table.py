@@ -8,13 +8,13 @@ from typing import Any
 HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory", "largest buffer")
 
 
-def device_table(devices: Sequence[Any], picked: int | None) -> str:
-    """`sarcl.devices()` as a table, a star at the index `picked`, the reason under what does not work."""
+def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:
+    """`sarcl.devices()` as a table, a star at the indices `picked`, the reason under what does not work."""
     from .cl import size_text
 
     rows = [HEAD]
     for d in devices:
-        mark = "*" if d.index == picked else ""
+        mark = "*" if d.index in picked else ""
         yes = ["yes" if v else "no" for v in (d.works, d.fp64)]
         rows.append((mark, str(d.index), d.name, d.platform, d.kind, *yes, str(d.vector_width),
                      size_text(d.memory), size_text(d.max_alloc)))  # fmt: skip
@@ -23,6 +23,6 @@ def device_table(devices: Sequence[Any], picked: int | None) -> str:
     for n, d in reversed(list(enumerate(devices, 1))):
         if not d.works:
             lines.insert(n + 1, f"{'':{widths[0] + widths[1] + 4}}does not work: {d.why}")
-    if picked is not None:
+    if picked:
         lines += ["", "* is used unless --device or SARCL_DEVICE names another"]
     return "\n".join(lines) if devices else "no OpenCL device"

@@ -70,6 +70,9 @@ class Direct:
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs of bands whose accumulators fit in their share of nbytes; a band that is alone may be larger."""
         most, tiling = self._tiles_at_once(nbytes) * self.tiling.per_tile, self.tiling
+        if tiling.grid.is_plane:  # all bands are alike
+            step = max(1, most // tiling.pixels(0, 1))
+            return [(a, min(a + step, tiling.n_bands)) for a in range(0, tiling.n_bands, step)]
         blocks, first = [], 0
         for band in range(tiling.n_bands):
             if band > first and tiling.pixels(first, band + 1) > most:

@@ -8,7 +8,8 @@ from typing import Any
 import numpy as np
 
 from . import cl, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, number, sealed
+from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, sealed
+from .check import tolerance as allowed_error
 from .geometry import Antennas
 from .phase_history import PhaseHistory
 from .planning import Clock, Plan
@@ -72,7 +73,7 @@ def echo(
     seed = count("seed", seed, 0)
     opened = cl.open_device(device)
     choice("polarization", polarization, ("HH", "VV"))
-    tolerance = number("tolerance", tolerance, above=0)
+    tolerance = allowed_error(tolerance)
     skips = planning.skips(skip, SKIPS)
     rx = _receiver(track, receiver)
     tx = track.positions

@@ -27,6 +27,7 @@ LEAF_COST = {64: 0.35, 32: 0.45, 16: 0.8}  # of a contribution to a leaf of that
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)
 TRIES = 8  # candidates worked out in full
+THINNEST = 4096  # pulses a node at most: more would save nothing
 GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may touch
 
 
@@ -115,7 +116,7 @@ class _Case:
         if grid.is_plane:
             assert grid.x_axis is not None and grid.y_axis is not None
             self.axes = np.stack([grid.x_axis, grid.y_axis])
-            self.points = line_plan.corners(grid)
+            self.points = line_plan.outline(grid)
             assert grid.spacing is not None
             pixel, self.largest = float(np.hypot(*grid.spacing)), max(grid.shape)
             self.leaves = {side: side / 2 * pixel for side in (LEAF_COST if lines else (32, 16))}
@@ -152,11 +153,11 @@ class _Case:
         sources, total, spaced, thins = float(n_rows), 0.0, 1.0, []
         for side in chain:
             radius = self.leaves[chain[-1]] * side / chain[-1]
-            thin = int(min(1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced), max(1, sources // 2)))
+            thin = int(min(1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced), max(1, sources // 2), THINNEST))
             if thin < 2:
                 return None
             thins.append(thin)
-            total += size / side**2 * sources * _moved(2 * radius * sigma + 2 * GUARD, taps, nodes)
+            total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, nodes)
             sources, spaced = sources / thin + nodes, spaced * thin
         leaf = LEAF_COST[chain[-1]] if self.lines else accuracy.TAP_COST[taps] + 0.1
         return total + size * sources * leaf + n_rows * PROFILE * spacing * self.task.raw.n_samples, thins
@@ -181,7 +182,7 @@ class _Case:
         for radius, thin in zip(radii, thins, strict=True):
             while True:
                 thinned_out = thinned(source, thin, nodes, fine)
-                worst = max(filter_error(source, thinned_out, p, radius, self.highest, self.axes) for p in self.points)
+                worst = filter_error(source, thinned_out, self.points, radius, self.highest, self.axes)
                 if worst <= 1.3 * share or thin <= 2:
                     break
                 thin = max(2, int(thin * 0.75))
@@ -203,9 +204,10 @@ class _Case:
         sources = [raw.n_rows, *(len(v.thinning.nodes) for v in levels)]
         cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * PROFILE * spacing * raw.n_samples
         for v, n in zip(levels, sources, strict=False):
-            cost += grid.size / v.side**2 * n * _moved(2 * v.reach, taps, nodes)
+            cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, nodes)
         return FactorPlan(
-            levels, factors, first, between, length, leaf, edge, error + leaf.predicted_error,
+            levels, factors, first, between, length, leaf, edge,
+            max(error + leaf.predicted_error, edge.predicted_error),  # a row is merged into a tile or added directly
             cost / (raw.n_rows * grid.size), self.order,
         ), tiling  # fmt: skip
 
@@ -256,7 +258,7 @@ class _Case:
         )  # fmt: skip
 
 
-def _moved(samples: float, taps: int, nodes: int) -> float:
+def moving_cost(samples: float, taps: int, nodes: int) -> float:
     """Cost of a pulse moved to a new tile and spread over nodes."""
     return samples * (taps * MOVE_TAP + nodes * MOVE_NODE) + SHIFT
 

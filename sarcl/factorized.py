@@ -7,6 +7,7 @@ About the centre of a small tile, what its pixels see changes slowly from pulse 
 
 from __future__ import annotations
 
+import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -17,6 +18,7 @@ from . import cl, profiles
 from .check import SPEED_OF_LIGHT
 from .direct import Direct
 from .factor_plan import GUARD, FactorPlan, Level, leaf_antennas
+from .factor_room import Room
 from .geometry import Tiles
 from .passes import Placed, pass_of
 from .planning import Clock
@@ -25,8 +27,6 @@ from .task import Task, tally
 from .tiling import GridTiling
 from .tree import Tree, tree_of
 
-ROWS = 256  # rows a block of the first level
-AT_ONCE = 16e6  # bytes of profiles below the first level at a time on a CPU: they stay in its caches
 SPAN = 32  # vectors of a profile a work-item
 
 
@@ -84,6 +84,15 @@ class Factorized:
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas.tx), self.lanes)
             self.nodes.append((device.upload(packed), packed.shape[2], len(antennas.tx)))
         self.strides = [self._stride(v) for v in plan.levels]
+        # a tile that lies in the window may reach beyond it with what its profiles have to spare
+        top = plan.levels[0]
+        sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
+        self.pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
+        self.source_stride = plan.length + 2 * self.pad
+        self.room = Room(
+            plan, tiling, task.raw.n_rows, self.strides, self.source_stride, self.nodes[-1][1], self.leaves.components,
+            device.info.max_alloc, device.is_cpu,
+        )  # fmt: skip
 
     def _stride(self, level: Level) -> int:
         """Complex samples of a profile of this level: whole vectors."""
@@ -91,98 +100,123 @@ class Factorized:
         return -(-(2 * level.reach + 1) // whole) * whole
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs of bands, whole tiles of the first level, whose profiles there fit in half of nbytes."""
-        tiling, level = self.tiling, self.plan.levels[0]
-        high = self.plan.factors[0] if tiling.grid.is_plane else 1
-        least = 8 * (self.plan.length + 4 * GUARD) * 16
-        if least > nbytes / 8:
-            raise MemoryError(
-                f"max_bytes is {cl.size_text(nbytes)} but 16 rows' range profiles need {cl.size_text(least)}, an "
-                f"eighth of it at most; give max_bytes={8 * least:.2g} or more"
-            )
-        blocks, first = [], 0
-        while first < tiling.n_bands:
-            last = min(first + high, tiling.n_bands)
-            while last < tiling.n_bands and self._bytes(level, first, min(last + high, tiling.n_bands)) <= nbytes / 2:
-                last = min(last + high, tiling.n_bands)
-            blocks.append((first, last))
-            first = last
-        return blocks
+        """Runs of bands to be made with nbytes on the device; see `Room.blocks`."""
+        return self.room.blocks(nbytes)
+
+    def working(self, nbytes: float) -> float:
+        """Bytes that `fill` takes for the first block, about, when it is given nbytes."""
+        return self.room.working(nbytes)
 
     @property
     def least_pixels(self) -> int:
         """Making a row's profile anew for every block costs as much as this many pixels, ten times over."""
         return 1000 * self.plan.length
 
-    def _bytes(self, level: Level, first: int, last: int) -> float:
-        """Of the first level's profiles and the pixels of these bands, about."""
-        tiles = self.tiling.pixels(first, last) / self.tiling.per_tile / self.plan.factors[0] ** 2
-        return tiles * level.n_bytes(self.strides[0]) + 24 * self.tiling.pixels(first, last)
-
     def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
         """Focus bands first ... last - 1 into `flat`; see task.Engine."""
-        device, tiling = self.device, self.tiling
-        tree = tree_of(tiling, first, last, self.plan.factors)
-        leaves = tree.leaves
-        image = device.zeros(16 * leaves.n_tiles * tiling.per_tile)
+        tiling, n_rows = self.tiling, self.task.raw.n_rows
+        skipped, done, of = 0, 0, tiling.pixels(first, last)
+
+        def part_of(pixels: int) -> Callable[[float], None]:
+            return lambda rows: tick((done * n_rows + rows * pixels) / of)
+
+        if not tiling.grid.is_plane:
+            tree = tree_of(tiling, first, last, self.plan.factors)
+            n = len(tree.centers[0])
+            sight, sizes = self._look(_top_of(tree.centers[0]), first, last), tiling.tile_sizes(first, last)
+            values, most = (
+                np.empty((tree.leaves.n_tiles, tiling.per_tile), np.complex64),
+                max(1, self.room.most(budget)),
+            )
+            for low in range(0, n, most):
+                tops = np.arange(low, min(low + most, n))
+                at = slice(*(tree.leaves_of(t)[i] for i, t in enumerate(tops[[0, -1]])))
+                pixels = (at.stop - at.start) * tiling.per_tile
+                some = _some_of(tree, low, tops[-1] + 1)
+                image, missed = self._sums(some, _seen(sight, tops), budget, clock, part_of(pixels))
+                sums = self.device.download(image, np.empty((4, pixels), np.float32))
+                values[at] = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(-1, tiling.per_tile)
+                skipped += tally(missed, sizes[at])
+                done += pixels
+            tiling.place(values.ravel(), first, last, tiling.bands(first, last)[1], flat)
+            clock.lap("write")
+            return skipped
+        factor, lines = self.plan.factors[0], (0, 0)
+        wide = -(-tiling.across // factor)
+        for a, b, left, right in self.room.parts(first, last, budget):
+            before, lines = lines, (a // factor, -(-b // factor))
+            if lines != before:
+                sight = self._look(_top_of(self._centers(*lines)), a, b)
+            part = _columns(tiling, left, right)
+            tree, pixels = tree_of(part, a, b, self.plan.factors), part.pixels(a, b)
+            down, over = np.arange(lines[1] - lines[0]), np.arange(left // factor, -(-right // factor))
+            seen = _seen(sight, (down[:, None] * wide + over).ravel())
+            image, missed = self._sums(tree, seen, budget, clock, part_of(pixels))
+            made = part.download(self.device, image, a, b, tree.slot)
+            at = slice(left * tiling.wide, left * tiling.wide + made.shape[1])
+            flat[a * tiling.high : a * tiling.high + len(made), at] = made
+            skipped += tally(missed, part.tile_sizes(a, b)[tree.slot])
+            done += pixels
+            clock.lap("write")
+        return skipped
+
+    def _sums(
+        self, tree: Tree, sight: Sight, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> tuple[Any, np.ndarray]:
+        """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
+        device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
+        image = device.zeros(16 * leaves.n_tiles * self.tiling.per_tile)
         down = _Descent(tree, image, [device.upload(cl.wide(c.T)) for c in tree.centers],
                         [None, *(device.upload(p) for p in tree.parents)], self.leaves.ready(leaves, 0))  # fmt: skip
-        sight = self._look(tree, first, last)
         count = np.array([[reason in self.whole.skips] for reason in ("range window", "beam")])
-        missed = sight.missed * count
+        n_tops = len(tree.centers[0])
+        each = [b - a for a, b in map(tree.leaves_of, range(n_tops))]
+        missed = np.repeat(sight.missed, each, axis=1) * count
         clock.lap("prepare")
         # directly first: the sums are put in place, and what is merged is added to them
         for tops, rows in sight.directly:
-            picked, skipped = self._add_directly(down, tops, rows, budget, clock)
+            picked, skipped = self._add_directly(down, tops, rows, budget / 2, clock)
             missed[:, picked] += skipped
-        for low, high in self._batches(sight.merged, budget):
+        step, within, below = self.room.at_once(tree, budget)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], sight.merged, [False]])))
+        for low, high in edges.reshape(-1, 2).tolist():
             gathered = device.zeros(8 * (high - low) * self.nodes[0][2] * self.strides[0])
-            self._gather(down, low, high, sight.left_out, gathered, budget, clock, tick)
-            step = self._at_once(tree, budget)
+
+            def rows_done(rows: float, low: int = low, high: int = high) -> None:
+                tick((low * n_rows + (high - low) * rows / 2) / n_tops)
+
+            self._gather(down, low, high, sight.left_out, gathered, budget, clock, rows_done)
+            queued = 0.0
             for top in range(low, high, step):
-                self._descend(down, 0, top, min(top + step, high), gathered, low)
+                self._descend(down, 0, top, min(top + step, high), gathered, low, within)
+                queued += step * below
+                if queued > budget / 8:  # what is queued holds its profiles
+                    device.finish()
+                    queued = 0.0
             device.finish()
             clock.lap("backproject")
-        tick(self.task.raw.n_rows)
-        sizes = tiling.tile_sizes(first, last)
-        if tiling.grid.is_plane:
-            made = tiling.download(device, image, first, last, tree.slot)
-            flat[first * tiling.high : first * tiling.high + len(made)] = made
-        else:
-            sums = device.download(image, np.empty((4, leaves.n_tiles * tiling.per_tile), np.float32))
-            values = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).astype(np.complex64)
-            tiling.place(values, first, last, tiling.bands(first, last)[1], flat)
-        clock.lap("write")
-        return tally(missed, sizes[tree.slot])
+        tick(n_rows)
+        return image, missed
+
+    def _centers(self, low: int, high: int) -> np.ndarray:
+        """Centres of lines low ... high - 1 of a plane's tiles of the first level, m (n, 3), those of its trees."""
+        tiling, factor = self.tiling, self.plan.factors[0]
+        if factor == 1:
+            return tiling.bands(low, high)[0].references
+        rows = (np.arange(low, high) + 0.5) * factor * tiling.high
+        columns = (np.arange(-(-tiling.across // factor)) + 0.5) * factor * tiling.wide
+        return np.asarray(tiling.grid.at(rows[:, None], columns).reshape(-1, 3) - tiling.center)
 
     def _look(self, tree: Tree, first: int, last: int) -> Sight:
-        """How rows see the largest tiles of bands first ... last - 1."""
-        tiling, plan = self.tiling, self.plan
-        if tiling.grid.is_plane:
-            line_of = (first + tree.slot // tiling.across) // plan.factors[0]
+        """How rows see tiles of the first level of bands first ... last - 1, whole lines of them in a plane."""
+        plan, factor = self.plan, self.plan.factors[0]
+        if self.tiling.grid.is_plane:
+            line_of = np.repeat(range(first // factor, -(-last // factor)), -(-self.tiling.across // factor))
         else:
-            bands = range(first, last)
-            line_of = np.repeat(bands, [tiling.pixels(b, b + 1) // tiling.per_tile for b in bands])
-        first_leaf = np.array([tree.leaves_of(top)[0] for top in range(len(tree.centers[0]))])
+            line_of = np.repeat(range(first, last), [self.room.tops(b, b + 1) for b in range(first, last)])
         # merging costs the same for any number of rows
         least = self.task.raw.n_rows * plan.cost / plan.edge.cost
-        return look(self.antennas, tree, tiling, plan.levels[0].radius, line_of[first_leaf], least)
-
-    def _batches(self, whole: np.ndarray, budget: float) -> Iterator[tuple[int, int]]:
-        """Runs of whole tiles whose profiles fit in half the budget."""
-        most = max(1, int(budget / 2 // self.plan.levels[0].n_bytes(self.strides[0])))
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], whole, [False]])))
-        for begin, end in edges.reshape(-1, 2):
-            for low in range(begin, end, most):
-                yield low, min(low + most, int(end))
-
-    def _at_once(self, tree: Tree, budget: float) -> int:
-        """Largest tiles whose profiles below the first level are made at a time."""
-        below = sum(
-            len(c) / len(tree.centers[0]) * v.n_bytes(n)
-            for c, v, n in zip(tree.centers[1:], self.plan.levels[1:], self.strides[1:], strict=True)
-        )
-        return max(1, int(min(AT_ONCE if self.device.is_cpu else budget / 8, budget / 8) // max(below, 1)))
+        return look(self.antennas, tree, self.tiling, plan.levels[0].radius, line_of, least)
 
     def _add_directly(
         self, down: _Descent, tops: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
@@ -197,10 +231,7 @@ class Factorized:
             task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
         picked = np.concatenate([np.arange(*tree.leaves_of(top)) for top in tops])
         engine = Direct(self.device, task, self.plan.edge, self.tiling)
-        some = Tiles(
-            self.tiling.per_tile, tree.leaves.references[picked], tree.leaves.radius[picked],
-            tree.leaves.tile_offsets(picked), tree.leaves.shared,
-        )  # fmt: skip
+        some = _picked(tree.leaves, picked)
         image, missed = engine.add_up(some, budget, clock, lambda rows: None)
         copy = self.device.kernel("untile.cl", "move")
         where = self.device.upload(picked.astype(np.int32))
@@ -222,21 +253,17 @@ class Factorized:
         """
         device, plan, task = self.device, self.plan, self.task
         level, raw = plan.levels[0], task.raw
-        sigma = 2 * float(raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
-        # a tile that lies in the window may reach beyond it with what its profiles have to spare
-        spare = level.reach - (0 if task.wrap else int(level.radius * sigma))
-        pad = min(spare + 2 * GUARD, plan.length)
-        stride = plan.length + 2 * pad
+        stride = self.source_stride
         shifts, merge = self.merges[0]
         tops, centers = len(down.tree.centers[0]), down.centers[0]
         nowhere = device.upload(np.zeros(tops, np.int32))
         blocks, n_shift = level.thinning.blocks, 2 + 2 * plan.first.taps
-        rows = min(ROWS, int(budget / 8 // (8 * stride)) // 16 * 16)
+        rows = self.room.rows(budget)
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
             weights = task.row_weight[start:stop, None] * self.sample_weight
             source = device.upload(
-                profiles.from_samples(device, raw.read(start, stop), weights, plan.first, plan.length, pad)
+                profiles.from_samples(device, raw.read(start, stop), weights, plan.first, plan.length, self.pad)
             )
             packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
             pulse, n, used = device.upload(packed), packed.shape[2], stop - start
@@ -265,38 +292,97 @@ class Factorized:
                 )  # fmt: skip
             device.finish()
             clock.lap("backproject")
-            tick(0.5 * stop)
+            tick(stop)
 
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))
 
-    def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int) -> None:
-        """Tiles low ... high - 1 of a level, whose profiles begin with tile `first` in `source`, and all below them."""
+    def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
+        """Tiles low ... high - 1 of a level, whose profiles begin with tile `first` in `source`, and all below them.
+
+        within  bytes that every level below may take at a time
+        """
         device, plan, tree = self.device, self.plan, down.tree
         pulse, n, used = self.nodes[level]
         if level == len(plan.levels) - 1:
             stride = self.strides[level]
-            offset = (low - first) * used * stride
-            self.leaves.add(
-                down.ready, low, high, self.nodes[level], source, stride, plan.levels[level].reach, offset, down.image
-            )
+            for begin, end in _runs(low, high, within / self.room.constants):
+                self.leaves.add(
+                    down.ready, begin, end, self.nodes[level], source, stride, plan.levels[level].reach,
+                    (begin - first) * used * stride, down.image,
+                )  # fmt: skip
+                if end < high:
+                    device.finish()
             return
-        begin, end = int(tree.children[level][low]), int(tree.children[level][high])
         shifts, merge = self.merges[level + 1]
         below, parents = plan.levels[level + 1], down.parents[level + 1]
         nodes, stride = self.nodes[level + 1][2], self.strides[level + 1]
-        made = device.zeros(8 * (end - begin) * nodes * stride)
-        records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
-        device.run(
-            shifts, (n // self.lanes, end - begin), None,
-            pulse, down.centers[level], len(tree.centers[level]), down.centers[level + 1], parents, self.tables[1],
-            n, used, len(tree.centers[level + 1]), begin, below.reach, stride, self.strides[level],
-            plan.levels[level].reach, records,
-        )  # fmt: skip
-        device.run(
-            merge, (self._spans(level + 1), end - begin), None,
-            source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
-            self.blocks_of[level + 1], len(below.thinning.blocks), self.filters[level + 1], below.reach, begin, begin,
-            nodes, stride, made,
-        )  # fmt: skip
-        self._descend(down, level + 1, begin, end, made, begin)
+        children = tree.children[level]
+        whole = int(children[low]), int(children[high])
+        for begin, end in _runs(*whole, within / self.room.tile_bytes(level + 1)):
+            made = device.zeros(8 * (end - begin) * nodes * stride)
+            records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
+            device.run(
+                shifts, (n // self.lanes, end - begin), None,
+                pulse, down.centers[level], len(tree.centers[level]), down.centers[level + 1], parents, self.tables[1],
+                n, used, len(tree.centers[level + 1]), begin, below.reach, stride, self.strides[level],
+                plan.levels[level].reach, records,
+            )  # fmt: skip
+            device.run(
+                merge, (self._spans(level + 1), end - begin), None,
+                source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
+                self.blocks_of[level + 1], len(below.thinning.blocks), self.filters[level + 1], below.reach, begin,
+                begin, nodes, stride, made,
+            )  # fmt: skip
+            self._descend(down, level + 1, begin, end, made, begin, within)
+            if (begin, end) != whole:
+                device.finish()
+
+
+def _runs(low: int, high: int, most: float) -> Iterator[tuple[int, int]]:
+    """low ... high - 1 in runs of `most`, one at least."""
+    step = max(1, int(min(most, high - low)))
+    for begin in range(low, high, step):
+        yield begin, min(begin + step, high)
+
+
+def _columns(tiling: GridTiling, left: int, right: int) -> GridTiling:
+    """Leaves left ... right - 1 across a plane; left is a multiple of the first level's factor."""
+    if (left, right) == (0, tiling.across):
+        return tiling
+    part = copy.copy(tiling)
+    part.across = right - left
+    part.grid = tiling.grid.columns(left * tiling.wide, min(right * tiling.wide, tiling.grid.shape[1]))
+    return part
+
+
+def _top_of(centers: np.ndarray) -> Tree:
+    """Tiles of the first level about `centers`, m (n, 3), and nothing below them."""
+    n = len(centers)
+    return Tree((centers,), (), Tiles(1, centers, np.zeros(n), np.zeros((6, 0), np.float32), True), np.arange(n))
+
+
+def _some_of(tree: Tree, low: int, high: int) -> Tree:
+    """Tiles low ... high - 1 of the first level, and all below them."""
+    centers, children = [tree.centers[0][low:high]], []
+    for below, begins in zip(tree.centers[1:], tree.children, strict=True):
+        children.append(begins[low : high + 1] - begins[low])
+        low, high = int(begins[low]), int(begins[high])
+        centers.append(below[low:high])
+    return Tree(tuple(centers), tuple(children), _picked(tree.leaves, np.arange(low, high)), tree.slot[low:high])
+
+
+def _picked(tiles: Tiles, which: np.ndarray) -> Tiles:
+    """These tiles."""
+    return Tiles(tiles.per_tile, tiles.references[which], tiles.radius[which], tiles.tile_offsets(which), tiles.shared)
+
+
+def _seen(sight: Sight, tops: np.ndarray) -> Sight:
+    """What `sight` says of these tops: the same rows are added directly, whichever neighbours are made with them."""
+    place = np.full(len(sight.merged), -1)
+    place[tops] = np.arange(len(tops))
+    directly = [(mine[mine >= 0], rows) for mine, rows in ((place[t], rows) for t, rows in sight.directly)]
+    return Sight(
+        sight.merged[tops], [sight.left_out[i] for i in tops], [d for d in directly if len(d[0])],
+        sight.missed[:, tops],
+    )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import copy
 import functools
 import time
 from dataclasses import dataclass
@@ -10,7 +11,11 @@ from typing import Any
 import numpy as np
 
 from . import cl, energy, planning
-from .check import choice, instance, number
+from .check import choice, instance
+from .check import tolerance as allowed_error
+from .crew import open_devices
+from .factor_plan import FactorPlan
+from .factor_plan import moving_cost as moving_cost
 from .grid import ImageGrid
 from .methods import METHODS, Choice, choose
 from .phase_history import PhaseHistory
@@ -18,6 +23,7 @@ from .planning import Clock
 from .task import Task, make_task
 
 PROBE = 0.03  # s a probe of a device takes at least
+MOST_BANDS = 2**16  # of which blocks are listed: what the first takes shows in these
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,8 +31,8 @@ class Forecast:
     """What `backproject` would do with the same options.
 
     method           "direct" or "factorized"; plan: the details, as in a report
-    seconds          about, on this device as fast as it is now
-    bytes            of memory, about: pixels in memory and blocks on the device
+    seconds          about, on these devices as fast as they are now
+    bytes            of memory, about: pixels in memory and blocks on every device
     predicted_error  bound of the relative error
     cheaper          (predicted error, seconds) of the next cheaper plan, or None where there is none
     """
@@ -62,52 +68,75 @@ def plan(
 ) -> Forecast:
     """How `backproject(raw, grid, ...)` would make the image with these options: a Forecast, before any work.
 
-    Samples are hardly read: a few rows, to see how much of their energy lies on the grid. Time is scaled from a short
-    run of the device's kernel. ValueError where `backproject` would raise one.
+    Samples are read once, up to 2^28 of them, to see how much of their energy lies on the grid. Time is scaled
+    from a short run of the kernel on each device. ValueError and MemoryError where `backproject` would raise one.
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
     choice("method", method, METHODS)
-    tolerance = number("tolerance", tolerance, above=0)
+    tolerance = allowed_error(tolerance)
     task = make_task(raw, grid, window, weights, wrap, skip, beam)
-    opened = cl.open_device(device)
-    budget = min(planning.budget(opened, max_bytes), opened.info.memory)
-    lanes = opened.info.vector_width > 1
-    chosen = choose(task, method, tolerance, lanes, opened.info.fp64)
-    seen = task.raw.n_rows * (grid.size if task.grid.empty is None else grid.size - int(task.grid.empty.sum()))
-    unit = seen * energy.share(task) / _speed(opened)  # seconds of the pairs that are not skipped, at cost 1
+    devices = open_devices(device)
+    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
+    chosen = choose(task, method, tolerance, lanes, float64)
+    working = sum(_bytes(task, chosen, d, min(planning.budget(d, max_bytes), d.info.memory)) for d in devices)
+    # of a pixel in all rows that see it, at cost 1
+    seconds = float(task.raw.n_rows * energy.share(task) / _rate(devices))
     return Forecast(
         chosen.method,
         chosen.plan.describe(chosen.method),
-        unit * chosen.cost,
-        _bytes(task, chosen, opened, budget),
+        seconds * _work(task, chosen),
+        float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
         chosen.predicted_error,
-        _cheaper(task, method, tolerance, lanes, opened.info.fp64, chosen, unit),
+        _cheaper(task, method, tolerance, lanes, float64, chosen, seconds),
     )
 
 
+def _work(task: Task, chosen: Choice) -> float:
+    """What a row costs: pixels to be made, of tiles that reach beyond the grid too, times the cost of each."""
+    tiling, plan, rows = chosen.tiling, chosen.plan, task.raw.n_rows
+    pixels = float(tiling.pixels(0, tiling.n_bands))
+    if not isinstance(plan, FactorPlan):
+        return pixels * chosen.cost
+    # the plan counts tiles as if they filled the grid
+    sources = [rows, *(len(level.thinning.nodes) for level in plan.levels)]
+    extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
+    for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
+        if tiling.grid.is_plane:
+            tiles = float(-(-tiling.n_bands // factor) * -(-tiling.across // factor))
+        else:
+            tiles = pixels / tiling.per_tile / factor**2
+        moved = moving_cost(2 * level.reach, plan.between.taps, level.thinning.filter.shape[1])
+        extra += max(tiles - task.grid.size / level.side**2, 0.0) * n * moved
+    return task.grid.size * chosen.cost + extra / rows
+
+
+def _rate(devices: list[cl.Device]) -> float:
+    """Contributions a second of all devices together; drivers of the same CPU share its cores."""
+    return sum(_speed(d) for d in devices if not d.is_cpu) + max((_speed(d) for d in devices if d.is_cpu), default=0.0)
+
+
 def _cheaper(
-    task: Task, method: str, tolerance: float, lanes: bool, float64: bool, chosen: Choice, unit: float
+    task: Task, method: str, tolerance: float, lanes: bool, float64: bool, chosen: Choice, seconds: float
 ) -> tuple[float, float] | None:
     """The plan of the smallest error that costs noticeably less."""
     for factor in (2, 3, 10, 30):
         if tolerance * factor < 1:
             other = choose(task, method, tolerance * factor, lanes, float64)
-            if other.cost < 0.95 * chosen.cost:
-                return other.predicted_error, unit * other.cost
+            if _work(task, other) < 0.95 * _work(task, chosen):
+                return other.predicted_error, seconds * _work(task, other)
     return None
 
 
 def _bytes(task: Task, chosen: Choice, device: cl.Device, budget: float) -> float:
-    """Pixels of the whole image, and what the device holds at a time."""
-    pixels = task.grid.size * np.dtype(chosen.dtype).itemsize
-    first, last = chosen.on(device, task).blocks(budget)[0]
-    working = 24.0 * chosen.tiling.pixels(first, last) + 8.0 * chosen.plan.length * 256
-    levels = getattr(chosen.plan, "levels", ())
-    if levels:
-        tiles = chosen.tiling.pixels(first, last) / levels[0].side ** 2
-        working += tiles * levels[0].n_bytes(2 * levels[0].reach + 8)
-    return pixels + min(working, budget)
+    """What a device holds at a time; its budget is kept."""
+    tiling = copy.copy(chosen.tiling)
+    tiling.n_bands = min(tiling.n_bands, MOST_BANDS)
+    engine: Any = chosen.engine(device, task, chosen.plan, tiling)
+    if hasattr(engine, "working"):
+        return min(float(engine.working(budget)), budget)
+    first, last = engine.blocks(budget)[0]
+    return min(24.0 * tiling.pixels(first, last) + 8.0 * chosen.plan.length * 256, budget)
 
 
 @functools.lru_cache(maxsize=16)

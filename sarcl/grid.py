@@ -4,12 +4,15 @@ from __future__ import annotations
 
 import functools
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from . import check
+
+FARTHEST = 1e150  # m: squares of coordinates stay finite
+MOST_NUMBERED = 2**63 - 1  # pixels that have a number
 
 
 @dataclass(frozen=True, eq=False)
@@ -68,13 +71,21 @@ class ImageGrid:
         if np.linalg.norm(x) < 1e-6:
             raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
         x /= np.linalg.norm(x)
-        return cls(
+        made = cls(
             shape=(check.count("shape[0]", rows), check.count("shape[1]", columns)),
             center=center,
             spacing=(check.number("spacing[0]", dy, above=0), check.number("spacing[1]", dx, above=0)),
             x_axis=x,
             y_axis=np.cross(n, x),
         )
+        with np.errstate(over="ignore", invalid="ignore"):
+            far = not (np.abs(made.bounds) < FARTHEST).all()
+        if far:
+            raise ValueError(
+                f"pixels of center {_text(center)} and spacing {_text(made.spacing)} reach beyond {FARTHEST:g} m, "
+                "where distances overflow; give both in metres"
+            )
+        return made
 
     @classmethod
     def points(cls, positions: Any, *, valid: Any = None) -> ImageGrid:
@@ -113,6 +124,18 @@ class ImageGrid:
         mask = np.isnan(self.listed[..., 0])
         return check.sealed(mask) if mask.any() else None
 
+    @functools.cached_property
+    def _middle(self) -> int:
+        """The column that lies at `center`."""
+        return self.shape[1] // 2
+
+    def columns(self, start: int, stop: int) -> ImageGrid:
+        """Columns start ... stop - 1 of a plane, their positions to the bit those they have there."""
+        self._need_plane("columns")
+        part = replace(self, shape=(self.shape[0], stop - start))
+        part.__dict__["_middle"] = self._middle - start
+        return part
+
     def filled(self) -> ImageGrid:
         """The grid with a position that is not empty in every empty cell; itself where there is none."""
         if self.empty is None or self.listed is None:
@@ -124,6 +147,9 @@ class ImageGrid:
     def sample(self, most: int, seed: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         """Up to `most` random pixels, no empty ones: index into an image, and positions, m (n, 3)."""
         random = np.random.default_rng(seed)
+        if self.size > MOST_NUMBERED:  # none is likely to be picked twice
+            index = tuple(random.integers(0, n, most) for n in self.shape)
+            return index, self.at(*index)
         if self.empty is None:
             picked = np.sort(random.choice(self.size, min(most, self.size), replace=False))
         else:
@@ -160,7 +186,7 @@ class ImageGrid:
         self._need_plane("at")
         assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
         i = (np.asarray(row) - self.shape[0] // 2) * self.spacing[0]
-        j = (np.asarray(column) - self.shape[1] // 2) * self.spacing[1]
+        j = (np.asarray(column) - self._middle) * self.spacing[1]
         return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
 
     def index(self, position: Any) -> np.ndarray:
@@ -171,7 +197,7 @@ class ImageGrid:
         )
         d = np.asarray(position, np.float64) - self.center
         row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
-        return np.stack([row, d @ self.x_axis / self.spacing[1] + self.shape[1] // 2], axis=-1)
+        return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
 
     def _need_plane(self, what: str) -> None:
         if not self.is_plane:
@@ -183,9 +209,12 @@ def _cells(positions: np.ndarray) -> np.ndarray:
     empty = np.isnan(positions).all(axis=-1)
     if empty.all():
         raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
-    bad = ~np.isfinite(positions) & ~empty[..., None]
+    bad = ~(np.abs(positions) < FARTHEST) & ~empty[..., None]
     if bad.any():
         at = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        if np.isfinite(positions[at]):
+            where = ", ".join(str(int(i)) for i in at)
+            raise ValueError(f"positions[{where}] is {positions[at]:g} m, where distances overflow; give metres")
         raise ValueError(
             f"positions[{', '.join(str(int(i)) for i in at)}] is {positions[at]}; give finite positions, and NaN in "
             "all three coordinates of a cell that is empty"

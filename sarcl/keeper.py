@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import logging
+import math
 import time
 from collections.abc import Iterator
 from typing import Any
@@ -11,6 +12,7 @@ import numpy as np
 
 from . import fingerprint
 from .files import paths, store
+from .files.hdf5 import BLOCK_BYTES
 from .image import Image
 from .methods import Choice
 from .pieces import Pieces, Run, discard, folder_of, gaps
@@ -21,6 +23,16 @@ log = logging.getLogger(__name__)
 
 PERIOD = 1.0  # s; a run that is over sooner leaves no files
 WORTH = 60.0  # s of work that are kept when a run fails or is interrupted, unless resume=True
+
+
+def _parts(flat: Any, at: slice) -> Iterator[np.ndarray]:
+    """Rows `at` of Target.flat, or all of a Strip, some at a time: they may lie in a file."""
+    if hasattr(flat, "values"):
+        yield flat.values
+        return
+    step = max(1, int(BLOCK_BYTES // (np.dtype(flat.dtype).itemsize * max(1, math.prod(flat.shape[1:])))))
+    for start in range(at.start, at.stop, step):
+        yield flat[start : min(start + step, at.stop)]
 
 
 class Keeper:
@@ -80,7 +92,7 @@ class Keeper:
         try:
             pieces = self.pieces or self._open()
             for a, b, n in self._waiting:
-                pieces.save(a, b, flat.values if hasattr(flat, "values") else flat[extent(self.chosen.tiling, a, b)], n)
+                pieces.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b)), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise

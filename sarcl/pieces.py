@@ -13,7 +13,8 @@ import os
 import re
 import secrets
 import struct
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
+from itertools import chain
 from pathlib import Path
 from typing import Any
 
@@ -76,16 +77,16 @@ class Pieces:
             end = b
             yield (a, b), values, skipped
 
-    def save(self, first: int, last: int, values: np.ndarray, skipped: int) -> None:
-        """Put the pixels of bands first ... last - 1 in a file, whole or not at all."""
+    def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: int) -> None:
+        """Put the pixels of bands first ... last - 1, given in parts, in a file, whole or not at all."""
         head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": int(skipped)}
         text = json.dumps(head).encode()
         check = checker()
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
         try:
             with open(temporary, "wb") as file:
-                payload: Any = as_bytes(values.astype(self.dtype, copy=False))
-                for part in (MAGIC, struct.pack("<Q", len(text)), text, payload):
+                start: tuple[Any, ...] = (MAGIC, struct.pack("<Q", len(text)), text)
+                for part in chain(start, (as_bytes(p.astype(self.dtype, copy=False)) for p in parts)):
                     file.write(part)
                     check.update(part)
                 file.write(check.digest())

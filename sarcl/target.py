@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from contextlib import ExitStack
 from typing import Any
 
@@ -18,11 +19,12 @@ class Target:
 
     def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
         self.grid, self.writer = grid, None
+        self.data: Any
         if out is None:
             nbytes = float(grid.size * np.dtype(dtype).itemsize)
             try:
                 self.data = np.empty(grid.shape, dtype)
-            except MemoryError:
+            except (MemoryError, ValueError):  # the latter where sizes overflow
                 raise MemoryError(
                     f"an image of {' x '.join(map(str, grid.shape))} needs {size_text(nbytes)} of memory; "
                     'take a smaller shape, or out="image.h5" to make it in a file'
@@ -34,6 +36,7 @@ class Target:
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data
         else:
+            _check_array(out)
             if tuple(out.shape) != tuple(grid.shape) or np.dtype(out.dtype).kind != "c":
                 raise ValueError(f"out has shape {out.shape} and type {out.dtype}, wanted complex of {grid.shape}")
             if np.dtype(out.dtype).itemsize < np.dtype(dtype).itemsize:
@@ -70,8 +73,25 @@ class Strip:
 
 
 def is_path(out: Any) -> bool:
-    """True for the name of a file."""
-    return isinstance(out, str) or hasattr(out, "__fspath__")
+    """True for the name of an image's file; ValueError for one that does not end in .h5 or .hdf5."""
+    if not isinstance(out, str) and not hasattr(out, "__fspath__"):
+        return False
+    name = os.fspath(out)
+    if not isinstance(name, str) or not name.lower().endswith((".h5", ".hdf5")):
+        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in .h5")
+    return True
+
+
+def _check_array(out: Any) -> None:
+    """TypeError unless `out` is an array or a file's dataset, ValueError unless it can be written to."""
+    if not all(hasattr(out, name) for name in ("shape", "dtype", "__setitem__")):
+        what = f"{' '.join(repr(out).split()):.40} ({type(out).__name__})"
+        raise TypeError(f'out is {what}; wanted None, a complex array of the grid\'s shape, or a path like "image.h5"')
+    file = getattr(out, "file", None)
+    if isinstance(out, np.ndarray) and not out.flags.writeable:
+        raise ValueError("out is a read-only array; give one that can be written to (a memmap: mode='r+')")
+    if file is not None and getattr(file, "mode", "r+") == "r":
+        raise ValueError(f"out is a dataset of {file.filename!r}, which is open for reading; open it with mode 'r+'")
 
 
 def row_shape(grid: ImageGrid) -> tuple[int, ...]:

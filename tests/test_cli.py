@@ -145,7 +145,7 @@ def record(**changes):
 
 def test_devices_marks_the_one_in_use_and_says_why_others_do_not_work():
     broken = record(index=1, name="gpu-y", kind="gpu", works=False, fp64=False, why="unknown target CPU")
-    lines = device_table([record(), broken], picked=0).splitlines()
+    lines = device_table([record(), broken], picked=[0]).splitlines()
     assert lines[1].startswith("*  0  cpu-x") and "6 GB" in lines[1] and "2 GB" in lines[1]
     assert lines[2].startswith("   1  gpu-y") and lines[3].strip() == "does not work: unknown target CPU"
 

@@ -131,8 +131,56 @@ def test_devices_are_named_in_lists_as_alone(monkeypatch):
     assert open_devices(working[0]) == open_devices([working[0]]) == open_devices(first) == [first]
     assert open_devices("all") == open_devices(working) == [cl.open_device(i) for i in working]
     assert open_devices(",".join(map(str, working))) == open_devices("all")
+    assert open_devices(",".join(map(str, working)) + ", ,") == open_devices("all")  # commas too many
     monkeypatch.setenv("SARCL_DEVICE", "all")
     assert open_devices(None) == open_devices("all")
+
+
+def test_what_uses_one_device_takes_the_first_of_a_list_that_works(raw, monkeypatch, capsys):
+    from sarcl.cli import main
+
+    working = [info.index for info in cl.devices() if info.works]
+    first = cl.open_device(working[0])
+    every, one = ",".join(map(str, working)), f"{working[0]},"
+    for names, wanted in (("all", cl.open_device()), (every, first), (one, first), (f" , nothing, {one}", first)):
+        monkeypatch.setenv("SARCL_DEVICE", names)
+        assert cl.open_device() is wanted
+        if "nothing" not in names:  # what takes several wants them all
+            assert main(["devices"]) == 0
+            starred = [line.split()[1] for line in capsys.readouterr().out.splitlines() if line.startswith("*  ")]
+            assert str(wanted.info.index) in starred
+    monkeypatch.setenv("SARCL_DEVICE", "nothing, no such device")
+    with pytest.raises(sarcl.NoDeviceError, match="SARCL_DEVICE 'nothing, no such device' matches no"):
+        cl.open_device()
+    with pytest.raises(sarcl.NoDeviceError, match="device '0,1' matches no"):  # in a call a list is a list
+        cl.open_device("0,1")
+
+
+def test_forecasts_are_for_all_devices(raw, pair, monkeypatch):
+    one, both = (sarcl.plan(raw, GRID, method="direct", device=d) for d in (pair[0], pair))
+    assert one.plan == both.plan
+    pixels = GRID.size * 8
+    other = sarcl.plan(raw, GRID, method="direct", device=pair[1])
+    assert both.bytes - pixels == pytest.approx(one.bytes + other.bytes - 2 * pixels)
+    assert both.seconds <= 1.01 * one.seconds
+    monkeypatch.setenv("SARCL_DEVICE", "all")
+    every = sarcl.plan(raw, GRID, method="direct")
+    monkeypatch.setenv("SARCL_DEVICE", ",".join(str(i.index) for i in cl.devices() if i.works) + ",")
+    assert sarcl.plan(raw, GRID, method="direct").bytes == every.bytes
+
+
+def test_cpus_add_up_to_the_fastest_of_them_and_others_to_all(pair, monkeypatch):
+    from dataclasses import replace
+
+    from sarcl import forecast
+
+    def device(kind):
+        return cl.Device(replace(pair[0].info, kind=kind), pair[0]._raw)
+
+    speeds = {device("cpu"): 1.0, device("cpu"): 3.0, device("gpu"): 10.0, device("gpu"): 20.0}
+    monkeypatch.setattr(forecast, "_speed", speeds.__getitem__)
+    assert forecast._rate(list(speeds)) == 33.0
+    assert forecast._rate([d for d in speeds if d.is_cpu]) == 3.0
 
 
 def test_bad_lists_of_devices_say_what_is_wrong(raw):

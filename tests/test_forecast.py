@@ -48,6 +48,36 @@ def test_what_a_beam_leaves_out_takes_no_time():
     assert lit.seconds < 0.5 * whole.seconds
 
 
+def test_tiles_that_reach_beyond_a_narrow_grid_take_their_time():
+    """Tiles of 16 x 16 pixels and more: of eight rows, half and more of each tile is thrown away."""
+    from cases import noise_on, straight
+
+    raw = noise_on(straight(400), n_samples=256)
+    narrow, square = (sarcl.ImageGrid.plane(shape=shape, spacing=0.1) for shape in ((8, 8192), (256, 256)))
+    for method in ("direct", "factorized"):
+        options = {"method": method, "tolerance": 1e-2, "wrap": True}
+        long, compact = (sarcl.plan(raw, grid, **options) for grid in (narrow, square))
+        assert long.seconds > 1.7 * compact.seconds
+
+
+def test_the_error_told_is_that_of_rows_added_directly_too():
+    from cases import noise_on, straight
+
+    from sarcl import factor_plan
+    from sarcl.task import make_task
+
+    for tolerance in (1e-1, 1e-2, 1e-3):
+        task = make_task(noise_on(straight(400)), GRID, None, None, False, True)
+        made, _ = factor_plan.make_plan(task, tolerance)
+        assert made.edge.predicted_error <= made.predicted_error <= tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1, 2.5, 1e9])
+def test_an_error_as_large_as_the_image_is_refused(tolerance):
+    with pytest.raises(ValueError, match=r"tolerance is .*; an error of 1 is no image at all"):
+        sarcl.plan(noise_history(n_rows=4), GRID, tolerance=tolerance)
+
+
 @pytest.mark.parametrize("tolerance", [0, -1e-3, float("nan"), 1e-30])
 def test_what_backproject_refuses_is_refused(tolerance):
     raw = noise_history(n_rows=4)

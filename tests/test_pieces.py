@@ -243,6 +243,56 @@ def test_a_full_disk_costs_the_files_but_not_the_image(raw, whole, tmp_path, mon
         sarcl.backproject(raw, GRID, out=tmp_path / "other.h5", tile=(1, 2))
 
 
+LIMITED = """
+import resource, sys
+resource.setrlimit(resource.RLIMIT_FSIZE, (18_000_000,) * 2)
+from sarcl.cli import main
+sys.exit(main(sys.argv[1:]))
+"""
+
+
+@pytest.mark.skipif(not sys.platform.startswith("linux"), reason="needs RLIMIT_FSIZE")
+@pytest.mark.parametrize("flag", ["--resume", "--no-resume"])
+def test_no_room_for_the_image_is_said_in_one_line_and_the_same_call_goes_on(raw, tmp_path, flag):
+    raw.save(tmp_path / "raw.h5")
+    large = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(1600, 1500), spacing=(0.01, 0.01))  # 19.2 MB
+    grid = ["--center", 1, 2, 0, "--shape", 1600, 1500, "--spacing", 0.01, 0.01, "--max-bytes", "8e6"]
+    argv = list(map(str, ["focus", "raw.h5", "-o", "image.h5", *grid, flag]))
+    warm = subprocess.run(  # kernels' binaries are files too
+        [sys.executable, "-m", "sarcl", *argv], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert warm.returncode == 0, warm.stderr
+    (tmp_path / "image.h5").rename(tmp_path / "wanted.h5")
+    done = subprocess.run(
+        [sys.executable, "-c", LIMITED, *argv], cwd=tmp_path, capture_output=True, text=True, timeout=120
+    )
+    assert done.returncode == 2
+    said = [line for line in done.stderr.splitlines() if "error" in line]
+    assert len(said) == 1 and "Traceback" not in done.stderr and "ref count" not in done.stderr
+    assert "cannot write 'image.h5': File too large; the image needs 0.02 GB" in said[0]
+    assert "give the same call again" in said[0]
+    kept = flag == "--resume"
+    assert names(tmp_path) == [*(["image.h5.parts"] if kept else []), "raw.h5", "wanted.h5"]
+    assert bool(tiles(tmp_path)) == kept
+    image = sarcl.backproject(raw, large, out=tmp_path / "image.h5", max_bytes=8e6)
+    assert ("from files" in image.report.plan) == kept
+    assert np.array_equal(image.data[...], sarcl.read(tmp_path / "wanted.h5").data[...])
+
+
+def test_what_was_wrong_is_not_hidden_by_a_file_that_cannot_be_closed(raw, tmp_path, monkeypatch):
+    import h5py
+
+    class Broken(h5py.File):
+        def close(self):
+            super().close()
+            raise RuntimeError("Can't decrement id ref count")
+
+    monkeypatch.setattr(h5py, "File", Broken)
+    with pytest.raises(Stopped):
+        sarcl.backproject(raw, GRID, out=tmp_path / "image.h5", progress=stop_after(1))
+    assert names(tmp_path) == []
+
+
 # ---- killed at any moment
 
 SCRIPT = """
@@ -568,6 +618,9 @@ BAD = {
     "max_bytes nan": ({"max_bytes": np.nan}, "max_bytes is nan"),
     "max_bytes negative": ({"max_bytes": -1e9}, "max_bytes is -1e"),
     "max_bytes zero": ({"max_bytes": 0}, "max_bytes is 0"),
+    "a picture": ({"out": "a.png"}, r"out is 'a\.png'; images are made in HDF5 files: give a name that ends in \.h5"),
+    "no ending": ({"out": "a", "resume": True}, "out is 'a'; images are made in HDF5 files"),
+    "read-only array": ({"out": np.broadcast_to(np.zeros(1, complex), GRID.shape)}, "out is a read-only array"),
 }
 
 
@@ -578,6 +631,29 @@ def test_bad_options_say_what_was_wanted(raw, tmp_path, monkeypatch, name):
     with pytest.raises(ValueError, match=message):
         sarcl.backproject(raw, GRID, **options)
     assert names(tmp_path) == []
+
+
+@pytest.mark.parametrize("out", [5, [1], b"a.h5", {"a": 1}], ids=str)
+def test_out_is_an_array_or_a_path(raw, tmp_path, monkeypatch, out):
+    monkeypatch.chdir(tmp_path)
+    with pytest.raises(
+        TypeError, match=r"out is .* \(\w+\); wanted None, a complex array of the grid's shape, or a path"
+    ):
+        sarcl.backproject(raw, GRID, out=out)
+    assert names(tmp_path) == []
+
+
+def test_a_dataset_open_for_reading_is_refused_before_the_work(raw, tmp_path):
+    import h5py
+
+    with h5py.File(tmp_path / "a.h5", "w") as file:
+        file.create_dataset("image", GRID.shape, np.complex64)
+
+    def fail(*_):
+        raise AssertionError("work began")
+
+    with h5py.File(tmp_path / "a.h5", "r") as file, pytest.raises(ValueError, match="open for reading"):
+        sarcl.backproject(raw, GRID, out=file["image"], progress=fail)
 
 
 def test_resume_is_yes_no_or_nothing(raw, tmp_path):

@@ -8,13 +8,21 @@ asked for.
 
 from __future__ import annotations
 
+import errno
+import logging
 import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import hdf5, paths
+
+log = logging.getLogger(__name__)
 
 if TYPE_CHECKING:
     from ..grid import ImageGrid
@@ -96,7 +104,9 @@ def load(path: Any) -> PhaseHistory | Image:
 class ImageWriter:
     """An image file in the making, for images larger than memory. Made by `image_writer`.
 
-    data   h5py.Dataset of the grid's shape, zero until written; write whole rows where you can
+    data   of the grid's shape and dtype, read and written in slices like an h5py.Dataset, zero until written; write
+           whole rows where you can
+    A write that fails, on a full disk, raises OSError with what would do.
     finish(...) puts the file in its place; abandon() removes it. As a context manager it abandons what was
     not finished. With `claim`, one run at a time makes this file, and takes over what a killed one left.
     """
@@ -106,25 +116,45 @@ class ImageWriter:
 
         self.path, self.grid = Path(path), grid
         dtype = np.dtype(dtype)
-        nbytes = grid.size * dtype.itemsize
+        nbytes = self._wanted = grid.size * dtype.itemsize
         self._part: Path | None
         self._lock: int | None
         self._part, self._lock = paths.claim(path, nbytes) if claim else (paths.begin(path, nbytes), None)
         try:
-            # our own lock is held already, and HDF5's would collide with it
-            self._file = h5py.File(self._part, "w", locking=False if claim else None)
-            hdf5.sign(self._file, "image")
-            group = self._file.create_group("grid")
-            for name in grid.__dataclass_fields__:
-                hdf5.put(group, name, getattr(grid, name))
-            self.data = self._file.create_dataset("data", tuple(grid.shape), dtype)
+            with self._writing():
+                # our own lock is held already, and HDF5's would collide with it
+                self._file = h5py.File(self._part, "w", locking=False if claim else None)
+                hdf5.sign(self._file, "image")
+                group = self._file.create_group("grid")
+                for name in grid.__dataclass_fields__:
+                    hdf5.put(group, name, getattr(grid, name))
+                self.data = _Pixels(self, self._file.create_dataset("data", tuple(grid.shape), dtype))
         except BaseException:
             self.abandon()
             raise
 
+    @contextmanager
+    def _writing(self) -> Iterator[None]:
+        """Turn what HDF5 says of a failed write into what to do about it."""
+        try:
+            yield
+        except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
+            found = re.search(r"errno = (\d+)", str(exc))
+            number = int(found[1]) if found else getattr(exc, "errno", None)
+            why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
+            free, wanted = shutil.disk_usage(self.path.parent or ".").free, self._wanted
+            room = "raise the limit on files' sizes (ulimit -f)" if number == errno.EFBIG else "make room there"
+            remedy = f"{room} for {wanted / 1e9:.2f} GB and give the same call again"
+            if self._lock is not None:
+                remedy += "; it goes on from its tiles where some were kept"
+            text = f"cannot write {str(self.path)!r}: {why}; the image needs {wanted / 1e9:.2f} GB, its disk has "
+            text += f"{free / 1e9:.2f} GB free: {remedy}"
+            raise OSError(text) from exc
+
     def mark(self, job: str) -> None:
         """Note which job made this file, for `job_of`."""
-        self._file.attrs["job"] = job
+        with self._writing():
+            self._file.attrs["job"] = job
 
     def finish(
         self, *, gain: float = 1.0, frequency: Any = None, tx: Any = None, rx: Any = None, report: Any = None
@@ -142,10 +172,11 @@ class ImageWriter:
             raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
         try:
             image = Image(self.data, self.grid, **fields)  # checks the fields
-            for name in ("gain", "frequency", "tx", "rx"):
-                hdf5.put(self._file, name, getattr(image, name))
-            hdf5.put_report(self._file, image.report)
-            self._file.close()
+            with self._writing():
+                for name in ("gain", "frequency", "tx", "rx"):
+                    hdf5.put(self._file, name, getattr(image, name))
+                hdf5.put_report(self._file, image.report)
+                self._file.close()
             paths.commit(self._part, self.path)
             self._part = None
             self._unlock()
@@ -160,6 +191,8 @@ class ImageWriter:
             try:
                 if hasattr(self, "_file"):
                     self._file.close()
+            except (OSError, RuntimeError) as exc:  # HDF5 cannot write what it still holds: nobody wants it
+                log.debug("%s could not be closed in order: %s", part, exc)
             finally:
                 part.unlink(missing_ok=True)
                 self._unlock()
@@ -174,6 +207,21 @@ class ImageWriter:
 
     def __exit__(self, *exc: object) -> None:
         self.abandon()
+
+
+class _Pixels:
+    """The dataset of an image in the making."""
+
+    def __init__(self, writer: ImageWriter, dataset: Any) -> None:
+        self.writer, self.dataset = writer, dataset
+        self.shape, self.dtype = dataset.shape, dataset.dtype
+
+    def __getitem__(self, at: Any) -> Any:
+        return self.dataset[at]
+
+    def __setitem__(self, at: Any, values: Any) -> None:
+        with self.writer._writing():
+            self.dataset[at] = values
 
 
 def image_writer(path: Any, grid: ImageGrid, dtype: Any = np.complex64, claim: bool = False) -> ImageWriter:
