@@ -81,14 +81,6 @@ inline fv lanes(void) {
 #endif
 }
 
-inline float largest(fv x) {
-    float v[VW], m = -INFINITY;
-    STORE(x, 0, v);
-#pragma unroll
-    for (int l = 0; l < VW; l++) m = fmax(m, v[l]);
-    return m;
-}
-
 // i times turns kept in two parts (line.clh), less whole turns of the first
 inline fv turns_of(fv i, float turn, float low) {
     fv whole = i * turn;

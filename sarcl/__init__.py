@@ -13,7 +13,7 @@ Two equations carry everything::
     v_p      1 inside the range window        |tau - tau_ref| <= 1/(2 frequency_step)
     I        data                             Image
 
-nouns    Waveform Trajectory Scene PhaseHistory ImageGrid Image Report Scenario
+nouns    Waveform Trajectory Material Scene PhaseHistory ImageGrid Image Report Scenario
 verbs    echo compress backproject autofocus measure read concatenate devices
 """
 
@@ -29,6 +29,7 @@ _HOME = {
     "Waveform": "waveform",
     "Trajectory": "trajectory",
     "Scene": "scene",
+    "Material": "material",
     "PhaseHistory": "phase_history",
     "concatenate": "phase_history",
     "ImageGrid": "grid",
@@ -40,6 +41,7 @@ _HOME = {
     "backproject": "backproject",
     "plan": "forecast",
     "Forecast": "forecast",
+    "add_noise": "noise",
     "autofocus": "autofocus",
     "measure": "quality",
     "PointResponse": "quality",
@@ -65,6 +67,8 @@ if TYPE_CHECKING:
     from .forecast import plan as plan
     from .grid import ImageGrid as ImageGrid
     from .image import Image as Image
+    from .material import Material as Material
+    from .noise import add_noise as add_noise
     from .phase_history import PhaseHistory as PhaseHistory
     from .phase_history import concatenate as concatenate
     from .quality import PointResponse as PointResponse

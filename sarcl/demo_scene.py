@@ -1,7 +1,7 @@
 """The demo's scene, made by code: an airfield with an aeroplane, a tank, a hangar, a control tower and trees.
 
 Metres; x to the right of the picture, y up in it, z up. Each object is made about the origin, standing on
-z = 0 and heading along +x, then turned and placed. Every surface is rough, so that every surface speckles.
+z = 0 and heading along +x, then turned and placed.
 """
 
 from __future__ import annotations
@@ -11,23 +11,24 @@ from typing import Any
 
 import numpy as np
 
+from .material import Material
 from .scene import Scene
 
 HALF = 26.5  # of the ground's side
 # Amplitude reflectivities that look like an airfield at X band
 METAL, CONCRETE, GRASS, PAINT, ASPHALT = 0.9, 0.6, 0.22, 0.22, 0.07
-ROUGH = 0.02  # m; over half a wavelength at X band: phases are fully random
+ROUGH = Material(diagram="cos")  # below a facet's size, so that every surface speckles
 
 
 def scene(edge: float, seed: int = 0) -> Scene:
     """The whole scene, the ground in cells whose edges are at most `edge`, m; `echo` cuts the objects."""
     random = np.random.default_rng(seed)
     out = ground(edge, random)
-    out = out + place(aeroplane(), (3.5, -5.5), 122, METAL)
-    out = out + place(tank(), (-15.5, -12.0), 30, METAL)
-    out = out + place(tank(), (-9.0, -18.5), 30, METAL)
-    out = out + place(hangar(), (14.0, 15.0), 12, CONCRETE)
-    out = out + place(tower(), (-9.5, 15.5), 25, CONCRETE)
+    out = out + place(aeroplane(), (3.5, -5.5), 122, rough(METAL))
+    out = out + place(tank(), (-15.5, -12.0), 30, rough(METAL))
+    out = out + place(tank(), (-9.0, -18.5), 30, rough(METAL))
+    out = out + place(hangar(), (14.0, 15.0), 12, rough(CONCRETE))
+    out = out + place(tower(), (-9.5, 15.5), 25, rough(CONCRETE))
     for x, y, height in TREES:
         out = out + tree((x, y, relief(x, y)), height, random)
     return out
@@ -39,12 +40,17 @@ TREES = (
 )  # fmt: skip
 
 
-def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: float) -> Scene:
+def rough(level: float) -> Material:
+    """A rough surface of this amplitude reflectivity."""
+    return replace(ROUGH, reflectivity=level)
+
+
+def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: Material) -> Scene:
     """Meshes turned by a heading and set on the ground."""
     position = (*at, float(relief(*at)))
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
-    parts = [Scene.from_mesh(m, material=material, position=position, rotation=turn, roughness=ROUGH) for m in meshes]
+    parts = [Scene.from_mesh(m, material=material, position=position, rotation=turn) for m in meshes]
     for part in parts[1:]:
         parts[0] = parts[0] + part
     return parts[0]
@@ -66,7 +72,7 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
     n = int(np.ceil(2 * HALF / (edge / np.sqrt(2))))
     axis = np.linspace(-HALF, HALF, n + 1)
     x, y = np.meshgrid(axis, axis)
-    bare = Scene.from_heights(axis, axis, relief(x, y), material=GRASS, roughness=ROUGH)
+    bare = Scene.from_heights(axis, axis, relief(x, y), material=ROUGH)
     x, y, _ = np.moveaxis(bare.triangles.mean(axis=1), -1, 0)
     level = GRASS * (1 + 0.35 * patches(x, y, random))
     level[y < relief_edge(x)] *= 1.7  # a field of taller growth
@@ -101,7 +107,7 @@ def tree(foot: tuple[float, float, float], height: float, random: np.random.Gene
     bumps = 1 + 0.15 * np.sin(5 * np.arctan2(direction[:, 1], direction[:, 0]) + 3 * direction[:, 2])
     middle = direction * (radius * bumps)[:, None] * size + (0, 0, 0.57 * height)
     corners = middle[:, None] + 0.12 * random.normal(size=(leaves, 3, 3))
-    return Scene.facets(corners + np.asarray(foot), material=0.45, roughness=ROUGH)
+    return Scene.facets(corners + np.asarray(foot), material=rough(0.45))
 
 
 def aeroplane() -> list[Any]:

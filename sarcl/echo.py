@@ -2,17 +2,22 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
 from . import cl, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, sealed
+from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, number, sealed
 from .check import tolerance as allowed_error
+from .echo_error import measure_error
+from .facet_plan import FacetPlan, crowding, cut_facets, plan_facets
+from .facet_spread import POLARIZATIONS, FacetSpreader
 from .geometry import Antennas
+from .material import COHERENT
 from .phase_history import PhaseHistory
-from .planning import Clock, Plan
+from .planning import Clock
 from .report import Report
 from .scene import Scene
 from .spread import Spreader
@@ -31,7 +36,7 @@ def echo(
     track: Trajectory,
     *,
     receiver: Trajectory | None = None,
-    polarization: str = "HH",
+    polarization: str | Sequence[str] = "HH",
     range_window: Any = None,
     reference: Any = None,
     shadows: bool = True,
@@ -47,17 +52,21 @@ def echo(
 ) -> PhaseHistory:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.
 
-    scene         points (|amplitude|^2 = RCS, m^2) and facets: a = 2 sqrt(pi)/lambda reflectivity area cos(incidence)
+    scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
+                  coefficients, the exact phase of the wave over every facet, single scattering (docs/facets.md)
     track         transmitter; receiver  a track of as many pulses, default the transmitter's
-    polarization  "HH" or "VV" (alike: this facet model has no cross-polarised return)
+    polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": a row a pulse for
+                  each, pulse by pulse. Points send back what they are sent: nothing in HV and VH
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
-    shadows       True: facets whose centroid is hidden at mid-aperture are dark (points are always seen)
+    shadows       True: of every facet only the share counts that both antennas see, in blocks of pulses
+                  (docs/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window"
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
-    max_edge      facets are cut until no edge is longer, m; "auto" half a resolution cell, None: left as they are
+    max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
+                  resolution cell too; None: left as they are
     max_bytes     memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
@@ -72,7 +81,7 @@ def echo(
         instance(name, value, kind)
     seed = count("seed", seed, 0)
     opened = cl.open_device(device)
-    choice("polarization", polarization, ("HH", "VV"))
+    polarizations = _polarizations(polarization)
     tolerance = allowed_error(tolerance)
     skips = planning.skips(skip, SKIPS)
     rx = _receiver(track, receiver)
@@ -82,10 +91,11 @@ def echo(
     near, far = _window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = _sampling(waveform, near, far, compressed)
     try:
-        samples = np.zeros((len(tx), n_samples), np.complex64)
+        samples = np.zeros((len(tx), len(polarizations), n_samples), np.complex64)
     except (MemoryError, ValueError):
         raise MemoryError(
-            f"echoes of {len(tx)} pulses x {n_samples} samples need {cl.size_text(8.0 * n_samples * len(tx))}, more "
+            f"echoes of {len(tx)} pulses x {len(polarizations)} polarisations x {n_samples} samples need "
+            f"{cl.size_text(8.0 * n_samples * len(tx) * len(polarizations))}, more "
             f"than there is; narrow range_window (now {near:g} to {far:g} m) or split the track"
         ) from None
     antennas = Antennas(
@@ -100,77 +110,138 @@ def echo(
     budget = planning.budget(opened, max_bytes)
     if progress:
         progress("scene", 0, 3)
-    parts, skipped = scatterers.prepare(
-        scene,
-        waveform,
-        antennas,
-        shadows=shadows,
-        seed=seed,
-        skips=skips,
-        max_edge=max_edge,
-        device=opened,
-        tell=None if progress is None else lambda n: progress("scene", n, 3),
-    )
-    if not parts:
+    # points and facets err independently: each gets its share, so that the sum keeps the tolerance
+    share = tolerance / np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1)
+    frequencies = frequency + step * np.arange(n_samples)
+    points, skipped = scatterers.points_of(scene, skips, len(tx))
+    facets, facet_plan, crowd = None, None, 1.0
+    if len(scene.triangles):
+        facet_plan, pieces, crowd = _cut(scene, waveform, antennas, len(polarizations), max_edge, share, seed)
+        if progress:
+            progress("scene", 1, 3)
+        facets, left_out = scatterers.facets_of(
+            pieces, waveform, antennas, shadows=shadows, seed=seed, skips=skips, max_bytes=budget / 4, device=opened,
+            tell=(lambda n: None) if progress is None else lambda n: progress("scene", n, 3),
+        )  # fmt: skip
+        skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
+    if points is None and facets is None:
         raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")
-    largest = max(part.largest() for part in parts)
-    if largest > LARGEST:
-        raise ValueError(f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}: scale them down")
+    if points is not None and points.largest() > LARGEST:
+        text = f"amplitudes reach {points.largest():g}; echoes in complex64 hold up to {LARGEST:g}"
+        raise ValueError(text + ": scale them down")
     clock.lap("scene")
 
-    # points and facets err independently: each gets its share, so that the sum keeps the tolerance
-    share = tolerance / np.sqrt(len(parts))
-    spreader = Spreader(opened, antennas, waveform.bandwidth, n_samples, share, budget, "range window" in skips)
-    total, done, gated = sum(len(p) for p in parts) * len(tx), 0, 0
-    if progress:
-        progress("echo", 0, total)
-    plans: list[Plan] = []
-    for part in parts:
-        tell = None if progress is None else lambda n, before=done: progress("echo", before + n, total)
-        plan, missed = spreader.add(part, samples, clock, tell)
-        plans.append(plan)
-        done += len(part) * len(tx)
-        gated += missed
+    common = (opened, antennas, waveform.bandwidth)
+    total, done, gated, behind = sum(len(p) for p in (points, facets) if p is not None) * len(tx), 0, 0, 0
+
+    def tell(n: int) -> None:
+        if progress:
+            progress("echo", done + n, total)
+
+    tell(0)
+    plans: list[tuple[float, dict[str, Any]]] = []
+    same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
+    if points is not None:
+        if same:
+            spreader = Spreader(*common, n_samples, share, budget, "range window" in skips)
+            plan, gated = spreader.add(points, samples[:, same[0]], clock, tell)
+            samples[:, same[1:]] = samples[:, same[:1]]
+            plans.append((plan.predicted_error, plan.describe("spread")))
+        done += len(points) * len(tx)
+    if facets is not None:
+        assert facet_plan is not None
+        facet_spreader = FacetSpreader(
+            *common, frequencies, share / crowd, budget, "range window" in skips, polarizations, facet_plan
+        )
+        plan, outside, behind = facet_spreader.add(facets, samples, clock, tell)
+        gated += outside
+        how = plan.describe("spread") | facet_plan.describe()
+        plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error), how))
     if gated == total:
         raise ValueError(
             f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "
             "widen range_window or move reference"
         )
-    frequencies = frequency + step * np.arange(n_samples)
     pulse = waveform.pulse_spectrum(frequencies)
     spectrum = np.abs(pulse) ** 2 if compressed else pulse
     samples *= spectrum.astype(np.complex64)
     clock.lap("spectra")
     measured = None
-    exact_seconds = 256 * sum(len(p) for p in parts) * 6e-8
+    exact_seconds = 256 * (0 if points is None else len(points)) * 6e-8 + (0 if facets is None else len(facets)) * 1e-4
     if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("echo", 0.0)):
-        measured = _measure_error(parts, antennas, frequencies, spectrum, samples)
+        measured = measure_error(points, facets, antennas, frequencies, spectrum, samples, polarizations)
         clock.lap("check")
+    n = len(polarizations)
+
+    def every(values: Any) -> Any:
+        return values if n == 1 or values is None else np.repeat(values, n, axis=0)
+
+    velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
+    skipped["facing away"] = skipped.get("facing away", 0) + behind
     return PhaseHistory(
-        sealed(samples),
+        sealed(samples.reshape(-1, n_samples)),
         frequency=frequency,
         frequency_step=step,
-        tx=tx,
-        rx=None if receiver is None else rx,
-        reference_range=reference_range,
-        time=track.times,
-        polarization=np.full(len(tx), polarization),
-        tx_velocity=track.velocities,
-        rx_velocity=track.velocities if receiver is None else receiver.velocities,
+        tx=every(tx),
+        rx=None if receiver is None else every(rx),
+        reference_range=every(reference_range),
+        time=every(track.times),
+        polarization=np.tile(polarizations, len(tx)),
+        tx_velocity=every(velocities[0]),
+        rx_velocity=every(velocities[1]),
         waveform=waveform,
         compressed=compressed,
         report=Report(
-            plan={"model": "stop and go", **max(plans, key=lambda p: p.predicted_error).describe("spread")},
+            plan={"model": "stop and go, single scattering", **max(plans, key=lambda p: p[0])[1]} if plans else {},
             tolerance=tolerance,
-            predicted_error=float(np.sqrt(sum(p.predicted_error**2 for p in plans))),
+            predicted_error=float(np.sqrt(sum(error**2 for error, _ in plans))),
             measured_error=measured,
-            contributions_done=total - gated,
+            contributions_done=total - gated - behind,
             contributions_skipped={**skipped, "range window": gated},
             seconds=clock.seconds,
             device=opened.info.name,
             seed=seed,
         ),
     )
+
+
+def _polarizations(asked: Any) -> tuple[str, ...]:
+    """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
+    if isinstance(asked, str):
+        asked = POLARIZATIONS if asked == "all" else (asked,)
+    names = tuple(asked) if isinstance(asked, Sequence) else ()
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"polarization is {asked!r}; give at least one, and each once")
+    for name in names:
+        choice("polarization", name, POLARIZATIONS)
+    return names
+
+
+def _cut(
+    scene: Scene, waveform: Waveform, antennas: Antennas, channels: int, max_edge: float | str | None, share: float,
+    seed: int,
+) -> tuple[FacetPlan, Scene, float]:  # fmt: skip
+    """The plan of the facets, the facets cut as it says, their grid points moved, and what `crowding` says of it."""
+    scene = replace(scene.realized(seed), positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
+    finest = np.inf
+    if max_edge == "auto" and (scene.roughness.any() or any(m.diagram not in COHERENT for m in scene.materials)):
+        finest = scatterers.resolution_edge(waveform, antennas, scene)
+    elif isinstance(max_edge, (int, float)):
+        finest = number("max_edge", max_edge, above=0)
+    elif max_edge not in ("auto", None):
+        raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
+    wanted, crowd = share, 1.0
+    for _ in range(6):
+        plan = plan_facets(
+            wanted / crowd, scene, antennas, waveform.center, waveform.bandwidth, channels, finest,
+            cut=max_edge is not None,
+        )  # fmt: skip
+        found = 1.0 if max_edge is None else crowding(scene, plan.max_edge, antennas, plan.nodes)
+        if found <= crowd:
+            break
+        crowd = 1.1 * found
+    made = scene if max_edge is None else cut_facets(scene, plan, finest)
+    return replace(plan, n_facets=len(made.triangles)), made, crowd
 
 
 def _receiver(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
@@ -223,37 +294,3 @@ def _sampling(waveform: Waveform, near: float, far: float, compressed: bool) -> 
 
 def _reasons(skipped: dict[str, int]) -> str:
     return ", ".join(why for why, n in skipped.items() if n) or "the scene is empty"
-
-
-def _measure_error(
-    parts: list[scatterers.Scatterers],
-    antennas: Antennas,
-    frequencies: np.ndarray,
-    spectrum: np.ndarray,
-    samples: np.ndarray,
-) -> float:
-    """Relative error of 256 random samples (16 random rows, 16 frequencies each) against the exact sum.
-
-    Relative to the larger of their norm and the norm they would have if scatterers added with random phases.
-    """
-    from .reference.echo import echo as exact
-
-    random = np.random.default_rng(0)
-    rx = antennas.tx if antennas.rx is None else antennas.rx
-    wrong = right = random_phases = 0.0
-    for p in random.integers(0, len(samples), 16):
-        n = random.integers(0, len(frequencies), 16)
-        wanted, power = np.zeros(16, np.complex128), 0.0
-        for part in parts:
-            delta = _half_path(antennas.tx[p], rx[p], part.positions) - antennas.reference_range[p]
-            seen = (delta >= antennas.near[p]) & (delta <= antennas.far[p])
-            amplitudes = part.seen_by(antennas.tx[p], rx[p]) * seen
-            power += float((np.abs(amplitudes) ** 2).sum())
-            wanted += exact(
-                part.positions, amplitudes, frequencies[n], antennas.tx[p], rx[p], antennas.reference_range[p]
-            )
-        wanted *= spectrum[n]
-        wrong += float((np.abs(samples[p, n] - wanted) ** 2).sum())
-        right += float((np.abs(wanted) ** 2).sum())
-        random_phases += power * float((np.abs(spectrum[n]) ** 2).sum())
-    return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0

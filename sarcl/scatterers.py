@@ -1,4 +1,4 @@
-"""From a scene to what a kernel adds up: points, and facets cut, moved, lit and weighed."""
+"""From a scene to what a kernel adds up: points, and facets moved, culled and lit."""
 
 from __future__ import annotations
 
@@ -8,141 +8,107 @@ from typing import Any
 
 import numpy as np
 
+from . import hashed
 from . import scene as scenes
-from .check import SPEED_OF_LIGHT, number
+from .check import SPEED_OF_LIGHT
+from .facet_spread import Facets
 from .geometry import Antennas
+from .lighting import lit
 from .scene import Scene
-from .shadow import visible
 from .waveform import Waveform
+
+RANDOM_STREAMS = (2, 3)  # of hashed.py's numbers: real and imaginary parts of what rough facets send back
 
 
 @dataclass(frozen=True, eq=False)
-class Scatterers:
-    """Points, m (n, 3), with complex amplitudes (n,), or with normals (n, 3), strengths and two_sided (n,)."""
+class Points:
+    """Points, m (n, 3), with complex amplitudes (n,)."""
 
     positions: np.ndarray
-    amplitudes: np.ndarray | None = None
-    normals: np.ndarray | None = None
-    strengths: np.ndarray | None = None
-    two_sided: np.ndarray | None = None
+    amplitudes: np.ndarray
 
     def __len__(self) -> int:
         return len(self.positions)
 
-    @property
-    def has_normals(self) -> bool:
-        """True for facets."""
-        return self.normals is not None
-
     def largest(self) -> float:
-        """Largest amplitude there can be."""
-        values = self.amplitudes if self.amplitudes is not None else self.strengths
-        assert values is not None
-        return float(np.abs(values).max())
+        """Largest amplitude."""
+        return float(np.abs(self.amplitudes).max())
 
     def planes(self, order: np.ndarray) -> np.ndarray:
         """Rows of numbers as kernels/echo.cl reads them, float32, in `order`; repeats at its end are blank."""
-        if self.amplitudes is not None:
-            out = np.stack([self.amplitudes.real, self.amplitudes.imag])[:, order]
-        else:
-            assert self.strengths is not None and self.normals is not None
-            out = np.concatenate([[self.strengths, self.two_sided], self.normals.T])[:, order]
-        out[0, len(self) :] = 0
-        if self.amplitudes is not None:
-            out[1, len(self) :] = 0
-        return out.astype(np.float32)
-
-    def seen_by(self, tx: np.ndarray, rx: np.ndarray) -> np.ndarray:
-        """Complex amplitudes for one antenna pair, m (3,): the float64 twin of the kernel's."""
-        if self.amplitudes is not None:
-            return self.amplitudes
-        from .reference.echo import facet_amplitudes
-
-        assert self.normals is not None and self.strengths is not None and self.two_sided is not None
-        return facet_amplitudes(self.positions, self.normals, self.strengths, self.two_sided, tx, rx)
+        out = np.stack([self.amplitudes.real, self.amplitudes.imag])[:, order].astype(np.float32)
+        out[:, len(self) :] = 0
+        return out
 
 
-def prepare(
-    scene: Scene,
-    waveform: Waveform,
-    antennas: Antennas,
-    *,
-    shadows: bool,
-    seed: int,
-    skips: set[str],
-    max_edge: float | str | None,
-    device: Any,
-    tell: Callable[[int], object] | None = None,
-) -> tuple[list[Scatterers], dict[str, int]]:
-    """The scene's points and facets, ready to spread, and what was left out: reason -> pairs with pulses.
+def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | None, dict[str, int]]:
+    """The scene's points, and pairs with pulses left out: reason -> count."""
+    keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
+    left_out = {"zero reflectivity": int((~keep).sum()) * n_pulses}
+    return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
 
-    tell is called with 1, 2, 3 when facets are cut, culled and lit.
+
+def facets_of(
+    scene: Scene, waveform: Waveform, antennas: Antennas, *, shadows: bool, seed: int, skips: set[str],
+    max_bytes: float, device: Any, tell: Callable[[int], object],
+) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
+    """Facets that are cut already: moved, culled and lit, and pairs with pulses left out: reason -> count.
+
+    tell is called with 2, 3 when facets are culled and lit.
     """
-    step = tell or (lambda n: None)
     n_pulses = len(antennas.tx)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
-    parts = []
-    if len(scene.positions):
-        keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
-        left_out["zero reflectivity"] += int((~keep).sum()) * n_pulses
-        if keep.any():
-            parts.append(Scatterers(scene.positions[keep], amplitudes=scene.amplitudes[keep]))
-    if len(scene.triangles):
-        edge = resolution_edge(waveform, antennas, scene) if max_edge == "auto" else max_edge
-        if edge is not None:
-            scene = scene.split(number("max_edge", edge, above=0))
-        step(1)
-        normals = scenes.normals(scene.triangles)
-        centers = scenes.centroids(scene.triangles)
-        centers += (random_heights(centers, seed) * scene.roughness)[:, None] * normals
-        keep = np.ones(len(centers), bool)
-        if "zero reflectivity" in skips:
-            keep &= scene.reflectivity != 0
-            left_out["zero reflectivity"] += int((~keep).sum()) * n_pulses
-        if "facing away" in skips:
-            away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
-            left_out["facing away"] = int(away.sum()) * n_pulses
-            keep &= ~away
-        step(2)
-        if shadows:
-            dark = keep & ~_seen(scene.triangles, antennas, device)
-            left_out["shadowed"] = int(dark.sum()) * n_pulses
-            keep &= ~dark
-        step(3)
-        if keep.any():
-            strength = 2 * np.sqrt(np.pi) * waveform.center / SPEED_OF_LIGHT
-            parts.append(
-                Scatterers(
-                    centers[keep],
-                    normals=normals[keep],
-                    strengths=strength * (scene.reflectivity * scenes.areas(scene.triangles))[keep],
-                    two_sided=scene.two_sided[keep],
-                )
-            )
-    return parts, left_out
+    normals = scenes.normals(scene.triangles)
+    triangles = scene.triangles
+    if scene.roughness.any():
+        heights = hashed.gaussian(scenes.centroids(triangles), seed) * scene.roughness
+        triangles = triangles + (heights[:, None] * normals)[:, None]
+    centers = scenes.centroids(triangles)
+    keep = np.ones(len(centers), bool)
+    if "zero reflectivity" in skips:
+        keep &= scene.reflectivity != 0
+        left_out["zero reflectivity"] = int((~keep).sum()) * n_pulses
+    if "facing away" in skips:
+        away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
+        left_out["facing away"] = int(away.sum()) * n_pulses
+        keep &= ~away
+    tell(2)
+    light = None
+    if shadows and keep.any():
+        # by the surface without its random heights: facets moved along their normals would hide their neighbours
+        light = lit(
+            scene.triangles, antennas.tx, antennas.rx, two_sided=scene.two_sided, wanted=keep,
+            tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
+        )  # fmt: skip
+        dark = keep & light.dark
+        left_out["shadowed"] = int(dark.sum()) * n_pulses
+        keep &= ~dark
+    tell(3)
+    if not keep.any():
+        return None, left_out
+    random = np.zeros(0, np.complex64)
+    if any(m.height > 0 for m in scene.materials):
+        # by the facets' own places: neither order nor neighbours matter
+        places = scenes.centroids(scene.triangles)[keep]
+        parts = [hashed.gaussian(places, seed, stream) for stream in RANDOM_STREAMS]
+        random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
+    return Facets(
+        triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials, light,
+        np.flatnonzero(keep), random,
+    ), left_out  # fmt: skip
 
 
-def random_heights(centers: np.ndarray, seed: int) -> np.ndarray:
-    """Standard normal numbers (k,) that depend on the seed and each facet's own place, m (k, 3), alone.
+def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> float:
+    """How much a facet's lit share may err: a quarter, or more where facets are small beside a resolution cell.
 
-    Neither order nor neighbours matter: adding a facet to a scene leaves the others as they were. Two hashes of the
-    place to a micrometre (splitmix64, Steele, Lea and Flood 2014) give one number by Box and Muller.
+    The bound on how far a shadow's edge moves (docs/shadows.md) is several times what it moves: the edge is then off by
+    about half a cell at most, or by a quarter of a facet.
     """
-    with np.errstate(over="ignore"):
-        state = np.full(len(centers), (seed + 1) * 0x9E3779B97F4A7C15 % 2**64, np.uint64)
-        for axis in np.rint(centers.T * 1e6).astype(np.int64).view(np.uint64):
-            state = _mix(state ^ axis)
-        first, second = _mix(state), _mix(state + np.uint64(0x9E3779B97F4A7C15))
-    radius = np.sqrt(-2 * np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
-    return radius * np.cos(2 * np.pi * (second >> np.uint64(11)).astype(np.float64) * 2.0**-53)
-
-
-def _mix(x: np.ndarray) -> np.ndarray:
-    """One step of splitmix64."""
-    x = x + np.uint64(0x9E3779B97F4A7C15)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
+    typical = float(np.median(np.maximum.reduce(scenes.edges(scene.triangles))))
+    try:
+        return float(np.clip(4 * resolution_edge(waveform, antennas, scene) / typical, 0.25, 8.0))
+    except ValueError:  # nothing is resolved
+        return 0.25
 
 
 def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
@@ -185,12 +151,3 @@ def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> 
         spread = np.linalg.norm(look - mean, axis=1).max() + np.pi / 2 * radius / distance.min()
         out |= normals @ mean + spread < 0
     return out
-
-
-def _seen(triangles: np.ndarray, antennas: Antennas, device: Any) -> np.ndarray:
-    """Facets that both antennas see at mid-aperture."""
-    middle = len(antennas.tx) // 2
-    seen = visible(triangles, antennas.tx[middle], device=device)
-    if antennas.rx is not None:
-        seen &= visible(triangles, antennas.rx[middle], device=device)
-    return seen

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+import inspect
 import re
 import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -33,6 +35,7 @@ class Scenario:
     waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
     trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
     receiver     the same for a receiver of its own, or None
+    materials    {name: {"eps_r": 4.0, ...}, ...}, or Materials, which the scene's tables name
     scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
     grid         {"plane": {...}} or {"points": {...}}, or an ImageGrid
     echo         arguments of `sarcl.echo`;  backproject  arguments of `sarcl.backproject`
@@ -49,16 +52,23 @@ class Scenario:
     grid: Any = None
     echo: Any = None
     backproject: Any = None
+    materials: Any = None
     folder: Path = Path()
     where: Where = field(default_factory=Where, repr=False)
 
     def __post_init__(self) -> None:
-        from .scenario_tables import plain, table_of
+        from .scenario_tables import named, plain, table_of
+        from .scene import Scene
 
         object.__setattr__(self, "folder", Path(self.folder))
+        if isinstance(self.scene, Scene):
+            own = {name: m for name, m in named(self.scene).items() if name != "metal"}
+            object.__setattr__(self, "materials", {**(self.materials or {}), **own} or None)
         for name in schema.SECTIONS:
             value = getattr(self, name)
             if value is not None:
+                if name == "materials" and isinstance(value, Mapping):
+                    value = {k: table_of(v) for k, v in value.items()}
                 value = plain(table_of(value))
                 schema.check_section(name, value, self.where)
                 object.__setattr__(self, name, value)
@@ -97,14 +107,25 @@ class Scenario:
 
     def build_scene(self) -> Scene:
         """The Scene: the sum of its tables, in the order they first appear."""
-        parts = [
-            self._call(path, table, schema.calls("scene")[kind])
-            for kind, value in self._section("scene").items()
-            for path, table in schema.tables_of("scene", kind, value)
-        ]
-        for part in parts[1:]:
-            parts[0] = parts[0] + part
-        return parts[0]
+        from .material import Material
+        from .scenario_tables import look_up
+
+        materials = {
+            name: self._call(("materials", name), table, partial(Material, name=name))
+            for name, table in (self.materials or {}).items()
+        }
+        scene = None
+        for kind, value in self._section("scene").items():
+            for path, table in schema.tables_of("scene", kind, value):
+                place = table.get(schema.ON)
+                table = {k: look_up(k, v, materials) for k, v in table.items() if k != schema.ON}
+                part = self._call(path, table, schema.calls("scene")[kind])
+                if place is not None:
+                    with self.where.blame(path, {schema.ON: place}):
+                        part = _stand(part, scene, place)
+                scene = part if scene is None else scene + part
+        assert scene is not None
+        return scene
 
     def simulate(self, **options: Any) -> PhaseHistory:
         """Echoes of the scene. `options` are arguments of `sarcl.echo` that come before those in [echo]."""
@@ -151,11 +172,12 @@ class Scenario:
         return self._call((name,), table, known[""])
 
     def _call(self, path: schema.Path, table: Mapping[str, Any], call: schema.Call) -> Any:
-        renamed = {new: old for old, new in schema.RENAMED.items()}
+        renamed = {new: old for old, new in schema.RENAMED.items() if old in inspect.signature(call).parameters}
         with self.where.blame(path, table):
             given = {renamed.get(k, k): _argument(k, v) for k, v in table.items()}
-            if "mesh" in given:
-                given["mesh"] = self.folder / given["mesh"]
+            for name in ("mesh", "path", "geoid"):
+                if isinstance(given.get(name), str):
+                    given[name] = self.folder / given[name]
             return call(**given)
 
     def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
@@ -204,6 +226,15 @@ def _syntax(name: str, text: str, message: str) -> str:
     column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
     said = message[: match.start()] if match else message
     return f"{name}:{line}: {said}{column}; this is not valid TOML"
+
+
+def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
+    """`part` on what came before it in the scenario, at place = [x, y] or [x, y, depth]."""
+    if ground is None:
+        raise ValueError("on has no ground: put the table of the ground before this one")
+    if not isinstance(place, list) or len(place) not in (2, 3):
+        raise ValueError(f"on is {place!r}; give [x, y], m, or [x, y, depth]")
+    return part.on(ground, place[0], place[1], depth=place[2] if len(place) == 3 else 0.0)
 
 
 def _argument(key: str, value: Any) -> Any:

@@ -3,12 +3,14 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
+from dataclasses import fields
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from .grid import ImageGrid
+from .material import METAL, Material
 from .scene import Scene
 from .trajectory import Trajectory
 from .waveform import Waveform
@@ -22,6 +24,8 @@ def table_of(value: Any) -> Any:
         return _without_none(value, ("times", "positions", "velocities", "attitude"))
     if isinstance(value, Scene):
         return _scene(value)
+    if isinstance(value, Material):
+        return _material(value)
     if isinstance(value, ImageGrid):
         if not value.is_plane:
             return {"points": {"positions": value.listed}}
@@ -50,18 +54,53 @@ def _waveform(value: Waveform) -> dict[str, Any]:
     return _without_none(value, ("center", "bandwidth", "duration"))
 
 
+def named(scene: Scene) -> dict[str, Material]:
+    """The scene's materials by names that are unique, in their order."""
+    names: dict[str, Material] = {}
+    for m in scene.materials:
+        name, n = ("metal" if m == METAL else m.name or "material"), 1
+        while name in names or (name == "metal" and m != METAL):
+            n += 1
+            name = f"{m.name or 'material'} {n}"
+        names[name] = m
+    return names
+
+
+def look_up(key: str, value: Any, materials: Mapping[str, Material]) -> Any:
+    """A value of a scene's table: where the key is that of materials, those that `materials` names instead of names."""
+    if key not in ("material", "materials"):
+        return value
+    if isinstance(value, str):
+        return materials.get(value, value)
+    if isinstance(value, list):
+        return [look_up(key, v, materials) for v in value]
+    if isinstance(value, Mapping):
+        return {part: look_up(key, v, materials) for part, v in value.items()}
+    return value
+
+
+def _material(value: Material) -> dict[str, Any]:
+    # what a default depends on is always written
+    always = ("eps_r", "conductivity", "height")
+    plain = {f.name: getattr(value, f.name) for f in fields(value) if f.name != "name"}
+    return {n: v for n, v in plain.items() if n in always or v != Material.__dataclass_fields__[n].default}
+
+
 def _scene(value: Scene) -> dict[str, Any]:
     tables: dict[str, Any] = {}
     if len(value.positions):
         tables["points"] = [{"positions": value.positions, "amplitudes": value.amplitudes}]
     if len(value.triangles):
-        # one table a run of facets of one reflectivity: their order, and so their random heights, stays
-        change = np.flatnonzero(np.diff(value.reflectivity)) + 1
+        names = list(named(value))
+        # one table a run of facets of one material: their order, and so their random heights, stays
+        change = np.flatnonzero(np.diff(value.material)) + 1
         tables["facets"] = [
             {
                 "triangles": value.triangles[a:b],
-                "material": value.reflectivity[a],
+                "material": names[value.material[a]],
+                "reflectivity": value.reflectivity[a:b],
                 "roughness": value.roughness[a:b],
+                **({"point_roughness": value.point_roughness[a:b]} if value.point_roughness[a:b].any() else {}),
                 "two_sided": value.two_sided[a:b],
             }
             for a, b in zip([0, *change], [*change, len(value.triangles)], strict=True)

@@ -16,11 +16,13 @@ from typing import Any
 Path = tuple[str | int, ...]
 Call = Callable[..., Any]
 
-# A mesh is a file in a scenario.
-RENAMED = {"mesh": "file"}
+# A mesh or an elevation model is a file in a scenario.
+RENAMED = {"mesh": "file", "path": "file"}
 # Arguments that are other sections, or belong to the run and not to the scenario.
 NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
 NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
+NOT_KEYS |= {"name"}  # a material's is its table's
+ON = "on"  # of a part of the scene: stand it on the parts before
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
     "int": (
@@ -32,9 +34,14 @@ _TYPES = {
 }
 
 
+_ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
+
+
 def calls(section: str) -> dict[str, Call]:
     """The calls a section can stand for, by the name of its table; "" is the section's own table."""
     import sarcl
+
+    from . import shapes
 
     if section in ("trajectory", "receiver"):
         t = sarcl.Trajectory
@@ -48,14 +55,18 @@ def calls(section: str) -> dict[str, Call]:
             "points": s.points,
             "from_mesh": s.from_mesh,
             "from_heights": s.from_heights,
+            "from_dem": s.from_dem,
             "facets": s.facets,
+            **{shape.__name__: shape for shape in shapes.SHAPES},
         }
+    if section == "materials":
+        return {"": sarcl.Material}
     if section == "grid":
         return {"plane": sarcl.ImageGrid.plane, "points": sarcl.ImageGrid.points}
     return {"": getattr(sarcl, section)}
 
 
-SECTIONS = ("waveform", "trajectory", "receiver", "scene", "grid", "echo", "backproject")
+SECTIONS = ("waveform", "trajectory", "receiver", "materials", "scene", "grid", "echo", "backproject")
 
 
 def parameters(call: Call) -> dict[str, inspect.Parameter]:
@@ -106,6 +117,12 @@ class Where:
 def check_section(section: str, table: Any, where: Where) -> None:
     """Refuse what no call would take: unknown keys, wrong types, missing keys. ValueError names the line."""
     known = calls(section)
+    if section == "materials" and isinstance(table, Mapping):
+        for name, part in table.items():
+            if not isinstance(part, Mapping):
+                raise ValueError(f"{where.text((section,), name)} {name} is {_shown(part)}, wanted a table")
+            _check_table((section, name), part, known[""], where)
+        return
     if not isinstance(table, Mapping):
         raise ValueError(f"{where.text((), section)} {section} is {_shown(table)}, wanted a table")
     if set(known) == {""} or ("" in known and not any(_is_table(v) for v in table.values())):
@@ -125,7 +142,8 @@ def check_section(section: str, table: Any, where: Where) -> None:
         for path, part in tables_of(section, kind, value):
             if not isinstance(part, Mapping):
                 raise ValueError(f"{where.text((section,), kind)} {kind} is {_shown(part)}, wanted a table")
-            _check_table(path, part, known[kind], where)
+            lying = section == "scene" and kind not in ("from_heights", "from_dem")
+            _check_table(path, part, known[kind], where, extra={ON: _ON} if lying else {})
 
 
 def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
@@ -136,9 +154,14 @@ def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
 
 
 def _check_table(
-    path: Path, table: Mapping[str, Any], call: Call, where: Where, kinds: list[str] | None = None
+    path: Path,
+    table: Mapping[str, Any],
+    call: Call,
+    where: Where,
+    kinds: list[str] | None = None,
+    extra: Mapping[str, inspect.Parameter] | None = None,
 ) -> None:
-    known = parameters(call)
+    known = {**parameters(call), **(extra or {})}
     for key, value in table.items():
         if kinds and key in kinds:
             raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted a table")
@@ -161,6 +184,8 @@ def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
         names = {n.strip() for n in str(parameter.annotation).split("|")} - {"None"}
     if names and names <= set(_TYPES):
         return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
+    if "Mapping" in str(parameter.annotation) and isinstance(value, Mapping):
+        return ""
     good = isinstance(value, (bool, int, float, str, list)) and not _is_table(value)
     return "" if good else "a number, a string, true, false or an array"
 

@@ -1,125 +1,131 @@
-"""What a viewpoint can see of a scene's facets."""
+"""What a viewpoint sees of a scene's facets: rays through a tree of boxes, from anywhere."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
 from . import cl
-from .scene import box, centroids, edges
+from .triangles import box, edges, normals
 
-# A facet hides what lies deeper by more than this share of the hidden facet's own size: coplanar and touching
-# neighbours, and sheets modelled twice, do not hide one another.
-BIAS = 0.01
+# Rays start above a facet by this share of its longest edge: coplanar and touching neighbours, and sheets modelled
+# twice, do not hide one another.
+LIFT = 1e-3
+# float32 resolves places to 1e-7 of the scene: rays start, and boxes reach, a few such steps further out
+STEP = 1e-6
+FAR = np.float32(4)  # of boxes that are none: points a ray can only meet by chance, with nothing in them
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Where facets are told in float32: (x - center) unit, at most one for all corners; unit is a power of two."""
+
+    center: np.ndarray
+    unit: float
+
+    @classmethod
+    def around(cls, points: np.ndarray) -> Frame:
+        """The frame that just holds points, m (n, 3)."""
+        corners = box(points)
+        half = float((corners[1] - corners[0]).max()) / 2
+        return cls(corners.mean(axis=0), 2.0 ** -np.ceil(np.log2(half)) if half else 1.0)
+
+    def eye(self, viewpoint: np.ndarray) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+        """A viewpoint, m (3,), for the kernels, and the power of two that makes its distance about one."""
+        at = (np.asarray(viewpoint, np.float64) - self.center) * self.unit
+        shrink = 2.0 ** -np.ceil(np.log2(max(float(np.abs(at).max()), 1.0)))
+        x, y, z = at.astype(np.float32)
+        return x, y, z, np.float32(shrink)
+
+
+class Facets:
+    """Facets on a device, m (k, 3, 3), as those who are looked at.
+
+    frame      of all that can hide them too
+    one_sided  (k,) bool: dark from behind
+    """
+
+    def __init__(self, device: cl.Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
+        self.device, self.frame, self.size = device, frame, len(triangles)
+        self.length = np.maximum.reduce(edges(triangles))
+        a = triangles[:, 0]
+        lift = np.maximum(LIFT * self.length * frame.unit, STEP)
+        parts = (
+            (a - frame.center) * frame.unit,
+            (triangles[:, 1] - a) * frame.unit,
+            (triangles[:, 2] - a) * frame.unit,
+            normals(triangles) * lift[:, None],
+        )
+        self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
+        self.side = device.upload(one_sided.astype(np.uint8))
+
+
+class Occluders:
+    """Facets on a device, m (k, 3, 3), as those who hide: a tree of boxes, eight children each."""
+
+    def __init__(self, device: cl.Device, triangles: np.ndarray, frame: Frame) -> None:
+        self.device, self.frame = device, frame
+        corners = ((triangles - frame.center) * frame.unit).astype(np.float32)
+        order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
+        # the last facet fills up the last eight
+        corners = corners[np.append(order, np.repeat(order[-1:], -len(order) % 8))]
+        leaf = np.ascontiguousarray(corners.reshape(-1, 8, 3, 3).transpose(0, 2, 3, 1))
+        low = leaf.min(axis=(1, 3)) - np.float32(2 * STEP)
+        high = leaf.max(axis=(1, 3)) + np.float32(2 * STEP)
+        levels = []
+        while True:
+            low, high = (_padded(side).reshape(-1, 8, 3) for side in (low, high))
+            levels.append(np.stack([low, high], axis=1).transpose(0, 1, 3, 2))
+            if len(low) == 1:
+                break
+            # the filling is no part of the boxes above
+            low, high = low.min(axis=1), np.where(high == FAR, -FAR, high).max(axis=1)
+        levels.reverse()
+        self.depth = len(levels)
+        base = np.cumsum([0, *(len(level) for level in levels[:-1])])
+        self.leaf = device.upload(leaf)
+        self.node = device.upload(np.concatenate(levels))
+        self.base = device.upload(base.astype(np.int32))
+
+    def hide(self, facets: Facets, index: Any, n: int, places: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+        """Set the bits of hidden samples: index (n,) int32, places (buffer, samples), hidden (n,) uint64."""
+        kernel = self.device.kernel("shadow.cl", "hidden")
+        arguments = (facets.buffer, index, *places, *self.frame.eye(viewpoint))
+        self.device.run(kernel, (n,), None, *arguments, self.leaf, self.node, self.base, self.depth, hidden)
 
 
 def visible(triangles: np.ndarray, viewpoint: np.ndarray, *, device: Any = None) -> np.ndarray:
     """True (k,) for facets, m (k, 3, 3), whose centroid nothing hides from `viewpoint`, m (3,).
 
-    Every facet hides what is behind it, from both sides. ValueError when the viewpoint is not in front of all
-    facets (the projection would fold over).
+    Every facet hides what is behind it, from both sides. The viewpoint may stand anywhere, among the facets too.
     """
+    from .lighting import Light
+
     if len(triangles) == 0:
         return np.ones(0, bool)
-    # perspective moves centroids: they are projected themselves
-    corners, centers = project(triangles, viewpoint, centroids(triangles))
-    order, start, member, ray_cell = _bin(corners, centers)
-    corners, centers = corners[order], centers[order]
-    rays, facets = _rays(corners, centers), _facets(corners)
-    opened = cl.open_device(device)
-    kernel = opened.kernel("shadow.cl", "hidden")
-    out = opened.empty(4 * len(triangles))
-    buffers = [opened.upload(a) for a in (rays.astype(np.float32), ray_cell, facets, start, member)]
-    opened.run(kernel, (len(triangles),), None, *buffers, len(triangles), out)
-    seen = np.empty(len(triangles), bool)
-    seen[order] = opened.download(out, np.empty(len(triangles), np.int32)) == 0
-    return seen
+    light = Light(cl.open_device(device), triangles, tolerance=1.0)
+    return light.share([viewpoint]) > 0
 
 
-def project(triangles: np.ndarray, viewpoint: np.ndarray, centers: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Corners, m (k, 3, 3), and centroids, m (k, 3), seen from `viewpoint`: (xi, eta, zeta), m, of both."""
-    corners = triangles.reshape(-1, 3)
-    sight = box(corners).mean(axis=0) - viewpoint
-    distance = float(np.linalg.norm(sight))
-    ahead = sight / distance if distance else sight
-    aside = np.cross(ahead, np.eye(3)[np.argmin(np.abs(ahead))])
-    aside /= np.linalg.norm(aside) or 1.0
-    axes = np.stack([aside, np.cross(ahead, aside), ahead])
-
-    def seen(points: np.ndarray) -> np.ndarray:
-        # one matrix product for all points: products with (k, 3, 3) are ten times slower
-        x, y, depth = axes @ (points - viewpoint).T
-        if not depth.min() > 1e-6 * distance:
-            raise ValueError(
-                "an antenna at mid-aperture stands among or beside the facets, where one projection cannot tell what "
-                "hides what; pass shadows=False or move the track away from the scene"
-            )
-        scale = distance / depth
-        # zeta = R0 - R0^2/depth without cancellation
-        return np.stack([x * scale, y * scale, (depth - distance) * scale], axis=-1)
-
-    return seen(corners).reshape(-1, 3, 3), seen(centers)
+def _curve(points: np.ndarray) -> np.ndarray:
+    """Place (n,) of points (n, 3) between -1 and 1 on a curve that fills space (Morton 1966)."""
+    out = np.zeros(len(points), np.uint64)
+    for axis, value in enumerate(points.T):
+        cell = np.clip((value + 1) * 2.0**20, 0, 2**21 - 1).astype(np.uint64)
+        for shift, mask in (
+            (32, 0x1F00000000FFFF),
+            (16, 0x1F0000FF0000FF),
+            (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3),
+            (2, 0x1249249249249249),
+        ):
+            cell = (cell | cell << np.uint64(shift)) & np.uint64(mask)
+        out |= cell << np.uint64(axis)
+    return out
 
 
-def _rays(corners: np.ndarray, centers: np.ndarray) -> np.ndarray:
-    """Projected centroid and depth allowance of every facet: (4, k)."""
-    size = np.maximum.reduce(edges(corners))
-    # float32 resolves places to 1e-7 of the scene
-    floor = 4e-7 * float(np.abs(corners).max())
-    return np.concatenate([centers.T, np.maximum(BIAS * size, floor)[None]])
-
-
-def _facets(projected: np.ndarray) -> np.ndarray:
-    """Corner 0, barycentric gradients and depth gradient of every facet: (k, 9) float32; edge-on ones hide nothing."""
-    a, b, c = projected[:, 0], projected[:, 1] - projected[:, 0], projected[:, 2] - projected[:, 0]
-    twice_area = b[:, 0] * c[:, 1] - b[:, 1] * c[:, 0]
-    edge_on = np.abs(twice_area) < 1e-9 * np.maximum((b**2).sum(axis=1), (c**2).sum(axis=1))
-    inverse = 1 / np.where(edge_on, 1.0, twice_area)
-    b1 = np.stack([c[:, 1], -c[:, 0]]) * inverse
-    b2 = np.stack([-b[:, 1], b[:, 0]]) * inverse
-    slope = b[:, 2] * b1 + c[:, 2] * b2
-    out = np.concatenate([a.T, b1, b2, slope]).astype(np.float32)
-    # no point has both coordinates >= 0 where both gradients vanish and corner 0 is infinitely deep
-    out[2:3, edge_on] = np.inf
-    out[3:, edge_on] = 0
-    return np.ascontiguousarray(out.T)
-
-
-def _bin(projected: np.ndarray, centers: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray, np.ndarray]:
-    """Facets by the square cells of the (xi, eta) plane they touch.
-
-    Returns the order of facets by their centroid's cell, and in that numbering: start (cells + 1,), member, and the
-    cell of each ray.
-    """
-    # slices, not axis=1: reductions over three corners are ten times slower
-    a, b, c = (projected[:, i, :2] for i in range(3))
-    low, high = np.minimum(np.minimum(a, b), c), np.maximum(np.maximum(a, b), c)
-    origin = box(low)[0]
-    extent = (box(high)[1] - origin).max()
-    typical = float(np.quantile(np.maximum(*(high - low).T), 0.9))
-    side = max(2 * typical, float(extent) / 2048, np.finfo(np.float64).tiny)
-    while True:
-        first = ((low - origin) / side).astype(np.int64)
-        last = ((high - origin) / side).astype(np.int64)
-        count = last - first + 1
-        each = count[:, 0] * count[:, 1]
-        # A few large facets among many small ones would fill the memory with entries: wider cells have fewer.
-        if each.sum() <= 2**22 + 16 * len(each):
-            break
-        side *= 2
-    across = int(last[:, 0].max()) + 1
-    cells = across * (int(last[:, 1].max()) + 1)
-    facet = np.repeat(np.arange(len(each)), each)
-    within = np.arange(len(facet)) - np.repeat(np.cumsum(each) - each, each)
-    column = first[facet, 0] + within % count[facet, 0]
-    row = first[facet, 1] + within // count[facet, 0]
-    cell = row * across + column
-    start = np.zeros(cells + 1, np.int32)
-    start[1:] = np.cumsum(np.bincount(cell, minlength=cells))
-    at = ((centers[:, :2] - origin) / side).astype(np.int64)
-    ray_cell = (at[:, 1] * across + at[:, 0]).astype(np.int32)
-    order = np.argsort(ray_cell, kind="stable")
-    number = np.empty(len(order), np.int32)
-    number[order] = np.arange(len(order))
-    return order, start, number[facet[np.argsort(cell, kind="stable")]], ray_cell[order]
+def _padded(rows: np.ndarray) -> np.ndarray:
+    """Rows filled up to a multiple of eight with FAR."""
+    return np.concatenate([rows, np.full((-len(rows) % 8, *rows.shape[1:]), FAR, rows.dtype)])

@@ -10,14 +10,14 @@ from . import cl, planning, profiles
 from .accuracy import U32
 from .geometry import Antennas, Tiles, morton_order, tile_points
 from .planning import Clock, Plan
-from .scatterers import Scatterers
+from .scatterers import Points
 from .scene import box
 
 PER_TILE = (256, 64)
 
 
 class Spreader:
-    """Adds scatterers to the samples of every pulse, each kind by the cheapest plan that meets the tolerance."""
+    """Adds points to the samples of every pulse by the cheapest plan that meets the tolerance."""
 
     def __init__(
         self,
@@ -33,7 +33,7 @@ class Spreader:
         self.bandwidth, self.tolerance, self.budget, self.skip = bandwidth, tolerance, budget, skip
 
     def add(
-        self, part: Scatterers, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
+        self, part: Points, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
     ) -> tuple[Plan, int]:
         """Add `part` to samples (n_pulses, n_samples); return the plan and how many pairs were gated out."""
         positions = part.positions
@@ -41,7 +41,7 @@ class Spreader:
         plan, tiles, order = self._plan(part, center)
         bistatic = self.antennas.rx is not None
         device, lanes = self.device, self.device.info.vector_width
-        macros = {**plan.macros(bistatic), "FACETS": int(part.has_normals), "TILE": tiles.per_tile}
+        macros = {**plan.macros(bistatic), "TILE": tiles.per_tile}
         constants_kernel = device.kernel("echo.cl", "tile_constants", **macros)
         kernel = device.kernel("echo.cl", "spread", **macros)
         table = device.upload(plan.interpolator.table)
@@ -88,7 +88,7 @@ class Spreader:
                 tell(stop * len(part))
         return plan, gated
 
-    def _plan(self, part: Scatterers, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
+    def _plan(self, part: Points, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
         order = morton_order(part.positions)
         made = {n: tile_points(part.positions, center, n, order) for n in PER_TILE}
         bounds = box(part.positions)

@@ -2,15 +2,19 @@
 
 from __future__ import annotations
 
+import dataclasses
 import logging
 
 import numpy as np
 import pytest
 import trimesh
 from scipy.spatial.transform import Rotation
+from scipy.stats import kstest
 
 import sarcl
-from sarcl.scene import areas, centroids, edges, normals
+from sarcl.hashed import gaussian
+from sarcl.material import MATERIALS, METAL
+from sarcl.scene import POINT_HEIGHTS, areas, centroids, edges, normals
 
 TOLERANCE = {
     "area": 1e-12,  # float64 sums of some ten thousand facets, relative
@@ -319,6 +323,32 @@ def test_every_cell_makes_two_facets_through_its_corners_facing_up():
         assert corners[cx, cy] == cz
 
 
+def test_heights_may_be_a_function():
+    x, y, _ = heights()
+    scene = sarcl.Scene.from_heights(x, y, lambda x, y: 0.4 * x - 0.3 * y)
+    same = sarcl.Scene.from_heights(x, y, np.add.outer(-0.3 * y, 0.4 * x))
+    assert np.abs(scene.triangles - same.triangles).max() <= 1e-14  # sums in another order
+    assert (sarcl.Scene.from_heights(x, y, lambda x, y: 7).triangles[..., 2] == 7).all()
+
+
+def test_materials_are_given_by_cell():
+    x, y, z = heights()
+    kind = np.arange(15).reshape(3, 5) % 3
+    names = np.array(["sand", "wet soil", "water"])
+    mine = sarcl.Material(9, name="mine")
+    for scene, wanted in (
+        (sarcl.Scene.from_heights(x, y, z, material=names[kind]), [MATERIALS[n] for n in names]),
+        (sarcl.Scene.from_heights(x, y, z, material=kind, materials=["water", mine, "sand"]),
+         [MATERIALS["water"], mine, MATERIALS["sand"]]),
+    ):  # fmt: skip
+        middle = centroids(scene.triangles)
+        i, j = (np.searchsorted(axis, middle[:, k]) - 1 for axis, k in ((y, 1), (x, 0)))
+        assert [scene.materials[m] for m in scene.material] == [wanted[k] for k in kind[i, j]]
+    grey = np.linspace(0, 1, 15).reshape(3, 5)
+    scene = sarcl.Scene.from_heights(x, y, z, material=grey)
+    assert scene.materials == (METAL,) and (scene.reflectivity == grey[i, j]).all()
+
+
 def test_roughness_is_given_by_cell():
     x, y, z = heights()
     rough = np.arange(15.0).reshape(3, 5)
@@ -326,6 +356,157 @@ def test_roughness_is_given_by_cell():
     middle = centroids(scene.triangles)
     i, j = (np.searchsorted(axis, middle[:, k]) - 1 for axis, k in ((y, 1), (x, 0)))
     assert (scene.roughness == rough[i, j]).all()
+
+
+# grid points of random height
+
+
+def rough(sigma=0.3, n=60, seed=1, **options):
+    axis = np.arange(n + 1) * 2.0
+    flat = np.zeros((n + 1, n + 1))
+    return sarcl.Scene.from_heights(axis, axis, flat, point_roughness=sigma, **options), seed
+
+
+def test_grid_points_move_up_and_down_and_the_surface_stays_closed():
+    scene, seed = rough()
+    made = scene.realized(seed)
+    assert (made.triangles[..., :2] == scene.triangles[..., :2]).all()
+    corners = made.triangles.reshape(-1, 3)
+    assert len(np.unique(corners, axis=0)) == len(np.unique(corners[:, :2], axis=0)) == 61 * 61
+    assert not made.point_roughness.any() and made.realized(5) is made
+
+
+def test_grid_points_have_the_deviation_asked_and_are_independent():
+    scene, seed = rough()
+    points = np.unique(scene.realized(seed).triangles.reshape(-1, 3), axis=0)
+    z = points[np.lexsort(points[:, :2].T)][:, 2].reshape(61, 61) / 0.3
+    # 3721 numbers: their mean within 4/sqrt(n), their variance within 4 sqrt(2/n)
+    assert abs(z.mean()) < 4 / 61 and abs(z.var() - 1) < 4 * np.sqrt(2) / 61
+    assert kstest(z.ravel(), "norm").pvalue > 0.01
+    for shifted in (z[1:] * z[:-1], z[:, 1:] * z[:, :-1]):
+        assert abs(shifted.mean()) < 4 / 60
+
+
+def test_grid_points_tilt_facets_as_the_slope_between_neighbours_says():
+    """SARAS: the slope is Gaussian, its standard deviation sqrt(2) sigma/dx along either axis."""
+    scene, seed = rough(n=200)
+    n = normals(scene.realized(seed).triangles)
+    for axis in (0, 1):
+        slope = -n[:, axis] / n[:, 2]
+        # 40 200 slopes, neighbours' correlation -1/2: variance of the variance 2 (1 + 2/4)/n; four deviations
+        assert abs(slope.var() / (2 * 0.3**2 / 2**2) - 1) < 4 * np.sqrt(3 / 40_200)
+
+
+def test_deviations_are_given_by_grid_point():
+    sigma = np.zeros((3, 4))
+    sigma[1, 2] = 0.5
+    scene = sarcl.Scene.from_heights(range(4), range(3), np.zeros((3, 4)), point_roughness=sigma)
+    moved = scene.realized(2).triangles
+    where = moved[..., 2] != 0
+    assert where.sum() == 6 and (moved[where][:, :2] == (2, 1)).all()
+
+
+def test_heights_follow_the_seed_and_their_place_alone():
+    scene, seed = rough(n=8)
+    same, other = scene.realized(seed), scene.realized(seed + 1)
+    assert (scene.realized(seed).triangles == same.triangles).all()
+    assert (other.triangles[..., 2] != same.triangles[..., 2]).mean() > 0.99
+    part, _ = rough(n=5)
+    small = {tuple(c[:2]): c[2] for c in part.realized(seed).triangles.reshape(-1, 3)}
+    large = {tuple(c[:2]): c[2] for c in same.triangles.reshape(-1, 3)}
+    assert all(large[place] == z for place, z in small.items())
+    both = (sarcl.Scene.points([[0, 0, 9]]) + scene).realized(seed)
+    assert (both.triangles == same.triangles).all()
+
+
+def test_facets_of_random_points_are_realized_before_they_are_cut():
+    scene, seed = rough(n=3)
+    with pytest.raises(ValueError, match=r"call scene\.realized\(seed\) first"):
+        scene.split(0.5)
+    cut = scene.realized(seed).split(0.5)
+    assert abs(total_area(cut) - total_area(scene.realized(seed))) <= TOLERANCE["area"] * total_area(cut)
+
+
+def test_the_facets_random_heights_are_a_stream_of_their_own():
+    places = np.random.default_rng(0).uniform(-10, 10, (4000, 3))
+    first, second = gaussian(places, 3), gaussian(places, 3, POINT_HEIGHTS)
+    assert abs(np.corrcoef(first, second)[0, 1]) < 4 / np.sqrt(4000)
+    assert (gaussian(places, 3) == first).all()
+
+
+# standing on the ground
+
+
+def test_the_height_of_the_ground_is_that_of_the_facet_there():
+    x, y, z = heights()
+    ground = sarcl.Scene.from_heights(x, y, z)
+    for i in (0, 1, 3):
+        for j in (0, 2, 5):
+            assert ground.height_at(x[j], y[i]) == pytest.approx(z[i, j], abs=TOLERANCE["position"])
+    tilted = sarcl.Scene.from_heights(x, y, lambda x, y: 0.4 * x - 0.3 * y + 2)
+    for at in np.random.default_rng(0).uniform((x[0], y[0]), (x[-1], y[-1]), (50, 2)):
+        assert tilted.height_at(*at) == pytest.approx(0.4 * at[0] - 0.3 * at[1] + 2, abs=TOLERANCE["position"])
+    with pytest.raises(ValueError, match=r"no facet lies at x -99, y 0 m; the scene reaches from"):
+        ground.height_at(-99, 0)
+    with pytest.raises(ValueError, match="no facet lies"):
+        sarcl.Scene.points([[0, 0, 0]]).height_at(0, 0)
+
+
+def test_what_stands_on_something_stands_on_its_highest_facet():
+    table = sarcl.Scene.from_mesh(box(), position=(0, 0, 3)) + sarcl.Scene.facets(TRIANGLE * 10)
+    assert table.height_at(0.1, 0.1) == pytest.approx(4.5)
+
+
+def test_a_thing_is_put_on_the_ground():
+    ground = sarcl.Scene.from_heights([-9, 9], [-9, 9], lambda x, y: 0.1 * x + 5)
+    thing = sarcl.Scene.from_mesh(box(), material="wood") + sarcl.Scene.points([[0, 0, 2]])
+    placed = thing.on(ground, 4, -3)
+    assert placed.bounds == pytest.approx(thing.bounds + np.array([4, -3, 5.4 + 1.5]))
+    assert placed.positions == pytest.approx(np.array([[4, -3, 8.9]]))
+    sunk = thing.on(ground, 4, -3, depth=0.2)
+    assert sunk.bounds[0, 2] == pytest.approx(5.4 - 0.2)
+    assert (ground + placed).materials == (METAL, MATERIALS["wood"])
+    with pytest.raises(ValueError, match="no facet lies at x 40"):
+        thing.on(ground, 40, 0)
+    with pytest.raises(TypeError, match=r"ground is a float; wanted a sarcl\.Scene"):
+        thing.on(3.0, 0, 0)
+
+
+# materials
+
+
+def test_a_number_is_a_perfect_conductor_of_that_reflectivity():
+    for material, factor in (("metal", 1), (0.3, 0.3), (1, 1), (np.float64(0.5), 0.5)):
+        scene = facets(material=material)
+        assert scene.materials == (METAL,) and scene.material == [0] and scene.reflectivity == [factor]
+
+
+def test_a_materials_own_reflectivity_becomes_the_facets():
+    """So that whoever multiplies by scene.reflectivity has it all, once."""
+    painted = sarcl.Material(4, reflectivity=0.5, name="painted")
+    bare = sarcl.Material(4, name="painted")
+    scene = facets(material=painted, reflectivity=0.5)
+    assert scene.materials == (bare,) and scene.reflectivity == [0.25]
+    by_hand = sarcl.Scene(np.zeros((0, 3)), [], TRIANGLE, [0.5], [0], [True], [0], (painted,))
+    assert by_hand.materials == (bare,) and by_hand.reflectivity == [0.25]
+    assert dataclasses.replace(by_hand).reflectivity == [0.25]
+
+
+def test_adding_merges_materials_and_cutting_keeps_them():
+    a = facets(soup(2), material=["sand", "metal"])
+    b = facets(soup(3), material=["metal", 0.5, "glass"])
+    both = a + b + points([[0, 0, 0]])
+    assert [both.materials[i].name for i in both.material] == ["sand", "metal", "metal", "metal", "glass"]
+    assert len(both.materials) == 3 and both.material.dtype == np.int32
+    cut = both.split(1.0)
+    share = [areas(cut.triangles)[cut.material == i].sum() for i in range(3)]
+    assert share == pytest.approx([areas(both.triangles)[both.material == i].sum() for i in range(3)])
+
+
+def test_facets_without_area_are_left_out_with_their_material():
+    flat = np.array([[[0.0, 0, 0], [1, 1, 1], [2, 2, 2]]])
+    scene = facets(np.concatenate([flat, TRIANGLE]), material=["sand", "glass"], reflectivity=[0.1, 0.2])
+    assert scene.materials[scene.material[0]].name == "glass" and scene.reflectivity == [0.2]
 
 
 # adding, and what every scene has
@@ -403,8 +584,26 @@ BAD = {
     "one triangle alone": (lambda: facets(TRIANGLE[0]), r"triangles has shape \(3, 3\), wanted \(n_facets, 3, 3\)"),
     "no triangles": (lambda: facets(np.zeros((0, 3, 3))), "triangles is empty"),
     "triangles not finite": (lambda: facets(TRIANGLE * np.nan), r"triangles\[0, 0, 0\] is nan"),
+    "materials of other length": (
+        lambda: facets(material=["sand", "sand"]),
+        r"material has shape \(2,\), wanted one for",
+    ),
+    "reflectivity above one": (lambda: facets(reflectivity=1.5), "reflectivity must lie between 0 and 1"),
+    "place of no material": (
+        lambda: sarcl.Scene(np.zeros((0, 3)), [], TRIANGLE, [1], [0], [True], [1], (METAL,)),
+        "scene material holds 1; it is a place in materials, 0 to 0",
+    ),
+    "deviations of other shape": (lambda: terrain(point_roughness=[[0.1]]), r"point_roughness has .* wanted \(2, 3\)"),
+    "negative deviation": (lambda: terrain(point_roughness=-0.1), "point_roughness reaches -0.1 m"),
+    "deviation not finite": (lambda: terrain(point_roughness=np.nan), "point_roughness is nan"),
+    "function of another shape": (lambda: terrain(z=lambda x, y: x[:1]), r"z has shape \(1, 3\), wanted \(2, 3\)"),
+    "function not finite": (lambda: terrain(z=lambda x, y: x * np.nan), r"z\[0, 0\] is nan"),
+    "seed below zero": (lambda: rough()[0].realized(-1), "seed is -1; it must be at least 0"),
     "all degenerate": (lambda: facets(TRIANGLE * [1, 0, 1]), "all 1 facets are degenerate .*check the mesh"),
-    "unknown material": (lambda: facets(material="wood"), "material is 'wood'; known are 'metal', or give a refl"),
+    "unknown material": (
+        lambda: facets(material="wool"),
+        r"material is 'wool'; known are 'metal', .*; or give a sarcl\.Material",
+    ),
     "material above one": (lambda: facets(material=1.2), "material is 1.2; an amplitude reflectivity lies between"),
     "material below zero": (lambda: facets(material=-0.1), "material is -0.1; it must be at least 0"),
     "material not finite": (lambda: facets(material=np.nan), "material is nan"),

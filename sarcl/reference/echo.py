@@ -8,22 +8,6 @@ from ..check import SPEED_OF_LIGHT
 from .geometry import half_path
 
 
-def facet_amplitudes(
-    centers: np.ndarray,
-    normals: np.ndarray,
-    strengths: np.ndarray,
-    two_sided: np.ndarray,
-    tx: np.ndarray,
-    rx: np.ndarray,
-) -> np.ndarray:
-    """strength sqrt(cos_tx cos_rx) of facets lit and seen from their outside; two-sided ones turn to the light."""
-    to_tx, to_rx = tx - centers, rx - centers
-    cos_tx = (normals * to_tx).sum(axis=1) / np.linalg.norm(to_tx, axis=1)
-    cos_rx = (normals * to_rx).sum(axis=1) / np.linalg.norm(to_rx, axis=1)
-    turn = np.where(two_sided & (cos_tx < 0), -1.0, 1.0)
-    return strengths * np.sqrt(np.maximum(turn * cos_tx, 0) * np.maximum(turn * cos_rx, 0))
-
-
 def echo(
     points: np.ndarray,
     amplitudes: np.ndarray,

@@ -1,31 +1,85 @@
-"""Which facets something hides, by testing every ray against every facet (Moeller and Trumbore, 1997)."""
+"""Which samples of facets something hides: every ray against every facet, every range line against every grid line."""
 
 from __future__ import annotations
 
 import numpy as np
 
+CENTROID = np.array([[1 / 3, 1 / 3]])
 
-def hidden(triangles: np.ndarray, viewpoint: np.ndarray, bias: float = 0.01) -> np.ndarray:
-    """True (k,) where a facet, m (k, 3, 3), crosses the line from another's centroid to `viewpoint`, m (3,).
 
-    Crossings nearer to the centroid than `bias` of the facet's longest edge do not count.
+def sample(triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray, lift: float) -> np.ndarray:
+    """Points (k, n, 3) at barycentric places (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
+
+    By `lift` of a facet's longest edge along its normal.
     """
     a = triangles[:, 0]
     b, c = triangles[:, 1] - a, triangles[:, 2] - a
-    out = np.zeros(len(triangles), bool)
-    for i, facet in enumerate(triangles):
-        origin = facet.mean(axis=0)
-        ray = viewpoint - origin
-        allowance = bias * np.linalg.norm(facet - np.roll(facet, 1, axis=0), axis=1).max()
+    normal = np.cross(b, c)
+    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
+    normal[np.einsum("ij,ij->i", normal, viewpoint - a) < 0] *= -1
+    length = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
+    u, v = np.asarray(places).T[:, None, :, None]
+    return (a + lift * length[:, None] * normal)[:, None] + u * b[:, None] + v * c[:, None]
+
+
+def hidden(
+    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-3
+) -> np.ndarray:
+    """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,).
+
+    Source: Moeller and Trumbore 1997.
+    """
+    a = triangles[:, 0]
+    b, c = triangles[:, 1] - a, triangles[:, 2] - a
+    points = sample(triangles, viewpoint, places, lift)
+    out = np.zeros(points.shape[:2], bool)
+    for i in np.ndindex(out.shape):
+        ray = viewpoint - points[i]
         p = np.cross(ray, c)
-        det = (b * p).sum(axis=1)
+        det = np.einsum("ij,ij->i", b, p)
         with np.errstate(divide="ignore", invalid="ignore"):
-            s = origin - a
-            u = (s * p).sum(axis=1) / det
+            s = points[i] - a
+            u = np.einsum("ij,ij->i", s, p) / det
             q = np.cross(s, b)
             v = (q @ ray) / det
-            t = (c * q).sum(axis=1) / det
-        crosses = (u >= 0) & (v >= 0) & (u + v <= 1) & (t * np.linalg.norm(ray) > allowance) & (t <= 1)
-        crosses[i] = False
-        out[i] = crosses.any()
+            t = np.einsum("ij,ij->i", c, q) / det
+            out[i] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t <= 1)).any()
+    return out
+
+
+def overshadowed(
+    grid: tuple[np.ndarray, np.ndarray, np.ndarray], points: np.ndarray, viewpoint: np.ndarray
+) -> np.ndarray:
+    """True (n,) where a terrain, (x, y, z), m, rises above the line from points, m (n, 3), to `viewpoint`, m (3,).
+
+    Looked at wherever the line crosses an edge of the terrain's triangles.
+    """
+    x, y, z = grid
+    out = np.zeros(len(points), bool)
+    for i, point in enumerate(points):
+        way = viewpoint - point
+        with np.errstate(divide="ignore", invalid="ignore"):
+            t = np.concatenate([(x - point[0]) / way[0], (y - point[1]) / way[1], [0.0, 1.0]])
+        t = np.sort(t[(t >= 0) & (t <= 1)])
+        middle = point + ((t[1:] + t[:-1]) / 2)[:, None] * way
+        inside = (middle[:, 0] > x[0]) & (middle[:, 0] < x[-1]) & (middle[:, 1] > y[0]) & (middle[:, 1] < y[-1])
+        start, end, middle = t[:-1][inside], t[1:][inside], middle[inside]
+        c, r = np.searchsorted(x, middle[:, 0]) - 1, np.searchsorted(y, middle[:, 1]) - 1
+        wide, high = x[c + 1] - x[c], y[r + 1] - y[r]
+
+        def above(t: np.ndarray, c: np.ndarray = c, r: np.ndarray = r, point: np.ndarray = point) -> np.ndarray:
+            """Terrain less line, on the cell's upper or lower triangle."""
+            u, v = (point[0] + t * way[0] - x[c]) / wide, (point[1] + t * way[1] - y[r]) / high  # noqa: B023
+            ground = z[r, c] + np.where(
+                u >= v,
+                u * (z[r, c + 1] - z[r, c]) + v * (z[r + 1, c + 1] - z[r, c + 1]),
+                v * (z[r + 1, c] - z[r, c]) + u * (z[r + 1, c + 1] - z[r + 1, c]),
+            )
+            return ground - (point[2] + t * way[2])  # noqa: B023
+
+        slope = way[0] / wide - way[1] / high
+        with np.errstate(divide="ignore", invalid="ignore"):
+            diagonal = ((point[1] - y[r]) / high - (point[0] - x[c]) / wide) / slope
+        diagonal = np.where((diagonal > start) & (diagonal < end), diagonal, start)
+        out[i] = any((above(at) > 0).any() for at in (start, diagonal, end))
     return out

@@ -1,0 +1,189 @@
+// Echoes of planar facets by physical optics, spread into range profiles.
+//
+//   g_pm[i] = sum_k a_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   x_k centroids
+//   s_p(f)  = f sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
+//
+// source    sarcl/reference/facet.py; amplitudes between NODES frequencies f_m by interpolation (docs/facets.md)
+// symbols   a_k(p, f)  1/f times the amplitude k/(2 sqrt(pi)) S I; delta, kappa, sigma as in geometry.clh
+//           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER as in the headers
+//           NODES      frequencies f_m
+//           HH, HV, VH, VV   1: wanted (first letter received)
+//           METAL      1: every facet is a perfect conductor
+//           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
+//           ROUGH      1: materials with roughness finer than a facet
+//           TILE       facets a tile, a multiple of VW
+// reference: sarcl/reference/facet.py:facet_amplitude
+
+#include "common.clh"
+#include "wide.clh"
+#include "geometry.clh"
+#include "interp.clh"
+#include "phase.clh"
+#include "rows.clh"
+#include "facet.clh"
+
+#define CHANNELS (NODES * (HH + HV + VH + VV))
+enum { F_EDGE = 0, F_FACTOR = 6, F_ROUGH = 7, F_M = ROUGH ? 13 : 7 };  // planes of `facets`
+
+inline triple load_triple(__global const float *restrict planes, size_t at, size_t n) {
+    return t_make(LOAD(at, planes), LOAD(at, planes + n), LOAD(at, planes + 2 * n));
+}
+
+// Unit vector from points to an antenna that lies R0 u from the tile's reference point.
+inline triple toward(direction u, offset x) {
+    triple d = t_make(fma((fv)u.x, (fv)u.R0, -x.x), fma((fv)u.y, (fv)u.R0, -x.y), fma((fv)u.z, (fv)u.R0, -x.z));
+    return t_scale((fv)1.0f / sqrt(t_dot(d, d)), d);
+}
+
+inline void add_channel(__global float *sum, int stride, int origin, int channel, iv j, const fv *w, complex_v a, fv scale,
+                        fv sine, fv cosine) {
+    a = c_scale(scale, a);
+    // times exp(-j 2 pi turn)
+    add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),
+             fma(a.im, cosine, -a.re * sine));
+}
+
+#if ROUGH
+// Mean of exp(j q.rho) over a facet that is rough below its size: what is left of the coherent `mean`, and a random part
+// that re-radiates as the facet's diagram says (sarcl/reference/roughness.py:rough_mean).
+//   qn  turns/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
+//   of  planes: rms height, m; diagram (0 none, 1 isotropic, 2 cos, 3 cos^2, 4 exp); 1/width; 1/Omega; random re, im
+inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wave, __global const float *restrict of, size_t at,
+                            size_t n) {
+    fv height = LOAD(at, of), diagram = LOAD(at, of + n), inverse_width = LOAD(at, of + 2 * n);
+    fv turns = min(fabs(qn * height), (fv)3.0f), fall = exp((fv)-39.478418f * turns * turns);
+    fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, c = max(cosine, (fv)0.0f), d = 0;
+    d = diagram == 1.0f ? (fv)1.0f : d;
+    d = diagram == 2.0f ? c : d;
+    d = diagram == 3.0f ? c * c : d;
+    d = diagram == 4.0f ? exp(-delta * delta) : d;
+    fv coherent = sqrt(fall);
+    fv random = sqrt(d * ((fv)1.0f - fall) * LOAD(at, of + 3 * n) / max(area, (fv)1e-30f)) / wave;
+    return c_make(fma(coherent, mean.re, random * LOAD(at, of + 4 * n)), fma(coherent, mean.im, random * LOAD(at, of + 5 * n)));
+}
+#endif
+
+// global size (pulses of this call, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
+//   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
+//   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
+//            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
+//   seen     (n_tiles TILE)           share of each facet that both antennas see, 0 ... 255
+//   nodes    (2, NODES)               f_m/c, turns/m, and k/(2 sqrt(pi) f)
+//   up       (6)                      vertical, and what takes its place along it
+//   last     facets in the last tile; the rest of it is blank
+//   flush    tiles added in float32 before they join the compensated total
+//   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
+//   done     (2, splits, n_used)      facets that were in the range window, and of those seen from their front
+__kernel void spread_facets(__global const float *restrict pulse, int n, int n_used,
+                            __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
+                            __global const float *restrict offsets, int n_offsets, __global const float *restrict facets,
+                            __global const uchar *restrict seen, __global const float *restrict nodes,
+                            __global const float *restrict up, __global const float *restrict table, int last, int flush,
+                            __global float *rows, int stride, int origin, __global int *restrict done) {
+    int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, added = 0;
+    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
+    float3 vertical = vload3(0, up), other = vload3(1, up);
+    for (int k = split; k < n_tiles; k += get_global_size(1)) {
+        __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
+        int state = as_int(c[C_STATE]);
+        if (state == OUTSIDE) continue;
+        int real = k == n_tiles - 1 ? last : TILE;
+        direction from_tx = load_direction(c, C_UX, C_LOW);
+#if BISTATIC
+        direction from_rx = load_direction(c, C_RX, C_RX_LOW);
+#endif
+        for (int i = 0; i < TILE / VW; i++) {
+            size_t at = (size_t)k * (TILE / VW) + i;
+            offset x = load_offset(offsets, at, n_offsets);
+            about_centre(&x, tile, k, n_tiles);
+            triple first = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
+            triple second = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
+            fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
+            triple normal = t_cross(first, second), u = toward(from_tx, x);
+            fv twice_area = sqrt(t_dot(normal, normal));
+            // blanks have no area
+            normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
+            fv cosine_tx = t_dot(normal, u);
+            iv turn_over = (factor < 0) & (cosine_tx < 0);
+            normal = t_scale(turn_over ? (fv)-1.0f : (fv)1.0f, normal);
+            cosine_tx = turn_over ? -cosine_tx : cosine_tx;
+            triple h, v;
+            polarisation(u, vertical, other, &h, &v);
+#if BISTATIC
+            triple ur = toward(from_rx, x), hr, vr;
+            polarisation(ur, vertical, other, &hr, &vr);
+            triple both = t_add(u, ur);
+            iv front = (cosine_tx > 0) & (t_dot(normal, ur) > 0);
+#else
+            triple both = t_scale((fv)2.0f, u);
+            iv front = cosine_tx > 0;
+#endif
+            place where = locate(c, pulse, p, n, x);
+            fv inside = 1;
+            if (state == CROSSING) inside = keep_inside(c, &where);
+            float is_inside[VW], is_front[VW], share[VW];
+            STORE(inside, 0, is_inside);
+            STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
+#pragma unroll
+            for (int l = 0; l < VW; l++) {
+                int counts = is_inside[l] != 0 && i * VW + l < real;
+                inside_count += counts;
+                front_count += counts && is_front[l] != 0;
+                share[l] = seen[at * VW + l] * (1.0f / 255.0f);
+            }
+            fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * inside * LOAD(0, share);
+            if (largest(amplitude) <= 0) continue;
+
+            fv sine, cosine, w[TAPS], b = t_dot(both, first), g = t_dot(both, second);
+            sincos_turns(where.turn, &sine, &cosine);
+            iv j;
+            tap_weights(first_tap(where.t, where.base, stride, origin, &j), table, w);
+            scattering s;
+            for (int m = 0; m < NODES; m++) {
+                if (m == 0 || DISPERSIVE) {
+#if METAL
+                    complex_v root = c_make((fv)0.0f, (fv)0.0f);
+#else
+                    __global const float *of = facets + (F_M + 2 * m) * (size_t)n_offsets;
+                    complex_v root = c_make(LOAD(at, of), LOAD(at, of + n_offsets));
+#endif
+#if BISTATIC
+                    s = scatter(normal, u, h, v, ur, hr, vr, root);
+#else
+                    s = scatter_back(normal, u, h, v, root);
+#endif
+                }
+                complex_v mean = triangle_mean(b * nodes[m], g * nodes[m]);
+#if ROUGH
+                fv along = t_dot(both, normal), size = max(sqrt(t_dot(both, both)), (fv)1e-6f);
+                mean = rough_mean(mean, along * nodes[m], along / size, (fv)0.5f * twice_area, nodes[m],
+                                  facets + F_ROUGH * (size_t)n_offsets, at, n_offsets);
+#endif
+                fv scale = amplitude * nodes[NODES + m];
+                int channel = m;
+#if HH
+                add_channel(sum, stride, origin, channel, j, w, c_mul(s.hh, mean), scale, sine, cosine);
+                channel += NODES;
+#endif
+#if HV
+                add_channel(sum, stride, origin, channel, j, w, c_mul(s.hv, mean), scale, sine, cosine);
+                channel += NODES;
+#endif
+#if VH
+                add_channel(sum, stride, origin, channel, j, w, c_mul(s.vh, mean), scale, sine, cosine);
+                channel += NODES;
+#endif
+#if VV
+                add_channel(sum, stride, origin, channel, j, w, c_mul(s.vv, mean), scale, sine, cosine);
+#endif
+            }
+        }
+        if (++added % flush == 0)
+            for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+    }
+    for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+    size_t mine = (size_t)split * n_used + p, all = (size_t)get_global_size(1) * n_used;
+    done[mine] = inside_count;
+    done[all + mine] = front_count;
+}

@@ -1,0 +1,218 @@
+"""How facets are computed to a tolerance: how finely they are cut, at how many frequencies, and what that errs.
+
+docs/facets.md derives each term; tests/test_facet_echo_engine.py measures the sum.
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from math import factorial
+from typing import Any
+
+import numpy as np
+
+from .check import SPEED_OF_LIGHT
+from .geometry import Antennas
+from .scene import Scene, box, centroids, edges, normals
+
+LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
+MOST_NODES = 8
+SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
+MOST_FACETS = 50_000_000
+# Relative cost of a facet and pulse: of direction, place and polarisations; of its integral at a frequency; of a tap
+FACET, NODE, TAP = 1.0, 0.6, 0.12
+TO_CORNER = 2 / 3  # from a centroid to the farthest corner, of the longest edge
+
+
+@dataclass(frozen=True, eq=False)
+class FacetPlan:
+    """Facets no longer than max_edge, m, their amplitudes interpolated between `nodes`, Hz (n,).
+
+    predicted_error  relative, of what this leaves out
+    n_facets         there will be, about
+    """
+
+    max_edge: float
+    nodes: np.ndarray
+    predicted_error: float
+    n_facets: float
+
+    def basis(self, frequencies: np.ndarray) -> np.ndarray:
+        """Lagrange's polynomials of the nodes at frequencies, Hz (m,), times these: (n, m), Hz.
+
+        The factor k(f) of amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
+        """
+        out = np.ones((len(self.nodes), 1)) * frequencies
+        for i, node in enumerate(self.nodes):
+            for j, other in enumerate(self.nodes):
+                if i != j:
+                    out[i] *= (frequencies - other) / (node - other)
+        return out
+
+    def describe(self) -> dict[str, Any]:
+        """For a report."""
+        return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, "frequencies a facet": len(self.nodes)}
+
+
+def coherent(scene: Scene) -> np.ndarray:
+    """Facets (k,) of which some part reflects as a mirror their size does."""
+    return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
+
+
+def cut_facets(scene: Scene, plan: FacetPlan, finest: float) -> Scene:
+    """The scene's facets as the plan wants them; those without a coherent part only to about `finest`, m."""
+    mirror = coherent(scene)
+    parts = [scene.part(which).split(edge) if np.isfinite(edge) else scene.part(which)
+             for which, edge in ((mirror, plan.max_edge), (~mirror, 1.05 * finest)) if which.any()]  # fmt: skip
+    return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+
+
+def chebyshev(center: float, bandwidth: float, n: int) -> np.ndarray:
+    """n nodes over the band, Hz."""
+    return center + bandwidth / 2 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
+
+
+def frequency_error(n: int, phase: float) -> float:
+    """Of interpolating exp(j phase t), |t| <= 1, between n Chebyshev nodes: 2 J_n(phase) and what follows, bounded."""
+    half = phase / 2
+    return float(2 * half**n / factorial(n) / max(1 - half / (n + 1), 0.1))
+
+
+def plan_facets(
+    tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, channels: int,
+    finest: float = np.inf, *, cut: bool = True,
+) -> FacetPlan:  # fmt: skip
+    """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
+
+    center, bandwidth  of the waveform, Hz;  channels  polarisations;  finest  no edge may be longer, m
+    cut                False: facets stay as they are
+    ValueError where more than 50 million facets would be needed, with what fewer could do.
+    """
+    longest = np.maximum.reduce(edges(scene.triangles))
+    mirror, highest = coherent(scene), center + bandwidth / 2
+    random = not mirror.all()  # such facets are points with random phases, cut to `finest` alone
+    top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
+    bounds = box(scene.triangles.reshape(-1, 3))
+    distance = nearest(scene, antennas, bounds)
+    look, spread = _look(antennas, bounds)
+    # how steeply ranges change over a facet, at worst over pulses and scene
+    slope = float(np.sqrt(np.clip(1 - np.min(np.abs(normals(scene.triangles) @ look)) ** 2, 0, 1)))
+    slope = min(1.0, slope + spread)
+    dispersion = _dispersion(scene, center - bandwidth / 2, highest)
+    best: tuple[float, FacetPlan] | None = None
+    least, edge = np.inf, min(top, finest)
+    while True:
+        corner = TO_CORNER * edge
+        count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
+        fixed = _rounding(edge, highest) + (_spherical(corner, distance, highest) if mirror.any() else 0.0)
+        phase = dispersion + (bandwidth / center if random else 0.0)  # a random part goes as 1/f
+        if mirror.any():
+            phase += 2 * np.pi * bandwidth / SPEED_OF_LIGHT * corner * slope
+        for n in range(1, MOST_NODES + 1):
+            error = fixed + frequency_error(n, phase)
+            least = min(least, error) if count <= MOST_FACETS else least
+            if error <= SHARE * tolerance and count <= MOST_FACETS:
+                cost = count * (FACET + n * (NODE + 4 * TAP * channels))
+                if best is None or cost < best[0]:
+                    best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count)
+                break
+        settled = best is not None and count > 4 * best[1].n_facets
+        if settled or not cut or not mirror.any() or count > MOST_FACETS:
+            break
+        edge /= LADDER
+    if best is None and not cut:
+        raise ValueError(
+            f"tolerance {tolerance:.1e} cannot be met with facets of up to {top:.3g} m uncut; the best is "
+            f"{least / SHARE:.1e}: let echo cut them (max_edge='auto')"
+        )
+    if best is None:
+        raise ValueError(
+            f"tolerance {tolerance:.1e} would cut these facets into more than {MOST_FACETS:,}; the best here is "
+            f"{least / SHARE:.1e}, or take a smaller scene"
+        )
+    return best[1]
+
+
+def crowding(scene: Scene, max_edge: float, antennas: Antennas, frequencies: np.ndarray) -> float:
+    """How much more the norm of cut facets is than that of uncut ones, were each added with a random phase; at least 1.
+
+    Cutting a smooth facet makes edges whose echoes cancel again; what they err does not. From up to 200 facets at
+    three pulses, as perfect conductors.
+    """
+    from .reference.facet import triangle_integral
+
+    some = np.flatnonzero((np.maximum.reduce(edges(scene.triangles)) > max_edge) & coherent(scene))
+    if len(some) == 0:
+        return 1.0
+    some = some[np.unique(np.linspace(0, len(some) - 1, 200).astype(int))]
+    whole = Scene.facets(scene.triangles[some])
+    cut = whole.split(max(max_edge, float(np.maximum.reduce(edges(whole.triangles)).max()) / 64))
+    power = [0.0, 0.0]
+    for row in np.unique(np.linspace(0, len(antennas.tx) - 1, 3).astype(int)):
+        for i, part in enumerate((whole, cut)):
+            centers = centroids(part.triangles)
+            q = np.zeros_like(centers)
+            for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+                away = ends[row] - centers
+                q += away / np.linalg.norm(away, axis=1, keepdims=True)
+            for f in frequencies:
+                integral = triangle_integral(part.triangles, 2 * np.pi * f / SPEED_OF_LIGHT * q)
+                power[i] += float((np.abs(integral) ** 2).sum())
+    return max(1.0, float(np.sqrt(power[1] / power[0]))) if power[0] else 1.0
+
+
+def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:
+    """Least distance of an antenna to a facet, m, or less: by the box of all, or by centroids where that is near."""
+    distance = antennas.distance(bounds)
+    if distance > float(np.linalg.norm(bounds[1] - bounds[0])):
+        return distance
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(centroids(scene.triangles))
+    ends = [antennas.tx] if antennas.rx is None else [antennas.tx, antennas.rx]
+    away = min(float(tree.query(end)[0].min()) for end in ends)
+    found = away - TO_CORNER * float(np.maximum.reduce(edges(scene.triangles)).max())
+    if max(found, distance) <= 0:
+        raise ValueError(
+            f"an antenna comes within {away:.3g} m of a facet that is as large; move the track away from the scene, "
+            "or cut its facets first: scene.split(max_edge)"
+        )
+    return max(found, distance)
+
+
+def _look(antennas: Antennas, bounds: np.ndarray) -> tuple[np.ndarray, float]:
+    """Mean direction from the scene to the antennas (3,), and how far from it any pulse and point may be, rad."""
+    middle, radius = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
+    ends = [antennas.tx] if antennas.rx is None else [antennas.tx, antennas.rx]
+    each = np.zeros_like(antennas.tx)
+    for end in ends:
+        d = end - middle
+        each += d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9) / len(ends)
+    mean = each.mean(axis=0)
+    mean = mean / (np.linalg.norm(mean) or 1.0)
+    near = max(antennas.distance(bounds), 1e-9)
+    return mean, float(np.linalg.norm(each - mean, axis=1).max()) + min(radius / near, 2.0)
+
+
+def _dispersion(scene: Scene, lowest: float, highest: float) -> float:
+    """How much the materials' reflection changes over the band, relative, as a phase would."""
+    worst = 0.0
+    for material in scene.materials:
+        low, high = (1 / np.sqrt(complex(material.permittivity(f))) for f in (lowest, highest))
+        if low != high:
+            worst = max(worst, 2 * abs(high - low) / abs(1 - high))
+    return worst
+
+
+def _spherical(corner: float, distance: float, highest: float) -> float:
+    """The wave's curvature over a facet, rad at its corners, and how its direction and polarisation change there."""
+    if corner >= distance:
+        return float("inf")
+    return float(
+        (2 * np.pi * highest / SPEED_OF_LIGHT) * corner**2 / (distance - corner) + corner / (distance - corner)
+    )
+
+
+def _rounding(edge: float, highest: float) -> float:
+    """Float32 directions (4e-7 |q| |edge| rad, a fifth of which counts) and integrals (kernels/facet.clh)."""
+    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + 2e-6

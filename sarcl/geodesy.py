@@ -1,0 +1,43 @@
+"""WGS84: longitude, latitude and height to Earth-centred coordinates and to local axes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+SEMI_MAJOR = 6_378_137.0  # m, defining
+FLATTENING = 1 / 298.257223563  # defining
+ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
+
+
+def ecef(longitude: Any, latitude: Any, height: Any) -> np.ndarray:
+    """Earth-centred, Earth-fixed positions, m (..., 3), of degrees and heights above the ellipsoid, m.
+
+    Source: NGA.STND.0036 (WGS84), eq. (4-14): x = (N + h) cos(lat) cos(lon), ..., z = (N (1 - e^2) + h) sin(lat).
+    """
+    longitude, latitude = np.radians(longitude), np.radians(latitude)
+    s, c = np.sin(latitude), np.cos(latitude)
+    normal = SEMI_MAJOR / np.sqrt(1 - ECCENTRICITY_SQUARED * s**2)  # radius of curvature in the prime vertical
+    across = (normal + height) * c
+    return np.stack(
+        np.broadcast_arrays(
+            across * np.cos(longitude), across * np.sin(longitude), (normal * (1 - ECCENTRICITY_SQUARED) + height) * s
+        ),
+        axis=-1,
+    )
+
+
+def up(longitude: Any, latitude: Any) -> np.ndarray:
+    """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
+    longitude, latitude = np.radians(longitude), np.radians(latitude)
+    c = np.cos(latitude)
+    return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
+
+
+def local_axes(longitude: float, latitude: float) -> np.ndarray:
+    """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin)."""
+    lon, lat = np.radians(longitude), np.radians(latitude)
+    east = np.array([-np.sin(lon), np.cos(lon), 0.0])
+    north = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
+    return np.stack([east, north, up(longitude, latitude)])

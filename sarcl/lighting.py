@@ -1,0 +1,271 @@
+"""What share of each facet both antennas see, pulse block by pulse block."""
+
+from __future__ import annotations
+
+import logging
+import warnings
+from collections.abc import Callable
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import cl, planning
+from .check import SarclWarning, array, choice, number, sealed
+from .horizon import Terrain, above, heights_of
+from .pulse_blocks import lever, pulse_blocks, reach, scene_box
+from .samples import PROBES, SAMPLES, places
+from .shadow import Facets, Frame, Occluders
+
+log = logging.getLogger(__name__)
+
+FEW = 4096  # facets that get all their samples at once
+LARGE = 4  # times the lower quartile of edges: facets on which a whole shadow may lie between corners and centre
+CHUNK = 2**22  # facets at a time
+
+
+@dataclass(frozen=True, eq=False)
+class Lighting:
+    """Shares of k facets that both antennas see, the same for all pulses of a block.
+
+    blocks      first and last + 1 of the pulses, int64 (n_blocks, 2)
+    viewpoints  the pulse of each block that was looked from (n_blocks,)
+    dark        (k,) bool: facets no antenna pair ever sees any of
+    full        (k,) bool: facets always seen as a whole
+    dark_facets how many none of which is seen, of those wanted, in each block (n_blocks,)
+    """
+
+    blocks: np.ndarray
+    viewpoints: np.ndarray
+    dark: np.ndarray
+    full: np.ndarray
+    dark_facets: np.ndarray
+    _usual: np.ndarray = field(repr=False)
+    _changes: list[tuple[np.ndarray, np.ndarray]] = field(repr=False)
+    _look: Callable[[int], np.ndarray] = field(repr=False)
+
+    def __len__(self) -> int:
+        return len(self.blocks)
+
+    def share(self, block: int) -> np.ndarray:
+        """Lit shares in a block, uint8 (k,): 255 is all of a facet. Looked up, or looked at again (max_bytes)."""
+        if not -len(self) <= block < len(self):
+            raise IndexError(f"block is {block}; there are {len(self)}")
+        block %= len(self)
+        if block >= len(self._changes):
+            return self._look(block)
+        out = self._usual.copy()
+        index, value = self._changes[block]
+        out[index] = value
+        return out
+
+    def fraction(self, block: int) -> np.ndarray:
+        """Lit shares in a block, float32 (k,), 0 to 1."""
+        return self.share(block) / np.float32(255)
+
+    def block_of(self, pulse: int) -> int:
+        """The block that holds a pulse."""
+        if not 0 <= pulse < self.blocks[-1, 1]:
+            raise IndexError(f"pulse is {pulse}; there are {self.blocks[-1, 1]}")
+        return int(np.searchsorted(self.blocks[:, 0], pulse, side="right")) - 1
+
+    def dark_pairs(self) -> int:
+        """Pairs of a pulse and a wanted facet none of which is seen: facing away, or in shadow."""
+        return int(((self.blocks[:, 1] - self.blocks[:, 0]) * self.dark_facets).sum())
+
+
+class Light:
+    """A scene on a device, ready to be looked at from antennas: arguments as of `lit`."""
+
+    def __init__(
+        self,
+        device: cl.Device,
+        triangles: np.ndarray,
+        *,
+        heights: Any = None,
+        on_heights: np.ndarray | None = None,
+        two_sided: np.ndarray | bool = True,
+        wanted: np.ndarray | None = None,
+        tolerance: float = 0.25,
+        engine: str = "opencl",
+    ) -> None:
+        self.device, k = device, len(triangles)
+        on = np.full(k, heights is not None) if on_heights is None else on_heights
+        self.frame = frame = Frame.around(scene_box(triangles, heights))
+        self.terrain = None if heights is None else Terrain(device, heights, frame)
+        one_sided = np.broadcast_to(~np.asarray(two_sided), k)
+        self.facets = Facets(device, triangles, frame, one_sided)
+        self.occluders: Any = None
+        if not on.all():
+            self.occluders = _caster(engine)(device, triangles[~on], frame)
+        length = self.facets.length
+        large = length > LARGE * np.quantile(length, 0.25) if k > FEW else np.ones(k, bool)
+        keep = np.ones(k, bool) if wanted is None else wanted
+        points = places(next(n for n, error in SAMPLES if error <= tolerance))
+        self.n_samples = len(points)
+        self._places = (device.upload(points), len(points))
+        self._probes = (device.upload(PROBES), len(PROBES))
+        if self.n_samples <= len(PROBES):
+            large = np.ones(k, bool)
+        self._large, self._small = np.flatnonzero(keep & large), np.flatnonzero(keep & ~large)
+
+    def share(self, viewpoints: list[np.ndarray], slack: float = 0.0) -> np.ndarray:
+        """Shares of facets that all viewpoints, m (3,), see: uint8 (k,), 255 for all of a facet, 0 if not wanted.
+
+        slack  rad by which one-sided facets must turn away to be dark for that alone
+        """
+        out = np.zeros(len(self.facets.length), np.uint8)
+        scans = [None if self.terrain is None else self.terrain.scan(v) for v in viewpoints]
+        edge = [self._large]
+        for part in _chunks(self._small):
+            seen = self._count(part, self._probes, viewpoints, scans, slack)
+            out[part] = np.where(seen == len(PROBES), 255, 0)
+            edge.append(part[(seen > 0) & (seen < len(PROBES))])
+        for part in _chunks(np.concatenate(edge)):
+            seen = self._count(part, self._places, viewpoints, scans, slack)
+            out[part] = np.rint(seen * (255 / self.n_samples))
+        return out
+
+    def _count(self, index: np.ndarray, places: Any, viewpoints: Any, scans: Any, slack: float) -> np.ndarray:
+        """How many of its places, a buffer and their number, all viewpoints see of each facet: uint8 (n,)."""
+        device, n = self.device, len(index)
+        if n == 0:
+            return np.zeros(0, np.uint8)
+        which, hidden = device.upload(index.astype(np.int32)), device.empty(8 * n)
+        face = device.kernel("shadow.cl", "face")
+        for first, viewpoint in enumerate(viewpoints):
+            eye = self.frame.eye(viewpoint)[:3]
+            arguments = (self.facets.buffer, which, self.facets.side, *eye, np.float32(slack), int(first == 0), hidden)
+            device.run(face, (n,), None, *arguments)
+        for viewpoint, scan in zip(viewpoints, scans, strict=True):
+            if scan is not None:
+                scan.hide(self.facets, which, n, places, hidden)
+            if self.occluders is not None:
+                self.occluders.hide(self.facets, which, n, places, viewpoint, hidden)
+        seen = device.empty(n)
+        device.run(device.kernel("shadow.cl", "seen"), (n,), None, hidden, places[1], seen)
+        return device.download(seen, np.empty(n, np.uint8))
+
+
+def lit(
+    triangles: np.ndarray,
+    tx: np.ndarray,
+    rx: np.ndarray | None = None,
+    *,
+    heights: Any = None,
+    on_heights: np.ndarray | None = None,
+    two_sided: np.ndarray | bool = True,
+    wanted: np.ndarray | None = None,
+    tolerance: float = 0.25,
+    max_bytes: float | None = None,
+    engine: str = "opencl",
+    device: Any = None,
+    progress: Callable[[int, int], None] | None = None,
+) -> Lighting:
+    """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.
+
+    rx          default tx
+    heights     (x, y, z) of a terrain as of Scene.from_heights: it shadows by horizons along range lines
+    on_heights  (k,) bool: facets of that terrain, or of parts of it, which shadow as terrain only; default all of them.
+                The others shadow by rays, from both sides
+    two_sided   (k,) bool or one for all: the others are dark where they face away from an antenna
+    wanted      (k,) bool: facets whose share is asked for; the others only shadow, their share is 0
+    tolerance   by how much a facet's share errs at most where the edge of a shadow is straight (1/16 or more; 5/9: all
+                or nothing by its centroid), and again at most between the pulses of a block, for the facet of middle
+                size; see docs/shadows.md
+    max_bytes   of the shares kept, default a quarter of the memory blocks `echo` may use; the others are found anew
+                each time they are asked for
+    engine      "opencl", or "embree" for the rays (package embreex; edges may differ in single samples)
+    progress    called as progress(block, blocks)
+
+    ValueError for an antenna under the terrain. SarclWarning when nothing at all is lit.
+    """
+    tx = array("tx", tx, np.float64, ("n_pulses", 3))
+    ends = [tx] if rx is None else [tx, array("rx", rx, np.float64, (len(tx), 3))]
+    k = len(triangles)
+    tolerance = number("tolerance", tolerance, least=SAMPLES[-1][1])
+    choice("engine", engine, ("opencl", "embree"))
+    grid = None if heights is None else heights_of(heights)
+    masks = {"on_heights": on_heights, "two_sided": two_sided, "wanted": wanted}
+    for name, mask in masks.items():
+        if mask is not None and np.shape(mask) not in ((), (k,)):
+            raise ValueError(f"{name} has shape {np.shape(mask)}; wanted one for each of {k} facets, ({k},)")
+    if grid is not None:
+        for name, end in zip(("tx", "rx"), ends, strict=False):
+            _check_above(name, grid, end)
+    opened = cl.open_device(device)
+    if max_bytes is None:
+        max_bytes = planning.budget(opened, None) / 4
+    if k == 0:
+        nothing = np.zeros(0, np.uint8)
+        none = np.zeros(0, bool)
+        whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
+        return Lighting(whole, first, none, none, first, nothing, [], lambda block: nothing)
+    bounds = scene_box(triangles, grid)
+    asked = triangles if wanted is None or not np.any(wanted) else triangles[np.asarray(wanted)]
+    limits = [tolerance * reach(asked, e[len(e) // 2]) / max(lever(bounds, e), 1e-300) for e in ends]
+    blocks, looks, turns = pulse_blocks(ends, bounds, limits)
+    light = Light(
+        opened,
+        triangles,
+        heights=grid,
+        on_heights=on_heights,
+        two_sided=two_sided,
+        wanted=wanted,
+        tolerance=tolerance,
+        engine=engine,
+    )
+
+    def look(block: int) -> np.ndarray:
+        return light.share([e[looks[block]] for e in ends], slack=float(turns[block]))
+
+    asked_for = k if wanted is None else int(np.sum(wanted))
+    usual = look(0)
+    ever, always, kept = usual > 0, usual == 255, 0
+    changes: list[tuple[np.ndarray, np.ndarray]] = []
+    dark = np.zeros(len(looks), np.int64)
+    for i in range(len(looks)):
+        row = look(i) if i else usual
+        dark[i] = asked_for - np.count_nonzero(row)
+        ever |= row > 0
+        always &= row == 255
+        if kept <= max_bytes and len(changes) == i:
+            index = np.flatnonzero(row != usual).astype(np.int32)
+            kept += 5 * len(index)
+            if kept <= max_bytes:
+                changes.append((index, row[index]))
+        if progress:
+            progress(i + 1, len(looks))
+    if not ever.any() and asked_for:
+        warnings.warn(
+            "the whole scene is in shadow: no facet faces the antennas with nothing between; check the side the track "
+            "is on, the mesh's winding, and heights; or pass shadows=False",
+            SarclWarning,
+            stacklevel=2,
+        )
+    log.info("%d pulses in %d blocks; %d of %d facets dark throughout", len(tx), len(blocks), k - ever.sum(), k)
+    blocks, looks, never, always, dark, usual = (sealed(a) for a in (blocks, looks, ~ever, always, dark, usual))
+    return Lighting(blocks, looks, never, always, dark, usual, changes, look)
+
+
+def _caster(engine: str) -> Any:
+    if engine != "embree":
+        return Occluders
+    from .embree import EmbreeOccluders
+
+    return EmbreeOccluders
+
+
+def _chunks(index: np.ndarray) -> list[np.ndarray]:
+    return [index[i : i + CHUNK] for i in range(0, len(index), CHUNK)]
+
+
+def _check_above(name: str, grid: tuple[np.ndarray, np.ndarray, np.ndarray], ends: np.ndarray) -> None:
+    """ValueError for an antenna under the terrain."""
+    high = above(grid, ends)
+    if high.min() < 0:
+        at = int(high.argmin())
+        raise ValueError(
+            f"{name}[{at}] stands {-high[at]:.3g} m under the terrain; raise the track, or check that track and "
+            "heights are told above the same surface"
+        )
