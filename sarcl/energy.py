@@ -74,7 +74,7 @@ def row_norms(task: Task) -> np.ndarray:
     raw = task.raw
     every = -(-raw.n_rows * raw.n_samples // ALL)
     weight, out = np.repeat(task.sample_weight**2, 2), np.empty(raw.n_rows)
-    step = max(1, 2**20 // raw.n_samples) if every == 1 else 1
+    step = max(1, min(64, 2**20 // raw.n_samples)) if every == 1 else 1
     for start in range(0, raw.n_rows, step * every):
         samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
         parts = samples.view(samples.real.dtype).astype(np.float64)
