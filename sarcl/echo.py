@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from . import cl, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, count, finite, instance, number, sealed
+from . import cl, geodesy, planning, scatterers
+from .check import SPEED_OF_LIGHT, array, choice, count, direction, finite, instance, number, sealed
 from .check import tolerance as allowed_error
 from .echo_error import measure_error
 from .facet_plan import FacetPlan, crowding, cut_facets, plan_facets
@@ -37,6 +37,7 @@ def echo(
     *,
     receiver: Trajectory | None = None,
     polarization: str | Sequence[str] = "HH",
+    vertical: Any = None,
     range_window: Any = None,
     reference: Any = None,
     shadows: bool = True,
@@ -57,6 +58,8 @@ def echo(
     track         transmitter; receiver  a track of as many pulses, default the transmitter's
     polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": a row a pulse for
                   each, pulse by pulse. Points send back what they are sent: nothing in HV and VH
+    vertical      (3,), which H lies across and V in a plane with; default z, or in Earth-centred coordinates the
+                  ellipsoid's normal at the scene's centre
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
@@ -88,6 +91,8 @@ def echo(
     tx = track.positions
     point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
     reference_range = _half_path(tx, rx, point)
+    upright = _vertical(vertical, scene.center)
+    scene = scene.realized(seed)  # before the window: it moves the corners of rough terrain
     near, far = _window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = _sampling(waveform, near, far, compressed)
     try:
@@ -116,7 +121,7 @@ def echo(
     points, skipped = scatterers.points_of(scene, skips, len(tx))
     facets, facet_plan, crowd = None, None, 1.0
     if len(scene.triangles):
-        facet_plan, pieces, crowd = _cut(scene, waveform, antennas, len(polarizations), max_edge, share, seed)
+        facet_plan, pieces, crowd = _cut(scene, waveform, antennas, len(polarizations), max_edge, share)
         if progress:
             progress("scene", 1, 3)
         facets, left_out = scatterers.facets_of(
@@ -124,6 +129,11 @@ def echo(
             tell=(lambda n: None) if progress is None else lambda n: progress("scene", n, 3),
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
+    same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
+    if facets is None and points is not None and not same:
+        raise ValueError(
+            f"polarization is {polarization!r}, in which points send back nothing: ask for 'HH' or 'VV', or give facets"
+        )
     if points is None and facets is None:
         raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")
     if points is not None and points.largest() > LARGEST:
@@ -140,7 +150,6 @@ def echo(
 
     tell(0)
     plans: list[tuple[float, dict[str, Any]]] = []
-    same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
     if points is not None:
         if same:
             spreader = Spreader(*common, n_samples, share, budget, "range window" in skips)
@@ -151,7 +160,14 @@ def echo(
     if facets is not None:
         assert facet_plan is not None
         facet_spreader = FacetSpreader(
-            *common, frequencies, share / crowd, budget, "range window" in skips, polarizations, facet_plan
+            *common,
+            frequencies,
+            share / crowd,
+            budget,
+            "range window" in skips,
+            polarizations,
+            facet_plan,
+            upright,
         )
         plan, outside, behind = facet_spreader.add(facets, samples, clock, tell)
         gated += outside
@@ -162,6 +178,8 @@ def echo(
             f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "
             "widen range_window or move reference"
         )
+    if gated + behind == total:
+        raise ValueError("every facet in the range window faces away from an antenna; move the track or turn the scene")
     pulse = waveform.pulse_spectrum(frequencies)
     spectrum = np.abs(pulse) ** 2 if compressed else pulse
     samples *= spectrum.astype(np.complex64)
@@ -169,7 +187,7 @@ def echo(
     measured = None
     exact_seconds = 256 * (0 if points is None else len(points)) * 6e-8 + (0 if facets is None else len(facets)) * 1e-4
     if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("echo", 0.0)):
-        measured = measure_error(points, facets, antennas, frequencies, spectrum, samples, polarizations)
+        measured = measure_error(points, facets, antennas, frequencies, spectrum, samples, polarizations, upright)
         clock.lap("check")
     n = len(polarizations)
 
@@ -217,12 +235,19 @@ def _polarizations(asked: Any) -> tuple[str, ...]:
     return names
 
 
+def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
+    """Unit vector (3,): as asked, the ellipsoid's normal at an Earth-centred `center`, m (3,), or z."""
+    if asked is not None:
+        return direction("vertical", asked)
+    normal = geodesy.vertical_at(center)
+    return np.array([0.0, 0.0, 1.0]) if normal is None else normal
+
+
 def _cut(
     scene: Scene, waveform: Waveform, antennas: Antennas, channels: int, max_edge: float | str | None, share: float,
-    seed: int,
 ) -> tuple[FacetPlan, Scene, float]:  # fmt: skip
-    """The plan of the facets, the facets cut as it says, their grid points moved, and what `crowding` says of it."""
-    scene = replace(scene.realized(seed), positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
+    """The plan of the facets, the facets cut as it says, and what `crowding` says of it."""
+    scene = replace(scene, positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
     finest = np.inf
     if max_edge == "auto" and (scene.roughness.any() or any(m.diagram not in COHERENT for m in scene.materials)):
         finest = scatterers.resolution_edge(waveform, antennas, scene)
@@ -240,6 +265,11 @@ def _cut(
         if found <= crowd:
             break
         crowd = 1.1 * found
+    else:
+        raise ValueError(
+            f"tolerance {share:.1e} cannot be met with these facets: cut finely enough, their edges' echoes cancel to "
+            f"less than a {crowd:.0f}th; ask for a looser one, or let fewer facets make up a plane"
+        )
     made = scene if max_edge is None else cut_facets(scene, plan, finest)
     return replace(plan, n_facets=len(made.triangles)), made, crowd
 

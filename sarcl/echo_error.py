@@ -14,7 +14,7 @@ from .scatterers import Points
 
 def measure_error(
     points: Points | None, facets: Facets | None, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray,
-    samples: np.ndarray, polarizations: Sequence[str],
+    samples: np.ndarray, polarizations: Sequence[str], vertical: np.ndarray,
 ) -> float:  # fmt: skip
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of 16 where
     there are more than 20 000 facets.
@@ -30,7 +30,7 @@ def measure_error(
         wanted, power = np.zeros((len(polarizations), draws), np.complex128), np.zeros((len(polarizations), draws))
         for part in (points, facets):
             if part is not None:
-                values, powers = _exact(part, antennas, int(p), frequencies[n], polarizations)
+                values, powers = _exact(part, antennas, int(p), frequencies[n], polarizations, vertical)
                 wanted, power = wanted + values, power + powers
         wanted *= spectrum[n]
         wrong += float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
@@ -40,7 +40,12 @@ def measure_error(
 
 
 def _exact(
-    part: Points | Facets, antennas: Antennas, p: int, frequencies: np.ndarray, polarizations: Sequence[str]
+    part: Points | Facets,
+    antennas: Antennas,
+    p: int,
+    frequencies: np.ndarray,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and the power they have at random phases."""
     from .reference.echo import echo as exact
@@ -69,21 +74,24 @@ def _exact(
     delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[p]))
     for j, f in enumerate(frequencies.tolist()):
         wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
-        matrix = _matrix(part, triangles, f, to_tx, to_rx)
+        matrix = _matrix(part, triangles, f, to_tx, to_rx, vertical)
         for i, name in enumerate(polarizations):
             a = matrix[:, "HV".index(name[0]), "HV".index(name[1])] * weight
             values[i, j], powers[i, j] = (a * wave).sum(), (np.abs(a) ** 2).sum()
     return values, powers
 
 
-def _matrix(part: Facets, triangles: np.ndarray, f: float, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
+def _matrix(
+    part: Facets, triangles: np.ndarray, f: float, to_tx: np.ndarray, to_rx: np.ndarray, vertical: np.ndarray
+) -> np.ndarray:
     """Amplitudes of facets at a frequency, Hz: complex128 (k, 2, 2)."""
     from .reference.facet import facet_amplitude, normals_and_areas, scattering_matrix, triangle_integral
     from .reference.roughness import rough_mean
 
-    eps = np.array([m.permittivity(f) for m in part.materials])[part.material]
+    x, y, z = vertical.tolist()
+    up, eps = (x, y, z), np.array([m.permittivity(f) for m in part.materials])[part.material]
     if not part.is_rough:
-        return facet_amplitude(triangles, eps, f, to_tx, to_rx)
+        return facet_amplitude(triangles, eps, f, to_tx, to_rx, up)
     wave = f / SPEED_OF_LIGHT
     q = 2 * np.pi * wave * (to_tx + to_rx)
     normals, areas = normals_and_areas(triangles)
@@ -92,4 +100,4 @@ def _matrix(part: Facets, triangles: np.ndarray, f: float, to_tx: np.ndarray, to
         of = part.material == i
         mean[of] = rough_mean(mean[of], material, q[of], normals[of], areas[of], 1 / wave, part.random[of])
     scale = np.sqrt(np.pi) * wave * areas * mean
-    return np.asarray(scale[:, None, None] * scattering_matrix(normals, to_tx, to_rx, eps))
+    return np.asarray(scale[:, None, None] * scattering_matrix(normals, to_tx, to_rx, eps, up))

@@ -19,7 +19,6 @@ from .triangles import box, centroids
 
 PER_TILE = (256, 64)
 SCALE = 1e9  # Hz, so that amplitudes over frequency keep away from float32's smallest numbers
-UP = (0.0, 0.0, 1.0)
 POLARIZATIONS = ("HH", "HV", "VH", "VV")
 
 
@@ -89,10 +88,11 @@ class FacetSpreader:
 
     def __init__(
         self, device: cl.Device, antennas: Antennas, bandwidth: float, frequencies: np.ndarray, tolerance: float,
-        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan,
+        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray,
     ) -> None:  # fmt: skip
         self.device, self.antennas, self.frequencies, self.bandwidth = device, antennas, frequencies, bandwidth
         self.tolerance, self.budget, self.skip, self.facet_plan = tolerance, budget, skip, plan
+        self.vertical = vertical
         # from one place what is sent as H and received as V equals what is sent as V and received as H
         self.alike = {"VH": "HV"} if antennas.rx is None else {}
         self.wanted = [self.alike.get(name, name) for name in polarizations]
@@ -128,7 +128,7 @@ class FacetSpreader:
         node = device.upload(
             np.stack([wave, np.full_like(wave, np.sqrt(np.pi) / SPEED_OF_LIGHT * SCALE)]).astype(np.float32)
         )
-        up, table = device.upload(_vertical(UP)), device.upload(plan.interpolator.table)
+        up, table = device.upload(_vertical(self.vertical)), device.upload(plan.interpolator.table)
         last = tiles.per_tile - (len(order) - len(part))
         flush = max(1, int(self._terms() / tiles.per_tile))
         clock.lap("scene")
@@ -212,7 +212,7 @@ def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
     return np.array([(h, 0 if d > 4 else d, w, o) for h, d, w, o in rows]).T
 
 
-def _vertical(up: tuple[float, float, float]) -> np.ndarray:
+def _vertical(up: np.ndarray) -> np.ndarray:
     """`up` and what takes its place for lines of sight along it (6,)."""
     other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
     return np.array([*up, *other], np.float32)

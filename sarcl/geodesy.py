@@ -41,3 +41,12 @@ def local_axes(longitude: float, latitude: float) -> np.ndarray:
     east = np.array([-np.sin(lon), np.cos(lon), 0.0])
     north = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
     return np.stack([east, north, up(longitude, latitude)])
+
+
+def vertical_at(position: np.ndarray) -> np.ndarray | None:
+    """Unit normal of the ellipsoid (3,) at an Earth-centred position, m (3,); None farther than 32 km from it."""
+    axes = SEMI_MAJOR * np.array([1, 1, 1 - FLATTENING])
+    if abs(np.linalg.norm(position / axes) - 1) > 0.005:
+        return None
+    normal = position / axes**2
+    return np.asarray(normal / np.linalg.norm(normal))

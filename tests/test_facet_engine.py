@@ -235,3 +235,41 @@ def test_facets_are_cut_no_finer_than_the_tolerance_needs():
         edges.append(report.plan["facet edges, m"])
     assert edges[0] >= edges[1] >= edges[2] and edges[0] > 0.5
     assert len(normals(scene.triangles)) == len(centroids(scene.triangles)) == 2
+
+
+def test_polarisations_lie_about_the_vertical_in_earth_centred_coordinates_too():
+    from sarcl import geodesy
+
+    random = np.random.default_rng(8)
+    corners = random.uniform(-4, 4, (20, 1, 3)) + random.uniform(-0.4, 0.4, (20, 3, 3))
+    ends = np.array([seen_from(8e3, 0.8, a) for a in (0.3, 0.31)])
+    axes, origin = geodesy.local_axes(12.0, 42.0), geodesy.ecef(12.0, 42.0, 100.0)
+    options = {"polarization": "all", "shadows": False, "tolerance": 1e-4, "check": False, "range_window": (-12, 12)}
+    local = sarcl.echo(
+        sarcl.Scene.facets(corners, material=WET), CHIRP, still(*ends), reference=(0, 0, 0), **options
+    ).samples
+    there = sarcl.Scene.facets(corners @ axes + origin, material=WET)
+    track = still(*(ends @ axes + origin))
+    earth = sarcl.echo(there, CHIRP, track, reference=origin, **options).samples
+    assert np.linalg.norm(earth - local) <= 3e-4 * np.linalg.norm(local)
+    told = sarcl.echo(there, CHIRP, track, reference=origin, vertical=axes[2], **options).samples
+    assert np.linalg.norm(told - earth) <= 1e-4 * np.linalg.norm(local)
+    z = sarcl.echo(there, CHIRP, track, reference=origin, vertical=(0, 0, 1), **options).samples
+    assert np.linalg.norm(z - local) > 0.05 * np.linalg.norm(local)
+
+
+def test_echoes_of_nothing_are_said():
+    track = still(seen_from(8e3, 0.8))
+    with pytest.raises(ValueError, match="points send back nothing"):
+        sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), CHIRP, track, polarization="HV")
+    down = sarcl.Scene.facets(plate(1.0, 0.0)[:, ::-1], two_sided=False)
+    for skip in (True, False):
+        with pytest.raises(ValueError, match=r"facing away|faces away"):
+            sarcl.echo(down, CHIRP, track, shadows=False, skip=skip)
+
+
+def test_the_window_holds_corners_where_they_are_moved_to():
+    axis = np.linspace(-2, 2, 9)
+    ground = sarcl.Scene.from_heights(axis, axis, np.zeros((9, 9)), point_roughness=20.0)
+    raw = sarcl.echo(ground, CHIRP, still(seen_from(8e3, 0.8)), shadows=False, tolerance=1e-2)
+    assert raw.report.contributions_skipped["range window"] == 0
