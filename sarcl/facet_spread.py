@@ -7,17 +7,16 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from . import cl, planning, profiles
-from .accuracy import U32
+from . import cl, profiles
 from .check import SPEED_OF_LIGHT
 from .facet_plan import FacetPlan
-from .geometry import Antennas, Tiles, morton_order, tile_points
+from .geometry import Antennas
 from .lighting import Lighting
 from .material import DIAGRAMS, Material
 from .planning import Clock, Plan
+from .spread_plan import plan_tiles, splits, terms
 from .triangles import box, centroids
 
-PER_TILE = (256, 64)
 SCALE = 1e9  # Hz, so that amplitudes over frequency keep away from float32's smallest numbers
 POLARIZATIONS = ("HH", "HV", "VH", "VV")
 
@@ -107,7 +106,10 @@ class FacetSpreader:
         """
         positions = centroids(part.triangles)
         center = box(positions).mean(axis=0)
-        plan, tiles, order = self._plan(positions, center)
+        left = self.tolerance - self.facet_plan.predicted_error
+        plan, tiles, order = plan_tiles(
+            positions, center, self.antennas, self.bandwidth, len(self.frequencies), left, least_tolerance=0.0
+        )
         device, lanes, nodes = self.device, self.device.info.vector_width, self.facet_plan.nodes
         bistatic = self.antennas.rx is not None
         metal = all(np.isinf(m.conductivity) for m in part.materials)
@@ -130,14 +132,14 @@ class FacetSpreader:
         )
         up, table = device.upload(_vertical(self.vertical)), device.upload(plan.interpolator.table)
         last = tiles.per_tile - (len(order) - len(part))
-        flush = max(1, int(self._terms() / tiles.per_tile))
+        flush = max(1, int(terms(self.tolerance) / tiles.per_tile))
         clock.lap("scene")
 
         channels, n_samples = len(nodes) * len(self.made), samples.shape[2]
         stride = plan.length + 2 * profiles.padding(plan.interpolator)
         record = 4 * plan.components(bistatic)
-        splits = self._splits(tiles)
-        per_pulse = record * tiles.n_tiles + 24 * stride * splits * channels
+        parts = splits(self.device, len(self.antennas.tx), tiles)
+        per_pulse = record * tiles.n_tiles + 24 * stride * parts * channels
         most = max(64, 16 * device.info.units)
         pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
         basis = self.facet_plan.basis(self.frequencies) / SCALE
@@ -147,17 +149,17 @@ class FacetSpreader:
             n, used = packed.shape[2], stop - start
             pulse, seen = device.upload(packed), device.upload(share[order])
             constants = device.empty(record * n * tiles.n_tiles)
-            rows, done = device.zeros(24 * splits * used * stride * channels), device.zeros(8 * splits * used)
+            rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
             device.run(
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
             )  # fmt: skip
             device.run(
-                kernel, (used, splits), (1, 1) if device.is_cpu else None,
+                kernel, (used, parts), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], facets, seen,
                 node, up, table, last, flush, rows, stride, stride // 2, done,
             )  # fmt: skip
-            made = device.download(rows, np.empty((splits, used * channels, 3, stride), np.complex64))
+            made = device.download(rows, np.empty((parts, used * channels, 3, stride), np.complex64))
             clock.lap("echo")
             total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
             spectra = profiles.to_samples(device, total, n_samples, plan.interpolator)
@@ -165,7 +167,7 @@ class FacetSpreader:
             for i, name in enumerate(self.wanted):
                 for m, weight in enumerate(basis.astype(np.float32)):
                     samples[start:stop, i] += spectra[:, self.made.index(name), m] * weight
-            counts = device.download(done, np.empty((2, splits, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
+            counts = device.download(done, np.empty((2, parts, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
             outside += used * len(part) - int(counts[0])
             behind += int(counts[0] - counts[1])
             clock.lap("spectra")
@@ -179,31 +181,6 @@ class FacetSpreader:
         for first, last, share in part.shares(n_pulses):
             for start in range(first, last, most):
                 yield start, min(start + most, last), share
-
-    def _plan(self, positions: np.ndarray, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
-        order = morton_order(positions)
-        made = {n: tile_points(positions, center, n, order) for n in PER_TILE}
-        plan = planning.cheapest(
-            self.tolerance - self.facet_plan.predicted_error,
-            [(n, float(tiles.radius.max())) for n, (tiles, _) in made.items()],
-            distance=self.antennas.distance(box(positions)),
-            frequency=float(self.antennas.frequency.max()) + self.bandwidth / 2,
-            bandwidth=self.bandwidth,
-            n_samples=len(self.frequencies),
-            points_per_row=len(positions),
-            chunk=min(len(positions), max(min(PER_TILE), int(self._terms()))),
-            least_tolerance=0.0,
-        )
-        tiles, order = made[plan.per_tile]
-        return plan, tiles, order
-
-    def _splits(self, tiles: Tiles) -> int:
-        """Partial sums a row: enough work-items for the device."""
-        return int(min(max(1, -(-4 * self.device.info.units // len(self.antennas.tx))), tiles.n_tiles, 64))
-
-    def _terms(self) -> float:
-        """Terms that may join one float32 sum: n like ones err by up to n/2 roundings, a fifth of the tolerance."""
-        return 0.2 * self.tolerance * 2 / U32
 
 
 def roughness_planes(materials: Sequence[Material]) -> np.ndarray:

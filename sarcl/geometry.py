@@ -148,7 +148,12 @@ def morton_order(positions: np.ndarray) -> np.ndarray:
     low, high = box(positions)
     extent = float((high - low).max()) or 1.0
     cell = ((positions - low) * ((2**20 - 1) / extent)).astype(np.uint64)
-    code = np.zeros(len(positions), np.uint64)
+    return np.argsort(interleaved(cell), kind="stable")
+
+
+def interleaved(cell: np.ndarray) -> np.ndarray:
+    """Place on the Z curve (Morton 1966) of cells (n, 3), uint64 below 2^21: uint64 (n,)."""
+    code = np.zeros(len(cell), np.uint64)
     for axis in range(3):
         x = cell[:, axis]
         for shift, mask in (
@@ -160,4 +165,4 @@ def morton_order(positions: np.ndarray) -> np.ndarray:
         ):
             x = (x | (x << np.uint64(shift))) & np.uint64(mask)
         code |= x << np.uint64(axis)
-    return np.argsort(code, kind="stable")
+    return code

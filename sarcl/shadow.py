@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from . import cl
+from .geometry import interleaved
 from .triangles import box, edges, normals
 
 # Rays start above a facet by this share of its longest edge: coplanar and touching neighbours, and sheets modelled
@@ -111,19 +112,7 @@ def visible(triangles: np.ndarray, viewpoint: np.ndarray, *, device: Any = None)
 
 def _curve(points: np.ndarray) -> np.ndarray:
     """Place (n,) of points (n, 3) between -1 and 1 on a curve that fills space (Morton 1966)."""
-    out = np.zeros(len(points), np.uint64)
-    for axis, value in enumerate(points.T):
-        cell = np.clip((value + 1) * 2.0**20, 0, 2**21 - 1).astype(np.uint64)
-        for shift, mask in (
-            (32, 0x1F00000000FFFF),
-            (16, 0x1F0000FF0000FF),
-            (8, 0x100F00F00F00F00F),
-            (4, 0x10C30C30C30C30C3),
-            (2, 0x1249249249249249),
-        ):
-            cell = (cell | cell << np.uint64(shift)) & np.uint64(mask)
-        out |= cell << np.uint64(axis)
-    return out
+    return interleaved(np.clip((points + 1) * 2.0**20, 0, 2**21 - 1).astype(np.uint64))
 
 
 def _padded(rows: np.ndarray) -> np.ndarray:

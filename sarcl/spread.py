@@ -6,14 +6,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from . import cl, planning, profiles
-from .accuracy import U32
-from .geometry import Antennas, Tiles, morton_order, tile_points
+from . import cl, profiles
+from .geometry import Antennas
 from .planning import Clock, Plan
 from .scatterers import Points
 from .scene import box
-
-PER_TILE = (256, 64)
+from .spread_plan import plan_tiles, splits, terms
 
 
 class Spreader:
@@ -38,7 +36,9 @@ class Spreader:
         """Add `part` to samples (n_pulses, n_samples); return the plan and how many pairs were gated out."""
         positions = part.positions
         center = box(positions).mean(axis=0)
-        plan, tiles, order = self._plan(part, center)
+        plan, tiles, order = plan_tiles(
+            positions, center, self.antennas, self.bandwidth, self.n_samples, self.tolerance
+        )
         bistatic = self.antennas.rx is not None
         device, lanes = self.device, self.device.info.vector_width
         macros = {**plan.macros(bistatic), "TILE": tiles.per_tile}
@@ -50,13 +50,13 @@ class Spreader:
         offsets = device.upload(tiles.offsets)
         planes = device.upload(part.planes(order))
         last = tiles.per_tile - (len(order) - len(part))
-        flush = max(1, int(self._terms() / tiles.per_tile))
+        flush = max(1, int(terms(self.tolerance) / tiles.per_tile))
         clock.lap("scene")
 
         stride = plan.length + 2 * profiles.padding(plan.interpolator)
         record = 4 * plan.components(bistatic)
-        splits = self._splits(tiles)
-        per_pulse = record * tiles.n_tiles + 24 * stride * splits
+        parts = splits(self.device, len(self.antennas.tx), tiles)
+        per_pulse = record * tiles.n_tiles + 24 * stride * parts
         # enough pulses at once to keep every unit busy, few enough to tell how far it is
         most = max(64, 16 * device.info.units)
         pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
@@ -67,48 +67,23 @@ class Spreader:
             n, used = packed.shape[2], stop - start
             pulse = device.upload(packed)
             constants = device.empty(record * n * tiles.n_tiles)
-            rows, done = device.zeros(24 * splits * used * stride), device.zeros(4 * splits * used)
+            rows, done = device.zeros(24 * parts * used * stride), device.zeros(4 * parts * used)
             device.run(
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
             )  # fmt: skip
             device.run(
-                kernel, (used, splits), (1, 1) if device.is_cpu else None,
+                kernel, (used, parts), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], planes,
                 table, last, flush, rows, stride, stride // 2, done,
             )  # fmt: skip
-            made = device.download(rows, np.empty((splits, used, 3, stride), np.complex64))
+            made = device.download(rows, np.empty((parts, used, 3, stride), np.complex64))
             clock.lap("echo")
             total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
             samples[start:stop] += profiles.to_samples(device, total, self.n_samples, plan.interpolator)
-            added = device.download(done, np.empty((splits, used), np.int32)).sum(dtype=np.int64)
+            added = device.download(done, np.empty((parts, used), np.int32)).sum(dtype=np.int64)
             gated += used * len(part) - int(added)
             clock.lap("spectra")
             if tell:
                 tell(stop * len(part))
         return plan, gated
-
-    def _plan(self, part: Points, center: np.ndarray) -> tuple[Plan, Tiles, np.ndarray]:
-        order = morton_order(part.positions)
-        made = {n: tile_points(part.positions, center, n, order) for n in PER_TILE}
-        bounds = box(part.positions)
-        plan = planning.cheapest(
-            self.tolerance,
-            [(n, float(tiles.radius.max())) for n, (tiles, _) in made.items()],
-            distance=self.antennas.distance(bounds),
-            frequency=float(self.antennas.frequency.max()) + self.bandwidth / 2,
-            bandwidth=self.bandwidth,
-            n_samples=self.n_samples,
-            points_per_row=len(part),
-            chunk=min(len(part), max(min(PER_TILE), int(self._terms()))),
-        )
-        tiles, order = made[plan.per_tile]
-        return plan, tiles, order
-
-    def _splits(self, tiles: Tiles) -> int:
-        """Partial sums a row: enough work-items for the device."""
-        return int(min(max(1, -(-4 * self.device.info.units // len(self.antennas.tx))), tiles.n_tiles, 64))
-
-    def _terms(self) -> float:
-        """Terms that may join one float32 sum: n like ones err by up to n/2 roundings, a fifth of the tolerance."""
-        return 0.2 * self.tolerance * 2 / U32
