@@ -4,9 +4,9 @@
 //   s_p(f)  = f sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
 //
 // source    sarcl/reference/facet.py; amplitudes between NODES frequencies f_m by interpolation (docs/facets.md)
-// symbols   a_k(p, f)  1/f times the amplitude k/(2 sqrt(pi)) S I; delta, kappa, sigma as in geometry.clh
+// symbols   a_k(p, f)  1/f times the amplitude k/(2 sqrt(pi)) S I, and the weight of beam.clh; delta, kappa, sigma as in geometry.clh
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
-// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES      frequencies f_m
 //           HH, HV, VH, VV   1: wanted (first letter received)
 //           METAL      1: every facet is a perfect conductor
@@ -21,6 +21,9 @@
 #include "interp.clh"
 #include "phase.clh"
 #include "rows.clh"
+#include "vectors.clh"
+#include "pattern.clh"
+#include "beam.clh"
 #include "facet.clh"
 
 #define CHANNELS (NODES * (HH + HV + VH + VV))
@@ -28,12 +31,6 @@ enum { F_EDGE = 0, F_FACTOR = 6, F_ROUGH = 7, F_M = ROUGH ? 13 : 7 };  // planes
 
 inline triple load_triple(__global const float *restrict planes, size_t at, size_t n) {
     return t_make(LOAD(at, planes), LOAD(at, planes + n), LOAD(at, planes + 2 * n));
-}
-
-// Unit vector from points to an antenna that lies R0 u from the tile's reference point.
-inline triple toward(direction u, offset x) {
-    triple d = t_make(fma((fv)u.x, (fv)u.R0, -x.x), fma((fv)u.y, (fv)u.R0, -x.y), fma((fv)u.z, (fv)u.R0, -x.z));
-    return t_scale((fv)1.0f / sqrt(t_dot(d, d)), d);
 }
 
 inline void add_channel(__global float *sum, int stride, int origin, int channel, iv j, const fv *w, complex_v a, fv scale,
@@ -69,19 +66,22 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
 //   seen     (n_tiles TILE)           share of each facet that both antennas see, 0 ... 255
-//   nodes    (2, NODES)               f_m/c, turns/m, and k/(2 sqrt(pi) f)
+//   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f); f_m over the patterns' frequency
 //   up       (6)                      vertical, and what takes its place along it
+//   patterns, second, axes (n_used, 18), range, reach (6)   see beam.clh;  radius (n_tiles)   m, of the facets' centres
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
 //   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
-//   done     (2, splits, n_used)      facets that were in the range window, and of those seen from their front
+//   done     (3, splits, n_used)      facets in the range window; of those seen from their front; left out of the beam
 __kernel void spread_facets(__global const float *restrict pulse, int n, int n_used,
                             __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
                             __global const float *restrict offsets, int n_offsets, __global const float *restrict facets,
                             __global const uchar *restrict seen, __global const float *restrict nodes,
-                            __global const float *restrict up, __global const float *restrict table, int last, int flush,
+                            __global const float *restrict up, __global const float *restrict patterns, int second,
+                            __global const float *restrict axes, float range, __global const float *restrict reach,
+                            __global const float *restrict radius, __global const float *restrict table, int last, int flush,
                             __global float *rows, int stride, int origin, __global int *restrict done) {
-    int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, added = 0;
+    int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
     __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
     float3 vertical = vload3(0, up), other = vload3(1, up);
     for (int k = split; k < n_tiles; k += get_global_size(1)) {
@@ -92,15 +92,24 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
         direction from_tx = load_direction(c, C_UX, C_LOW);
 #if BISTATIC
         direction from_rx = load_direction(c, C_RX, C_RX_LOW);
+#elif CULL
+        direction from_rx = from_tx;
+#endif
+#if CULL
+        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
+            unlit_count += real;
+            continue;
+        }
 #endif
         for (int i = 0; i < TILE / VW; i++) {
             size_t at = (size_t)k * (TILE / VW) + i;
             offset x = load_offset(offsets, at, n_offsets);
             about_centre(&x, tile, k, n_tiles);
-            triple first = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
-            triple second = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
+            triple one = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
+            triple two = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
             fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
-            triple normal = t_cross(first, second), u = toward(from_tx, x);
+            fv tx_range, rx_range;
+            triple normal = t_cross(one, two), u = toward(from_tx, x, &tx_range);
             fv twice_area = sqrt(t_dot(normal, normal));
             // blanks have no area
             normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
@@ -111,13 +120,14 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             triple h, v;
             polarisation(u, vertical, other, &h, &v);
 #if BISTATIC
-            triple ur = toward(from_rx, x), hr, vr;
+            triple ur = toward(from_rx, x, &rx_range), hr, vr;
             polarisation(ur, vertical, other, &hr, &vr);
             triple both = t_add(u, ur);
             iv front = (cosine_tx > 0) & (t_dot(normal, ur) > 0);
 #else
-            triple both = t_scale((fv)2.0f, u);
+            triple both = t_scale((fv)2.0f, u), ur = u;
             iv front = cosine_tx > 0;
+            rx_range = tx_range;
 #endif
             place where = locate(c, pulse, p, n, x);
             fv inside = 1;
@@ -135,11 +145,15 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * inside * LOAD(0, share);
             if (largest(amplitude) <= 0) continue;
 
-            fv sine, cosine, w[TAPS], b = t_dot(both, first), g = t_dot(both, second);
+            fv sine, cosine, w[TAPS], b = t_dot(both, one), g = t_dot(both, two);
             sincos_turns(where.turn, &sine, &cosine);
             iv j;
             tap_weights(first_tap(where.t, where.base, stride, origin, &j), table, w);
             scattering s;
+#if WEIGHTS
+            sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)p, range);
+            complex_v gain;
+#endif
             for (int m = 0; m < NODES; m++) {
                 if (m == 0 || DISPERSIVE) {
 #if METAL
@@ -159,6 +173,10 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                 fv along = t_dot(both, normal), size = max(sqrt(t_dot(both, both)), (fv)1e-6f);
                 mean = rough_mean(mean, along * nodes[m], along / size, (fv)0.5f * twice_area, nodes[m],
                                   facets + F_ROUGH * (size_t)n_offsets, at, n_offsets);
+#endif
+#if WEIGHTS
+                if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[2 * NODES + m]);
+                mean = c_mul(mean, gain);
 #endif
                 fv scale = amplitude * nodes[NODES + m];
                 int channel = m;
@@ -186,4 +204,5 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
     size_t mine = (size_t)split * n_used + p, all = (size_t)get_global_size(1) * n_used;
     done[mine] = inside_count;
     done[all + mine] = front_count;
+    done[2 * all + mine] = unlit_count;
 }

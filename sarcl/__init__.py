@@ -30,6 +30,8 @@ _HOME = {
     "Trajectory": "trajectory",
     "Scene": "scene",
     "Material": "material",
+    "Antenna": "antenna",
+    "Radar": "radar",
     "PhaseHistory": "phase_history",
     "concatenate": "phase_history",
     "ImageGrid": "grid",
@@ -55,6 +57,7 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
+    from .antenna import Antenna as Antenna
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
     from .check import SarclWarning as SarclWarning
@@ -73,6 +76,7 @@ if TYPE_CHECKING:
     from .phase_history import concatenate as concatenate
     from .quality import PointResponse as PointResponse
     from .quality import measure as measure
+    from .radar import Radar as Radar
     from .read import read as read
     from .report import Report as Report
     from .scenario import Scenario as Scenario

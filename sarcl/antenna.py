@@ -8,14 +8,16 @@ from typing import Any
 import numpy as np
 
 from . import check
-from .pattern import factor_reach, table_reach, table_slope, uniform_spline
+from .pattern import factor_reach, table_limits, table_slope, uniform_spline
 from .pointing import rotations
 from .trajectory import Trajectory
 
 KINDS = ("isotropic", "aperture", "gaussian", "table")
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mounted along the body's axes
 HEADER = 16  # floats before a table's coefficients, as kernels/pattern.clh reads them
 SLACK = 1e-3  # of a step: angles this little outside a table are its edge
 ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
+COSINE = 1e-5  # beyond which a float32 direction cosine exceeds a limit for certain
 FLOAT_ERROR = 2e-6  # of the peak: float32 sines, exponentials and spline sums
 
 
@@ -48,7 +50,7 @@ class Antenna:
     elevation: Any = None
     values: Any = None
     frequency: float | None = None
-    mount: Any = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))
+    mount: Any = LEVEL
 
     def __post_init__(self) -> None:
         check.choice("antenna kind", self.kind, KINDS)
@@ -111,24 +113,31 @@ class Antenna:
         return cls(kind="isotropic", gain_db=gain_db)
 
     @classmethod
-    def rectangular(cls, *, size: Any, taper: Any = 1.0, **common: Any) -> Antenna:
+    def rectangular(
+        cls, *, size: Any, taper: Any = 1.0, gain_db: float = 0.0, two_way: bool = False, mount: Any = LEVEL
+    ) -> Antenna:
         """A rectangular aperture, m (azimuth, elevation): sinc(size_y y/lambda) sinc(size_z z/lambda) if lit evenly.
 
         taper  illumination at the edges, one or per axis: 1 even, 0.08 Hamming's, 0 Hann's, a raised cosine on a
-               pedestal. common: gain_db, two_way, mount.
+               pedestal
         """
-        return cls(kind="aperture", size=size, taper=np.broadcast_to(np.asarray(taper), (2,)), **common)
+        taper = np.broadcast_to(np.asarray(taper), (2,))
+        return cls(kind="aperture", size=size, taper=taper, gain_db=gain_db, two_way=two_way, mount=mount)
 
     @classmethod
-    def gaussian(cls, *, width: Any, **common: Any) -> Antenna:
+    def gaussian(
+        cls, *, width: Any, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
+        mount: Any = LEVEL,
+    ) -> Antenna:  # fmt: skip
         """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle off boresight times the
-        unit vector of (y, z): azimuth and elevation on the axes. common: gain_db, two_way, frequency, mount."""
-        return cls(kind="gaussian", width=width, **common)
+        unit vector of (y, z): azimuth and elevation on the axes."""
+        return cls(kind="gaussian", width=width, gain_db=gain_db, two_way=two_way, frequency=frequency, mount=mount)
 
     @classmethod
     def table(
-        cls, azimuth: Any, elevation: Any, values: Any = None, *, values_db: Any = None, **common: Any
-    ) -> Antenna:
+        cls, azimuth: Any, elevation: Any, values: Any = None, *, values_db: Any = None, gain_db: float = 0.0,
+        two_way: bool = False, frequency: float | None = None, mount: Any = LEVEL,
+    ) -> Antenna:  # fmt: skip
         """A measured pattern: bicubic spline through complex amplitudes, or values_db = 20 log10 of their modulus.
 
         azimuth (n,), elevation (m,) rad, evenly spaced; values (n, m), of any scale: their peak gets `gain_db`.
@@ -137,7 +146,10 @@ class Antenna:
             raise ValueError("an antenna table takes either values or values_db; give one of them")
         if values is None:
             values = 10 ** (check.converted("antenna values_db", values_db, np.float64) / 20)
-        return cls(kind="table", azimuth=azimuth, elevation=elevation, values=values, **common)
+        return cls(
+            kind="table", azimuth=azimuth, elevation=elevation, values=values, gain_db=gain_db, two_way=two_way,
+            frequency=frequency, mount=mount,
+        )  # fmt: skip
 
     @property
     def amplitude(self) -> float:
@@ -184,18 +196,21 @@ class Antenna:
         """Bound of what a device's float32 gain errs, over the peak, at directions right to float32."""
         return FLOAT_ERROR + ANGLE_ERROR * self.slope(frequency)
 
-    def reach(self, level: float, frequency: float) -> float:
-        """Half angle of a cone about boresight, rad, outside which |gain| stays below `level` of the peak."""
+    def limits(self, level: float, frequency: float) -> np.ndarray:
+        """(y, z, behind): |gain| is below `level` of the peak where a direction cosine along azimuth exceeds y, along
+        elevation exceeds z, and behind the antenna where `behind` is -1 (0: not for certain).
+        """
         level = check.number("level", level, above=0)
         if self.kind == "isotropic":
-            return np.pi
-        if self.kind == "aperture":  # a direction this far off lies outside one factor's reach or the other's
-            sine = np.hypot(factor_reach(self, 0, level, frequency), factor_reach(self, 1, level, frequency))
-            return float(np.arcsin(min(float(sine), 1.0)))
-        if self.kind == "gaussian":
-            off = self.width.max() * np.sqrt(max(np.log(1 / level), 0.0) / (2 * np.log(2)))
-            return float(min(off / self.ratio(frequency), np.pi))
-        return table_reach(self, level, float(self.ratio(frequency)))
+            return np.array([2.0, 2.0, 0.0])
+        if self.kind == "aperture":
+            y, z = (factor_reach(self, axis, level, frequency) for axis in (0, 1))
+            return np.array([y + COSINE, z + COSINE, -1.0])
+        if self.kind == "gaussian":  # an angle is no less than its sine
+            off = np.sqrt(max(np.log(1 / level), 0.0) / (2 * np.log(2))) / self.ratio(frequency)
+            return np.array([*(self.width * off + COSINE), -float(self.width.max() * off < np.pi / 2)])
+        y, z, behind = table_limits(self, level, float(self.ratio(frequency)))
+        return np.array([y + COSINE, z + COSINE, behind])
 
     def packed(self, frequency: float) -> np.ndarray:
         """Numbers of kernels/pattern.clh, float32: a header, then a table's spline coefficients.

@@ -3,19 +3,19 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 
-from . import cl, geodesy, planning, scatterers
-from .check import SPEED_OF_LIGHT, array, choice, count, direction, finite, instance, number, sealed
+from . import beam, cl, echo_rows, geodesy, planning, scatterers
+from .beam_error import beam_error
+from .check import array, choice, count, direction, instance, sealed
 from .check import tolerance as allowed_error
 from .echo_error import measure_error
-from .facet_plan import FacetPlan, crowding, cut_facets, plan_facets
+from .facet_cut import cut
+from .facet_plan import chebyshev, lagrange
 from .facet_spread import POLARIZATIONS, FacetSpreader
 from .geometry import Antennas
-from .material import COHERENT
 from .phase_history import PhaseHistory
 from .planning import Clock
 from .report import Report
@@ -24,9 +24,9 @@ from .spread import Spreader
 from .trajectory import Trajectory
 from .waveform import Waveform
 
-SKIPS = ("zero reflectivity", "facing away", "range window")
-LEAST_SAMPLES = 64  # of the default range window: a lone point still gets a profile to look at
+SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam")
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
+UNSEEN = 1e-3  # of a tolerance: what the beam may leave out of it. So little, since what is left out may be specular
 Progress = Callable[[str, int, int], None]
 
 
@@ -40,6 +40,8 @@ def echo(
     vertical: Any = None,
     range_window: Any = None,
     reference: Any = None,
+    antenna: Any = None,
+    radar: Any = None,
     shadows: bool = True,
     seed: int = 0,
     skip: Any = True,
@@ -63,10 +65,13 @@ def echo(
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
+    antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
+    radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
     shadows       True: of every facet only the share counts that both antennas see, in blocks of pulses
                   (docs/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
-    skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window"
+    skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
+                  "out of beam"
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
                   resolution cell too; None: left as they are
@@ -76,8 +81,8 @@ def echo(
     check         recompute 256 random samples exactly; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
-    Stop and go; spreading loss and gains are left out. Returns a PhaseHistory. ValueError, MemoryError,
-    sarcl.NoDeviceError say what does not fit. Source: DESIGN.md, echo equation.
+    Stop and go. Returns a PhaseHistory. ValueError, MemoryError, sarcl.NoDeviceError say what does not fit. Source:
+    DESIGN.md, echo equation.
     """
     clock = Clock()
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
@@ -87,14 +92,14 @@ def echo(
     polarizations = _polarizations(polarization)
     tolerance = allowed_error(tolerance)
     skips = planning.skips(skip, SKIPS)
-    rx = _receiver(track, receiver)
+    rx = echo_rows.receiver_positions(track, receiver)
     tx = track.positions
     point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
-    reference_range = _half_path(tx, rx, point)
+    reference_range = echo_rows.half_path(tx, rx, point)
     upright = _vertical(vertical, scene.center)
     scene = scene.realized(seed)  # before the window: it moves the corners of rough terrain
-    near, far = _window(scene, waveform, tx, rx, reference_range, range_window)
-    frequency, step, n_samples = _sampling(waveform, near, far, compressed)
+    near, far = echo_rows.window(scene, waveform, tx, rx, reference_range, range_window)
+    frequency, step, n_samples = echo_rows.sampling(waveform, near, far, compressed)
     try:
         samples = np.zeros((len(tx), len(polarizations), n_samples), np.complex64)
     except (MemoryError, ValueError):
@@ -117,11 +122,15 @@ def echo(
         progress("scene", 0, 3)
     # points and facets err independently: each gets its share, so that the sum keeps the tolerance
     share = tolerance / np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1)
+    weights = beam.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    blur = beam_error(weights, scene, waveform, polarizations, upright, share)
+    if "out of beam" in skips:
+        weights = weights.within(UNSEEN * share / blur.dim, waveform)
     frequencies = frequency + step * np.arange(n_samples)
     points, skipped = scatterers.points_of(scene, skips, len(tx))
     facets, facet_plan, crowd = None, None, 1.0
     if len(scene.triangles):
-        facet_plan, pieces, crowd = _cut(scene, waveform, antennas, len(polarizations), max_edge, share)
+        facet_plan, pieces, crowd = cut(scene, waveform, antennas, len(polarizations), max_edge, share, blur)
         if progress:
             progress("scene", 1, 3)
         facets, left_out = scatterers.facets_of(
@@ -136,13 +145,13 @@ def echo(
         )
     if points is None and facets is None:
         raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")
-    if points is not None and points.largest() > LARGEST:
-        text = f"amplitudes reach {points.largest():g}; echoes in complex64 hold up to {LARGEST:g}"
-        raise ValueError(text + ": scale them down")
+    if points is not None:
+        _bounded(points.largest() * weights.peak)
+        weights.clear_of(points.positions)
     clock.lap("scene")
 
-    common = (opened, antennas, waveform.bandwidth)
-    total, done, gated, behind = sum(len(p) for p in (points, facets) if p is not None) * len(tx), 0, 0, 0
+    total, done, gated, behind, unlit = sum(len(p) for p in (points, facets) if p is not None) * len(tx), 0, 0, 0, 0
+    gate = "range window" in skips
 
     def tell(n: int) -> None:
         if progress:
@@ -152,25 +161,24 @@ def echo(
     plans: list[tuple[float, dict[str, Any]]] = []
     if points is not None:
         if same:
-            spreader = Spreader(*common, n_samples, share, budget, "range window" in skips)
-            plan, gated = spreader.add(points, samples[:, same[0]], clock, tell)
+            nodes = chebyshev(waveform.center, waveform.bandwidth, blur.nodes(0.3 * share))
+            error = blur.of(len(nodes), share)
+            spreader = Spreader(
+                opened, antennas, waveform.bandwidth, n_samples, share - error, budget, gate, weights,
+                lagrange(nodes, frequencies), nodes,
+            )  # fmt: skip
+            plan, gated, unlit = spreader.add(points, samples[:, same[0]], clock, tell)
             samples[:, same[1:]] = samples[:, same[:1]]
-            plans.append((plan.predicted_error, plan.describe("spread")))
+            plans.append((plan.predicted_error + error, plan.describe("spread")))
         done += len(points) * len(tx)
     if facets is not None:
         assert facet_plan is not None
         facet_spreader = FacetSpreader(
-            *common,
-            frequencies,
-            share / crowd,
-            budget,
-            "range window" in skips,
-            polarizations,
-            facet_plan,
-            upright,
-        )
-        plan, outside, behind = facet_spreader.add(facets, samples, clock, tell)
-        gated += outside
+            opened, antennas, waveform.bandwidth, frequencies, share / crowd, budget, gate, polarizations,
+            facet_plan, upright, weights,
+        )  # fmt: skip
+        plan, outside, behind, dark = facet_spreader.add(facets, samples, clock, tell)
+        gated, unlit = gated + outside, unlit + dark
         how = plan.describe("spread") | facet_plan.describe()
         plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error), how))
     if gated == total:
@@ -178,16 +186,20 @@ def echo(
             f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "
             "widen range_window or move reference"
         )
-    if gated + behind == total:
+    if gated + unlit == total:
+        raise ValueError("no scatterer in the range window is ever in the beam; aim the antenna with sarcl.pointing")
+    if gated + unlit + behind == total:
         raise ValueError("every facet in the range window faces away from an antenna; move the track or turn the scene")
     pulse = waveform.pulse_spectrum(frequencies)
-    spectrum = np.abs(pulse) ** 2 if compressed else pulse
+    spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * weights.factor(frequencies)
     samples *= spectrum.astype(np.complex64)
     clock.lap("spectra")
     measured = None
     exact_seconds = 256 * (0 if points is None else len(points)) * 6e-8 + (0 if facets is None else len(facets)) * 1e-4
     if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("echo", 0.0)):
-        measured = measure_error(points, facets, antennas, frequencies, spectrum, samples, polarizations, upright)
+        measured = measure_error(
+            points, facets, antennas, frequencies, spectrum, samples, polarizations, upright, weights
+        )
         clock.lap("check")
     n = len(polarizations)
 
@@ -196,6 +208,9 @@ def echo(
 
     velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
     skipped["facing away"] = skipped.get("facing away", 0) + behind
+    if weights.pair is not None:
+        skipped["out of beam"] = unlit
+    chosen = max(plans, key=lambda p: p[0])[1] if plans else {}
     return PhaseHistory(
         sealed(samples.reshape(-1, n_samples)),
         frequency=frequency,
@@ -210,11 +225,11 @@ def echo(
         waveform=waveform,
         compressed=compressed,
         report=Report(
-            plan={"model": "stop and go, single scattering", **max(plans, key=lambda p: p[0])[1]} if plans else {},
+            plan={"model": "stop and go, single scattering", **chosen, **weights.describe(blur)} if plans else {},
             tolerance=tolerance,
             predicted_error=float(np.sqrt(sum(error**2 for error, _ in plans))),
             measured_error=measured,
-            contributions_done=total - gated - behind,
+            contributions_done=total - gated - behind - unlit,
             contributions_skipped={**skipped, "range window": gated},
             seconds=clock.seconds,
             device=opened.info.name,
@@ -243,83 +258,10 @@ def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
     return np.array([0.0, 0.0, 1.0]) if normal is None else normal
 
 
-def _cut(
-    scene: Scene, waveform: Waveform, antennas: Antennas, channels: int, max_edge: float | str | None, share: float,
-) -> tuple[FacetPlan, Scene, float]:  # fmt: skip
-    """The plan of the facets, the facets cut as it says, and what `crowding` says of it."""
-    scene = replace(scene, positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
-    finest = np.inf
-    if max_edge == "auto" and (scene.roughness.any() or any(m.diagram not in COHERENT for m in scene.materials)):
-        finest = scatterers.resolution_edge(waveform, antennas, scene)
-    elif isinstance(max_edge, (int, float)):
-        finest = number("max_edge", max_edge, above=0)
-    elif max_edge not in ("auto", None):
-        raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
-    wanted, crowd = share, 1.0
-    for _ in range(6):
-        plan = plan_facets(
-            wanted / crowd, scene, antennas, waveform.center, waveform.bandwidth, channels, finest,
-            cut=max_edge is not None,
-        )  # fmt: skip
-        found = 1.0 if max_edge is None else crowding(scene, plan.max_edge, antennas, plan.nodes)
-        if found <= crowd:
-            break
-        crowd = 1.1 * found
-    else:
-        raise ValueError(
-            f"tolerance {share:.1e} cannot be met with these facets: cut finely enough, their edges' echoes cancel to "
-            f"less than a {crowd:.0f}th; ask for a looser one, or let fewer facets make up a plane"
-        )
-    made = scene if max_edge is None else cut_facets(scene, plan, finest)
-    return replace(plan, n_facets=len(made.triangles)), made, crowd
-
-
-def _receiver(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
-    """Receiver positions (n_pulses, 3)."""
-    if receiver is None:
-        return track.positions
-    instance("receiver", receiver, Trajectory)
-    if len(receiver) != len(track):
-        raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
-    return receiver.positions
-
-
-def _half_path(tx: np.ndarray, rx: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Half the two-way path from antennas (n, 3) to points (..., 3), m."""
-    return (np.linalg.norm(tx - point, axis=-1) + np.linalg.norm(rx - point, axis=-1)) / 2
-
-
-def _window(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
-) -> tuple[float, float]:
-    """The range gate (near, far) about the reference, m: as asked, or what holds the scene's box plus 10 %."""
-    if asked is not None:
-        pair = np.asarray(asked, np.float64)
-        if pair.shape != (2,):
-            raise ValueError(f"range_window is {asked!r}; give (near, far) in metres about the reference")
-        finite("range_window", pair)
-        if not pair[0] < pair[1]:
-            raise ValueError(f"range_window ({pair[0]:g}, {pair[1]:g}) is empty; near must be less than far")
-        return float(pair[0]), float(pair[1])
-    low, high = scene.bounds
-    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 1, 3)
-    # distance is convex: the farthest point of a box is a corner, the nearest is the antenna clipped to the box
-    farthest = _half_path(tx, rx, corners).max(axis=0) - reference_range
-    clipped = [np.linalg.norm(e - np.clip(e, low, high), axis=1) for e in (tx, rx)]
-    nearest = (clipped[0] + clipped[1]) / 2 - reference_range
-    least = LEAST_SAMPLES * SPEED_OF_LIGHT / (4 * waveform.bandwidth)
-    half = max(1.1 * float(farthest.max()), -1.1 * float(nearest.min()), least)
-    return -half, half
-
-
-def _sampling(waveform: Waveform, near: float, far: float, compressed: bool) -> tuple[float, float, int]:
-    """Frequency of sample 0, step, and number: f_n = fc - B/2 + (n + 1/2) df with n_samples df = B."""
-    period = 4 * max(abs(near), abs(far)) / SPEED_OF_LIGHT
-    if not compressed:
-        period += waveform.duration  # so that pulses at the window's ends do not wrap
-    n_samples = max(1, int(np.ceil(period * waveform.bandwidth * (1 - 1e-12))))
-    step = waveform.bandwidth / n_samples
-    return waveform.center - waveform.bandwidth / 2 + step / 2, step, n_samples
+def _bounded(largest: float) -> None:
+    if largest > LARGEST:
+        text = f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}"
+        raise ValueError(text + ": scale them down")
 
 
 def _reasons(skipped: dict[str, int]) -> str:

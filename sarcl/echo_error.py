@@ -6,6 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from .beam import Beam
 from .check import SPEED_OF_LIGHT
 from .facet_spread import Facets
 from .geometry import Antennas
@@ -14,7 +15,7 @@ from .scatterers import Points
 
 def measure_error(
     points: Points | None, facets: Facets | None, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray,
-    samples: np.ndarray, polarizations: Sequence[str], vertical: np.ndarray,
+    samples: np.ndarray, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
 ) -> float:  # fmt: skip
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of 16 where
     there are more than 20 000 facets.
@@ -30,7 +31,7 @@ def measure_error(
         wanted, power = np.zeros((len(polarizations), draws), np.complex128), np.zeros((len(polarizations), draws))
         for part in (points, facets):
             if part is not None:
-                values, powers = _exact(part, antennas, int(p), frequencies[n], polarizations, vertical)
+                values, powers = _exact(part, antennas, int(p), frequencies[n], polarizations, vertical, beam)
                 wanted, power = wanted + values, power + powers
         wanted *= spectrum[n]
         wrong += float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
@@ -46,6 +47,7 @@ def _exact(
     frequencies: np.ndarray,
     polarizations: Sequence[str],
     vertical: np.ndarray,
+    beam: Beam,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and the power they have at random phases."""
     from .reference.echo import echo as exact
@@ -62,10 +64,13 @@ def _exact(
     powers = np.zeros(values.shape)
     if isinstance(part, Points):
         place = (tx, rx, float(antennas.reference_range[p]))
-        one = exact(part.positions, part.amplitudes * inside, frequencies, *place)
-        for i, name in enumerate(polarizations):
-            if name[0] == name[1]:
-                values[i], powers[i] = one, float((np.abs(part.amplitudes * inside) ** 2).sum())
+        same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
+        for j, f in enumerate(frequencies.tolist()):
+            a = part.amplitudes * inside * beam.weights(places, p, f)
+            values[same, j], powers[same, j] = (
+                exact(places, a, frequencies[j : j + 1], *place)[0],
+                (np.abs(a) ** 2).sum(),
+            )
         return values, powers
     to_tx, to_rx = (tx - places) / away[0][:, None], (rx - places) / away[1][:, None]
     behind = part.two_sided & ((normals(part.triangles) * to_tx).sum(axis=1) < 0)
@@ -74,14 +79,15 @@ def _exact(
     delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[p]))
     for j, f in enumerate(frequencies.tolist()):
         wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
-        matrix = _matrix(part, triangles, f, to_tx, to_rx, vertical)
+        matrix = facet_matrix(part, triangles, f, to_tx, to_rx, vertical)
+        scale = weight * beam.weights(places, p, f)
         for i, name in enumerate(polarizations):
-            a = matrix[:, "HV".index(name[0]), "HV".index(name[1])] * weight
+            a = matrix[:, "HV".index(name[0]), "HV".index(name[1])] * scale
             values[i, j], powers[i, j] = (a * wave).sum(), (np.abs(a) ** 2).sum()
     return values, powers
 
 
-def _matrix(
+def facet_matrix(
     part: Facets, triangles: np.ndarray, f: float, to_tx: np.ndarray, to_rx: np.ndarray, vertical: np.ndarray
 ) -> np.ndarray:
     """Amplitudes of facets at a frequency, Hz: complex128 (k, 2, 2)."""

@@ -11,12 +11,12 @@ from typing import Any
 
 import numpy as np
 
+from .beam import MOST_NODES, BeamError
 from .check import SPEED_OF_LIGHT
 from .geometry import Antennas
 from .scene import Scene, box, centroids, edges, normals
 
 LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
-MOST_NODES = 8
 SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
 # Relative cost of a facet and pulse: of direction, place and polarisations; of its integral at a frequency; of a tap
@@ -42,12 +42,7 @@ class FacetPlan:
 
         The factor k(f) of amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
         """
-        out = np.ones((len(self.nodes), 1)) * frequencies
-        for i, node in enumerate(self.nodes):
-            for j, other in enumerate(self.nodes):
-                if i != j:
-                    out[i] *= (frequencies - other) / (node - other)
-        return out
+        return lagrange(self.nodes, frequencies) * frequencies
 
     def describe(self) -> dict[str, Any]:
         """For a report."""
@@ -59,12 +54,14 @@ def coherent(scene: Scene) -> np.ndarray:
     return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
 
 
-def cut_facets(scene: Scene, plan: FacetPlan, finest: float) -> Scene:
-    """The scene's facets as the plan wants them; those without a coherent part only to about `finest`, m."""
-    mirror = coherent(scene)
-    parts = [scene.part(which).split(edge) if np.isfinite(edge) else scene.part(which)
-             for which, edge in ((mirror, plan.max_edge), (~mirror, 1.05 * finest)) if which.any()]  # fmt: skip
-    return parts[0] if len(parts) == 1 else parts[0] + parts[1]
+def lagrange(nodes: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    """Lagrange's polynomials of nodes, Hz (n,), at frequencies, Hz (m,): (n, m)."""
+    out = np.ones((len(nodes), len(frequencies)))
+    for i, node in enumerate(nodes):
+        for j, other in enumerate(nodes):
+            if i != j:
+                out[i] *= (frequencies - other) / (node - other)
+    return out
 
 
 def chebyshev(center: float, bandwidth: float, n: int) -> np.ndarray:
@@ -80,12 +77,12 @@ def frequency_error(n: int, phase: float) -> float:
 
 def plan_facets(
     tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, channels: int,
-    finest: float = np.inf, *, cut: bool = True,
+    finest: float = np.inf, *, cut: bool = True, weights: BeamError | None = None,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
 
     center, bandwidth  of the waveform, Hz;  channels  polarisations;  finest  no edge may be longer, m
-    cut                False: facets stay as they are
+    cut                False: facets stay as they are;  weights  what antennas and distance err
     ValueError where more than 50 million facets would be needed, with what fewer could do.
     """
     longest = np.maximum.reduce(edges(scene.triangles))
@@ -99,17 +96,21 @@ def plan_facets(
     slope = float(np.sqrt(np.clip(1 - np.min(np.abs(normals(scene.triangles) @ look)) ** 2, 0, 1)))
     slope = min(1.0, slope + spread)
     dispersion = _dispersion(scene, center - bandwidth / 2, highest)
+    weights = weights or BeamError()
     best: tuple[float, FacetPlan] | None = None
     least, edge = np.inf, min(top, finest)
     while True:
         corner = TO_CORNER * edge
         count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
-        fixed = _rounding(edge, highest) + (_spherical(corner, distance, highest) if mirror.any() else 0.0)
+        fixed = _rounding(edge, highest) + weights.rounding
+        if mirror.any():
+            fixed += _spherical(corner, distance, highest) + weights.steepness * corner
         phase = dispersion + (bandwidth / center if random else 0.0)  # a random part goes as 1/f
         if mirror.any():
             phase += 2 * np.pi * bandwidth / SPEED_OF_LIGHT * corner * slope
+        of_phase = [np.inf] + [frequency_error(n, phase) for n in range(1, MOST_NODES + 1)]
         for n in range(1, MOST_NODES + 1):
-            error = fixed + frequency_error(n, phase)
+            error = fixed + weights.with_phase(n, of_phase)
             least = min(least, error) if count <= MOST_FACETS else least
             if error <= SHARE * tolerance and count <= MOST_FACETS:
                 cost = count * (FACET + n * (NODE + 4 * TAP * channels))
@@ -131,34 +132,6 @@ def plan_facets(
             f"{least / SHARE:.1e}, or take a smaller scene"
         )
     return best[1]
-
-
-def crowding(scene: Scene, max_edge: float, antennas: Antennas, frequencies: np.ndarray) -> float:
-    """How much more the norm of cut facets is than that of uncut ones, were each added with a random phase; at least 1.
-
-    Cutting a smooth facet makes edges whose echoes cancel again; what they err does not. From up to 200 facets at
-    three pulses, as perfect conductors.
-    """
-    from .reference.facet import triangle_integral
-
-    some = np.flatnonzero((np.maximum.reduce(edges(scene.triangles)) > max_edge) & coherent(scene))
-    if len(some) == 0:
-        return 1.0
-    some = some[np.unique(np.linspace(0, len(some) - 1, 200).astype(int))]
-    whole = Scene.facets(scene.triangles[some])
-    cut = whole.split(max(max_edge, float(np.maximum.reduce(edges(whole.triangles)).max()) / 64))
-    power = [0.0, 0.0]
-    for row in np.unique(np.linspace(0, len(antennas.tx) - 1, 3).astype(int)):
-        for i, part in enumerate((whole, cut)):
-            centers = centroids(part.triangles)
-            q = np.zeros_like(centers)
-            for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
-                away = ends[row] - centers
-                q += away / np.linalg.norm(away, axis=1, keepdims=True)
-            for f in frequencies:
-                integral = triangle_integral(part.triangles, 2 * np.pi * f / SPEED_OF_LIGHT * q)
-                power[i] += float((np.abs(integral) ** 2).sum())
-    return max(1.0, float(np.sqrt(power[1] / power[0]))) if power[0] else 1.0
 
 
 def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:

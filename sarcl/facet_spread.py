@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from . import cl, profiles
+from .beam import Beam
 from .check import SPEED_OF_LIGHT
 from .facet_plan import FacetPlan
 from .geometry import Antennas
@@ -87,11 +88,11 @@ class FacetSpreader:
 
     def __init__(
         self, device: cl.Device, antennas: Antennas, bandwidth: float, frequencies: np.ndarray, tolerance: float,
-        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray,
+        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray, beam: Beam,
     ) -> None:  # fmt: skip
         self.device, self.antennas, self.frequencies, self.bandwidth = device, antennas, frequencies, bandwidth
         self.tolerance, self.budget, self.skip, self.facet_plan = tolerance, budget, skip, plan
-        self.vertical = vertical
+        self.vertical, self.beam = vertical, beam
         # from one place what is sent as H and received as V equals what is sent as V and received as H
         self.alike = {"VH": "HV"} if antennas.rx is None else {}
         self.wanted = [self.alike.get(name, name) for name in polarizations]
@@ -99,10 +100,11 @@ class FacetSpreader:
 
     def add(
         self, part: Facets, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
-    ) -> tuple[Plan, int, int]:
+    ) -> tuple[Plan, int, int, int]:
         """Add to samples (n_pulses, n_polarizations, n_samples).
 
-        Returns the plan, and how many pairs of facet and pulse were outside the window, and inside but from behind.
+        Returns the plan, and how many pairs of facet and pulse were outside the window, inside but from behind, and
+        left out of the beam.
         """
         positions = centroids(part.triangles)
         center = box(positions).mean(axis=0)
@@ -114,7 +116,7 @@ class FacetSpreader:
         bistatic = self.antennas.rx is not None
         metal = all(np.isinf(m.conductivity) for m in part.materials)
         dispersive = not metal and bool(np.ptp(np.stack([part.roots(float(f)) for f in nodes]), axis=0).any())
-        macros = {**plan.macros(bistatic), "TILE": tiles.per_tile, "NODES": len(nodes), "METAL": int(metal)}
+        macros = {**plan.macros(bistatic), **self.beam.macros(len(nodes)), "TILE": tiles.per_tile, "METAL": int(metal)}
         macros |= {
             "DISPERSIVE": int(dispersive),
             "ROUGH": int(part.is_rough),
@@ -127,9 +129,10 @@ class FacetSpreader:
         references, radius, offsets = (device.upload(a) for a in shared)
         facets = device.upload(part.planes(order, nodes, metal, dispersive))
         # the basis brings in the frequency itself
-        node = device.upload(
-            np.stack([wave, np.full_like(wave, np.sqrt(np.pi) / SPEED_OF_LIGHT * SCALE)]).astype(np.float32)
-        )
+        scale = np.full_like(wave, np.sqrt(np.pi) / SPEED_OF_LIGHT * SCALE)
+        node = device.upload(np.stack([wave, scale, nodes / self.beam.frequency]).astype(np.float32))
+        patterns, second = self.beam.upload(device)
+        reach = device.upload(self.beam.limits)
         up, table = device.upload(_vertical(self.vertical)), device.upload(plan.interpolator.table)
         last = tiles.per_tile - (len(order) - len(part))
         flush = max(1, int(terms(self.tolerance) / tiles.per_tile))
@@ -143,21 +146,23 @@ class FacetSpreader:
         most = max(64, 16 * device.info.units)
         pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
         basis = self.facet_plan.basis(self.frequencies) / SCALE
-        outside = behind = 0
+        outside = behind = unlit = 0
         for start, stop, share in self._blocks(part, len(samples), pulses):
             packed = self.antennas.packed(center, plan.length, start, stop, lanes)
             n, used = packed.shape[2], stop - start
             pulse, seen = device.upload(packed), device.upload(share[order])
             constants = device.empty(record * n * tiles.n_tiles)
-            rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
+            rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(12 * parts * used)
             device.run(
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
             )  # fmt: skip
+            axes = device.upload(self.beam.turned(start, stop))
             device.run(
                 kernel, (used, parts), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], facets, seen,
-                node, up, table, last, flush, rows, stride, stride // 2, done,
+                node, up, patterns, second, axes, np.float32(self.beam.range), reach, radius, table, last,
+                flush, rows, stride, stride // 2, done,
             )  # fmt: skip
             made = device.download(rows, np.empty((parts, used * channels, 3, stride), np.complex64))
             clock.lap("echo")
@@ -167,13 +172,14 @@ class FacetSpreader:
             for i, name in enumerate(self.wanted):
                 for m, weight in enumerate(basis.astype(np.float32)):
                     samples[start:stop, i] += spectra[:, self.made.index(name), m] * weight
-            counts = device.download(done, np.empty((2, parts, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
-            outside += used * len(part) - int(counts[0])
+            counts = device.download(done, np.empty((3, parts, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
+            outside += used * len(part) - int(counts[0] + counts[2])
             behind += int(counts[0] - counts[1])
+            unlit += int(counts[2])
             clock.lap("spectra")
             if tell:
                 tell(stop * len(part))
-        return plan, outside, behind
+        return plan, outside, behind, unlit
 
     @staticmethod
     def _blocks(part: Facets, n_pulses: int, most: int) -> Iterator[tuple[int, int, np.ndarray]]:

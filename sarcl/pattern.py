@@ -42,17 +42,19 @@ def table_slope(antenna: Antenna) -> float:
     return float(np.sqrt(squares.max()))
 
 
-def table_reach(antenna: Antenna, level: float, ratio: float) -> float:
+def table_limits(antenna: Antenna, level: float, ratio: float) -> tuple[float, float, float]:
+    """Largest direction cosines along azimuth and elevation where a table reaches `level`; -1 if nowhere behind."""
     from .reference.antenna import splines
 
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     power = sum(s(a, e) ** 2 for s in splines(antenna))
     seen = power >= level**2
     if not seen.any():
-        return 0.0
-    cosine = np.maximum(np.cos(e / ratio), 0) * np.cos(np.minimum(np.abs(a / ratio), np.pi))[:, None]
-    # half a cell of the finer grid, both ways, between samples that were looked at
-    return float(min(np.arccos(np.clip(cosine[seen].min(), -1, 1)) + np.hypot(a[1] - a[0], e[1] - e[0]) / ratio, np.pi))
+        return 0.0, 0.0, -1.0
+    # half a cell of the finer grid between samples that were looked at, and what may lie outside by rounding
+    azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[seen.any(axis=1)].max()
+    elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[seen.any(axis=0)].max()
+    return float(np.sin(min(azimuth, np.pi / 2))), float(np.sin(elevation)), -float(azimuth < np.pi / 2)
 
 
 def factor_reach(antenna: Antenna, axis: int, level: float, frequency: float) -> float:

@@ -20,6 +20,7 @@ if TYPE_CHECKING:
     from .grid import ImageGrid
     from .image import Image
     from .phase_history import PhaseHistory
+    from .radar import Radar
     from .scene import Scene
     from .trajectory import Trajectory
     from .waveform import Waveform
@@ -35,10 +36,13 @@ class Scenario:
     waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
     trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
     receiver     the same for a receiver of its own, or None
+    pointing     {"spotlight": {"point": [0, 0, 0]}}, {"stripmap": ...}, {"fixed": ...}: what sets a track's attitude
+    antenna      {"gaussian": {...}}, {"rectangular": ...}, {"table": ...}, {"isotropic": ...}, or an Antenna
+    receiver_pointing, receiver_antenna   the receiver's, where they differ;  radar  {"power": ...}, or a Radar
     materials    {name: {"eps_r": 4.0, ...}, ...}, or Materials, which the scene's tables name
     scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
     grid         {"plane": {...}} or {"points": {...}}, or an ImageGrid
-    echo         arguments of `sarcl.echo`;  backproject  arguments of `sarcl.backproject`
+    echo         arguments of `sarcl.echo`;  noise  of `sarcl.add_noise`;  backproject  of `sarcl.backproject`
     folder       mesh files are named relative to it
 
     All are optional until they are used. Nouns become tables; arrays and tuples become lists. ValueError
@@ -53,6 +57,12 @@ class Scenario:
     echo: Any = None
     backproject: Any = None
     materials: Any = None
+    pointing: Any = None
+    antenna: Any = None
+    receiver_pointing: Any = None
+    receiver_antenna: Any = None
+    radar: Any = None
+    noise: Any = None
     folder: Path = Path()
     where: Where = field(default_factory=Where, repr=False)
 
@@ -94,12 +104,27 @@ class Scenario:
         return self._one("waveform")
 
     def build_track(self) -> Trajectory:
-        """The transmitter's Trajectory."""
-        return self._one("trajectory")
+        """The transmitter's Trajectory, aimed as [pointing] says."""
+        return self._aimed(self._one("trajectory"), "pointing")
 
     def build_receiver(self) -> Trajectory | None:
         """The receiver's Trajectory, None where it moves with the transmitter."""
-        return None if self.receiver is None else self._one("receiver")
+        if self.receiver is None:
+            return None
+        return self._aimed(self._one("receiver"), "receiver_pointing" if self.receiver_pointing else "pointing")
+
+    def build_antenna(self) -> Any:
+        """The Antenna, a pair (transmitting, receiving), or None."""
+        if self.antenna is None:
+            if self.receiver_antenna is not None:
+                raise ValueError(f"{self.where.text(('receiver_antenna',))} has no [antenna] that sends; add one")
+            return None
+        sends = self._one("antenna")
+        return sends if self.receiver_antenna is None else (sends, self._one("receiver_antenna"))
+
+    def build_radar(self) -> Radar | None:
+        """The Radar, None where amplitudes do not fall with range."""
+        return None if self.radar is None else self._one("radar")
 
     def build_grid(self) -> ImageGrid:
         """The ImageGrid."""
@@ -128,14 +153,23 @@ class Scenario:
         return scene
 
     def simulate(self, **options: Any) -> PhaseHistory:
-        """Echoes of the scene. `options` are arguments of `sarcl.echo` that come before those in [echo]."""
+        """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
         import sarcl
 
         self._check_focus()
         pieces = (self.build_scene(), self.build_waveform(), self.build_track())
         given = self._options("echo", options)
         with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
-            return sarcl.echo(*pieces, receiver=self.build_receiver(), **given)
+            raw = sarcl.echo(
+                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), radar=self.build_radar(), **given
+            )
+        if self.noise is None:
+            return raw
+        level = self._options("noise", {})
+        if "nesz" in level or "nesz_db" in level:
+            level.setdefault("grid", None if "cell_area" in level else self.build_grid())
+        with self.where.blame(("noise",), level):
+            return sarcl.add_noise(raw, **level)
 
     def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Any) -> Image:
         """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
@@ -146,6 +180,13 @@ class Scenario:
             grid = self.build_grid()
         with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
             return sarcl.backproject(raw, grid, **given)
+
+    def _aimed(self, track: Trajectory, section: str) -> Trajectory:
+        table = getattr(self, section)
+        if table is None:
+            return track
+        kind = next(iter(table))
+        return self._call((section, kind), table[kind], partial(schema.calls(section)[kind], track))
 
     def _check_focus(self) -> None:
         """Refuse a window that would be refused only after the echoes are made."""
@@ -243,5 +284,7 @@ def _argument(key: str, value: Any) -> Any:
         for i, pair in enumerate(value):
             if len(pair) != 2 or not all(isinstance(v, (int, float)) for v in pair):
                 raise ValueError(f"{key}[{i}] is {pair}; a complex number is a pair [real, imaginary]")
+        return np.asarray(value, np.float64) @ (1, 1j)
+    if key == "values" and np.ndim(value) == 3:  # of an antenna's table
         return np.asarray(value, np.float64) @ (1, 1j)
     return value

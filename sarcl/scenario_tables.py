@@ -9,8 +9,10 @@ from typing import Any
 
 import numpy as np
 
+from .antenna import Antenna
 from .grid import ImageGrid
 from .material import METAL, Material
+from .radar import Radar
 from .scene import Scene
 from .trajectory import Trajectory
 from .waveform import Waveform
@@ -26,6 +28,10 @@ def table_of(value: Any) -> Any:
         return _scene(value)
     if isinstance(value, Material):
         return _material(value)
+    if isinstance(value, Antenna):
+        return _antenna(value)
+    if isinstance(value, Radar):
+        return _without_none(value, ("power", "losses_db", "noise_temperature"))
     if isinstance(value, ImageGrid):
         if not value.is_plane:
             return {"points": {"positions": value.listed}}
@@ -52,6 +58,16 @@ def _waveform(value: Waveform) -> dict[str, Any]:
     if value.kind == "sampled":
         return _without_none(value, ("signal", "rate", "center"))
     return _without_none(value, ("center", "bandwidth", "duration"))
+
+
+def _antenna(value: Antenna) -> dict[str, Any]:
+    kind = {"aperture": "rectangular"}.get(value.kind, value.kind)
+    own = {
+        "isotropic": (), "rectangular": ("size", "taper"), "gaussian": ("width", "frequency"),
+        "table": ("azimuth", "elevation", "values", "frequency"),
+    }[kind]  # fmt: skip
+    common = ("gain_db",) if kind == "isotropic" else ("gain_db", "two_way", "mount")
+    return {kind: _without_none(value, (*own, *common))}
 
 
 def named(scene: Scene) -> dict[str, Material]:

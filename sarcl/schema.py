@@ -21,7 +21,7 @@ RENAMED = {"mesh": "file", "path": "file"}
 # Arguments that are other sections, or belong to the run and not to the scenario.
 NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
 NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
-NOT_KEYS |= {"name"}  # a material's is its table's
+NOT_KEYS |= {"name", "antenna", "radar"}  # a material's is its table's; the others are tables of their own
 ON = "on"  # of a part of the scene: stand it on the parts before
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
@@ -59,6 +59,15 @@ def calls(section: str) -> dict[str, Call]:
             "facets": s.facets,
             **{shape.__name__: shape for shape in shapes.SHAPES},
         }
+    if section in ("antenna", "receiver_antenna"):
+        a = sarcl.Antenna
+        return {"isotropic": a.isotropic, "rectangular": a.rectangular, "gaussian": a.gaussian, "table": a.table}
+    if section in ("pointing", "receiver_pointing"):
+        from . import pointing as p
+
+        return {"spotlight": p.spotlight, "stripmap": p.stripmap, "fixed": p.fixed}
+    if section in ("radar", "noise"):
+        return {"": sarcl.Radar if section == "radar" else sarcl.add_noise}
     if section == "materials":
         return {"": sarcl.Material}
     if section == "grid":
@@ -66,7 +75,10 @@ def calls(section: str) -> dict[str, Call]:
     return {"": getattr(sarcl, section)}
 
 
-SECTIONS = ("waveform", "trajectory", "receiver", "materials", "scene", "grid", "echo", "backproject")
+SECTIONS = (
+    "waveform", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna", "radar",
+    "materials", "scene", "grid", "echo", "noise", "backproject",
+)  # fmt: skip
 
 
 def parameters(call: Call) -> dict[str, inspect.Parameter]:

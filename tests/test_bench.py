@@ -386,3 +386,33 @@ def test_the_command_writes_what_it_is_asked_for(tmp_path, capsys):
 def test_bad_options_end_in_one_line(options, said, capsys):
     assert cli.main(["bench", "backproject", *options]) == cli.BAD_INPUT
     assert said in capsys.readouterr().err
+
+
+def test_echo_documents_become_tables(tmp_path):
+    """A document of bench/echo.py: spreading, whole echoes and scenes."""
+    from sarcl.bench import backproject, page
+
+    spread = [
+        {
+            "name": "sarcl, delays from geometry", "setting": "1e-03", "seconds": [0.5, 0.4], "error": 2e-4,
+            "call": [1, 0.8],
+        },
+        {"name": "finufft, delays given", "setting": "1e-03 complex64", "seconds": [1.0, 1.2], "error": 7e-4},
+    ]  # fmt: skip
+    whole = [
+        {"name": "metal", "setting": "1e-02", "seconds": [2.0], "pairs": 4_000_000, "error": 1e-3, "predicted": 8e-3}
+    ]
+    long = [
+        {"name": "SARAS", "setting": "1e-02", "seconds": [9.0], "pairs": 5e6, "error": 1e-3, "samples": 7, "vax": 490}
+    ]
+    document = backproject.header([]) | {
+        "kind": "echo", "points": 1000, "pulses": 40000, "samples": 7, "spread": spread, "whole": whole, "scenes": long,
+    }  # fmt: skip
+    (tmp_path / "results").mkdir()
+    backproject.write(document, tmp_path / "results" / "2-echo.json")
+    page.write(tmp_path / "results", tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "| sarcl, delays from geometry | 1e-03 | 2.0e-04 | 0.4 | 100 | 80 | 50 |" in text
+    assert "| 1e-03 complex64 | 7.0e-04 | 1e-03 | 2.0e-04 | 2.50 x | 2.40 x |" in text
+    assert "| metal | 1e-02 | 1.0e-03 | 8.0e-03 | 2 | 2.0 | 0.05 x its rate |" in text
+    assert "| SARAS | 1e-02 | 1.0e-03 | 5e+06 | 7 | 9 | 490 |" in text

@@ -11,7 +11,7 @@ from sarcl import cl
 from sarcl.check import SPEED_OF_LIGHT
 from sarcl.reference import facet
 
-HEADERS = ("common.clh", "wide.clh", "geometry.clh", "facet.clh")
+HEADERS = ("common.clh", "wide.clh", "geometry.clh", "vectors.clh", "facet.clh")
 MACROS = {"BISTATIC": 1, "WRAP": 0, "RANGE": 2, "WIDE_FACETS": 1}
 KAPPA = float(np.float32(9.6e9 / SPEED_OF_LIGHT))  # turns/m, X band
 PERMITTIVITIES = np.array(

@@ -70,13 +70,7 @@ def run(
     twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
     opened += twins
 
-    document: Document = {
-        "format": FORMAT,
-        "machine": _machine(),
-        "devices": [_device(d) for d in opened],
-        "peers": [],
-        "cases": [],
-    }
+    document: Document = {**header(opened), "cases": []}
     with ExitStack() as stack:
         peer = None
         if with_peers:
@@ -117,7 +111,7 @@ def run(
                     "rows": rows,
                 }
                 document["cases"].append(result)
-                document["machine"]["load"] = [document["machine"]["load"][0], *_load()]
+                document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
                 say("\n" + table.text(result))
     growth = table.growth_text(document["cases"])
@@ -165,7 +159,12 @@ def _device(device: cl.Device) -> dict[str, Any]:
     }
 
 
-def _load() -> list[float]:
+def header(devices: Sequence[cl.Device]) -> Document:
+    """What every document begins with: machine, devices, and room for peers."""
+    return {"format": FORMAT, "machine": _machine(), "devices": [_device(d) for d in devices], "peers": []}
+
+
+def load() -> list[float]:
     """Processes that wait for a processor, averaged over a minute; empty where the system does not say."""
     return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else [float("nan")]
 
@@ -185,7 +184,7 @@ def _machine() -> dict[str, Any]:
         "python": platform.python_version(),
         "numpy": np.__version__,
         "sarcl": __version__,
-        "load": _load(),
+        "load": load(),
     }
 
 

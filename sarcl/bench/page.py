@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from . import figures, pareto, table
+from . import echo_page, figures, pareto, table
 from .backproject import FORMAT
 
 INTRODUCTION = """# Results
@@ -31,6 +31,9 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     written = []
     page = INTRODUCTION
     for name, document in documents.items():
+        if document.get("kind") == "echo":
+            page += echo_page.section(name, document)
+            continue
         drawn = any(figures.ran(case) for case in document["cases"])
         if drawn:
             picture = docs / f"results-{name}.png"
@@ -44,7 +47,7 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     (docs / "results.md").write_text(page)
     written.append(docs / "results.md")
     if readme is not None:
-        block = readme_table(next(iter(documents.values())))
+        block = next((readme_table(d) for d in documents.values() if "cases" in d), "")
         text = readme.read_text()
         new = re.sub(
             r"<!-- results -->.*?<!-- end of results -->",
