@@ -148,13 +148,16 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
 
 
 @functools.lru_cache(maxsize=4096)
-def choose_interpolator(error: float, n_samples: int, pairs_per_row: float) -> tuple[Interpolator, int, float]:
+def choose_interpolator(
+    error: float, n_samples: int, pairs_per_row: float, carrier: float = 0.0
+) -> tuple[Interpolator, int, float]:
     """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
 
     The cost of a contribution is in units of one with the hat; making profiles is counted in.
 
     n_samples      of a row before oversampling
     pairs_per_row  contributions read from a row: they weigh taps against the length of the FFT
+    carrier        centre frequency in steps between samples, for scatterers that lie evenly: see off_carrier
     The choice never depends on memory, so that results do not.
     ValueError names the smallest error there is when none is small enough.
     """
@@ -167,6 +170,8 @@ def choose_interpolator(error: float, n_samples: int, pairs_per_row: float) -> t
             # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
             # and an even length puts delay 0 on a sample
             length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
+            while not off_carrier(length, carrier):
+                length = 2 * fft.good_length(length // 2 + 1)
             if length > max(LONGEST, 2 * n_samples * taps):
                 continue
             made = interpolator(taps, float(oversample))
@@ -178,6 +183,15 @@ def choose_interpolator(error: float, n_samples: int, pairs_per_row: float) -> t
     if best is None:
         raise ValueError(f"an interpolation error of {error:.1e} cannot be met; the least is {least:.1e}")
     return best[1], best[2], best[0] / pairs_per_row
+
+
+def off_carrier(length: int, carrier: float) -> bool:
+    """Whether no image of a kernel, one profile rate from the next, lies within a quarter of that from the carrier.
+
+    There scatterers that lie evenly, as the pieces of a plate, all add up, however they cancel at the carrier itself.
+    """
+    images = carrier / length
+    return abs(images - max(round(images), 1)) >= 0.25
 
 
 def phase_rounding(radius: float, frequency: float, wide: bool) -> float:

@@ -171,11 +171,11 @@ class Beam:
         packed = [one.packed(self.frequency) for one in self.ways] or [np.zeros(1, np.float32)]
         return device.upload(np.concatenate(packed)), len(packed[0])
 
-    def turned(self, start: int, stop: int) -> np.ndarray:
-        """Axes of both antennas at pulses start ... stop - 1, one axis after another, float32 (n, 18)."""
+    def turned(self, pulses: np.ndarray) -> np.ndarray:
+        """Axes of both antennas at pulses (n,), one axis after another, float32 (n, 18)."""
         if self.axes is None:
             return np.zeros((1, 18), np.float32)
-        both = np.stack([a[start:stop].swapaxes(1, 2) for a in self.axes], axis=1)
+        both = np.stack([a[pulses].swapaxes(1, 2) for a in self.axes], axis=1)
         return np.ascontiguousarray(both, np.float32).reshape(-1, 18)
 
 

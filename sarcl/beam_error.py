@@ -11,10 +11,9 @@ from collections.abc import Sequence
 import numpy as np
 
 from .beam import MOST_NODES, Beam, BeamError
-from .echo_error import facet_matrix
-from .facet_spread import Facets
+from .facets import Facets
 from .scene import Scene
-from .triangles import areas, box, centroids, normals
+from .triangles import areas, box, centroids
 from .waveform import Waveform
 
 SAFETY = 2.0  # these are samples (a facet's corner, by which its weight is judged, lies twice as far off as its area)
@@ -64,12 +63,9 @@ def _sampled(
         power = np.empty(len(places))
         power[n_facets:] = point_power[some] * point_share
         if n_facets:
-            to_tx, to_rx = (_unit(end[pulse] - where) for end in (beam.tx, beam.rx))
-            turned = facets.two_sided & ((normals(facets.triangles) * to_tx).sum(axis=1) < 0)
-            triangles = np.where(turned[:, None, None], facets.triangles[:, ::-1], facets.triangles)
-            matrix = facet_matrix(facets, triangles, waveform.center, to_tx, to_rx, vertical)
-            wanted = [matrix[:, "HV".index(name[0]), "HV".index(name[1])] for name in polarizations]
-            power[:n_facets] = share * facets.reflectivity**2 * sum(np.abs(a) ** 2 for a in wanted)
+            ends = beam.tx[pulse], beam.rx[pulse]
+            made = facets.amplitudes(*ends, np.array([waveform.center]), polarizations, vertical)[0]
+            power[:n_facets] = share * (np.abs(made) ** 2).sum(axis=1)
         weight = beam.weights(places, int(pulse), waveform.center)
         lit = power * np.abs(weight) ** 2
         total += float(power.sum())

@@ -14,7 +14,8 @@ from .check import tolerance as allowed_error
 from .echo_error import measure_error
 from .facet_cut import cut
 from .facet_plan import chebyshev, lagrange
-from .facet_spread import POLARIZATIONS, FacetSpreader
+from .facet_spread import FacetSpreader
+from .facets import POLARIZATIONS
 from .geometry import Antennas
 from .phase_history import PhaseHistory
 from .planning import Clock
@@ -130,7 +131,7 @@ def echo(
     points, skipped = scatterers.points_of(scene, skips, len(tx))
     facets, facet_plan, crowd = None, None, 1.0
     if len(scene.triangles):
-        facet_plan, pieces, crowd = cut(scene, waveform, antennas, len(polarizations), max_edge, share, blur)
+        facet_plan, pieces, crowd = cut(scene, waveform, antennas, polarizations, upright, max_edge, share, blur)
         if progress:
             progress("scene", 1, 3)
         facets, left_out = scatterers.facets_of(
@@ -177,10 +178,10 @@ def echo(
             opened, antennas, waveform.bandwidth, frequencies, share / crowd, budget, gate, polarizations,
             facet_plan, upright, weights,
         )  # fmt: skip
-        plan, outside, behind, dark = facet_spreader.add(facets, samples, clock, tell)
+        plan, knots, outside, behind, dark = facet_spreader.add(facets, samples, clock, tell)
         gated, unlit = gated + outside, unlit + dark
-        how = plan.describe("spread") | facet_plan.describe()
-        plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error), how))
+        how = plan.describe("spread") | facet_plan.describe() | {"pulses an amplitude": knots.spacing}
+        plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error + knots.error), how))
     if gated == total:
         raise ValueError(
             f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "

@@ -8,7 +8,7 @@ import numpy as np
 
 from .beam import Beam
 from .check import SPEED_OF_LIGHT
-from .facet_spread import Facets
+from .facets import Facets
 from .geometry import Antennas
 from .scatterers import Points
 
@@ -52,7 +52,7 @@ def _exact(
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and the power they have at random phases."""
     from .reference.echo import echo as exact
     from .reference.geometry import half_path
-    from .triangles import centroids, normals
+    from .triangles import centroids
 
     tx = antennas.tx[p]
     rx = tx if antennas.rx is None else antennas.rx[p]
@@ -72,38 +72,11 @@ def _exact(
                 (np.abs(a) ** 2).sum(),
             )
         return values, powers
-    to_tx, to_rx = (tx - places) / away[0][:, None], (rx - places) / away[1][:, None]
-    behind = part.two_sided & ((normals(part.triangles) * to_tx).sum(axis=1) < 0)
-    triangles = np.where(behind[:, None, None], part.triangles[:, ::-1], part.triangles)
-    weight = part.reflectivity * inside * part.share_at(p)
+    weight = inside * part.share_at(p)
     delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[p]))
+    sent = part.amplitudes(tx, rx, frequencies, polarizations, vertical)
     for j, f in enumerate(frequencies.tolist()):
         wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
-        matrix = facet_matrix(part, triangles, f, to_tx, to_rx, vertical)
-        scale = weight * beam.weights(places, p, f)
-        for i, name in enumerate(polarizations):
-            a = matrix[:, "HV".index(name[0]), "HV".index(name[1])] * scale
-            values[i, j], powers[i, j] = (a * wave).sum(), (np.abs(a) ** 2).sum()
+        a = sent[j] * (weight * beam.weights(places, p, f))[:, None]
+        values[:, j], powers[:, j] = wave @ a, (np.abs(a) ** 2).sum(axis=0)
     return values, powers
-
-
-def facet_matrix(
-    part: Facets, triangles: np.ndarray, f: float, to_tx: np.ndarray, to_rx: np.ndarray, vertical: np.ndarray
-) -> np.ndarray:
-    """Amplitudes of facets at a frequency, Hz: complex128 (k, 2, 2)."""
-    from .reference.facet import facet_amplitude, normals_and_areas, scattering_matrix, triangle_integral
-    from .reference.roughness import rough_mean
-
-    x, y, z = vertical.tolist()
-    up, eps = (x, y, z), np.array([m.permittivity(f) for m in part.materials])[part.material]
-    if not part.is_rough:
-        return facet_amplitude(triangles, eps, f, to_tx, to_rx, up)
-    wave = f / SPEED_OF_LIGHT
-    q = 2 * np.pi * wave * (to_tx + to_rx)
-    normals, areas = normals_and_areas(triangles)
-    mean = triangle_integral(triangles, q) / areas
-    for i, material in enumerate(part.materials):
-        of = part.material == i
-        mean[of] = rough_mean(mean[of], material, q[of], normals[of], areas[of], 1 / wave, part.random[of])
-    scale = np.sqrt(np.pi) * wave * areas * mean
-    return np.asarray(scale[:, None, None] * scattering_matrix(normals, to_tx, to_rx, eps, up))

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 import numpy as np
@@ -17,8 +18,8 @@ from .waveform import Waveform
 
 
 def cut(
-    scene: Scene, waveform: Waveform, antennas: Antennas, channels: int, max_edge: float | str | None, share: float,
-    weights: BeamError,
+    scene: Scene, waveform: Waveform, antennas: Antennas, polarizations: Sequence[str], vertical: np.ndarray,
+    max_edge: float | str | None, share: float, weights: BeamError,
 ) -> tuple[FacetPlan, Scene, float]:  # fmt: skip
     """The plan of a scene's facets within `share` of a tolerance, the facets cut as it says, and what `crowding` says.
 
@@ -36,8 +37,8 @@ def cut(
     wanted, crowd = share, 1.0
     for _ in range(6):
         plan = plan_facets(
-            wanted / crowd, scene, antennas, waveform.center, waveform.bandwidth, channels, finest,
-            cut=max_edge is not None, weights=weights,
+            wanted / crowd, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
+            vertical, finest, cut=max_edge is not None, weights=weights,
         )  # fmt: skip
         found = 1.0 if max_edge is None else crowding(scene, plan.max_edge, antennas, plan.nodes)
         if found <= crowd:

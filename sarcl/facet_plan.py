@@ -5,17 +5,19 @@ docs/facets.md derives each term; tests/test_facet_echo_engine.py measures the s
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
-from math import factorial
 from typing import Any
 
 import numpy as np
 
 from .beam import MOST_NODES, BeamError
 from .check import SPEED_OF_LIGHT
+from .facet_band import over_band
 from .geometry import Antennas
-from .scene import Scene, box, centroids, edges, normals
+from .scene import Scene, box, centroids, edges
 
+GIGAHERTZ = 1e9  # amplitudes are over f in GHz: so they keep away from float32's smallest numbers
 LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
 SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
@@ -26,8 +28,9 @@ TO_CORNER = 2 / 3  # from a centroid to the farthest corner, of the longest edge
 
 @dataclass(frozen=True, eq=False)
 class FacetPlan:
-    """Facets no longer than max_edge, m, their amplitudes interpolated between `nodes`, Hz (n,).
+    """Facets no longer than max_edge, m, their amplitudes over f^power interpolated between `nodes`, Hz (n,).
 
+    power            1 where facets reflect as mirrors, 0 where what they send back has no k in it
     predicted_error  relative, of what this leaves out
     n_facets         there will be, about
     """
@@ -36,13 +39,19 @@ class FacetPlan:
     nodes: np.ndarray
     predicted_error: float
     n_facets: float
+    power: int = 1
 
     def basis(self, frequencies: np.ndarray) -> np.ndarray:
-        """Lagrange's polynomials of the nodes at frequencies, Hz (m,), times these: (n, m), Hz.
+        """Lagrange's polynomials of the nodes at frequencies, Hz (m,), times these over 1 GHz to the power: (n, m).
 
-        The factor k(f) of amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
+        The factor k(f) of mirrors' amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
         """
-        return lagrange(self.nodes, frequencies) * frequencies
+        return lagrange(self.nodes, frequencies) * (frequencies / GIGAHERTZ) ** self.power
+
+    def scales(self) -> np.ndarray:
+        """k/(2 sqrt(pi)) at the nodes over the same, 1/m (n,)."""
+        wave = self.nodes / SPEED_OF_LIGHT
+        return np.asarray(np.sqrt(np.pi) * wave / (self.nodes / GIGAHERTZ) ** self.power)
 
     def describe(self) -> dict[str, Any]:
         """For a report."""
@@ -69,33 +78,21 @@ def chebyshev(center: float, bandwidth: float, n: int) -> np.ndarray:
     return center + bandwidth / 2 * np.cos(np.pi * (np.arange(n) + 0.5) / n)
 
 
-def frequency_error(n: int, phase: float) -> float:
-    """Of interpolating exp(j phase t), |t| <= 1, between n Chebyshev nodes: 2 J_n(phase) and what follows, bounded."""
-    half = phase / 2
-    return float(2 * half**n / factorial(n) / max(1 - half / (n + 1), 0.1))
-
-
 def plan_facets(
-    tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, channels: int,
-    finest: float = np.inf, *, cut: bool = True, weights: BeamError | None = None,
+    tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, polarizations: Sequence[str],
+    vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True, weights: BeamError | None = None,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
 
-    center, bandwidth  of the waveform, Hz;  channels  polarisations;  finest  no edge may be longer, m
+    center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
     cut                False: facets stay as they are;  weights  what antennas and distance err
     ValueError where more than 50 million facets would be needed, with what fewer could do.
     """
     longest = np.maximum.reduce(edges(scene.triangles))
     mirror, highest = coherent(scene), center + bandwidth / 2
-    random = not mirror.all()  # such facets are points with random phases, cut to `finest` alone
     top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
     bounds = box(scene.triangles.reshape(-1, 3))
     distance = nearest(scene, antennas, bounds)
-    look, spread = _look(antennas, bounds)
-    # how steeply ranges change over a facet, at worst over pulses and scene
-    slope = float(np.sqrt(np.clip(1 - np.min(np.abs(normals(scene.triangles) @ look)) ** 2, 0, 1)))
-    slope = min(1.0, slope + spread)
-    dispersion = _dispersion(scene, center - bandwidth / 2, highest)
     weights = weights or BeamError()
     best: tuple[float, FacetPlan] | None = None
     least, edge = np.inf, min(top, finest)
@@ -105,18 +102,19 @@ def plan_facets(
         fixed = _rounding(edge, highest) + weights.rounding
         if mirror.any():
             fixed += _spherical(corner, distance, highest) + weights.steepness * corner
-        phase = dispersion + (bandwidth / center if random else 0.0)  # a random part goes as 1/f
-        if mirror.any():
-            phase += 2 * np.pi * bandwidth / SPEED_OF_LIGHT * corner * slope
-        of_phase = [np.inf] + [frequency_error(n, phase) for n in range(1, MOST_NODES + 1)]
-        for n in range(1, MOST_NODES + 1):
-            error = fixed + weights.with_phase(n, of_phase)
-            least = min(least, error) if count <= MOST_FACETS else least
-            if error <= SHARE * tolerance and count <= MOST_FACETS:
-                cost = count * (FACET + n * (NODE + 4 * TAP * channels))
-                if best is None or cost < best[0]:
-                    best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count)
-                break
+        if fixed < SHARE * tolerance and count <= MOST_FACETS:
+            band = over_band(
+                scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
+            )  # fmt: skip
+            for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
+                error = fixed + weights.with_phase(n, band[power])
+                least = min(least, error)
+                if error <= SHARE * tolerance:
+                    cost = count * (FACET + n * (NODE + 4 * TAP * len(polarizations)))
+                    if best is None or cost < best[0]:
+                        best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power)
+        elif count <= MOST_FACETS:
+            least = min(least, fixed)
         settled = best is not None and count > 4 * best[1].n_facets
         if settled or not cut or not mirror.any() or count > MOST_FACETS:
             break
@@ -151,30 +149,6 @@ def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:
             "or cut its facets first: scene.split(max_edge)"
         )
     return max(found, distance)
-
-
-def _look(antennas: Antennas, bounds: np.ndarray) -> tuple[np.ndarray, float]:
-    """Mean direction from the scene to the antennas (3,), and how far from it any pulse and point may be, rad."""
-    middle, radius = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
-    ends = [antennas.tx] if antennas.rx is None else [antennas.tx, antennas.rx]
-    each = np.zeros_like(antennas.tx)
-    for end in ends:
-        d = end - middle
-        each += d / np.maximum(np.linalg.norm(d, axis=1, keepdims=True), 1e-9) / len(ends)
-    mean = each.mean(axis=0)
-    mean = mean / (np.linalg.norm(mean) or 1.0)
-    near = max(antennas.distance(bounds), 1e-9)
-    return mean, float(np.linalg.norm(each - mean, axis=1).max()) + min(radius / near, 2.0)
-
-
-def _dispersion(scene: Scene, lowest: float, highest: float) -> float:
-    """How much the materials' reflection changes over the band, relative, as a phase would."""
-    worst = 0.0
-    for material in scene.materials:
-        low, high = (1 / np.sqrt(complex(material.permittivity(f))) for f in (lowest, highest))
-        if low != high:
-            worst = max(worst, 2 * abs(high - low) / abs(1 - high))
-    return worst
 
 
 def _spherical(corner: float, distance: float, highest: float) -> float:

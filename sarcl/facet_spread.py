@@ -3,84 +3,23 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from . import cl, profiles
 from .beam import Beam
 from .check import SPEED_OF_LIGHT
+from .facet_knots import Knots, plan_knots
 from .facet_plan import FacetPlan
+from .facets import POLARIZATIONS, Facets
 from .geometry import Antennas
-from .lighting import Lighting
-from .material import DIAGRAMS, Material
 from .planning import Clock, Plan
 from .spread_plan import plan_tiles, splits, terms
 from .triangles import box, centroids
 
-SCALE = 1e9  # Hz, so that amplitudes over frequency keep away from float32's smallest numbers
-POLARIZATIONS = ("HH", "HV", "VH", "VV")
-
-
-@dataclass(frozen=True, eq=False)
-class Facets:
-    """What is left of a scene's facets to be added up.
-
-    triangles     m (k, 3, 3);  reflectivity, two_sided, material (k,), materials   as in Scene
-    light, kept   what of each facet both antennas see, by blocks of pulses, and which of its facets these are (k,);
-                  None: all of all
-    random        complex Gaussian numbers of unit power (k,): what rough facets send back besides
-    """
-
-    triangles: np.ndarray
-    reflectivity: np.ndarray
-    two_sided: np.ndarray
-    material: np.ndarray
-    materials: tuple[Material, ...]
-    light: Lighting | None
-    kept: np.ndarray
-    random: np.ndarray
-
-    def __len__(self) -> int:
-        return len(self.triangles)
-
-    def roots(self, frequency: float) -> np.ndarray:
-        """1/sqrt(eps) of every material at one frequency, complex128; 0 of a perfect conductor."""
-        eps = np.array([m.permittivity(frequency) for m in self.materials], np.complex128)
-        with np.errstate(divide="ignore", invalid="ignore"):
-            return np.where(np.isinf(eps), 0, 1 / np.sqrt(eps))
-
-    def shares(self, n_pulses: int) -> Iterator[tuple[int, int, np.ndarray]]:
-        """(first pulse, last + 1, share of each facet that is seen, uint8 (k,), 255 for all of it) of every block."""
-        if self.light is None:
-            yield 0, n_pulses, np.full(len(self), 255, np.uint8)
-        else:
-            for i, (first, last) in enumerate(self.light.blocks.tolist()):
-                yield first, last, self.light.share(i)[self.kept]
-
-    def share_at(self, pulse: int) -> np.ndarray:
-        """Share of each facet that a pulse sees, 0 to 1 (k,)."""
-        return np.ones(len(self)) if self.light is None else self.light.fraction(self.light.block_of(pulse))[self.kept]
-
-    @property
-    def is_rough(self) -> bool:
-        """Any material has roughness finer than a facet."""
-        return any(m.height > 0 for m in self.materials)
-
-    def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
-        """Rows of numbers as kernels/facets.cl reads them, float32, in `order`; repeats at its end are blank."""
-        first, second = (self.triangles[:, i] - self.triangles[:, 0] for i in (1, 2))
-        factor = np.where(self.two_sided, -self.reflectivity, self.reflectivity)
-        rows = [*first.T, *second.T, factor]
-        if self.is_rough:
-            rows += [*roughness_planes(self.materials)[:, self.material], self.random.real, self.random.imag]
-        if not metal:
-            for f in nodes if dispersive else nodes[:1]:
-                root = self.roots(float(f))[self.material]
-                rows += [root.real, root.imag]
-        out = np.stack(rows)[:, order].astype(np.float32)
-        out[:6, len(self) :] = 0
-        return out
+MOST_PULSES = 256  # a block, where amplitudes are shared: knots at its ends serve it alone
+KNOTS_SHARE = 0.2  # of the tolerance left, for what lies between knots
 
 
 class FacetSpreader:
@@ -100,86 +39,35 @@ class FacetSpreader:
 
     def add(
         self, part: Facets, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
-    ) -> tuple[Plan, int, int, int]:
+    ) -> tuple[Plan, Knots, int, int, int]:
         """Add to samples (n_pulses, n_polarizations, n_samples).
 
-        Returns the plan, and how many pairs of facet and pulse were outside the window, inside but from behind, and
-        left out of the beam.
+        Returns the plan, the knots, and how many pairs of facet and pulse were outside the window, inside but from
+        behind, and left out of the beam.
         """
-        positions = centroids(part.triangles)
-        center = box(positions).mean(axis=0)
-        left = self.tolerance - self.facet_plan.predicted_error
-        plan, tiles, order = plan_tiles(
-            positions, center, self.antennas, self.bandwidth, len(self.frequencies), left, least_tolerance=0.0
-        )
-        device, lanes, nodes = self.device, self.device.info.vector_width, self.facet_plan.nodes
-        bistatic = self.antennas.rx is not None
-        metal = all(np.isinf(m.conductivity) for m in part.materials)
-        dispersive = not metal and bool(np.ptp(np.stack([part.roots(float(f)) for f in nodes]), axis=0).any())
-        macros = {**plan.macros(bistatic), **self.beam.macros(len(nodes)), "TILE": tiles.per_tile, "METAL": int(metal)}
-        macros |= {
-            "DISPERSIVE": int(dispersive),
-            "ROUGH": int(part.is_rough),
-            **{name: int(name in self.made) for name in POLARIZATIONS},
-        }
-        constants_kernel = device.kernel("facets.cl", "tile_constants", **macros)
-        kernel = device.kernel("facets.cl", "spread_facets", **macros)
-        wave = nodes / SPEED_OF_LIGHT
-        shared = [cl.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
-        references, radius, offsets = (device.upload(a) for a in shared)
-        facets = device.upload(part.planes(order, nodes, metal, dispersive))
-        # the basis brings in the frequency itself
-        scale = np.full_like(wave, np.sqrt(np.pi) / SPEED_OF_LIGHT * SCALE)
-        node = device.upload(np.stack([wave, scale, nodes / self.beam.frequency]).astype(np.float32))
-        patterns, second = self.beam.upload(device)
-        reach = device.upload(self.beam.limits)
-        up, table = device.upload(_vertical(self.vertical)), device.upload(plan.interpolator.table)
-        last = tiles.per_tile - (len(order) - len(part))
-        flush = max(1, int(terms(self.tolerance) / tiles.per_tile))
+        n_samples, left = samples.shape[2], self.tolerance - self.facet_plan.predicted_error
+        highest = float(self.frequencies[-1])
+        knots = plan_knots(part, self.beam, self.made, self.vertical, highest, KNOTS_SHARE * left)
+        work = _Work(self, part, knots, left - knots.error, n_samples)
         clock.lap("scene")
-
-        channels, n_samples = len(nodes) * len(self.made), samples.shape[2]
-        stride = plan.length + 2 * profiles.padding(plan.interpolator)
-        record = 4 * plan.components(bistatic)
-        parts = splits(self.device, len(self.antennas.tx), tiles)
-        per_pulse = record * tiles.n_tiles + 24 * stride * parts * channels
-        most = max(64, 16 * device.info.units)
-        pulses = max(1, min(most, int(self.budget / 2 / per_pulse)) // lanes) * lanes
-        basis = self.facet_plan.basis(self.frequencies) / SCALE
-        outside = behind = unlit = 0
-        for start, stop, share in self._blocks(part, len(samples), pulses):
-            packed = self.antennas.packed(center, plan.length, start, stop, lanes)
-            n, used = packed.shape[2], stop - start
-            pulse, seen = device.upload(packed), device.upload(share[order])
-            constants = device.empty(record * n * tiles.n_tiles)
-            rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(12 * parts * used)
-            device.run(
-                constants_kernel, (n // lanes, tiles.n_tiles), None,
-                pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
-            )  # fmt: skip
-            axes = device.upload(self.beam.turned(start, stop))
-            device.run(
-                kernel, (used, parts), (1, 1) if device.is_cpu else None,
-                pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], facets, seen,
-                node, up, patterns, second, axes, np.float32(self.beam.range), reach, radius, table, last,
-                flush, rows, stride, stride // 2, done,
-            )  # fmt: skip
-            made = device.download(rows, np.empty((parts, used * channels, 3, stride), np.complex64))
+        basis = self.facet_plan.basis(self.frequencies).astype(np.float32)
+        counts = np.zeros(3, np.int64)
+        pairs = 0
+        for start, stop, share in self._blocks(part, len(samples), work.pulses):
+            total, found = work.profiles(start, stop, share)
             clock.lap("echo")
-            total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
-            spectra = profiles.to_samples(device, total, n_samples, plan.interpolator)
-            spectra = spectra.reshape(used, len(self.made), len(nodes), n_samples)
+            spectra = profiles.to_samples(self.device, total, n_samples, work.plan.interpolator)
+            spectra = spectra.reshape(stop - start, len(self.made), len(basis), n_samples)
             for i, name in enumerate(self.wanted):
-                for m, weight in enumerate(basis.astype(np.float32)):
+                for m, weight in enumerate(basis):
                     samples[start:stop, i] += spectra[:, self.made.index(name), m] * weight
-            counts = device.download(done, np.empty((3, parts, used), np.int32)).sum(axis=(1, 2), dtype=np.int64)
-            outside += used * len(part) - int(counts[0] + counts[2])
-            behind += int(counts[0] - counts[1])
-            unlit += int(counts[2])
+            counts += found
+            pairs += (stop - start) * len(part)
             clock.lap("spectra")
             if tell:
                 tell(stop * len(part))
-        return plan, outside, behind, unlit
+        inside, front, unlit = counts.tolist()
+        return work.plan, knots, pairs - inside - unlit, inside - front, unlit
 
     @staticmethod
     def _blocks(part: Facets, n_pulses: int, most: int) -> Iterator[tuple[int, int, np.ndarray]]:
@@ -189,10 +77,103 @@ class FacetSpreader:
                 yield start, min(start + most, last), share
 
 
-def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
-    """Height, m, number of the diagram, 1/width and 1/Omega of materials as kernels/facets.cl reads them: (4, n)."""
-    rows = [(min(m.height, 1e3), DIAGRAMS.index(m.diagram), 1 / (m.width or 1.0), 1 / m.solid_angle) for m in materials]
-    return np.array([(h, 0 if d > 4 else d, w, o) for h, d, w, o in rows]).T
+class _Work:
+    """What lies on the device for all blocks: facets in tiles, tables, kernels."""
+
+    def __init__(self, of: FacetSpreader, part: Facets, knots: Knots, tolerance: float, n_samples: int) -> None:
+        self.of, self.part, self.knots, device = of, part, knots, of.device
+        positions = centroids(part.triangles)
+        self.center = box(positions).mean(axis=0)
+        self.plan, self.tiles, self.order = plan_tiles(
+            positions, self.center, of.antennas, of.bandwidth, n_samples, tolerance, least_tolerance=0.0
+        )
+        plan, tiles, nodes, bistatic = self.plan, self.tiles, of.facet_plan.nodes, of.antennas.rx is not None
+        metal = all(np.isinf(m.conductivity) for m in part.materials)
+        dispersive = not metal and bool(np.ptp(np.stack([part.roots(float(f)) for f in nodes]), axis=0).any())
+        macros = {**plan.macros(bistatic), **of.beam.macros(len(nodes)), "TILE": tiles.per_tile, "METAL": int(metal)}
+        macros |= {
+            "DISPERSIVE": int(dispersive),
+            "ROUGH": int(part.is_rough),
+            "KNOTS": knots.order,
+            **{name: int(name in of.made) for name in POLARIZATIONS},
+        }
+        names = ("tile_constants", "facet_amplitudes", "spread_facets")
+        self.constants, self.amplitudes, self.spread = (device.kernel("facets.cl", name, **macros) for name in names)
+        shared = [cl.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
+        self.references, self.radius, self.offsets = (device.upload(a) for a in shared)
+        self.facets = device.upload(part.planes(self.order, nodes, metal, dispersive))
+        at_nodes = nodes / SPEED_OF_LIGHT, of.facet_plan.scales(), nodes / of.beam.frequency
+        self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
+        self.patterns, self.second = of.beam.upload(device)
+        self.reach, self.up = device.upload(of.beam.limits), device.upload(_vertical(of.vertical))
+        self.table = device.upload(plan.interpolator.table)
+        self.last = tiles.per_tile - (len(self.order) - len(part))
+        self.flush = max(1, int(terms(of.tolerance) / tiles.per_tile))
+        self.channels = len(nodes) * len(of.made)
+        self.stride = plan.length + 2 * profiles.padding(plan.interpolator)
+        self.record = 4 * plan.components(bistatic)
+        self.splits = splits(device, len(of.antennas.tx), tiles)
+        self.pulses, self.tiles_at_once = self._blocks()
+
+    def _blocks(self) -> tuple[int, int]:
+        """Pulses of a block, and tiles whose amplitudes are held at once, that keep to the budget."""
+        device, tiles, lanes = self.of.device, self.tiles, self.of.device.info.vector_width
+        most = max(64, 16 * device.info.units)
+        if self.knots.spacing > 1:
+            most = max(most, MOST_PULSES)
+        per_pulse = self.record * tiles.n_tiles * (2 if self.knots.spacing > 1 else 1)
+        per_pulse += 24 * self.stride * self.splits * self.channels
+        room = self.of.budget / 2
+        pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
+        n_knots = pulses if self.knots.spacing == 1 else pulses // self.knots.spacing + self.knots.order + 1
+        per_tile = tiles.per_tile * (8 * self.channels + 1) * n_knots
+        return pulses, int(np.clip(room / 2 / per_tile, 1, tiles.n_tiles))
+
+    def profiles(self, start: int, stop: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Range profiles of pulses start ... stop - 1, complex64 (n channels, stride), and counts of pairs (3,): inside
+        the window, of these from the front, and left out of the beam."""
+        device, tiles, used = self.of.device, self.tiles, stop - start
+        at, which, shares = self.knots.of(start, stop)
+        pulse, constants, n = self._constants(np.arange(start, stop), self.of.skip)
+        knot_constants, n_knots = constants, n
+        if self.knots.spacing > 1:  # what a knot does not see in its window a pulse beside it may
+            _, knot_constants, n_knots = self._constants(at, False)
+        axes, knot_axes = (device.upload(self.of.beam.turned(rows)) for rows in (np.arange(start, stop), at))
+        seen, which_here, shares_here = device.upload(share[self.order]), device.upload(which), device.upload(shares)
+        rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
+        done = device.zeros(12 * self.splits * used)
+        n_offsets, ends = tiles.offsets.shape[1], (1, 1) if device.is_cpu else None
+        size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
+        made, marks = device.empty(8 * size * self.channels), device.empty(size)
+        for first in range(0, tiles.n_tiles, self.tiles_at_once):
+            here = min(self.tiles_at_once, tiles.n_tiles - first)
+            device.run(
+                self.amplitudes, (len(at), here), ends,
+                n_knots, knot_constants, self.offsets, n_offsets, self.facets, seen, self.nodes, self.up, self.patterns,
+                self.second, knot_axes, np.float32(self.of.beam.range), self.reach, self.radius, first, made, marks,
+            )  # fmt: skip
+            device.run(
+                self.spread, (used, self.splits), ends,
+                pulse, n, used, constants, self.references, tiles.n_tiles, self.offsets, n_offsets, made, marks, first,
+                here, which_here, shares_here, axes, self.reach, self.radius, self.table, self.last, self.flush, rows,
+                self.stride, self.stride // 2, done,
+            )  # fmt: skip
+        found = device.download(rows, np.empty((self.splits, used * self.channels, 3, self.stride), np.complex64))
+        total = found[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
+        counts = device.download(done, np.empty((3, self.splits, used), np.int32))
+        return total, counts.sum(axis=(1, 2), dtype=np.int64)
+
+    def _constants(self, rows: np.ndarray, skip: bool) -> tuple[Any, Any, int]:
+        """Packed antennas of pulses, what tiles share with each of them, and how many there are with blanks."""
+        of, lanes = self.of, self.of.device.info.vector_width
+        packed = of.antennas.picked(rows).packed(self.center, self.plan.length, 0, len(rows), lanes)
+        n, device = packed.shape[2], of.device
+        pulse, constants = device.upload(packed), device.empty(self.record * n * self.tiles.n_tiles)
+        device.run(
+            self.constants, (n // lanes, self.tiles.n_tiles), None,
+            pulse, self.references, self.radius, n, self.tiles.n_tiles, 0, int(skip), constants,
+        )  # fmt: skip
+        return pulse, constants, n
 
 
 def _vertical(up: np.ndarray) -> np.ndarray:

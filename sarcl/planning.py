@@ -75,16 +75,18 @@ def cheapest(
     points_per_row: int,
     chunk: int,
     least_tolerance: float = LEAST_TOLERANCE,
+    carrier: float = 0.0,
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     tiles        choices of (points a tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
     chunk        rows or points summed in float32; least_tolerance: below it none is offered
+    carrier      Hz, that no image of the kernel may lie on (accuracy.off_carrier); 0: any may
     ValueError names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
-    least = np.inf
+    least, steps = np.inf, carrier * n_samples / bandwidth if bandwidth else 0.0
     for per_tile, radius in tiles:
         for mode, range_cost in RANGE_COST.items():
             for order in (2, 3, 0) if mode < 2 else (0,):
@@ -95,7 +97,7 @@ def cheapest(
                     continue
                 try:
                     interpolator, length, cost = accuracy.choose_interpolator(
-                        tolerance - fixed, n_samples, points_per_row
+                        tolerance - fixed, n_samples, points_per_row, steps
                     )
                 except ValueError:
                     continue

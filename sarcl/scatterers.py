@@ -11,7 +11,7 @@ import numpy as np
 from . import hashed
 from . import scene as scenes
 from .check import SPEED_OF_LIGHT
-from .facet_spread import Facets
+from .facets import Facets
 from .geometry import Antennas
 from .lighting import lit
 from .scene import Scene

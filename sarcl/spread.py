@@ -84,7 +84,7 @@ class Spreader:
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
             )  # fmt: skip
-            axes = device.upload(self.beam.turned(start, stop))
+            axes = device.upload(self.beam.turned(np.arange(start, stop)))
             device.run(
                 kernel, (used, parts), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], planes,

@@ -30,6 +30,7 @@ def plan_tiles(
         points_per_row=len(positions),
         chunk=min(len(positions), max(min(PER_TILE), int(terms(tolerance)))),
         least_tolerance=least_tolerance,
+        carrier=float(antennas.frequency.mean()),
     )
     return plan, *made[plan.per_tile]
 

@@ -82,3 +82,13 @@ def test_spreading_is_the_adjoint_of_interpolation_profiles(device):
     forward = profiles.from_samples(device, samples, weights, made, length)
     backward = profiles.to_samples(device, rows.astype(np.complex64), 37, made)
     assert np.vdot(rows, forward) == pytest.approx(np.vdot(backward, samples), rel=1e-5)
+
+
+@pytest.mark.parametrize("carrier", [0.0, 1.3, 40.0, 1024.0, 1e4, 3.21e7])
+@pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-5])
+def test_images_keep_off_the_carrier(error, carrier):
+    made, length, _ = accuracy.choose_interpolator(error, 64, 1e6, carrier)
+    assert made.error <= error
+    nearest = np.abs(carrier - length * np.arange(1, carrier / length + 2)).min()
+    assert nearest >= 0.25 * length
+    assert length <= 1.6 * accuracy.choose_interpolator(error, 64, 1e6)[1]

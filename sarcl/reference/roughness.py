@@ -20,16 +20,21 @@ from ..material import Material
 
 
 def rough_mean(
-    mean: np.ndarray, material: Material, q: np.ndarray, normal: np.ndarray, area: np.ndarray, wavelength: float,
-    random: np.ndarray,
+    mean: np.ndarray, material: Material, q: np.ndarray, normal: np.ndarray, area: np.ndarray,
+    wavelength: float | np.ndarray, random: np.ndarray,
 ) -> np.ndarray:  # fmt: skip
-    """Mean of exp(j q.rho) over rough facets, complex128 (k,), from that of smooth ones.
+    """Mean of exp(j q.rho) over rough facets, complex128 (..., k), from that of smooth ones.
 
-    q  rad/m (k, 3);  normal  unit (k, 3);  area  m^2 (k,);  random  complex Gaussian of unit power (k,)
+    q  rad/m (..., k, 3), of wavelength, m (or (..., 1));  normal  unit (k, 3);  area  m^2 (k,)
+    random  complex Gaussian of unit power (k,)
     """
-    along = (q * normal).sum(axis=1)
-    delta = np.arccos(np.clip(along / np.linalg.norm(q, axis=1), -1, 1))
+    along = (q * normal).sum(axis=-1)
+    delta = np.arccos(np.clip(along / np.linalg.norm(q, axis=-1), -1, 1))
     with np.errstate(invalid="ignore"):
-        fall = np.exp(-(np.where(along == 0, 0, along * material.height) ** 2)) if material.height else np.ones(len(q))
+        fall = (
+            np.exp(-(np.where(along == 0, 0, along * material.height) ** 2))
+            if material.height
+            else np.ones(along.shape)
+        )
     power = wavelength**2 * material.lobe(delta) / material.solid_angle * (1 - fall) / area
     return np.asarray(np.sqrt(fall) * mean + np.sqrt(power) * random)
