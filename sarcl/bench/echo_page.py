@@ -8,8 +8,8 @@ from . import table
 
 Row = dict[str, Any]
 EXPLAINED = """Mpts/s: millions of pairs of scatterer and pulse a second, shortest run. sarcl finds delays and carrier
-from antennas and positions; sorting the points, once a call, is in the whole call alone. finufft is given the delays, and
-sorts for every pulse, as its points move.
+from antennas and positions; sorting the points, once a call, is in the whole call alone. finufft is given the delays,
+and sorts for every pulse, as its points move.
 """
 
 
