@@ -70,7 +70,8 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
-//   seen     (n_tiles TILE)           share of each facet that both antennas see, 0 ... 255
+//   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
+//   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
 //   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and what takes its place along it
 //   patterns, second, axes (knots, 18), range, reach (6)   see beam.clh;  radius (n_tiles)   m, of the facets' centres
@@ -79,6 +80,7 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 //   marks    (knots, tiles of this call, TILE)                       FRONT, BRIGHT
 __kernel void facet_amplitudes(int n, __global const float *restrict constants, __global const float *restrict offsets,
                                int n_offsets, __global const float *restrict facets, __global const uchar *restrict seen,
+                               __global const uchar *restrict later, __global const float *restrict moments,
                                __global const float *restrict nodes, __global const float *restrict up,
                                __global const float *restrict patterns, int second, __global const float *restrict axes,
                                float range, __global const float *restrict reach, __global const float *restrict radius,
@@ -102,7 +104,10 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
         __global float *put = out + to * CHANNELS * 2 * VW;
         float share[VW], is_front[VW], is_bright[VW];
 #pragma unroll
-        for (int l = 0; l < VW; l++) share[l] = dark ? 0.0f : seen[at * VW + l] * (1.0f / 255.0f);
+        for (int l = 0; l < VW; l++) {
+            float now = seen[at * VW + l];
+            share[l] = dark ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
+        }
 
         offset x = load_offset(offsets, at, n_offsets);
         triple one = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
@@ -131,10 +136,10 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #endif
         fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share);
         STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
-        STORE(amplitude, 0, is_bright);
+        STORE(fabs(amplitude), 0, is_bright);
 #pragma unroll
         for (int l = 0; l < VW; l++) marks[to * VW + l] = (is_front[l] != 0 ? FRONT : 0) | (is_bright[l] > 0 ? BRIGHT : 0);
-        if (largest(amplitude) <= 0) {
+        if (largest(fabs(amplitude)) <= 0) {
             for (int channel = 0; channel < CHANNELS; channel++)
                 put_channel(put, channel, c_make((fv)0.0f, (fv)0.0f), (fv)0.0f);
             continue;

@@ -14,6 +14,7 @@ from .facet_knots import Knots, plan_knots
 from .facet_plan import FacetPlan
 from .facets import POLARIZATIONS, Facets
 from .geometry import Antennas
+from .lighting import Span
 from .planning import Clock, Plan
 from .spread_plan import plan_tiles, splits, terms
 from .triangles import box, centroids
@@ -53,8 +54,8 @@ class FacetSpreader:
         basis = self.facet_plan.basis(self.frequencies).astype(np.float32)
         counts = np.zeros(3, np.int64)
         pairs = 0
-        for start, stop, share in self._blocks(part, len(samples), work.pulses):
-            total, found = work.profiles(start, stop, share)
+        for start, stop, span in self._blocks(part, len(samples), work.pulses):
+            total, found = work.profiles(start, stop, span)
             clock.lap("echo")
             spectra = profiles.to_samples(self.device, total, n_samples, work.plan.interpolator)
             spectra = spectra.reshape(stop - start, len(self.made), len(basis), n_samples)
@@ -70,11 +71,11 @@ class FacetSpreader:
         return work.plan, knots, pairs - inside - unlit, inside - front, unlit
 
     @staticmethod
-    def _blocks(part: Facets, n_pulses: int, most: int) -> Iterator[tuple[int, int, np.ndarray]]:
-        """(first pulse, last, share seen) of blocks of at most `most` pulses."""
-        for first, last, share in part.shares(n_pulses):
-            for start in range(first, last, most):
-                yield start, min(start + most, last), share
+    def _blocks(part: Facets, n_pulses: int, most: int) -> Iterator[tuple[int, int, Span]]:
+        """(first pulse, last + 1, span they lie in) of blocks of at most `most` pulses."""
+        for span in part.spans(n_pulses):
+            for start in range(span.first, span.stop, most):
+                yield start, min(start + most, span.stop), span
 
 
 class _Work:
@@ -129,7 +130,7 @@ class _Work:
         per_tile = tiles.per_tile * (8 * self.channels + 1) * n_knots
         return pulses, int(np.clip(room / 2 / per_tile, 1, tiles.n_tiles))
 
-    def profiles(self, start: int, stop: int, share: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    def profiles(self, start: int, stop: int, span: Span) -> tuple[np.ndarray, np.ndarray]:
         """Range profiles of pulses start ... stop - 1, complex64 (n channels, stride), and counts of pairs (3,): inside
         the window, of these from the front, and left out of the beam."""
         device, tiles, used = self.of.device, self.tiles, stop - start
@@ -139,7 +140,9 @@ class _Work:
         if self.knots.spacing > 1:  # what a knot does not see in its window a pulse beside it may
             _, knot_constants, n_knots = self._constants(at, False)
         axes, knot_axes = (device.upload(self.of.beam.turned(rows)) for rows in (np.arange(start, stop), at))
-        seen, which_here, shares_here = device.upload(share[self.order]), device.upload(which), device.upload(shares)
+        seen = device.upload(span.share[self.order])
+        later = seen if span.later is span.share else device.upload(span.later[self.order])
+        moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
         n_offsets, ends = tiles.offsets.shape[1], (1, 1) if device.is_cpu else None
@@ -149,8 +152,9 @@ class _Work:
             here = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
                 self.amplitudes, (len(at), here), ends,
-                n_knots, knot_constants, self.offsets, n_offsets, self.facets, seen, self.nodes, self.up, self.patterns,
-                self.second, knot_axes, np.float32(self.of.beam.range), self.reach, self.radius, first, made, marks,
+                n_knots, knot_constants, self.offsets, n_offsets, self.facets, seen, later, moments, self.nodes,
+                self.up, self.patterns, self.second, knot_axes, np.float32(self.of.beam.range), self.reach, self.radius,
+                first, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (used, self.splits), ends,

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from .check import SPEED_OF_LIGHT
-from .lighting import Lighting
+from .lighting import Lighting, Span
 from .material import DIAGRAMS, Material
 from .triangles import centroids, normals
 
@@ -44,17 +44,19 @@ class Facets:
         with np.errstate(divide="ignore", invalid="ignore"):
             return np.where(np.isinf(eps), 0, 1 / np.sqrt(eps))
 
-    def shares(self, n_pulses: int) -> Iterator[tuple[int, int, np.ndarray]]:
-        """(first pulse, last + 1, share of each facet that is seen, uint8 (k,), 255 for all of it) of every block."""
+    def spans(self, n_pulses: int) -> Iterator[Span]:
+        """The track in parts, in each of which the share of each facet that is seen, uint8 (k,), changes evenly."""
         if self.light is None:
-            yield 0, n_pulses, np.full(len(self), 255, np.uint8)
-        else:
-            for i, (first, last) in enumerate(self.light.blocks.tolist()):
-                yield first, last, self.light.share(i)[self.kept]
+            all_of_all = np.full(len(self), 255, np.uint8)
+            yield Span(0, n_pulses, all_of_all, all_of_all)
+            return
+        for span in self.light.spans():
+            share = span.share[self.kept]
+            yield Span(span.first, span.stop, share, share if span.later is span.share else span.later[self.kept])
 
     def share_at(self, pulse: int) -> np.ndarray:
         """Share of each facet that a pulse sees, 0 to 1 (k,)."""
-        return np.ones(len(self)) if self.light is None else self.light.fraction(self.light.block_of(pulse))[self.kept]
+        return np.ones(len(self)) if self.light is None else self.light.fraction_at(pulse)[self.kept]
 
     @property
     def is_rough(self) -> bool:

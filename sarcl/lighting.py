@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 import warnings
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -25,8 +25,24 @@ CHUNK = 2**22  # facets at a time
 
 
 @dataclass(frozen=True, eq=False)
+class Span:
+    """Pulses first ... stop - 1, and lit shares, uint8 (k,), at the first and at pulse `stop`."""
+
+    first: int
+    stop: int
+    share: np.ndarray
+    later: np.ndarray
+
+    def moments(self, pulses: np.ndarray) -> np.ndarray:
+        """How far from first to stop pulses (n,) are; 0 where nothing changes."""
+        if self.later is self.share:
+            return np.zeros(len(pulses), np.float32)
+        return ((pulses - self.first) / np.float32(self.stop - self.first)).astype(np.float32)
+
+
+@dataclass(frozen=True, eq=False)
 class Lighting:
-    """Shares of k facets that both antennas see, the same for all pulses of a block.
+    """Shares of k facets that both antennas see, looked at once for all pulses of a block.
 
     blocks      first and last + 1 of the pulses, int64 (n_blocks, 2)
     viewpoints  the pulse of each block that was looked from (n_blocks,)
@@ -68,6 +84,27 @@ class Lighting:
         if not 0 <= pulse < self.blocks[-1, 1]:
             raise IndexError(f"pulse is {pulse}; there are {self.blocks[-1, 1]}")
         return int(np.searchsorted(self.blocks[:, 0], pulse, side="right")) - 1
+
+    def spans(self) -> Iterator[Span]:
+        """The track from one pulse that was looked from to the next: shares change evenly between them."""
+        n, held, start = int(self.blocks[-1, 1]), self.share(0), 0
+        at = self.viewpoints.tolist()
+        for i in range(1, len(self)):
+            share = self.share(i)
+            if not np.array_equal(share, held):
+                if start < at[i - 1]:  # nothing has changed up to there
+                    yield Span(start, at[i - 1], held, held)
+                yield Span(at[i - 1], at[i], held, share)
+                held, start = share, at[i]
+        yield Span(start, n, held, held)
+
+    def fraction_at(self, pulse: int) -> np.ndarray:
+        """Lit shares at a pulse, float32 (k,), 0 to 1: between those of the pulses looked from."""
+        after = int(np.searchsorted(self.viewpoints, pulse))
+        one, two = max(after - 1, 0), min(after, len(self) - 1)
+        before, behind = int(self.viewpoints[one]), int(self.viewpoints[two])
+        part = np.float32((pulse - before) / (behind - before)) if behind > before and pulse > before else np.float32(0)
+        return self.fraction(one) + part * (self.fraction(two) - self.fraction(one))
 
     def dark_pairs(self) -> int:
         """Pairs of a pulse and a wanted facet none of which is seen: facing away, or in shadow."""
@@ -202,8 +239,8 @@ def lit(
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
         return Lighting(whole, first, none, none, first, nothing, [], lambda block: nothing)
     bounds = scene_box(triangles, grid)
-    asked = triangles if wanted is None or not np.any(wanted) else triangles[np.asarray(wanted)]
-    limits = [tolerance * reach(asked, e[len(e) // 2]) / max(lever(bounds, e), 1e-300) for e in ends]
+    # by all facets: what is left out for other reasons must not move the blocks
+    limits = [tolerance * reach(triangles, e[len(e) // 2]) / max(lever(bounds, e), 1e-300) for e in ends]
     blocks, looks, turns = pulse_blocks(ends, bounds, limits)
     light = Light(
         opened,

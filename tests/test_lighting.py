@@ -279,6 +279,29 @@ def test_a_sweeping_poles_shadow_is_right_at_every_pulse_within_the_bound(tolera
     assert np.abs(light.share([tx[0]]) - 1.0 * light.share([tx[-1]])).max() == 255
 
 
+def test_shares_change_evenly_between_the_pulses_looked_from():
+    scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
+    found = lit(scene, tx, two_sided=False, tolerance=0.5)
+    light = Light(cl.open_device(), scene, two_sided=False, tolerance=1 / 16)
+    spans = list(found.spans())
+    assert [s.first for s in spans] == [0, *(s.stop for s in spans[:-1])] and spans[-1].stop == len(tx)
+    assert len(found) - 1 <= len(spans) <= len(found) + 1
+    even = stepped = 0.0
+    for span in spans:
+        for pulse in range(span.first, span.stop, 17):
+            part = span.moments(np.array([pulse]))[0]
+            share = (span.share + part * (span.later - 1.0 * span.share)) / 255
+            assert share == pytest.approx(found.fraction_at(pulse), abs=1e-6)
+            true = light.share([tx[pulse]]) / 255.0
+            even += ((share - true) ** 2).sum()
+            stepped += ((found.fraction(found.block_of(pulse)) - true) ** 2).sum()
+    assert even < 0.7 * stepped  # the rest is that shares are counted in samples
+    for block, pulse in enumerate(found.viewpoints):
+        assert (found.fraction_at(pulse) == found.fraction(block)).all()
+    still = next(lit(scene, tx[:1], two_sided=False).spans())
+    assert (still.first, still.stop) == (0, 1) and still.later is still.share
+
+
 def test_lighting_tells_dark_full_and_changing_facets(device):
     scene, tx = np.concatenate([ground(20), pole()]), circle(90)
     found = lit(scene, tx, two_sided=False, tolerance=0.25, device=device)
