@@ -2,14 +2,15 @@
 
 from __future__ import annotations
 
+import warnings
 from collections.abc import Callable, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import beam, cl, echo_rows, geodesy, planning, scatterers
+from . import beam, cl, echo_rows, fineness, geodesy, planning, scatterers, speckle
 from .beam_error import beam_error
-from .check import array, choice, count, direction, instance, sealed
+from .check import SarclWarning, array, choice, count, direction, instance, sealed
 from .check import tolerance as allowed_error
 from .echo_error import measure_error
 from .facet_cut import cut
@@ -68,7 +69,7 @@ def echo(
     reference     point of zero phase, m (3,), default the centre of the scene's box
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
-    shadows       True: of every facet only the share counts that both antennas see, in blocks of pulses
+    shadows       True: of every facet only the share counts that both antennas see, along the track
                   (docs/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
@@ -98,7 +99,7 @@ def echo(
     point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
     reference_range = echo_rows.half_path(tx, rx, point)
     upright = _vertical(vertical, scene.center)
-    scene = scene.realized(seed)  # before the window: it moves the corners of rough terrain
+    given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
     near, far = echo_rows.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_rows.sampling(waveform, near, far, compressed)
     try:
@@ -129,9 +130,11 @@ def echo(
         weights = weights.within(UNSEEN * share / blur.dim, waveform)
     frequencies = frequency + step * np.arange(n_samples)
     points, skipped = scatterers.points_of(scene, skips, len(tx))
-    facets, facet_plan, crowd = None, None, 1.0
+    facets, facet_plan, crowd, judged = None, None, 1.0, {}
     if len(scene.triangles):
         facet_plan, pieces, crowd = cut(scene, waveform, antennas, polarizations, upright, max_edge, share, blur)
+        # curves are told from facets as they came, speckle from what is added up
+        judged = _warned(fineness.judge(given, antennas, waveform), speckle.judge(pieces, antennas, waveform))
         if progress:
             progress("scene", 1, 3)
         facets, left_out = scatterers.facets_of(
@@ -180,7 +183,7 @@ def echo(
         )  # fmt: skip
         plan, knots, outside, behind, dark = facet_spreader.add(facets, samples, clock, tell)
         gated, unlit = gated + outside, unlit + dark
-        how = plan.describe("spread") | facet_plan.describe() | {"pulses an amplitude": knots.spacing}
+        how = plan.describe("spread") | facet_plan.describe() | {"pulses an amplitude": knots.spacing} | judged
         plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error + knots.error), how))
     if gated == total:
         raise ValueError(
@@ -237,6 +240,16 @@ def echo(
             seed=seed,
         ),
     )
+
+
+def _warned(*judgements: fineness.Fineness | speckle.Speckle) -> dict[str, Any]:
+    """SarclWarnings of what was judged, and what it says in a report."""
+    out: dict[str, Any] = {}
+    for judgement in judgements:
+        for text in judgement.warnings():
+            warnings.warn(text, SarclWarning, stacklevel=3)
+        out |= judgement.describe()
+    return out
 
 
 def _polarizations(asked: Any) -> tuple[str, ...]:

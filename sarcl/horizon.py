@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from . import check, cl
+from . import cl
 from .shadow import Facets, Frame
 
 FINE = 2  # range lines a cell, where the terrain ends
@@ -111,33 +111,3 @@ def _sector(axes: Any, per: Any, eye: np.ndarray, axis: int, sign: int) -> _Sect
     lines = np.stack([place + eye[1 - axis], place / reach[-1]], axis=1)
     density = (n - 1) / (high - low)
     return _Sector(axis, sign, int(out[0]), end, lines[0, 0], density, lines, len(out))
-
-
-def heights_of(value: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Checked (x, y, z) of a terrain."""
-    try:
-        x, y, z = value
-    except (TypeError, ValueError):
-        raise ValueError("heights must be (x, y, z): grid lines (n_x,) and (n_y,) and heights (n_y, n_x)") from None
-    x = check.array("heights x", x, np.float64, ("n_x",))
-    y = check.array("heights y", y, np.float64, ("n_y",))
-    z = check.array("heights z", z, np.float64, (len(y), len(x)))
-    for name, axis in (("x", x), ("y", y)):
-        if len(axis) < 2 or not (np.diff(axis) > 0).all():
-            raise ValueError(f"heights {name} must hold at least two increasing values, as Scene.from_heights wants")
-    return x, y, z
-
-
-def above(grid: tuple[np.ndarray, np.ndarray, np.ndarray], points: np.ndarray) -> np.ndarray:
-    """Heights of points, m (n, 3), above the terrain, m (n,); inf beside it."""
-    x, y, z = grid
-    px, py, pz = points.T
-    inside = (px >= x[0]) & (px <= x[-1]) & (py >= y[0]) & (py <= y[-1])
-    i = np.clip(np.searchsorted(x, px, side="right") - 1, 0, len(x) - 2)
-    j = np.clip(np.searchsorted(y, py, side="right") - 1, 0, len(y) - 2)
-    u, v = (px - x[i]) / (x[i + 1] - x[i]), (py - y[j]) / (y[j + 1] - y[j])
-    # the cell's two triangles, as Scene.from_heights cuts it
-    a, d = z[j, i], z[j + 1, i + 1]
-    ground = np.where(u >= v, a + u * (z[j, i + 1] - a) + v * (d - z[j, i + 1]), a + v * (z[j + 1, i] - a))
-    ground = np.where(u >= v, ground, ground + u * (d - z[j + 1, i]))
-    return np.where(inside, pz - ground, np.inf)

@@ -12,10 +12,11 @@ import numpy as np
 
 from . import cl, planning
 from .check import SarclWarning, array, choice, number, sealed
-from .horizon import Terrain, above, heights_of
+from .horizon import Terrain
 from .pulse_blocks import lever, pulse_blocks, reach, scene_box
 from .samples import PROBES, SAMPLES, places
 from .shadow import Facets, Frame, Occluders
+from .terrain import check_above, heights_of
 
 log = logging.getLogger(__name__)
 
@@ -229,7 +230,7 @@ def lit(
             raise ValueError(f"{name} has shape {np.shape(mask)}; wanted one for each of {k} facets, ({k},)")
     if grid is not None:
         for name, end in zip(("tx", "rx"), ends, strict=False):
-            _check_above(name, grid, end)
+            check_above(name, grid, end)
     opened = cl.open_device(device)
     if max_bytes is None:
         max_bytes = planning.budget(opened, None) / 4
@@ -295,14 +296,3 @@ def _caster(engine: str) -> Any:
 
 def _chunks(index: np.ndarray) -> list[np.ndarray]:
     return [index[i : i + CHUNK] for i in range(0, len(index), CHUNK)]
-
-
-def _check_above(name: str, grid: tuple[np.ndarray, np.ndarray, np.ndarray], ends: np.ndarray) -> None:
-    """ValueError for an antenna under the terrain."""
-    high = above(grid, ends)
-    if high.min() < 0:
-        at = int(high.argmin())
-        raise ValueError(
-            f"{name}[{at}] stands {-high[at]:.3g} m under the terrain; raise the track, or check that track and "
-            "heights are told above the same surface"
-        )

@@ -15,6 +15,7 @@ from .facets import Facets
 from .geometry import Antennas
 from .lighting import lit
 from .scene import Scene
+from .terrain import check_above, facets_on
 from .waveform import Waveform
 
 RANDOM_STREAMS = (2, 3)  # of hashed.py's numbers: real and imaginary parts of what rough facets send back
@@ -57,6 +58,7 @@ def facets_of(
     tell is called with 2, 3 when facets are culled and lit.
     """
     n_pulses = len(antennas.tx)
+    terrain = _terrain(scene, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = scenes.normals(scene.triangles)
     triangles = scene.triangles
@@ -77,7 +79,7 @@ def facets_of(
     if shadows and keep.any():
         # by the surface without its random heights: facets moved along their normals would hide their neighbours
         light = lit(
-            scene.triangles, antennas.tx, antennas.rx, two_sided=scene.two_sided, wanted=keep,
+            scene.triangles, antennas.tx, antennas.rx, **terrain, two_sided=scene.two_sided, wanted=keep,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
         )  # fmt: skip
         dark = keep & light.dark
@@ -96,6 +98,17 @@ def facets_of(
         triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials, light,
         np.flatnonzero(keep), random,
     ), left_out  # fmt: skip
+
+
+def _terrain(scene: Scene, antennas: Antennas) -> dict[str, Any]:
+    """What `lit` wants to know of a scene's terrain, if it is whole. ValueError for an antenna under it."""
+    on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
+    if scene.heights is None or on is None:
+        return {}
+    for name, ends in (("track", antennas.tx), ("receiver", antennas.rx)):
+        if ends is not None:
+            check_above(name, scene.heights, ends)
+    return {"heights": scene.heights, "on_heights": on}
 
 
 def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> float:

@@ -38,6 +38,8 @@ class Scene:
     materials        tuple of sarcl.Material, default a perfect conductor; their own reflectivity is moved into
                      `reflectivity`
     point_roughness  how far one standard deviation moves each corner, m (k, 3, 3); `realized` moves them
+    heights          (x, y, z) of the largest terrain in it, as of from_heights, where it has one: `echo` finds what
+                     that hides by horizons, as long as its facets are all there, cut or not
     """
 
     positions: np.ndarray
@@ -49,6 +51,7 @@ class Scene:
     material: np.ndarray = None  # type: ignore[assignment]
     materials: tuple[Material, ...] = ()
     point_roughness: np.ndarray = None  # type: ignore[assignment]
+    heights: terrain.Heights | None = None
 
     def __post_init__(self) -> None:
         n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
@@ -205,7 +208,8 @@ class Scene:
         """
         points = terrain.grid(x, y, z)
         up = np.array([0.0, 0.0, 1.0])
-        return cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
+        made = cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
+        return replace(made, heights=terrain.heights(points))
 
     @classmethod
     def from_dem(
@@ -259,7 +263,8 @@ class Scene:
         joined = {n: check.sealed(np.concatenate([getattr(self, n), getattr(other, n)])) for n in names}
         parts = [p[s.material] for p, s in zip(places, (self, other), strict=True)]
         joined["material"] = check.sealed(np.concatenate(parts))
-        return Scene(**joined, materials=table)
+        largest = max((s.heights for s in (self, other)), key=lambda h: 0 if h is None else h[2].size)
+        return Scene(**joined, materials=table, heights=largest)
 
     @property
     def has_random_points(self) -> bool:
@@ -301,7 +306,12 @@ class Scene:
     def moved(self, by: Any) -> Scene:
         """This scene moved by a vector, m (3,)."""
         by = check.array("by", by, np.float64, (3,))
-        return replace(self, positions=check.sealed(self.positions + by), triangles=check.sealed(self.triangles + by))
+        positions, triangles = check.sealed(self.positions + by), check.sealed(self.triangles + by)
+        heights = self.heights
+        if heights is not None:
+            x, y, z = (check.sealed(values + step) for values, step in zip(heights, by, strict=True))
+            heights = x, y, z
+        return replace(self, positions=positions, triangles=triangles, heights=heights)
 
     def realized(self, seed: int = 0) -> Scene:
         """One surface of those that point_roughness describes: every corner moved by a seeded Gaussian number.
@@ -316,7 +326,8 @@ class Scene:
 
         random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)
         moved = check.sealed(self.triangles + random * self.point_roughness)
-        return replace(self, triangles=moved, point_roughness=_none(len(moved)))
+        heights = None if self.heights is None else terrain.raised(self.heights, self.triangles, moved)
+        return replace(self, triangles=moved, point_roughness=_none(len(moved)), heights=heights)
 
     def part(self, which: np.ndarray) -> Scene:
         """The scene with some of its facets alone, bool (k,)."""
@@ -362,7 +373,7 @@ class Scene:
         return replace(self, triangles=check.sealed(triangles), point_roughness=_none(len(row)), **belongs)
 
 
-_ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n != "materials")
+_ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n not in ("materials", "heights"))
 _FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes"))
 
 

@@ -207,7 +207,7 @@ def test_both_ways_multiply_and_a_two_way_pattern_serves_once():
 
 BAD = [
     (lambda: Antenna.rectangular(size=(1, -1)), "greater than 0"),
-    (lambda: Antenna.rectangular(size=1, frequency=FC), "every frequency"),
+    (lambda: Antenna(kind="aperture", size=1, frequency=FC), "every frequency"),
     (lambda: Antenna.rectangular(size=1, taper=2), "0 to 1"),
     (lambda: Antenna.gaussian(width=20), "in deg"),
     (lambda: Antenna.gaussian(width=np.nan), "finite"),

@@ -159,6 +159,7 @@ def test_default_window_holds_the_scene(device):
     assert echo_error(raw, scene.positions, scene.amplitudes) <= 1e-3
 
 
+@pytest.mark.filterwarnings("ignore:mesh too coarse")
 def test_the_back_of_a_body_is_dark(device):
     import trimesh
 

@@ -8,10 +8,11 @@ from scipy.ndimage import gaussian_filter
 
 import sarcl
 from sarcl import cl
-from sarcl.horizon import Terrain, above
+from sarcl.horizon import Terrain
 from sarcl.lighting import Light, lit
 from sarcl.reference.shadow import CENTROID, overshadowed, sample
 from sarcl.shadow import LIFT, Frame
+from sarcl.terrain import above
 from sarcl.triangles import areas, centroids, normals
 
 TOLERANCE = {

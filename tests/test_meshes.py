@@ -59,6 +59,7 @@ def test_cutting_a_mesh_keeps_its_surface(mesh):
     assert areas(cut.triangles).sum() == pytest.approx(areas(scene.triangles).sum(), rel=1e-9)
 
 
+@pytest.mark.filterwarnings("ignore:mesh too coarse")  # as such models are
 def test_a_mesh_echoes_and_focuses_where_it_stands(mesh):
     scene, _ = mesh
     raw = sarcl.echo(scene, CHIRP, TRACK)

@@ -61,6 +61,7 @@ def globe(latitudes, sections):
     return sarcl.Scene.facets(np.concatenate(triangles), two_sided=False)
 
 
+@pytest.mark.filterwarnings("ignore:mesh too coarse")
 def test_rings_too_wide_for_the_wavelength_err_by_decibels_seen_along_their_axis():
     # TRUTH.md: ka = 50, 50 latitudes, pole-on: all errors of a ring add up
     pole, side = excess(globe(50, 200), 50, [(1e-9, 0.0), (np.pi / 2, 0.3)])
