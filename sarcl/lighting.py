@@ -13,7 +13,7 @@ import numpy as np
 from . import cl, planning
 from .check import SarclWarning, array, choice, number, sealed
 from .horizon import Terrain
-from .pulse_blocks import lever, pulse_blocks, reach, scene_box
+from .pulse_blocks import STRIDE, blocks_around, enough_looks, lever, pulse_blocks, reach, scene_box
 from .samples import PROBES, SAMPLES, places
 from .shadow import Facets, Frame, Occluders
 from .terrain import check_above, heights_of
@@ -101,7 +101,7 @@ class Lighting:
 
     def fraction_at(self, pulse: int) -> np.ndarray:
         """Lit shares at a pulse, float32 (k,), 0 to 1: between those of the pulses looked from."""
-        after = int(np.searchsorted(self.viewpoints, pulse))
+        after = int(np.searchsorted(self.viewpoints, pulse, side="right"))
         one, two = max(after - 1, 0), min(after, len(self) - 1)
         before, behind = int(self.viewpoints[one]), int(self.viewpoints[two])
         part = np.float32((pulse - before) / (behind - before)) if behind > before and pulse > before else np.float32(0)
@@ -242,7 +242,9 @@ def lit(
     bounds = scene_box(triangles, grid)
     # by all facets: what is left out for other reasons must not move the blocks
     limits = [tolerance * reach(triangles, e[len(e) // 2]) / max(lever(bounds, e), 1e-300) for e in ends]
-    blocks, looks, turns = pulse_blocks(ends, bounds, limits)
+    _, offered, turns = pulse_blocks(ends, bounds, limits)
+    # what may turn towards an antenna before the next look
+    slack = 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     light = Light(
         opened,
         triangles,
@@ -254,26 +256,31 @@ def lit(
         engine=engine,
     )
 
-    def look(block: int) -> np.ndarray:
-        return light.share([e[looks[block]] for e in ends], slack=float(turns[block]))
+    def look(place: int) -> np.ndarray:
+        return light.share([e[offered[place]] for e in ends], slack=float(slack[place]))
 
     asked_for = k if wanted is None else int(np.sum(wanted))
-    usual = look(0)
-    ever, always, kept = usual > 0, usual == 255, 0
+    chosen: list[int] = []
+    dark: list[int] = []
+    kept = 0
     changes: list[tuple[np.ndarray, np.ndarray]] = []
-    dark = np.zeros(len(looks), np.int64)
-    for i in range(len(looks)):
-        row = look(i) if i else usual
-        dark[i] = asked_for - np.count_nonzero(row)
-        ever |= row > 0
-        always &= row == 255
-        if kept <= max_bytes and len(changes) == i:
+    usual, ever, always = np.zeros(k, np.uint8), np.zeros(k, bool), np.ones(k, bool)
+    for place, row in enough_looks(look, offered):
+        if not chosen:
+            usual = row
+        if kept <= max_bytes and len(changes) == len(chosen):
             index = np.flatnonzero(row != usual).astype(np.int32)
             kept += 5 * len(index)
             if kept <= max_bytes:
                 changes.append((index, row[index]))
+        chosen.append(place)
+        dark.append(asked_for - int(np.count_nonzero(row)))
+        ever |= row > 0
+        always &= row == 255
         if progress:
-            progress(i + 1, len(looks))
+            progress(place + 1, len(offered))
+    looks = offered[chosen]
+    blocks = blocks_around(looks, len(tx))
     if not ever.any() and asked_for:
         warnings.warn(
             "the whole scene is in shadow: no facet faces the antennas with nothing between; check the side the track "
@@ -282,8 +289,9 @@ def lit(
             stacklevel=2,
         )
     log.info("%d pulses in %d blocks; %d of %d facets dark throughout", len(tx), len(blocks), k - ever.sum(), k)
-    blocks, looks, never, always, dark, usual = (sealed(a) for a in (blocks, looks, ~ever, always, dark, usual))
-    return Lighting(blocks, looks, never, always, dark, usual, changes, look)
+    blocks, looks, usual, never = sealed(blocks), sealed(looks), sealed(usual), sealed(~ever)
+    counts = sealed(np.array(dark, np.int64))
+    return Lighting(blocks, looks, never, sealed(always), counts, usual, changes, lambda block: look(chosen[block]))
 
 
 def _caster(engine: str) -> Any:

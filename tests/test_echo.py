@@ -294,7 +294,7 @@ def test_a_scene_that_shows_only_its_back_is_a_clear_statement():
     below = sarcl.Trajectory([0.0], [[0, 0, -5e3]])
     ground = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
     with pytest.raises(ValueError, match="nothing is left to reflect: facing away"):
-        sarcl.echo(ground, CHIRP, below)
+        sarcl.echo(sarcl.Scene.facets(ground.triangles, two_sided=False), CHIRP, below)
 
 
 def test_antennas_inside_a_box_have_distance_zero():
