@@ -68,13 +68,21 @@ def main() -> None:
     args = parser.parse_args()
     document = backproject.header([cl.open_device(args.device)])
     document |= {"kind": "echo", "points": args.points, "pulses": args.pulses}
+    document |= {"spread": [], "whole": [], "scenes": []}
+
+    def keep() -> None:  # what comes later may fail
+        if args.json:
+            backproject.write(document, args.json)
+
     document["spread"] = spread(args, document)
+    keep()
     document["whole"] = whole(args)
-    document["scenes"] = scenes(args.device) if args.scenes else []
+    keep()
+    if args.scenes:
+        document["scenes"] = scenes(args.device)
     document["machine"]["load"] += backproject.load()
     print(echo_page.section("echo", document))
-    if args.json:
-        backproject.write(document, args.json)
+    keep()
 
 
 def spread(args: argparse.Namespace, document: Row) -> list[Row]:
@@ -187,7 +195,7 @@ def scenes(device: Any) -> list[Row]:
     rough = sarcl.Material(eps_r=4.0, conductivity=1e-3, height=np.inf, diagram="cos")
     out = []
     for name, material in (("a million rough facets", rough), ("a million smooth metal facets", "metal")):
-        axis = np.linspace(-250, 250, 708)
+        axis = np.linspace(-175, 175, 708)
         heights = 3 * np.sin(axis / 40)[:, None] * np.cos(axis / 55)
         scene = sarcl.Scene.from_heights(axis, axis, heights, material=material)
         out.append(timed(name, scene, track(1024), 1e-2, device, max_edge=None))
