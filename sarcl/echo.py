@@ -8,8 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from . import beam, cl, echo_rows, fineness, geodesy, planning, scatterers, speckle
-from .beam_error import beam_error
+from . import cl, echo_rows, fineness, gains, geodesy, planning, scatterers, speckle
 from .check import SarclWarning, array, choice, count, direction, instance, sealed
 from .check import tolerance as allowed_error
 from .echo_error import measure_error
@@ -17,6 +16,7 @@ from .facet_cut import cut
 from .facet_plan import chebyshev, lagrange
 from .facet_spread import FacetSpreader
 from .facets import POLARIZATIONS
+from .gains_error import beam_error
 from .geometry import Antennas
 from .phase_history import PhaseHistory
 from .planning import Clock
@@ -124,7 +124,7 @@ def echo(
         progress("scene", 0, 3)
     # points and facets err independently: each gets its share, so that the sum keeps the tolerance
     share = tolerance / np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1)
-    weights = beam.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    weights = gains.beam_of(antenna, radar, track, receiver, waveform, scene.center)
     blur = beam_error(weights, scene, waveform, polarizations, upright, share)
     if "out of beam" in skips:
         weights = weights.within(UNSEEN * share / blur.dim, waveform)

@@ -68,7 +68,7 @@ class Beam:
     tx, rx  m (n, 3);  frequency  Hz, the band's middle
     pair    antennas as `antenna.pair_of` gives them, None: gains of 1;  axes  theirs in the scene, (n, 3, 3) each
     radar   None: no loss by spreading;  range  R, m: where spreading is counted from
-    limits  beyond which either antenna need not be asked (6,), as kernels/beam.clh reads them; zeros: none
+    limits  beyond which either antenna need not be asked (6,), as kernels/gains.clh reads them; zeros: none
     """
 
     tx: np.ndarray
@@ -110,7 +110,7 @@ class Beam:
         return np.ones(len(frequencies)) if self.radar is None else self.radar.factor(frequencies) / self.range**2
 
     def weights(self, points: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
-        """Weights (n,), complex128, of points, m (n, 3): what kernels/beam.clh computes."""
+        """Weights (n,), complex128, of points, m (n, 3): what kernels/gains.clh computes."""
         from .reference.antenna import two_way_gain
 
         out = np.ones(len(points), np.complex128)
@@ -156,7 +156,7 @@ class Beam:
         return out
 
     def macros(self, n_nodes: int) -> dict[str, int]:
-        """Build-time macros of kernels/beam.clh."""
+        """Build-time macros of kernels/gains.clh."""
         return {
             "NODES": n_nodes,
             "GAINS": len(self.ways),
