@@ -30,6 +30,11 @@ class Channel:
     stop: int
 
 
+def is_single(array: AntennaArray) -> bool:
+    """One element at the reference point that sends the base frequency: no array at all."""
+    return array.n == 1 and not (array.positions.any() or array.offsets.any()) and array.weights[0] == 1
+
+
 def channels_of(array: AntennaArray, center: float, n_pulses: int) -> list[Channel]:
     """Channels of an array about a base frequency, Hz; equal ones are one. ValueError for carriers of 0 Hz or less."""
     low = center + float(array.offsets.min())

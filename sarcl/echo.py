@@ -8,7 +8,11 @@ from typing import Any
 import numpy as np
 
 from . import cl, echo_rows, gains, geodesy, planning
-from .check import array, choice, count, direction, instance, sealed
+from .array import AntennaArray
+from .array_echo import array_echo
+from .channels import is_single
+from .check import array as numbers
+from .check import choice, count, direction, instance, sealed
 from .check import tolerance as allowed_error
 from .echo_work import Order, Progress, Work
 from .facets import POLARIZATIONS
@@ -32,6 +36,9 @@ def echo(
     vertical: Any = None,
     range_window: Any = None,
     reference: Any = None,
+    array: AntennaArray | None = None,
+    channels: str = "simultaneous",
+    receive: str = "reference",
     antenna: Any = None,
     radar: Any = None,
     shadows: bool = True,
@@ -57,6 +64,12 @@ def echo(
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
+    array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one: element
+                  n sends the waveform moved by its offset; None: one element
+    channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse and
+                  receiver; "separated": a row of its own for every pulse, sending element and receiver
+    receive       "reference": at the array's reference point; "own": every element hears its own channel ("separated"
+                  only); "all": every element hears all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
     shadows       True: of every facet only the share counts that both antennas see, along the track
@@ -86,9 +99,17 @@ def echo(
     )  # fmt: skip
     rx = echo_rows.receiver_positions(track, receiver)
     tx = track.positions
-    point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
+    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     reference_range = echo_rows.half_path(tx, rx, point)
     given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
+    weights = gains.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    if array is not None:
+        instance("array", array, AntennaArray)
+        if not is_single(array):
+            return array_echo(
+                array, scene, given, waveform, track, receiver, point, range_window, weights, order,
+                channels=channels, receive=receive, compressed=compressed, check=check,
+            )  # fmt: skip
     near, far = echo_rows.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_rows.sampling(waveform, near, far, compressed)
     samples = echo_rows.zeros(len(tx), len(order.polarizations), n_samples, near, far)
@@ -104,7 +125,6 @@ def echo(
     )
     if progress:
         progress("scene", 0, 3)
-    weights = gains.beam_of(antenna, radar, track, receiver, waveform, scene.center)
     work = Work(order, given, scene, waveform, antennas, weights)
     frequencies = frequency + step * np.arange(n_samples)
     work.add(antennas, waveform, frequencies, samples, work.scatterers * len(tx))
@@ -132,6 +152,7 @@ def echo(
         tx_velocity=every(velocities[0]),
         rx_velocity=every(velocities[1]),
         waveform=waveform,
+        array=array,
         compressed=compressed,
         report=Report(
             plan=work.plan(),

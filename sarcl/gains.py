@@ -121,6 +121,11 @@ class Beam:
             out *= self.range**2 * spreading(*(np.linalg.norm(points - end, axis=1) for end in (tx, rx)))
         return out
 
+    def seen_from(self, tx: np.ndarray, rx: np.ndarray, pulses: slice) -> Beam:
+        """The weights of some pulses from other places, m (n, 3): an array's elements."""
+        axes = None if self.axes is None else (self.axes[0][pulses], self.axes[1][pulses])
+        return replace(self, tx=tx, rx=rx, axes=axes)
+
     def within(self, level: float, waveform: Waveform) -> Beam:
         """The same, leaving out places where weights are below `level` of the peak, over the waveform's band."""
         if self.pair is None:
