@@ -153,9 +153,8 @@ def array_echo(
         for number, heard in rows.receivers(channel):
             _, rx, reference = rows.ends(channel.offset, heard)
             tx = sides.senders(channel.offset)
-            antennas = _antennas(
-                tx[at], rx[at], reference[at], float(frequencies[0]), grid, (near, far), len(frequencies)
-            )
+            n_here, edges = len(frequencies), (near, far)
+            antennas = _antennas(tx[at], rx[at], reference[at], float(frequencies[0]), grid, edges, n_here)
             beam = work.weights.seen_from(antennas.tx, antennas.tx if antennas.rx is None else antennas.rx, at)
             made = np.zeros((len(antennas.tx), len(order.polarizations), len(frequencies)), np.complex64)
             work.add(antennas, band, frequencies, made, total, channel.first, beam)

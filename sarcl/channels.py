@@ -5,6 +5,7 @@ from __future__ import annotations
 import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
+from itertools import pairwise
 
 import numpy as np
 
@@ -39,9 +40,9 @@ def channels_of(array: AntennaArray, center: float, n_pulses: int) -> list[Chann
     """Channels of an array about a base frequency, Hz; equal ones are one. ValueError for carriers of 0 Hz or less."""
     low = center + float(array.offsets.min())
     if low <= 0:
-        plan, element = np.unravel_index(int(array.offsets.argmin()), array.offsets.shape)
+        at, element = divmod(int(array.offsets.argmin()), array.n)
         raise ValueError(
-            f"element {element} would send at {low:g} Hz (offset {array.offsets[plan, element]:g} Hz about "
+            f"element {element} would send at {low:g} Hz (offset {array.offsets[at, element]:g} Hz about "
             f"{center:g} Hz); carriers must be positive: raise the waveform's center or lower frequency_step"
         )
     out = []
@@ -67,7 +68,7 @@ def _runs(array: AntennaArray, n_pulses: int) -> Iterator[tuple[int, int, int]]:
             f"the array's plan names {len(array.plan)} pulses but the track has {n_pulses}; give one entry a pulse"
         )
     ends = [0, *(np.flatnonzero(np.diff(array.plan)) + 1).tolist(), n_pulses]
-    for first, stop in zip(ends[:-1], ends[1:], strict=True):
+    for first, stop in pairwise(ends):
         yield int(array.plan[first]), first, stop
 
 
@@ -129,8 +130,8 @@ def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> No
     apart = spacing(carriers)
     if apart is not None and waveform.duration * apart > 1 + 1e-9:
         warnings.warn(
-            f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / apart:.4g} s: the channels' sum peaks "
-            f"{waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m apart "
+            f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / apart:.4g} s: the channels' sum "
+            f"peaks {waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m apart "
             f"are ambiguous; shorten the pulse to {1 / apart:.4g} s",
             SarclWarning,
             stacklevel=4,
@@ -139,9 +140,9 @@ def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> No
     if jump:
         share = jump / (np.ptp(carriers) or 1.0)
         warnings.warn(
-            f"the array's centre frequency jumps by {jump:.4g} Hz from plan to plan, {100 * share:.3g} % of the band: a "
-            f"point r m from the reference changes its phase there by {4 * np.pi * jump / SPEED_OF_LIGHT:.3g} r rad, and "
-            "images of it defocus beyond a quarter turn; move the base frequency as well (array.mirrored)",
+            f"the array's centre frequency jumps by {jump:.4g} Hz from plan to plan, {100 * share:.3g} % of the band: "
+            f"a point r m from the reference changes its phase there by {4 * np.pi * jump / SPEED_OF_LIGHT:.3g} r rad, "
+            "and images of it defocus beyond a quarter turn; move the base frequency as well (array.mirrored)",
             SarclWarning,
             stacklevel=4,
         )

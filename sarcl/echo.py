@@ -64,12 +64,12 @@ def echo(
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
-    array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one: element
-                  n sends the waveform moved by its offset; None: one element
-    channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse and
-                  receiver; "separated": a row of its own for every pulse, sending element and receiver
-    receive       "reference": at the array's reference point; "own": every element hears its own channel ("separated"
-                  only); "all": every element hears all
+    array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one:
+                  element n sends the waveform moved by its offset; None: one element
+    channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse
+                  and receiver; "separated": a row of its own for every pulse, sending element and receiver
+    receive       "reference": at the array's reference point; "own": every element hears its own channel
+                  ("separated" only); "all": every element hears all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
     shadows       True: of every facet only the share counts that both antennas see, along the track
