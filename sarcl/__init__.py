@@ -46,6 +46,7 @@ _HOME = {
     "Forecast": "forecast",
     "add_noise": "noise",
     "autofocus": "autofocus",
+    "map_aperture": "aperture",
     "measure": "quality",
     "PointResponse": "quality",
     "read": "read",
@@ -59,6 +60,7 @@ __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
     from .antenna import Antenna as Antenna
+    from .aperture import map_aperture as map_aperture
     from .array import AntennaArray as AntennaArray
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject

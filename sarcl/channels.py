@@ -131,8 +131,8 @@ def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> No
     if apart is not None and waveform.duration * apart > 1 + 1e-9:
         warnings.warn(
             f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / apart:.4g} s: the channels' sum "
-            f"peaks {waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m apart "
-            f"are ambiguous; shorten the pulse to {1 / apart:.4g} s",
+            f"peaks {waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m "
+            f"apart are ambiguous; shorten the pulse to {1 / apart:.4g} s",
             SarclWarning,
             stacklevel=4,
         )
