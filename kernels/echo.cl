@@ -5,7 +5,7 @@
 //
 // source    DESIGN.md, echo equation; type-1 nonuniform FFT in range
 // symbols   a_k          amplitude, |a|^2 = radar cross section, m^2; delta, kappa, sigma as in geometry.clh
-//           w_k(p, f)    the weight of beam.clh: antennas' gains and spreading
+//           w_k(p, f)    the weight of gains.clh: antennas' gains and spreading
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES     frequencies f_m
 //           TILE      scatterers a tile, a multiple of VW
@@ -19,12 +19,12 @@
 #include "rows.clh"
 #include "vectors.clh"
 #include "pattern.clh"
-#include "beam.clh"
+#include "gains.clh"
 
 // global size (pulses of this block, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   scatterers  (2, n_tiles TILE)    re, im of amplitude
-//   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see beam.clh
+//   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see gains.clh
 //   radius      (n_tiles)   m, of the points about their reference
 //   last        scatterers in the last tile; the rest of it is blank
 //   flush       tiles added in float32 before they join the compensated total

@@ -6,7 +6,7 @@
 //
 // source    sarcl/reference/facet.py; amplitudes between NODES frequencies f_m and between knots by interpolation
 //           (docs/facets.md)
-// symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of beam.clh; delta, kappa, sigma as in
+// symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of gains.clh; delta, kappa, sigma as in
 //                      geometry.clh
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
@@ -27,7 +27,7 @@
 #include "rows.clh"
 #include "vectors.clh"
 #include "pattern.clh"
-#include "beam.clh"
+#include "gains.clh"
 #include "facet.clh"
 
 #define CHANNELS (NODES * (HH + HV + VH + VV))
@@ -74,7 +74,7 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 //   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
 //   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and what takes its place along it
-//   patterns, second, axes (knots, 18), range, reach (6)   see beam.clh;  radius (n_tiles)   m, of the facets' centres
+//   patterns, second, axes (knots, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
 //   out      (knots, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
 //   marks    (knots, tiles of this call, TILE)                       FRONT, BRIGHT
@@ -202,7 +202,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
 //   knots    (n_used, 2)              first of the KNOTS knots of a pulse, and the nearest
 //   shares   (n_used, KNOTS)          what each of them counts for
-//   axes (n_used, 18), reach, radius  see beam.clh
+//   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
 //   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`

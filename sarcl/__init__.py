@@ -13,7 +13,7 @@ Two equations carry everything::
     v_p      1 inside the range window        |tau - tau_ref| <= 1/(2 frequency_step)
     I        data                             Image
 
-nouns    Waveform Trajectory Material Scene PhaseHistory ImageGrid Image Report Scenario
+nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
 verbs    echo compress backproject autofocus measure read concatenate devices
 """
 
@@ -31,6 +31,7 @@ _HOME = {
     "Scene": "scene",
     "Material": "material",
     "Antenna": "antenna",
+    "AntennaArray": "array",
     "Radar": "radar",
     "PhaseHistory": "phase_history",
     "concatenate": "phase_history",
@@ -45,6 +46,7 @@ _HOME = {
     "Forecast": "forecast",
     "add_noise": "noise",
     "autofocus": "autofocus",
+    "map_aperture": "aperture",
     "measure": "quality",
     "PointResponse": "quality",
     "read": "read",
@@ -58,6 +60,8 @@ __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
     from .antenna import Antenna as Antenna
+    from .aperture import map_aperture as map_aperture
+    from .array import AntennaArray as AntennaArray
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
     from .check import SarclWarning as SarclWarning

@@ -10,6 +10,7 @@ from typing import Any, overload
 import numpy as np
 
 from . import planning
+from .aperture import map_aperture
 from .check import ToleranceMissed, choice, count, instance
 from .check import tolerance as allowed_error
 from .crew import BLOCKS_EACH, Crew, Local, open_devices
@@ -49,6 +50,7 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
     window: Any = None,
     weights: Any = None,
     beam: Any = None,
+    mapping: Any = None,
     wrap: bool = False,
     skip: Any = True,
     max_bytes: float | None = None,
@@ -70,6 +72,8 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
     weights    one a row (n_rows,), on top of window and raw.weight
     beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
                grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
+    mapping    of a frequency-diverse array's echoes: what `sarcl.map_aperture` takes, "corrected", "apparent" or
+               "channels", or a dict of its arguments, such as {"mapping": "apparent", "center": (0, 0, 5)}
     wrap       False: a row reaches only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats beyond
     skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data") to leave pairs out
                unseen instead of finding that they add nothing; the image is the same
@@ -93,6 +97,8 @@ def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result
     clock = Clock()
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
+    if mapping is not None:
+        raw = map_aperture(raw, **(mapping if isinstance(mapping, dict) else {"mapping": mapping}))
     choice("method", method, METHODS)
     tolerance = allowed_error(tolerance)
     piece = _piece(tile, resume, out)

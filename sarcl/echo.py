@@ -2,34 +2,28 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from typing import Any
 
 import numpy as np
 
-from . import beam, cl, echo_rows, fineness, geodesy, planning, scatterers, speckle
-from .beam_error import beam_error
-from .check import SarclWarning, array, choice, count, direction, instance, sealed
+from . import cl, echo_rows, gains, geodesy, planning
+from .array import AntennaArray
+from .array_echo import array_echo
+from .channels import is_single
+from .check import array as numbers
+from .check import choice, count, direction, instance, sealed
 from .check import tolerance as allowed_error
-from .echo_error import measure_error
-from .facet_cut import cut
-from .facet_plan import chebyshev, lagrange
-from .facet_spread import FacetSpreader
+from .echo_work import Order, Progress, Work
 from .facets import POLARIZATIONS
 from .geometry import Antennas
 from .phase_history import PhaseHistory
-from .planning import Clock
 from .report import Report
 from .scene import Scene
-from .spread import Spreader
 from .trajectory import Trajectory
 from .waveform import Waveform
 
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam")
-LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
-UNSEEN = 1e-3  # of a tolerance: what the beam may leave out of it. So little, since what is left out may be specular
-Progress = Callable[[str, int, int], None]
 
 
 def echo(
@@ -42,6 +36,9 @@ def echo(
     vertical: Any = None,
     range_window: Any = None,
     reference: Any = None,
+    array: AntennaArray | None = None,
+    channels: str = "simultaneous",
+    receive: str = "reference",
     antenna: Any = None,
     radar: Any = None,
     shadows: bool = True,
@@ -67,6 +64,12 @@ def echo(
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
                   scatterers outside it are gated out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
+    array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one:
+                  element n sends the waveform moved by its offset; None: one element
+    channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse
+                  and receiver; "separated": a row of its own for every pulse, sending element and receiver
+    receive       "reference": at the array's reference point; "own": every element hears its own channel
+                  ("separated" only); "all": every element hears all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
     shadows       True: of every facet only the share counts that both antennas see, along the track
@@ -86,135 +89,57 @@ def echo(
     Stop and go. Returns a PhaseHistory. ValueError, MemoryError, sarcl.NoDeviceError say what does not fit. Source:
     DESIGN.md, echo equation.
     """
-    clock = Clock()
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     seed = count("seed", seed, 0)
     opened = cl.open_device(device)
-    polarizations = _polarizations(polarization)
-    tolerance = allowed_error(tolerance)
-    skips = planning.skips(skip, SKIPS)
+    order = Order(
+        opened, allowed_error(tolerance), planning.budget(opened, max_bytes), planning.skips(skip, SKIPS),
+        _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed, progress,
+    )  # fmt: skip
     rx = echo_rows.receiver_positions(track, receiver)
     tx = track.positions
-    point = scene.center if reference is None else array("reference", reference, np.float64, (3,))
+    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     reference_range = echo_rows.half_path(tx, rx, point)
-    upright = _vertical(vertical, scene.center)
     given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
+    weights = gains.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    if array is not None:
+        instance("array", array, AntennaArray)
+        if not is_single(array):
+            return array_echo(
+                array, scene, given, waveform, track, receiver, point, range_window, weights, order,
+                channels=channels, receive=receive, compressed=compressed, check=check,
+            )  # fmt: skip
     near, far = echo_rows.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_rows.sampling(waveform, near, far, compressed)
-    try:
-        samples = np.zeros((len(tx), len(polarizations), n_samples), np.complex64)
-    except (MemoryError, ValueError):
-        raise MemoryError(
-            f"echoes of {len(tx)} pulses x {len(polarizations)} polarisations x {n_samples} samples need "
-            f"{cl.size_text(8.0 * n_samples * len(tx) * len(polarizations))}, more "
-            f"than there is; narrow range_window (now {near:g} to {far:g} m) or split the track"
-        ) from None
+    samples = echo_rows.zeros(len(tx), len(order.polarizations), n_samples, near, far)
+    rows = np.ones(len(tx))
     antennas = Antennas(
         tx=tx,
         rx=None if receiver is None else rx,
         reference_range=reference_range,
-        frequency=np.full(len(tx), frequency + n_samples // 2 * step),
-        frequency_step=np.full(len(tx), step),
-        near=np.full(len(tx), near),
-        far=np.full(len(tx), far),
+        frequency=(frequency + n_samples // 2 * step) * rows,
+        frequency_step=step * rows,
+        near=near * rows,
+        far=far * rows,
     )
-    budget = planning.budget(opened, max_bytes)
     if progress:
         progress("scene", 0, 3)
-    # points and facets err independently: each gets its share, so that the sum keeps the tolerance
-    share = tolerance / np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1)
-    weights = beam.beam_of(antenna, radar, track, receiver, waveform, scene.center)
-    blur = beam_error(weights, scene, waveform, polarizations, upright, share)
-    if "out of beam" in skips:
-        weights = weights.within(UNSEEN * share / blur.dim, waveform)
+    work = Work(order, given, scene, waveform, antennas, weights)
     frequencies = frequency + step * np.arange(n_samples)
-    points, skipped = scatterers.points_of(scene, skips, len(tx))
-    facets, facet_plan, crowd, judged = None, None, 1.0, {}
-    if len(scene.triangles):
-        facet_plan, pieces, crowd = cut(scene, waveform, antennas, polarizations, upright, max_edge, share, blur)
-        # curves are told from facets as they came, speckle from what is added up
-        judged = _warned(fineness.judge(given, antennas, waveform), speckle.judge(pieces, antennas, waveform))
-        if progress:
-            progress("scene", 1, 3)
-        facets, left_out = scatterers.facets_of(
-            pieces, waveform, antennas, shadows=shadows, seed=seed, skips=skips, max_bytes=budget / 4, device=opened,
-            tell=(lambda n: None) if progress is None else lambda n: progress("scene", n, 3),
-        )  # fmt: skip
-        skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
-    same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
-    if facets is None and points is not None and not same:
-        raise ValueError(
-            f"polarization is {polarization!r}, in which points send back nothing: ask for 'HH' or 'VV', or give facets"
-        )
-    if points is None and facets is None:
-        raise ValueError(f"nothing is left to reflect: {_reasons(skipped)}; move the track or the scene")
-    if points is not None:
-        _bounded(points.largest() * weights.peak)
-        weights.clear_of(points.positions)
-    clock.lap("scene")
-
-    total, done, gated, behind, unlit = sum(len(p) for p in (points, facets) if p is not None) * len(tx), 0, 0, 0, 0
-    gate = "range window" in skips
-
-    def tell(n: int) -> None:
-        if progress:
-            progress("echo", done + n, total)
-
-    tell(0)
-    plans: list[tuple[float, dict[str, Any]]] = []
-    if points is not None:
-        if same:
-            nodes = chebyshev(waveform.center, waveform.bandwidth, blur.nodes(0.3 * share))
-            error = blur.of(len(nodes), share)
-            spreader = Spreader(
-                opened, antennas, waveform.bandwidth, n_samples, share - error, budget, gate, weights,
-                lagrange(nodes, frequencies), nodes,
-            )  # fmt: skip
-            plan, gated, unlit = spreader.add(points, samples[:, same[0]], clock, tell)
-            samples[:, same[1:]] = samples[:, same[:1]]
-            plans.append((plan.predicted_error + error, plan.describe("spread")))
-        done += len(points) * len(tx)
-    if facets is not None:
-        assert facet_plan is not None
-        facet_spreader = FacetSpreader(
-            opened, antennas, waveform.bandwidth, frequencies, share / crowd, budget, gate, polarizations,
-            facet_plan, upright, weights,
-        )  # fmt: skip
-        plan, knots, outside, behind, dark = facet_spreader.add(facets, samples, clock, tell)
-        gated, unlit = gated + outside, unlit + dark
-        how = plan.describe("spread") | facet_plan.describe() | {"pulses an amplitude": knots.spacing} | judged
-        plans.append((crowd * (plan.predicted_error + facet_plan.predicted_error + knots.error), how))
-    if gated == total:
-        raise ValueError(
-            f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "
-            "widen range_window or move reference"
-        )
-    if gated + unlit == total:
-        raise ValueError("no scatterer in the range window is ever in the beam; aim the antenna with sarcl.pointing")
-    if gated + unlit + behind == total:
-        raise ValueError("every facet in the range window faces away from an antenna; move the track or turn the scene")
+    work.add(antennas, waveform, frequencies, samples, work.scatterers * len(tx))
+    work.must_show(near, far)
     pulse = waveform.pulse_spectrum(frequencies)
-    spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * weights.factor(frequencies)
+    spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
     samples *= spectrum.astype(np.complex64)
-    clock.lap("spectra")
-    measured = None
-    exact_seconds = 256 * (0 if points is None else len(points)) * 6e-8 + (0 if facets is None else len(facets)) * 1e-4
-    if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("echo", 0.0)):
-        measured = measure_error(
-            points, facets, antennas, frequencies, spectrum, samples, polarizations, upright, weights
-        )
-        clock.lap("check")
-    n = len(polarizations)
+    order.clock.lap("spectra")
+    measured = work.measured(antennas, frequencies, spectrum, samples, check)
+    n = len(order.polarizations)
 
     def every(values: Any) -> Any:
         return values if n == 1 or values is None else np.repeat(values, n, axis=0)
 
     velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
-    skipped["facing away"] = skipped.get("facing away", 0) + behind
-    if weights.pair is not None:
-        skipped["out of beam"] = unlit
-    chosen = max(plans, key=lambda p: p[0])[1] if plans else {}
     return PhaseHistory(
         sealed(samples.reshape(-1, n_samples)),
         frequency=frequency,
@@ -223,33 +148,23 @@ def echo(
         rx=None if receiver is None else every(rx),
         reference_range=every(reference_range),
         time=every(track.times),
-        polarization=np.tile(polarizations, len(tx)),
+        polarization=np.tile(order.polarizations, len(tx)),
         tx_velocity=every(velocities[0]),
         rx_velocity=every(velocities[1]),
         waveform=waveform,
+        array=array,
         compressed=compressed,
         report=Report(
-            plan={"model": "stop and go, single scattering", **chosen, **weights.describe(blur)} if plans else {},
-            tolerance=tolerance,
-            predicted_error=float(np.sqrt(sum(error**2 for error, _ in plans))),
+            plan=work.plan(),
+            tolerance=order.tolerance,
+            predicted_error=work.predicted_error,
             measured_error=measured,
-            contributions_done=total - gated - behind - unlit,
-            contributions_skipped={**skipped, "range window": gated},
-            seconds=clock.seconds,
+            **work.counted(),
+            seconds=order.clock.seconds,
             device=opened.info.name,
             seed=seed,
         ),
     )
-
-
-def _warned(*judgements: fineness.Fineness | speckle.Speckle) -> dict[str, Any]:
-    """SarclWarnings of what was judged, and what it says in a report."""
-    out: dict[str, Any] = {}
-    for judgement in judgements:
-        for text in judgement.warnings():
-            warnings.warn(text, SarclWarning, stacklevel=3)
-        out |= judgement.describe()
-    return out
 
 
 def _polarizations(asked: Any) -> tuple[str, ...]:
@@ -270,13 +185,3 @@ def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
         return direction("vertical", asked)
     normal = geodesy.vertical_at(center)
     return np.array([0.0, 0.0, 1.0]) if normal is None else normal
-
-
-def _bounded(largest: float) -> None:
-    if largest > LARGEST:
-        text = f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}"
-        raise ValueError(text + ": scale them down")
-
-
-def _reasons(skipped: dict[str, int]) -> str:
-    return ", ".join(why for why, n in skipped.items() if n) or "the scene is empty"

@@ -6,9 +6,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .beam import Beam
 from .check import SPEED_OF_LIGHT
 from .facets import Facets
+from .gains import Beam
 from .geometry import Antennas
 from .scatterers import Points
 

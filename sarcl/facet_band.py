@@ -9,8 +9,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .beam import MOST_NODES
 from .facets import Facets
+from .gains import MOST_NODES
 from .geometry import Antennas
 from .scene import Scene, areas, centroids, edges
 

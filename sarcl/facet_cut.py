@@ -7,9 +7,9 @@ from dataclasses import replace
 
 import numpy as np
 
-from .beam import BeamError
 from .check import SPEED_OF_LIGHT, number
 from .facet_plan import FacetPlan, coherent, plan_facets
+from .gains import BeamError
 from .geometry import Antennas
 from .material import COHERENT
 from .scatterers import resolution_edge

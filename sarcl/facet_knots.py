@@ -10,10 +10,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .beam import Beam
 from .check import SPEED_OF_LIGHT
 from .facet_band import typical_power
 from .facets import Facets
+from .gains import Beam
 from .triangles import centroids, edges
 
 ORDER = 4  # knots a cubic goes through

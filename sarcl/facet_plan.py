@@ -11,9 +11,9 @@ from typing import Any
 
 import numpy as np
 
-from .beam import MOST_NODES, BeamError
 from .check import SPEED_OF_LIGHT
 from .facet_band import over_band
+from .gains import MOST_NODES, BeamError
 from .geometry import Antennas
 from .scene import Scene, box, centroids, edges
 

@@ -8,11 +8,11 @@ from typing import Any
 import numpy as np
 
 from . import cl, profiles
-from .beam import Beam
 from .check import SPEED_OF_LIGHT
 from .facet_knots import Knots, plan_knots
 from .facet_plan import FacetPlan
 from .facets import POLARIZATIONS, Facets
+from .gains import Beam
 from .geometry import Antennas
 from .lighting import Span
 from .planning import Clock, Plan

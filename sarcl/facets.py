@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from .check import SPEED_OF_LIGHT
-from .lighting import Lighting, Span
+from .lighting import Lighting, Part, Span
 from .material import DIAGRAMS, Material
 from .triangles import centroids, normals
 
@@ -31,7 +31,7 @@ class Facets:
     two_sided: np.ndarray
     material: np.ndarray
     materials: tuple[Material, ...]
-    light: Lighting | None
+    light: Lighting | Part | None
     kept: np.ndarray
     random: np.ndarray
 
@@ -53,6 +53,10 @@ class Facets:
         for span in self.light.spans():
             share = span.share[self.kept]
             yield Span(span.first, span.stop, share, share if span.later is span.share else span.later[self.kept])
+
+    def between(self, first: int, stop: int) -> Facets:
+        """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
+        return self if self.light is None else replace(self, light=self.light.between(first, stop))
 
     def share_at(self, pulse: int) -> np.ndarray:
         """Share of each facet that a pulse sees, 0 to 1 (k,)."""

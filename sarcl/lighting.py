@@ -99,6 +99,10 @@ class Lighting:
                 held, start = share, at[i]
         yield Span(start, n, held, held)
 
+    def between(self, first: int, stop: int) -> Part:
+        """Of pulses first ... stop - 1 alone, which then are pulses 0 ..."""
+        return Part(self, first, stop)
+
     def fraction_at(self, pulse: int) -> np.ndarray:
         """Lit shares at a pulse, float32 (k,), 0 to 1: between those of the pulses looked from."""
         after = int(np.searchsorted(self.viewpoints, pulse, side="right"))
@@ -110,6 +114,41 @@ class Lighting:
     def dark_pairs(self) -> int:
         """Pairs of a pulse and a wanted facet none of which is seen: facing away, or in shadow."""
         return int(((self.blocks[:, 1] - self.blocks[:, 0]) * self.dark_facets).sum())
+
+
+@dataclass(frozen=True, eq=False)
+class Part:
+    """The lighting of pulses first ... stop - 1, counted from 0."""
+
+    whole: Lighting
+    first: int
+    stop: int
+
+    def spans(self) -> Iterator[Span]:
+        """As `Lighting.spans`."""
+        for span in self.whole.spans():
+            first, stop = max(span.first, self.first), min(span.stop, self.stop)
+            if first >= stop:
+                continue
+            if span.later is span.share:
+                yield Span(first - self.first, stop - self.first, span.share, span.share)
+                continue
+            ends = span.moments(np.array([first, stop]))
+            shares = [_mixed(span, moment) for moment in ends.tolist()]
+            yield Span(first - self.first, stop - self.first, *shares)
+
+    def between(self, first: int, stop: int) -> Part:
+        """As `Lighting.between`."""
+        return Part(self.whole, self.first + first, self.first + stop)
+
+    def fraction_at(self, pulse: int) -> np.ndarray:
+        """As `Lighting.fraction_at`."""
+        return self.whole.fraction_at(pulse + self.first)
+
+
+def _mixed(span: Span, moment: float) -> np.ndarray:
+    """Shares at a moment of a span, uint8."""
+    return np.rint(span.share + np.float32(moment) * (span.later - span.share.astype(np.float32))).astype(np.uint8)
 
 
 class Light:

@@ -7,7 +7,7 @@ from collections.abc import Callable
 import numpy as np
 
 from . import cl, profiles
-from .beam import Beam
+from .gains import Beam
 from .geometry import Antennas
 from .planning import Clock, Plan
 from .scatterers import Points

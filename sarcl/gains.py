@@ -68,7 +68,7 @@ class Beam:
     tx, rx  m (n, 3);  frequency  Hz, the band's middle
     pair    antennas as `antenna.pair_of` gives them, None: gains of 1;  axes  theirs in the scene, (n, 3, 3) each
     radar   None: no loss by spreading;  range  R, m: where spreading is counted from
-    limits  beyond which either antenna need not be asked (6,), as kernels/beam.clh reads them; zeros: none
+    limits  beyond which either antenna need not be asked (6,), as kernels/gains.clh reads them; zeros: none
     """
 
     tx: np.ndarray
@@ -110,7 +110,7 @@ class Beam:
         return np.ones(len(frequencies)) if self.radar is None else self.radar.factor(frequencies) / self.range**2
 
     def weights(self, points: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
-        """Weights (n,), complex128, of points, m (n, 3): what kernels/beam.clh computes."""
+        """Weights (n,), complex128, of points, m (n, 3): what kernels/gains.clh computes."""
         from .reference.antenna import two_way_gain
 
         out = np.ones(len(points), np.complex128)
@@ -120,6 +120,11 @@ class Beam:
         if self.radar is not None:
             out *= self.range**2 * spreading(*(np.linalg.norm(points - end, axis=1) for end in (tx, rx)))
         return out
+
+    def seen_from(self, tx: np.ndarray, rx: np.ndarray, pulses: slice) -> Beam:
+        """The weights of some pulses from other places, m (n, 3): an array's elements."""
+        axes = None if self.axes is None else (self.axes[0][pulses], self.axes[1][pulses])
+        return replace(self, tx=tx, rx=rx, axes=axes)
 
     def within(self, level: float, waveform: Waveform) -> Beam:
         """The same, leaving out places where weights are below `level` of the peak, over the waveform's band."""
@@ -156,7 +161,7 @@ class Beam:
         return out
 
     def macros(self, n_nodes: int) -> dict[str, int]:
-        """Build-time macros of kernels/beam.clh."""
+        """Build-time macros of kernels/gains.clh."""
         return {
             "NODES": n_nodes,
             "GAINS": len(self.ways),

@@ -10,8 +10,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from .beam import MOST_NODES, Beam, BeamError
 from .facets import Facets
+from .gains import MOST_NODES, Beam, BeamError
 from .scene import Scene
 from .triangles import areas, box, centroids
 from .waveform import Waveform
