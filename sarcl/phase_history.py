@@ -12,6 +12,7 @@ from . import check
 from .rows import in_memory, pick, stack
 
 if TYPE_CHECKING:
+    from .array import AntennaArray
     from .report import Report
     from .waveform import Waveform
 
@@ -38,7 +39,7 @@ class PhaseHistory:
     tx, rx           antenna positions, m (n_rows, 3); rx defaults to tx
     reference_range  m, one or per row: half the two-way path whose phase is already removed
     time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one a row
-    waveform         the Waveform sent, or None
+    waveform         the Waveform sent, or None;  array  the AntennaArray that sent it, or None: one antenna
     compressed       False while the pulse's own spectrum is still in the data (see `compress`)
 
     A point of amplitude a at x gives a exp(-j 2 pi f (tau - tau_ref)), tau = (|tx - x| + |x - rx|)/c,
@@ -60,7 +61,7 @@ class PhaseHistory:
     tx_velocity: Any = None
     rx_velocity: Any = None
     waveform: Waveform | None = None
-    array: Any = None
+    array: AntennaArray | None = None
     compressed: bool = True
     report: Report | None = None
 
@@ -97,6 +98,8 @@ class PhaseHistory:
             raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
         if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
             raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
+        if self.array is not None and not hasattr(self.array, "offsets_at"):
+            raise TypeError(f"array is a {type(self.array).__name__}; give a sarcl.AntennaArray or None")
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)

@@ -233,10 +233,24 @@ def test_a_nan_found_while_saving_leaves_the_old_file(tmp_path):
     assert same(sarcl.read(path).samples, a_raw().samples) and leftovers(tmp_path) == []
 
 
-def test_what_the_format_cannot_hold_is_refused_before_writing(tmp_path):
-    with pytest.raises(ValueError, match="array cannot be stored"):
-        a_raw(array=object()).save(tmp_path / "a.h5")
-    assert list(tmp_path.iterdir()) == []
+@pytest.mark.parametrize(
+    "array",
+    [
+        sarcl.AntennaArray.linear(5, spacing=0.015, frequency_step=20e6).mirrored(3, 7),
+        sarcl.AntennaArray.planar((2, 2), spacing=(0.1, 0.2), weights=[1, 1j, 0.5, -2]),
+    ],
+)
+def test_an_array_comes_back_as_it_was(tmp_path, array):
+    a_raw(array=array).save(tmp_path / "a.h5")
+    found = sarcl.read(tmp_path / "a.h5").array
+    for name in array.__dataclass_fields__:
+        assert same(getattr(found, name), getattr(array, name)) or getattr(array, name) is None
+    assert (found.plan is None) == (array.plan is None)
+
+
+def test_what_is_no_array_is_refused():
+    with pytest.raises(TypeError, match=r"array is a object; give a sarcl\.AntennaArray"):
+        a_raw(array=object())
 
 
 def test_every_optional_field_of_the_noun_is_in_the_tests():

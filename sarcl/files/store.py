@@ -40,8 +40,6 @@ def save_phase_history(raw: PhaseHistory, path: Any) -> None:
 
     from ..phase_history import PER_ROW
 
-    if raw.array is not None:
-        raise ValueError("raw.array cannot be stored in format 1; save replace(raw, array=None) and keep the array")
     dtype = np.dtype(raw.samples.dtype)
     with (
         paths.atomic(path, raw.n_rows * raw.n_samples * dtype.itemsize) as part,
@@ -57,6 +55,10 @@ def save_phase_history(raw: PhaseHistory, path: Any) -> None:
             group = file.create_group("waveform")
             for name in raw.waveform.__dataclass_fields__:
                 hdf5.put(group, name, getattr(raw.waveform, name))
+        if raw.array is not None:
+            group = file.create_group("array")
+            for name in raw.array.__dataclass_fields__:
+                hdf5.put(group, name, getattr(raw.array, name))
         hdf5.put_report(file, raw.report)
         samples = file.create_dataset("samples", (raw.n_rows, raw.n_samples), dtype)
         for a, b in hdf5.blocks(samples):
@@ -242,12 +244,16 @@ def job_of(path: Any) -> str | None:
 
 
 def _load_phase_history(file: Any) -> PhaseHistory:
+    from ..array import AntennaArray
     from ..phase_history import PER_ROW, PhaseHistory
     from ..waveform import Waveform
 
     waveform = None
     if "waveform" in file:
         waveform = Waveform(**{n: hdf5.get(file["waveform"], n) for n in Waveform.__dataclass_fields__})
+    array = None
+    if "array" in file:
+        array = AntennaArray(**{n: hdf5.get(file["array"], n) for n in AntennaArray.__dataclass_fields__})
     optional = {n: hdf5.get(file, n) for n in ("rx", *PER_ROW)}
     needed = {n: file[n][...] for n in ("frequency", "frequency_step", "tx", "reference_range")}
     return PhaseHistory(
@@ -255,6 +261,7 @@ def _load_phase_history(file: Any) -> PhaseHistory:
         **needed,
         **optional,
         waveform=waveform,
+        array=array,
         compressed=bool(file.attrs["compressed"]),
         report=hdf5.get_report(file),
     )
