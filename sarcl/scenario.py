@@ -17,6 +17,7 @@ from . import schema, toml_write
 from .schema import Where
 
 if TYPE_CHECKING:
+    from .array import AntennaArray
     from .grid import ImageGrid
     from .image import Image
     from .phase_history import PhaseHistory
@@ -26,7 +27,7 @@ if TYPE_CHECKING:
     from .waveform import Waveform
 
 # Arguments that may be complex, which TOML has no word for: a list of [real, imaginary] pairs.
-COMPLEX = {"amplitudes", "signal"}
+COMPLEX = {"amplitudes", "signal", "weights"}
 
 
 @dataclass(frozen=True, eq=False)
@@ -38,6 +39,7 @@ class Scenario:
     receiver     the same for a receiver of its own, or None
     pointing     {"spotlight": {"point": [0, 0, 0]}}, {"stripmap": ...}, {"fixed": ...}: what sets a track's attitude
     antenna      {"gaussian": {...}}, {"rectangular": ...}, {"table": ...}, {"isotropic": ...}, or an Antenna
+    array        {"linear": {"n": 45, ...}}, {"planar": ...}, {"costas": ...}, or an AntennaArray
     receiver_pointing, receiver_antenna   the receiver's, where they differ;  radar  {"power": ...}, or a Radar
     materials    {name: {"eps_r": 4.0, ...}, ...}, or Materials, which the scene's tables name
     scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
@@ -61,6 +63,7 @@ class Scenario:
     antenna: Any = None
     receiver_pointing: Any = None
     receiver_antenna: Any = None
+    array: Any = None
     radar: Any = None
     noise: Any = None
     folder: Path = Path()
@@ -126,6 +129,10 @@ class Scenario:
         """The Radar, None where amplitudes do not fall with range."""
         return None if self.radar is None else self._one("radar")
 
+    def build_array(self) -> AntennaArray | None:
+        """The AntennaArray that sends, None where one antenna does."""
+        return None if self.array is None else self._one("array")
+
     def build_grid(self) -> ImageGrid:
         """The ImageGrid."""
         return self._one("grid")
@@ -161,8 +168,9 @@ class Scenario:
         given = self._options("echo", options)
         with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
             raw = sarcl.echo(
-                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), radar=self.build_radar(), **given
-            )
+                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), array=self.build_array(),
+                radar=self.build_radar(), **given,
+            )  # fmt: skip
         if self.noise is None:
             return raw
         level = self._options("noise", {})

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from .antenna import Antenna
+from .array import AntennaArray
 from .grid import ImageGrid
 from .material import METAL, Material
 from .radar import Radar
@@ -30,6 +31,8 @@ def table_of(value: Any) -> Any:
         return _material(value)
     if isinstance(value, Antenna):
         return _antenna(value)
+    if isinstance(value, AntennaArray):
+        return _without_none(value, ("positions", "offsets", "weights", "plan"))
     if isinstance(value, Radar):
         return _without_none(value, ("power", "losses_db", "noise_temperature"))
     if isinstance(value, ImageGrid):

@@ -21,7 +21,7 @@ RENAMED = {"mesh": "file", "path": "file"}
 # Arguments that are other sections, or belong to the run and not to the scenario.
 NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
 NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
-NOT_KEYS |= {"name", "antenna", "radar"}  # a material's is its table's; the others are tables of their own
+NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material's is its table's; the others are tables of their own
 ON = "on"  # of a part of the scene: stand it on the parts before
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
@@ -62,6 +62,9 @@ def calls(section: str) -> dict[str, Call]:
     if section in ("antenna", "receiver_antenna"):
         a = sarcl.Antenna
         return {"isotropic": a.isotropic, "rectangular": a.rectangular, "gaussian": a.gaussian, "table": a.table}
+    if section == "array":
+        array = sarcl.AntennaArray
+        return {"linear": array.linear, "planar": array.planar, "costas": array.costas, "": array}
     if section in ("pointing", "receiver_pointing"):
         from . import pointing as p
 
@@ -76,8 +79,8 @@ def calls(section: str) -> dict[str, Call]:
 
 
 SECTIONS = (
-    "waveform", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna", "radar",
-    "materials", "scene", "grid", "echo", "noise", "backproject",
+    "waveform", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna", "array",
+    "radar", "materials", "scene", "grid", "echo", "noise", "backproject",
 )  # fmt: skip
 
 
