@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo compress backproject autofocus measure read concatenate devices
+verbs    echo beam compress backproject autofocus measure read concatenate devices
 """
 
 import sys
@@ -40,6 +40,7 @@ _HOME = {
     "Report": "report",
     "Scenario": "scenario",
     "echo": "echo",
+    "beam": "beam",
     "compress": "compress",
     "backproject": "backproject",
     "plan": "forecast",
@@ -62,6 +63,7 @@ if TYPE_CHECKING:
     from .array import AntennaArray as AntennaArray
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
+    from .beam import beam as beam
     from .check import SarclWarning as SarclWarning
     from .check import ToleranceMissed as ToleranceMissed
     from .cl import NoDeviceError as NoDeviceError
