@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo beam compress backproject autofocus measure read concatenate devices
+verbs    echo beam ambiguity compress backproject autofocus measure read concatenate devices
 """
 
 import sys
@@ -41,6 +41,8 @@ _HOME = {
     "Scenario": "scenario",
     "echo": "echo",
     "beam": "beam",
+    "ambiguity": "ambiguity",
+    "Ambiguity": "ambiguity",
     "compress": "compress",
     "backproject": "backproject",
     "plan": "forecast",
@@ -59,6 +61,8 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
+    from .ambiguity import Ambiguity as Ambiguity
+    from .ambiguity import ambiguity as ambiguity
     from .antenna import Antenna as Antenna
     from .array import AntennaArray as AntennaArray
     from .autofocus import autofocus as autofocus
