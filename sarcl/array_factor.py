@@ -144,15 +144,17 @@ def center_frequency(f0: float, n: int, frequency_step: float) -> float:
     return check.number("f0", f0) + (check.count("n", n) - 1) / 2 * check.number("frequency_step", frequency_step)
 
 
-def peak_delay(f0: float, *, spacing: float, frequency_step: float, azimuth: Any, elevation: Any = 0.0) -> np.ndarray:
-    """When the peak passes, s after R/c: -d cos(elevation) sin(azimuth)/(lambda0 df) for elements at +n d.
+def peak_delay(
+    f0: float, *, spacing: float, frequency_step: float, azimuth: Any, elevation: Any = 0.0, n: int = 1
+) -> np.ndarray:
+    """When the peak passes, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
 
-    (4.27) has the other sign, for elements at -n d. Both hold where `quadratic_phase` is small: beyond, the peak
-    stands at f0 + (n - 1) df in place of f0 (docs/fda.md).
+    n = 1: f = f0, the peak of the closed form, (4.27), whose other sign is that of elements at -n d.
+    n elements: f = f0 + (n - 1) df, that of the exact field: of its phase i^2 dk d k, the part i (n - 1) is linear.
     """
-    wave = SPEED_OF_LIGHT / check.number("f0", f0, above=0)
+    f = check.number("f0", f0, above=0) + (check.count("n", n) - 1) * _step(frequency_step)
     d = check.number("spacing", spacing)
-    return np.asarray(-d * np.cos(elevation) * np.sin(azimuth) / (wave * _step(frequency_step)))
+    return np.asarray(-d * np.cos(elevation) * np.sin(azimuth) * f / (SPEED_OF_LIGHT * frequency_step))
 
 
 def waveform(

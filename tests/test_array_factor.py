@@ -85,8 +85,8 @@ def test_a_diverse_factor_without_steps_is_the_constant_one():
     assert np.array_equal(still, closed.constant_factor(F0, shape=shape, spacing=spacing, cosines=k))
 
 
-@pytest.mark.parametrize("step, largest, at_20_deg", [(30e6, 0.182, 0.063), (150e6, 0.768, 0.308)])
-def test_closed_and_exact_power_patterns_differ_by_the_known_figures(step, largest, at_20_deg):
+@pytest.mark.parametrize("step, largest, at_20, at_45", [(30e6, 0.182, 0.063, 0.129), (150e6, 0.768, 0.308, 0.596)])
+def test_closed_and_exact_power_patterns_differ_by_the_known_figures(step, largest, at_20, at_45):
     """9 x 9, principal azimuth plane, over one period. Farooq's figures 3.10 to 3.14 say "not appreciable" and -1.2 dB,
     and little within 45 deg: the first is -7.4 dB, the last 0.31 at 20 deg already."""
     shape, spacing = (9, 9), (-HALF, -HALF)  # his layout
@@ -100,7 +100,8 @@ def test_closed_and_exact_power_patterns_differ_by_the_known_figures(step, large
     apart = np.abs(closed.power_pattern(exact, 81) - closed.power_pattern(made, 81)).max(axis=0)
     assert apart.max() == pytest.approx(largest, abs=1e-3)
     assert abs(azimuth[apart.argmax()]) == pytest.approx(np.pi / 2)
-    assert apart[np.isclose(azimuth, np.deg2rad(20))] == pytest.approx(at_20_deg, abs=2e-3)
+    for degrees, wanted in ((20, at_20), (45, at_45)):
+        assert apart[np.isclose(azimuth, np.deg2rad(degrees))] == pytest.approx(wanted, abs=2e-3)
     assert apart[180] < 1e-4  # broadside
 
 
@@ -170,15 +171,43 @@ def test_the_closed_waveform_peaks_where_4_27_says(degrees):
             assert wanted == pytest.approx(-layout * np.sign(degrees) * 0.3536e-9, abs=1e-13)
 
 
-@pytest.mark.parametrize("degrees", [3, 10])
-def test_the_exact_waveform_peaks_where_the_last_carrier_would(device, degrees):
-    """The phase that (3.40) neglects, n^2 dk d ky, moves the peak from f0 to f0 + (N - 1) df in (4.27): by 1.8 at 1 GHz
+@pytest.mark.parametrize("n, step, degrees, worth", [(9, 1e9, 3, 1.8), (9, -0.2e9, 10, 0.84), (450, 2e6, 2.46, 1.0898)])
+def test_the_exact_waveform_peaks_where_the_last_carrier_would(device, n, step, degrees, worth):
+    """The phase that (3.40) neglects, i^2 dk d ky, moves the peak from f0 to f0 + (n - 1) df in (4.27): by 1.8 at 1 GHz
     steps, where the paper's own bound is passed 32 times."""
-    t, azimuth = np.linspace(-0.5e-9, 0.5e-9, 20_001), np.deg2rad(degrees)
-    array = AntennaArray.linear(9, spacing=-HALF, frequency_step=1e9)
+    azimuth = np.deg2rad(degrees)
+    plain = closed.peak_delay(F0, spacing=-HALF, frequency_step=step, azimuth=azimuth)
+    wanted = closed.peak_delay(F0, spacing=-HALF, frequency_step=step, azimuth=azimuth, n=n)
+    assert wanted == pytest.approx(worth * plain, rel=1e-3)
+    t = wanted + np.linspace(-1, 1, 4001) / (n * abs(step))
+    array = AntennaArray.linear(n, spacing=-HALF, frequency_step=step)
     made = np.abs(sarcl.beam(array, F0, times=FAR / C + t, positions=FAR * directions(azimuth), device=device))
-    plain = closed.peak_delay(F0, spacing=-HALF, frequency_step=1e9, azimuth=azimuth)
-    assert t[made.argmax()] == pytest.approx(1.8 * plain, rel=5e-3)
+    assert abs(t[made.argmax()] - wanted) < 0.01 / (n * abs(step)) < 0.1 * abs(wanted - plain)
+
+
+@pytest.mark.parametrize(
+    "n, step, phase, peak", [(45, 20e6, 0.547, 0.9992), (225, 4e6, 2.735, 0.9794), (450, 2e6, 5.470, 0.9193)]
+)
+def test_what_the_closed_form_leaves_out_at_the_end_of_the_papers_aperture(n, step, phase, peak):
+    """215 m along the track, 5 km away, elements 15 mm apart: quadratic phase, and what it leaves of the peak."""
+    azimuth, spacing = np.arctan(215 / 5000), -0.015
+    left_out = closed.quadratic_phase(
+        shape=(n, 1), spacing=(spacing, 0), frequency_step=(step, 0), cosines=(np.sin(azimuth), 0)
+    )
+    assert left_out == pytest.approx(phase, abs=1e-3)
+    middle = closed.peak_delay(F0, spacing=spacing, frequency_step=step, azimuth=azimuth, n=n)
+    t = middle + np.linspace(-1, 1, 2001) / (n * step)
+    array = AntennaArray.linear(n, spacing=spacing, frequency_step=step)
+    made = np.abs(sarcl.beam(array, F0, times=FAR / C + t, positions=FAR * directions(azimuth)))
+    assert made.max() / n == pytest.approx(peak, abs=5e-4)
+
+
+def test_the_papers_waveform_is_far_beyond_its_own_bound():
+    """At 45 deg its 9 carriers, 1 GHz apart, never come together: 4.9 of 9, over a whole period."""
+    array = AntennaArray.linear(9, spacing=-HALF, frequency_step=1e9)
+    t, azimuth = np.linspace(-0.5e-9, 0.5e-9, 10_001), np.deg2rad(45)
+    made = np.abs(sarcl.beam(array, F0, times=FAR / C + t, positions=FAR * directions(azimuth)))
+    assert made.max() == pytest.approx(4.873, abs=0.01)
     bound = closed.quadratic_phase(shape=(9, 1), spacing=(HALF, 0), frequency_step=(1e9, 0), cosines=(1, 0))
     assert bound == pytest.approx(32.4 * np.pi / 4, rel=1e-3)
 

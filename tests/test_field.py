@@ -113,6 +113,42 @@ def test_the_prediction_holds_and_grows_with_the_array_and_the_distance(device):
     assert error(array, made, exact(array, t, x)) < wide.predicted_error
 
 
+def test_random_fields_err_less_than_predicted_and_asked(device):
+    """1 m to 36 000 km, 100 MHz to 100 GHz, elements anywhere within a kilometre, steps up to a tenth of f0."""
+    random = np.random.default_rng(10)
+    met = refused = 0
+    for _ in range(60):
+        n, f0 = int(10 ** random.uniform(0, 2.5)), 10 ** random.uniform(8, 11)
+        distance, extent = 10 ** random.uniform(0, 7.55), 10 ** random.uniform(-2, 3)
+        tolerance = float(random.choice([1e-3, 1e-5, 4.5e-6, 1e-7, 1e-9]))
+        array = AntennaArray(
+            positions=around(random, n, extent),
+            offsets=[random.uniform(-0.1, 0.1, n) * f0],
+            weights=random.normal(size=n) + 1j * random.normal(size=n),
+        )
+        x, origin = around(random, 5, distance), random.normal(size=3) * 10.0 ** random.uniform(-2, 6)
+        x += origin
+        t = distance / C + random.uniform(-1, 1, 3) * 10.0 ** random.uniform(-9, 0)
+        reach = np.abs(t).max(), np.linalg.norm(x - origin, axis=1).max()
+        longest = np.linalg.norm(array.positions, axis=1).max()
+        highest = f0 + float(array.offsets.max())
+        asked = {"times": t, "positions": x, "reference": origin, "tolerance": tolerance, "device": device}
+        try:
+            plan = make_plan(device, tolerance, highest, longest, *reach)
+        except ValueError:
+            with pytest.raises(ValueError, match="cannot be met"):
+                sarcl.beam(array, f0, **asked)
+            refused += 1
+            continue
+        of_reference = 2 * np.pi * highest * (reach[0] + reach[1] / C) * 1e-18
+        assert error(array, sarcl.beam(array, f0, **asked), exact(array, t, x, origin, f0)) < (
+            plan.predicted_error + of_reference
+        )
+        assert plan.predicted_error <= tolerance
+        met += 1
+    assert met >= 25 and refused >= 1
+
+
 def test_a_point_on_an_element_and_on_the_reference(device):
     array = AntennaArray.linear(4, spacing=0.5, frequency_step=1e8)
     x = np.concatenate([array.positions, array.positions + np.array([1e-7, 0, 0])])
