@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo compress backproject autofocus measure read concatenate devices
+verbs    echo beam ambiguity compress backproject autofocus measure read concatenate devices
 """
 
 import sys
@@ -40,6 +40,9 @@ _HOME = {
     "Report": "report",
     "Scenario": "scenario",
     "echo": "echo",
+    "beam": "beam",
+    "ambiguity": "ambiguity",
+    "Ambiguity": "ambiguity",
     "compress": "compress",
     "backproject": "backproject",
     "plan": "forecast",
@@ -59,11 +62,14 @@ _HOME = {
 __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
+    from .ambiguity import Ambiguity as Ambiguity
+    from .ambiguity import ambiguity as ambiguity
     from .antenna import Antenna as Antenna
     from .aperture import map_aperture as map_aperture
     from .array import AntennaArray as AntennaArray
     from .autofocus import autofocus as autofocus
     from .backproject import backproject as backproject
+    from .beam import beam as beam
     from .check import SarclWarning as SarclWarning
     from .check import ToleranceMissed as ToleranceMissed
     from .cl import NoDeviceError as NoDeviceError
