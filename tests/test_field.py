@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl import AntennaArray
+from sarcl import AntennaArray, cl
 from sarcl.field_plan import blocks, make_plan
 from sarcl.reference.field import field
 
@@ -170,6 +170,17 @@ def test_shapes_and_blocks_do_not_matter(device, n_times, n_points):
     folded = sarcl.beam(array, F0, times=t[:, None], positions=x[None], device=device)
     assert folded.shape == (n_times, 1, 1, n_points) and np.array_equal(folded[:, 0, 0], whole)
     assert sarcl.beam(array, F0, times=t[0], positions=x[0], device=device).shape == ()
+
+
+@pytest.mark.parametrize("n_times, n_points", [(3, 129), (129, 3)])
+def test_tiles_as_wide_as_on_gpus(device, monkeypatch, n_times, n_points):
+    """64 lanes a tile, groups as the driver likes them, buffers that are copies."""
+    monkeypatch.setattr(cl.Device, "is_cpu", property(lambda self: False))
+    random = np.random.default_rng(11)
+    array = AntennaArray.linear(70, spacing=0.015, frequency_step=2e6)
+    x, t = around(random, n_points, 1e4), random.uniform(0, 1e-4, n_times)
+    made = sarcl.beam(array, F0, times=t, positions=x, device=device.one_lane())
+    assert error(array, made, exact(array, t, x)) < 1e-6
 
 
 def test_times_and_ranges_far_apart_are_taken_in_blocks_of_their_own(device):
