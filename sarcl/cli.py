@@ -1,4 +1,4 @@
-"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | bench.
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | bench.
 
 Only the parser is here, so that --help answers at once; sarcl/commands.py does the work.
 """
@@ -62,6 +62,7 @@ def parser() -> argparse.ArgumentParser:
     measure = command("measure", "measure a point response: resolution and side lobes")
     measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
     measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
+    _fda(command("fda", "measure what aperture mappings of frequency-diverse arrays gain: a page and a JSON", device))
     _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
     return top
 
@@ -137,6 +138,11 @@ def _focus(p: argparse.ArgumentParser) -> None:
     p.add_argument(
         "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
     )
+
+
+def _fda(p: argparse.ArgumentParser) -> None:
+    p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/fda.md)")
+    p.add_argument("-o", "--output", metavar="PATH", help="the page, default FILE.html, with FILE.json beside it")
 
 
 def _bench(p: argparse.ArgumentParser) -> None:

@@ -30,6 +30,7 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
         "simulate": simulate,
         "focus": focus,
         "measure": measure,
+        "fda": fda,
         "bench": bench,
     }[args.command]
     with Job(outputs) as job:
@@ -153,6 +154,37 @@ def measure(args: argparse.Namespace, job: Job) -> int:
     if not isinstance(image, Image):
         raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
     print(sarcl.measure(image, near=args.near))
+    return 0
+
+
+def fda(args: argparse.Namespace, job: Job) -> int:
+    """The page and the numbers of an experiment on frequency-diverse apertures."""
+    import json
+
+    from . import fda as experiment
+    from . import fda_page
+    from .cl import open_device
+    from .fda_file import load
+    from .files import paths
+
+    title, cases = load(args.experiment)
+    output = args.output or f"{Path(args.experiment).stem}.html"
+    numbers = str(Path(output).with_suffix(".json"))
+    _expect(job, [output], (".html", ".htm"), [args.experiment])
+    job.expect(numbers)
+    results = []
+    for i, case in enumerate(cases):
+        results.append(experiment.measure(case, open_device(args.device)))
+        job.progress("fda", i + 1, len(cases))
+        # what is measured is kept, whatever comes of the next case
+        for path, text in ((numbers, json.dumps(results)), (output, fda_page.html(results, title))):
+            with paths.atomic(path) as part:
+                part.write_text(text, encoding="utf-8")
+    for result in results:
+        job.say(f"{result['name']}: {fda_page.setting(result)}")
+        for verdict in fda_page.verdicts(result):
+            job.say(f"  {verdict}")
+    job.say(f"wrote {output} and {numbers}")
     return 0
 
 

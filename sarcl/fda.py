@@ -205,15 +205,16 @@ def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, floa
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
-    """How far the image falls between two points, dB below the lower of the peaks beside; 0: they are one."""
-    peaks = []
+    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is but one peak."""
+    found = []
     for side in (-1, 1):
-        near = np.abs(at - side * separation / 2) <= separation / 2
-        near &= side * at > 0
-        peaks.append(float(values[near].max(initial=0.0)))
-    between = float(values[np.abs(at) <= separation / 2].min())
-    lower = min(peaks)
-    return float(20 * np.log10(lower / max(between, 1e-6 * lower))) if lower > between else 0.0
+        near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
+        peak = int(near[values[near].argmax()])
+        if peak in (near[0], near[-1]):  # it only rises towards the middle, or goes on rising outwards
+            return 0.0
+        found.append(peak)
+    lower, between = float(values[found].min()), float(values[found[0] : found[1] + 1].min())
+    return float(20 * np.log10(lower / max(between, 1e-6 * lower)))
 
 
 def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:

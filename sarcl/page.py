@@ -1,0 +1,114 @@
+"""One HTML page, whole in one file: headings, words, tables and drawings. Reports and papers share it."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from html import escape
+from typing import Any
+
+import numpy as np
+
+STYLE = """
+body { font: 16px/1.5 system-ui, sans-serif; max-width: 60rem; margin: 2rem auto; padding: 0 1rem; color: #222; }
+h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bottom: 1px solid #ccc; }
+table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
+th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e4e4; }
+th:first-child, td:first-child { text-align: left; } th { font-weight: 600; }
+figure { display: inline-block; margin: .5rem 1rem .5rem 0; } figcaption { font-size: .85rem; color: #555; }
+svg text { font: 11px system-ui, sans-serif; fill: #444; } .note { color: #555; }
+"""
+COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 380, 260, 56, 36, 12
+
+
+def page(title: str, parts: Sequence[str]) -> str:
+    """The whole file."""
+    body = "\n".join(parts)
+    return (
+        f'<!doctype html>\n<html lang="en"><head><meta charset="utf-8"><title>{escape(title)}</title>'
+        f"<style>{STYLE}</style></head>\n<body>\n<h1>{escape(title)}</h1>\n{body}\n</body></html>\n"
+    )
+
+
+def heading(text: str) -> str:
+    """A section begins."""
+    return f"<h2>{escape(text)}</h2>"
+
+
+def words(text: str, note: bool = False) -> str:
+    """A paragraph."""
+    return f"<p>{escape(text)}</p>" if not note else _note(text)
+
+
+def _note(text: str) -> str:
+    return f'<p class="note">{escape(text)}</p>'
+
+
+def table(head: Sequence[str], rows: Sequence[Sequence[Any]]) -> str:
+    """Rows of words and numbers."""
+    line = "".join(f"<th>{escape(str(h))}</th>" for h in head)
+    cells = ("".join(f"<td>{escape(str(c))}</td>" for c in row) for row in rows)
+    return f"<table><tr>{line}</tr>\n" + "\n".join(f"<tr>{c}</tr>" for c in cells) + "</table>"
+
+
+def plot(
+    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, caption: str, *, dots: bool = False,
+    same_scale: bool = False,
+) -> str:  # fmt: skip
+    """Curves (name, x (n,), y (n,)) or clouds of dots in one frame, with a caption."""
+    xs, ys = (np.concatenate([np.asarray(c[i], float) for c in curves]) for i in (1, 2))
+    (x0, x1), (y0, y1) = (_range(v) for v in (xs, ys))
+    wide, high = WIDTH - LEFT - 10, HEIGHT - BOTTOM - TOP
+    if same_scale:
+        scale = max((x1 - x0) / wide, (y1 - y0) / high)
+        x0, x1 = ((x0 + x1) / 2 + s * scale * wide / 2 for s in (-1, 1))
+        y0, y1 = ((y0 + y1) / 2 + s * scale * high / 2 for s in (-1, 1))
+
+    def at(x: Any, y: Any) -> tuple[np.ndarray, np.ndarray]:
+        return (
+            LEFT + (np.asarray(x, float) - x0) / (x1 - x0) * wide,
+            TOP + high - (np.asarray(y, float) - y0) / (y1 - y0) * high,
+        )
+
+    out = [f'<rect x="{LEFT}" y="{TOP}" width="{wide}" height="{high}" fill="none" stroke="#bbb"/>']
+    for value in _ticks(x0, x1):
+        tick = float(at(value, y0)[0])
+        out.append(f'<text x="{tick:.1f}" y="{TOP + high + 14}" text-anchor="middle">{value:.4g}</text>')
+        out.append(f'<path d="M{tick:.1f} {TOP + high}v-4" stroke="#bbb"/>')
+    for value in _ticks(y0, y1):
+        tick = float(at(x0, value)[1])
+        out.append(f'<text x="{LEFT - 5}" y="{tick + 4:.1f}" text-anchor="end">{value:.4g}</text>')
+        out.append(f'<path d="M{LEFT} {tick:.1f}h4" stroke="#bbb"/>')
+    for i, (_, x, y) in enumerate(curves):
+        px, py = at(x, y)
+        color, pairs = COLORS[i % len(COLORS)], zip(px.tolist(), py.tolist(), strict=True)
+        if dots:
+            path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in pairs)
+            out.append(f'<path d="{path}" stroke="{color}" stroke-width="2" stroke-linecap="round" opacity=".6"/>')
+        else:
+            line = " ".join(f"{a:.1f},{min(max(b, TOP), TOP + high):.1f}" for a, b in pairs)
+            out.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="1.5"/>')
+    for i, (name, *_) in enumerate(curves):
+        out.append(
+            f'<text x="{LEFT + 6}" y="{TOP + 14 + 14 * i}" style="fill:{COLORS[i % len(COLORS)]}">{escape(name)}</text>'
+        )
+    out.append(f'<text x="{LEFT + wide / 2}" y="{HEIGHT - 6}" text-anchor="middle">{escape(x_name)}</text>')
+    out.append(
+        f'<text transform="translate(12 {TOP + high / 2}) rotate(-90)" text-anchor="middle">{escape(y_name)}</text>'
+    )
+    drawing = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{"".join(out)}</svg>'
+    return f"<figure>{drawing}<figcaption>{escape(caption)}</figcaption></figure>"
+
+
+def _range(values: np.ndarray) -> tuple[float, float]:
+    low, high = float(values.min()), float(values.max())
+    room = 0.04 * (high - low) or 0.5 * max(abs(high), 1.0)
+    return low - room, high + room
+
+
+def _ticks(low: float, high: float) -> list[float]:
+    """Three to six round numbers between low and high."""
+    step = 10.0 ** np.floor(np.log10((high - low) / 3))
+    step *= next(m for m in (5, 2, 1) if (high - low) / (m * step) >= 3)
+    first = np.ceil(low / step)
+    return [float(i * step) for i in np.arange(first, np.floor(high / step) + 1)]
