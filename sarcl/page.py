@@ -18,7 +18,7 @@ figure { display: inline-block; margin: .5rem 1rem .5rem 0; } figcaption { font-
 svg text { font: 11px system-ui, sans-serif; fill: #444; } .note { color: #555; }
 """
 COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
-WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 380, 260, 56, 36, 12
+WIDTH, HEIGHT, LEFT, BOTTOM, TOP = 400, 270, 56, 36, 12
 
 
 def page(title: str, parts: Sequence[str]) -> str:
@@ -88,16 +88,15 @@ def plot(
         else:
             line = " ".join(f"{a:.1f},{min(max(b, TOP), TOP + high):.1f}" for a, b in pairs)
             out.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="1.5"/>')
-    for i, (name, *_) in enumerate(curves):
-        out.append(
-            f'<text x="{LEFT + 6}" y="{TOP + 14 + 14 * i}" style="fill:{COLORS[i % len(COLORS)]}">{escape(name)}</text>'
-        )
+    names = " ".join(
+        f'<span style="color:{COLORS[i % len(COLORS)]}">{escape(c[0])}</span>' for i, c in enumerate(curves)
+    )
     out.append(f'<text x="{LEFT + wide / 2}" y="{HEIGHT - 6}" text-anchor="middle">{escape(x_name)}</text>')
     out.append(
         f'<text transform="translate(12 {TOP + high / 2}) rotate(-90)" text-anchor="middle">{escape(y_name)}</text>'
     )
     drawing = f'<svg viewBox="0 0 {WIDTH} {HEIGHT}" width="{WIDTH}" height="{HEIGHT}" role="img">{"".join(out)}</svg>'
-    return f"<figure>{drawing}<figcaption>{escape(caption)}</figcaption></figure>"
+    return f"<figure>{drawing}<figcaption>{names}<br/>{escape(caption)}</figcaption></figure>"
 
 
 def _range(values: np.ndarray) -> tuple[float, float]:
@@ -111,4 +110,4 @@ def _ticks(low: float, high: float) -> list[float]:
     step = 10.0 ** np.floor(np.log10((high - low) / 3))
     step *= next(m for m in (5, 2, 1) if (high - low) / (m * step) >= 3)
     first = np.ceil(low / step)
-    return [float(i * step) for i in np.arange(first, np.floor(high / step) + 1)]
+    return [float(i * step) + 0.0 for i in np.arange(first, np.floor(high / step) + 1)]
