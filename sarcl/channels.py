@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
@@ -10,7 +9,7 @@ from itertools import pairwise
 import numpy as np
 
 from .array import AntennaArray
-from .check import SPEED_OF_LIGHT, SarclWarning
+from .check import SPEED_OF_LIGHT, warn
 from .waveform import Waveform
 
 EVEN = 1e-9  # of the carriers' spacing: what lies no further off its multiples is on them
@@ -129,20 +128,16 @@ def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> No
     """SarclWarnings of what these channels cannot tell apart, or do not focus."""
     apart = spacing(carriers)
     if apart is not None and waveform.duration * apart > 1 + 1e-9:
-        warnings.warn(
+        warn(
             f"the pulse of {waveform.duration:.4g} s is longer than 1/|df| = {1 / apart:.4g} s: the channels' sum "
             f"peaks {waveform.duration * apart:.3g} times in it, so that ranges {SPEED_OF_LIGHT / (2 * apart):.4g} m "
-            f"apart are ambiguous; shorten the pulse to {1 / apart:.4g} s",
-            SarclWarning,
-            stacklevel=4,
+            f"apart are ambiguous; shorten the pulse to {1 / apart:.4g} s"
         )
     jump = array.center_jump
     if jump:
         share = jump / (np.ptp(carriers) or 1.0)
-        warnings.warn(
+        warn(
             f"the array's centre frequency jumps by {jump:.4g} Hz from plan to plan, {100 * share:.3g} % of the band: "
             f"a point r m from the reference changes its phase there by {4 * np.pi * jump / SPEED_OF_LIGHT:.3g} r rad, "
-            "and images of it defocus beyond a quarter turn; move the base frequency as well (array.mirrored)",
-            SarclWarning,
-            stacklevel=4,
+            "and images of it defocus beyond a quarter turn; move the base frequency as well (array.mirrored)"
         )

@@ -2,15 +2,27 @@
 
 from __future__ import annotations
 
+import os
+import sys
+import warnings
 from typing import Any
 
 import numpy as np
 
+_HERE = os.path.dirname(os.path.realpath(__file__)) + os.sep
 SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact
 
 
 class SarclWarning(UserWarning):
     """Something the user should know about a result that is still right."""
+
+
+def warn(text: str) -> None:
+    """A SarclWarning that points at the line which called the library, however deep inside it is found."""
+    level, frame = 2, sys._getframe(1)
+    while frame.f_back and os.path.realpath(frame.f_code.co_filename).startswith(_HERE):
+        level, frame = level + 1, frame.f_back
+    warnings.warn(text, SarclWarning, stacklevel=level)
 
 
 class ToleranceMissed(ValueError):

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import warnings
 from collections.abc import Callable
 from dataclasses import dataclass, field
 from typing import Any
@@ -10,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from . import cl, fineness, scatterers, speckle
-from .check import SarclWarning
+from .check import warn
 from .echo_error import measure_error
 from .facet_cut import cut
 from .facet_plan import FacetPlan, chebyshev, lagrange
@@ -236,7 +235,7 @@ def _warned(*judgements: fineness.Fineness | speckle.Speckle) -> dict[str, Any]:
     out: dict[str, Any] = {}
     for judgement in judgements:
         for text in judgement.warnings():
-            warnings.warn(text, SarclWarning, stacklevel=5)
+            warn(text)
         out |= judgement.describe()
     return out
 

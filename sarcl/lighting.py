@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import logging
-import warnings
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from typing import Any
@@ -11,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from . import cl, planning
-from .check import SarclWarning, array, choice, number, sealed
+from .check import array, choice, number, sealed, warn
 from .horizon import Terrain
 from .pulse_blocks import STRIDE, blocks_around, enough_looks, lever, pulse_blocks, reach, scene_box
 from .samples import PROBES, SAMPLES, places
@@ -321,11 +320,9 @@ def lit(
     looks = offered[chosen]
     blocks = blocks_around(looks, len(tx))
     if not ever.any() and asked_for:
-        warnings.warn(
+        warn(
             "the whole scene is in shadow: no facet faces the antennas with nothing between; check the side the track "
-            "is on, the mesh's winding, and heights; or pass shadows=False",
-            SarclWarning,
-            stacklevel=2,
+            "is on, the mesh's winding, and heights; or pass shadows=False"
         )
     log.info("%d pulses in %d blocks; %d of %d facets dark throughout", len(tx), len(blocks), k - ever.sum(), k)
     blocks, looks, usual, never = sealed(blocks), sealed(looks), sealed(usual), sealed(~ever)

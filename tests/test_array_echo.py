@@ -221,3 +221,10 @@ def test_bad_input_is_refused(name):
     options, kind, message = BAD[name]
     with pytest.raises(kind, match=message):
         sarcl.echo(SCENE, TONE, passing(), **{"array": line(3), "range_window": WINDOW, **options})
+
+
+def test_warnings_point_at_the_line_that_asked():
+    long = sarcl.Waveform.tone(center=F0, duration=2 / STEP)
+    with pytest.warns(sarcl.SarclWarning) as found:
+        sarcl.echo(SCENE, long, passing(3), array=line(3), reference=(0, 0, 0), range_window=WINDOW)
+    assert [w.filename for w in found] == [__file__]

@@ -233,11 +233,9 @@ def _undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: s
     if np.ndim(geoid) == 0:
         value = check.number("geoid", geoid)
         if value == 0:
-            warnings.warn(
+            check.warn(
                 f"{name} has heights above {above!r}, taken as heights above the ellipsoid (geoid=0): the scene lies "
-                "wrong by the undulation, -107 to +86 m over the Earth",
-                check.SarclWarning,
-                stacklevel=4,
+                "wrong by the undulation, -107 to +86 m over the Earth"
             )
         return np.full(longitude.shape, value)
     return check.array("geoid", geoid, np.float64, longitude.shape)
