@@ -41,7 +41,7 @@ def echo(
     receive: str = "reference",
     antenna: Any = None,
     radar: Any = None,
-    shadows: bool = True,
+    shadows: bool | str = True,
     seed: int = 0,
     skip: Any = True,
     compressed: bool = True,
@@ -72,7 +72,8 @@ def echo(
                   ("separated" only); "all": every element hears all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
-    shadows       True: of every facet only the share counts that both antennas see, along the track
+    shadows       True: of every facet only the share counts that both antennas see, along the track; "embree": the
+                  same, rays by that library (package embreex), quicker, and not to the bit the same on all devices
                   (docs/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
@@ -92,6 +93,8 @@ def echo(
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     seed = count("seed", seed, 0)
+    if not isinstance(shadows, (bool, np.bool_)):
+        choice("shadows", shadows, ("embree",))
     opened = cl.open_device(device)
     order = Order(
         opened, allowed_error(tolerance), planning.budget(opened, max_bytes), planning.skips(skip, SKIPS),

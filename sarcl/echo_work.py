@@ -43,7 +43,7 @@ class Order:
     polarizations: tuple[str, ...]
     vertical: np.ndarray
     max_edge: float | str | None
-    shadows: bool
+    shadows: bool | str
     seed: int
     progress: Progress | None
     clock: Clock = field(default_factory=Clock)

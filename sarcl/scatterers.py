@@ -50,7 +50,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    scene: Scene, waveform: Waveform, antennas: Antennas, *, shadows: bool, seed: int, skips: set[str],
+    scene: Scene, waveform: Waveform, antennas: Antennas, *, shadows: bool | str, seed: int, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object],
 ) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
     """Facets that are cut already: moved, culled and lit, and pairs with pulses left out: reason -> count.
@@ -81,6 +81,7 @@ def facets_of(
         light = lit(
             scene.triangles, antennas.tx, antennas.rx, **terrain, two_sided=scene.two_sided, wanted=keep,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
+            engine="embree" if shadows == "embree" else "opencl",
         )  # fmt: skip
         dark = keep & light.dark
         left_out["shadowed"] = int(dark.sum()) * n_pulses
