@@ -25,14 +25,13 @@ def measure_error(
     """
     random = np.random.default_rng(0)
     wrong = right = random_phases = 0.0
-    n_facets = 0 if facets is None else len(facets)
-    draws = 16 if n_facets <= 20_000 else 4 if n_facets <= 2_000_000 else 2
+    draws = how_many(facets)
     for p in random.integers(0, len(samples), draws):
         n = random.integers(0, len(frequencies), draws)
         wanted, power = np.zeros((len(polarizations), draws), np.complex128), np.zeros((len(polarizations), draws))
         for part in (points, facets):
             if part is not None:
-                values, powers = _exact(part, antennas, int(p), frequencies[n], polarizations, vertical, beam)
+                values, powers = exact_samples(part, antennas, int(p), frequencies[n], polarizations, vertical, beam)
                 wanted, power = wanted + values, power + powers
         wanted *= spectrum[n]
         wrong += float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
@@ -41,7 +40,13 @@ def measure_error(
     return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0
 
 
-def _exact(
+def how_many(facets: Facets | None) -> int:
+    """Rows that are looked at, and samples of each."""
+    n = 0 if facets is None else len(facets)
+    return 16 if n <= 20_000 else 4 if n <= 2_000_000 else 2
+
+
+def exact_samples(
     part: Points | Facets,
     antennas: Antennas,
     p: int,

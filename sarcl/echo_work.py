@@ -10,7 +10,7 @@ import numpy as np
 
 from . import cl, fineness, scatterers, speckle
 from .check import warn
-from .echo_error import measure_error
+from .echo_error import exact_samples, how_many, measure_error
 from .facet_cut import cut
 from .facet_plan import FacetPlan, chebyshev, lagrange
 from .facet_spread import FacetSpreader
@@ -181,14 +181,33 @@ class Work:
         chosen = max(self.plans, key=lambda p: p[0])[1]
         return {"model": "stop and go, single scattering", **chosen, **self.weights.describe(self.blur)}
 
+    def worth_checking(self, check: bool | None) -> bool:
+        """Whether samples are to be computed again: as asked, or where that costs less than 2 %."""
+        points, facets = (0 if part is None else len(part) for part in (self.points, self.facets))
+        seconds = 256 * points * 6e-8 + facets * 1e-4
+        return check if check is not None else seconds < 0.02 * self.order.clock.seconds.get("echo", 0.0)
+
+    @property
+    def draws(self) -> int:
+        """Rows that are checked, and samples of each."""
+        return how_many(self.facets)
+
+    def exact(
+        self, antennas: Antennas, pulse: int, frequencies: np.ndarray, weights: Beam
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Exact sums over scatterers (n_polarizations, n), and the power they have at random phases."""
+        order, out = self.order, np.zeros((2, len(self.order.polarizations), len(frequencies)), np.complex128)
+        for part in (self.points, self.facets):
+            if part is not None:
+                out += exact_samples(part, antennas, pulse, frequencies, order.polarizations, order.vertical, weights)
+        return out[0], out[1].real
+
     def measured(
         self, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray, samples: np.ndarray,
         check: bool | None,
     ) -> float | None:  # fmt: skip
         """Error of a channel's samples, where it is asked for, or costs next to nothing."""
-        points, facets = (0 if part is None else len(part) for part in (self.points, self.facets))
-        seconds = 256 * points * 6e-8 + facets * 1e-4
-        if not check and (check is not None or seconds >= 0.02 * self.order.clock.seconds.get("echo", 0.0)):
+        if not self.worth_checking(check):
             return None
         found = measure_error(
             self.points, self.facets, antennas, frequencies, spectrum, samples, self.order.polarizations,

@@ -82,12 +82,14 @@ def test_every_way_to_send_and_receive(options, tolerance, device):
     array, track = line(5, spacing=0.4), passing(6)
     raw = sarcl.echo(
         SCENE, TONE, track, array=array, reference=(0, 0, 0), range_window=WINDOW, tolerance=tolerance, device=device,
-        **options,
+        check=True, **options,
     )  # fmt: skip
     receivers = 5 if options.get("receive") == "all" else 1
     senders = 5 if options.get("channels") == "separated" else 1
     assert raw.samples.shape == (6 * senders * receivers, 1 if senders > 1 else 5)
-    assert error(raw, SCENE, TONE, array, track) <= raw.report.predicted_error <= tolerance
+    measured = error(raw, SCENE, TONE, array, track)
+    assert measured <= raw.report.predicted_error <= tolerance
+    assert raw.report.measured_error == pytest.approx(measured, rel=0.5)  # of 256 samples
     assert raw.report.contributions_done == 6 * 5 * receivers * 3 and raw.array is array
 
 
@@ -169,7 +171,10 @@ def test_facets_are_seen_by_every_channel():
     scene, array = shapes.plate((0.4, 0.4)), line(4, step=200e6)
     tone = sarcl.Waveform.tone(center=F0, duration=1 / 200e6)
     track = passing(6)
-    raw = sarcl.echo(scene, tone, track, array=array, reference=(0, 0, 0), range_window=(-0.3, 0.3), tolerance=1e-3)
+    raw = sarcl.echo(
+        scene, tone, track, array=array, reference=(0, 0, 0), range_window=(-0.3, 0.3), tolerance=1e-3, check=True
+    )
+    assert 0 < raw.report.measured_error < raw.report.predicted_error
     for n in range(4):
         own = sarcl.echo(
             scene, sarcl.Waveform.tone(center=F0 + n * 200e6, duration=1e-3, bandwidth=1.0),

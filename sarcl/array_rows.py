@@ -1,0 +1,126 @@
+"""Rows of an array's echoes: whose antennas, at which element, with which reference."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from . import echo_rows
+from .array import AntennaArray
+from .channels import Channel, Sampling
+from .geometry import Antennas
+from .trajectory import Trajectory
+
+CHANNELS = ("simultaneous", "separated")
+RECEIVE = ("reference", "own", "all")
+
+
+@dataclass(frozen=True, eq=False)
+class Sides:
+    """Antennas of every pulse, and what their arrays' elements are off them.
+
+    tx, rx  m (n, 3);  turn_tx, turn_rx  from the arrays' axes to the scene's (n, 3, 3), or None: the same
+    """
+
+    tx: np.ndarray
+    rx: np.ndarray
+    turn_tx: np.ndarray | None
+    turn_rx: np.ndarray | None
+
+    @classmethod
+    def of(cls, track: Trajectory, receiver: Trajectory | None) -> Sides:
+        """Of tracks: arrays turn with their attitude."""
+        back = track if receiver is None else receiver
+        return cls(track.positions, echo_rows.receiver_positions(track, receiver), track.attitude, back.attitude)
+
+    def senders(self, offset: np.ndarray) -> np.ndarray:
+        """Where an element at `offset`, m (3,), stands, (n, 3)."""
+        return self.tx + _turned(self.turn_tx, offset)
+
+    def receivers(self, offset: np.ndarray) -> np.ndarray:
+        """The same on the receiving side."""
+        return self.rx + _turned(self.turn_rx, offset)
+
+
+class Rows:
+    """Rows of an array's echoes: (pulse, receiver) where channels are added up, else (pulse, sender, receiver)."""
+
+    def __init__(
+        self, array: AntennaArray, sides: Sides, point: np.ndarray, channels: str, receive: str, polarizations: Any
+    ) -> None:
+        self.array, self.sides, self.point, self.receive = array, sides, point, receive
+        self.separated, self.polarizations = channels == "separated", polarizations
+        self.heard = array.positions if receive == "all" else np.zeros((1, 3))
+
+    @property
+    def shape(self) -> tuple[int, int, int]:
+        """Pulses, senders, receivers of each."""
+        return len(self.sides.tx), self.array.n if self.separated else 1, len(self.heard)
+
+    def receivers(self, channel: Channel) -> list[tuple[int, np.ndarray]]:
+        """Number and place of what hears a channel."""
+        return [(0, channel.offset)] if self.receive == "own" else list(enumerate(self.heard))
+
+    def ends(self, sender: np.ndarray, receiver: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Positions of a row's antennas at every pulse, m (n, 3), and its reference range (n,)."""
+        tx = self.sides.senders(sender) if self.separated else self.sides.tx
+        rx = self.sides.receivers(receiver)
+        return tx, rx, echo_rows.half_path(tx, rx, self.point)
+
+    def put(self, samples: np.ndarray, channel: Channel, receiver: int, part: slice, made: np.ndarray) -> None:
+        """Add a channel, (n, n_polarizations, width), to samples (pulses, senders, receivers, polarizations, n)."""
+        at = slice(channel.first, channel.stop)
+        if not self.separated:
+            samples[at, 0, receiver, :, part] += np.complex64(channel.weight) * made
+            return
+        for element in channel.elements.tolist():
+            samples[at, element, receiver] = np.complex64(self.array.weights[element]) * made
+
+    def geometry(self, center: float, sampling: Sampling, track: Trajectory, back: Trajectory) -> dict[str, Any]:
+        """What a PhaseHistory holds of every row."""
+        pulses, senders, receivers = self.shape
+        n, names = pulses * senders * receivers, self.polarizations
+        tx, rx, reference = np.empty((*self.shape, 3)), np.empty((*self.shape, 3)), np.empty(self.shape)
+        frequency = np.full(self.shape, sampling.frequency)
+        offsets = np.stack([self.array.offsets_at(p) for p in range(pulses)]) if self.separated else None
+        for sender in range(senders):
+            place = self.array.positions[sender] if self.separated else np.zeros(3)
+            for receiver, heard in enumerate(place[None] if self.receive == "own" else self.heard):
+                at = (slice(None), sender, receiver)
+                tx[at], rx[at], reference[at] = self.ends(place, heard)
+                if offsets is not None:
+                    frequency[at] = center + offsets[:, sender] - (sampling.width - 1) / 2 * sampling.step
+        pulse, sender_of, receiver_of = (i.ravel() for i in np.indices(self.shape))
+        out: dict[str, Any] = {
+            "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
+            "reference_range": reference.reshape(n), "time": track.times[pulse],
+            "tx_channel": sender_of if self.separated else None,
+            "rx_channel": sender_of if self.receive == "own" else receiver_of,
+        }  # fmt: skip
+        for name, velocities in (("tx_velocity", track.velocities), ("rx_velocity", back.velocities)):
+            out[name] = None if velocities is None else velocities[pulse]
+        every = {k: v if v is None or len(names) == 1 else np.repeat(v, len(names), axis=0) for k, v in out.items()}
+        return {**every, "polarization": np.tile(names, n), "frequency_step": sampling.step}
+
+
+def antennas_of(
+    tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, frequency: float, grid: Sampling,
+    window: tuple[float, float], n: int | None = None,
+) -> Antennas:  # fmt: skip
+    """Antennas of pulses whose samples begin at `frequency`, Hz, n of them."""
+    rows, n = np.ones(len(tx)), grid.n if n is None else n
+    return Antennas(
+        tx=tx,
+        rx=None if np.array_equal(tx, rx) else rx,
+        reference_range=reference_range,
+        frequency=(frequency + n // 2 * grid.step) * rows,
+        frequency_step=grid.step * rows,
+        near=window[0] * rows,
+        far=window[1] * rows,
+    )
+
+
+def _turned(turn: np.ndarray | None, offset: np.ndarray) -> np.ndarray:
+    return offset if turn is None else turn @ offset
