@@ -10,6 +10,7 @@ import numpy as np
 from . import echo_rows
 from .array import AntennaArray
 from .channels import Channel, Sampling
+from .gains import Beam
 from .geometry import Antennas
 from .trajectory import Trajectory
 
@@ -38,6 +39,12 @@ class Sides:
     def senders(self, offset: np.ndarray) -> np.ndarray:
         """Where an element at `offset`, m (3,), stands, (n, 3)."""
         return self.tx + _turned(self.turn_tx, offset)
+
+    def together(self, weights: Beam, places: np.ndarray, shares: np.ndarray, middle: np.ndarray) -> Beam:
+        """The weights of elements at places off `middle`, m (m, 3), as one antenna there."""
+        turned = places @ np.swapaxes(self.turn_tx, 1, 2) if self.turn_tx is not None else places
+        every = np.broadcast_to(turned, (len(self.tx), *places.shape))
+        return weights.of_elements(every, shares, self.senders(middle))
 
     def receivers(self, offset: np.ndarray) -> np.ndarray:
         """The same on the receiving side."""

@@ -181,11 +181,11 @@ class Work:
         chosen = max(self.plans, key=lambda p: p[0])[1]
         return {"model": "stop and go, single scattering", **chosen, **self.weights.describe(self.blur)}
 
-    def worth_checking(self, check: bool | None) -> bool:
+    def worth_checking(self, check: bool | None, channels: float = 1) -> bool:
         """Whether samples are to be computed again: as asked, or where that costs less than 2 %."""
         points, facets = (0 if part is None else len(part) for part in (self.points, self.facets))
         seconds = 256 * points * 6e-8 + facets * 1e-4
-        return check if check is not None else seconds < 0.02 * self.order.clock.seconds.get("echo", 0.0)
+        return check if check is not None else channels * seconds < 0.02 * self.order.clock.seconds.get("echo", 0.0)
 
     @property
     def draws(self) -> int:

@@ -233,3 +233,82 @@ def test_warnings_point_at_the_line_that_asked():
     with pytest.warns(sarcl.SarclWarning) as found:
         sarcl.echo(SCENE, long, passing(3), array=line(3), reference=(0, 0, 0), range_window=WINDOW)
     assert [w.filename for w in found] == [__file__]
+
+
+def constant(n=9, spacing=0.015, **options):
+    return line(n, spacing=spacing, step=0.0, **options)
+
+
+CHIRP = sarcl.Waveform.chirp(center=F0, bandwidth=300e6, duration=1e-6)
+APART = {"zero reflectivity", "facing away", "range window", "out of beam"}  # but not "equal channels"
+
+
+@pytest.mark.parametrize("name", ["elements", "weighted", "wide", "near", "turning", "planned"])
+def test_elements_of_one_carrier_are_one_antenna(name, device):
+    from scipy.spatial.transform import Rotation
+
+    track, tolerance = passing(6), 1e-2 if name == "wide" else 1e-3
+    array = constant(weights=[1, 2, 1j, -1, 1, 1, 0.5, 1, 1]) if name == "weighted" else constant()
+    if name == "wide":
+        array = constant(5, spacing=0.2)
+    if name == "near":
+        track = sarcl.Trajectory(track.times, track.positions / 100)
+    if name == "turning":
+        turns = Rotation.from_rotvec(np.outer(np.linspace(0, 1.5, 6), [0, 0, 1])).as_matrix()
+        track = sarcl.Trajectory(track.times, track.positions, attitude=turns)
+    if name == "planned":
+        array = array.switched(array.with_offsets(np.full(9, 1e6)), 2, 6)
+    options = {
+        "array": array,
+        "reference": (0, 0, 0),
+        "range_window": (-40, 40),
+        "tolerance": tolerance,
+        "device": device,
+    }
+    if name == "planned":
+        with pytest.warns(sarcl.SarclWarning, match="centre frequency jumps"):
+            raw, apart = (sarcl.echo(SCENE, CHIRP, track, skip=s, check=True, **options) for s in (True, APART))
+    else:
+        raw, apart = (sarcl.echo(SCENE, CHIRP, track, skip=s, check=True, **options) for s in (True, APART))
+    assert raw.report.contributions_done * array.n == apart.report.contributions_done
+    assert (
+        raw.report.contributions_skipped["equal channels"]
+        == apart.report.contributions_done - raw.report.contributions_done
+    )
+    size = np.sqrt(raw.samples.size * (np.abs(SCENE.amplitudes) ** 2).sum() * (np.abs(array.weights) ** 2).sum())
+    size = max(size, np.linalg.norm(apart.samples))
+    assert np.linalg.norm(np.asarray(raw.samples) - apart.samples) <= 2 * tolerance * size
+    for found in (raw, apart):
+        assert found.report.measured_error <= found.report.predicted_error <= tolerance
+
+
+def test_one_carrier_added_up_or_at_once_is_the_same_to_a_millionth():
+    # at the tightest tolerance float32 keeps paths along this array to
+    scene, track = sarcl.Scene.points([[0.0, 0, 0]]), passing(6, 20.0)
+    array = constant(9, spacing=0.0002)
+    options = {"array": array, "reference": (0, 0, 0), "range_window": (-40, 40), "tolerance": 2e-5}
+    raw, apart = (sarcl.echo(scene, CHIRP, track, skip=s, **options) for s in (True, APART))
+    assert raw.report.contributions_done < apart.report.contributions_done
+    assert np.linalg.norm(np.asarray(raw.samples) - apart.samples) <= 1e-5 * np.linalg.norm(apart.samples)
+
+
+def test_facets_in_front_of_an_array_of_one_carrier():
+    scene, array = (
+        shapes.box((0.5, 0.4, 0.3))
+        + sarcl.Scene.facets(shapes.plate((2.0, 2.0)).triangles, material=sarcl.Material(4.0, diagram="cos")),
+        constant(7, spacing=0.05),
+    )
+    options = {"array": array, "reference": (0, 0, 0), "tolerance": 1e-2, "check": True, "polarization": ("HH", "VV")}
+    raw, apart = (sarcl.echo(scene, CHIRP, passing(8), skip=s, **options) for s in (True, APART))
+    assert np.linalg.norm(np.asarray(raw.samples) - apart.samples) <= 2e-2 * np.linalg.norm(apart.samples)
+    assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
+
+
+def test_a_beam_that_looks_away_is_dim_as_the_array_factor_says():
+    array, tone = constant(32), sarcl.Waveform.chirp(center=F0, bandwidth=1e6, duration=1e-6)
+    for turned, wanted in ((0.0, 32.0), (0.3, None)):
+        track = sarcl.Trajectory([0.0], [[-5e3 * np.cos(turned), 5e3 * np.sin(turned), 0]])
+        raw = sarcl.echo(sarcl.Scene.points([[0.0, 0, 0]]), tone, track, array=array, tolerance=1e-3)
+        phase = 2 * np.pi * F0 * 0.015 * np.sin(turned) / SPEED_OF_LIGHT
+        wanted = wanted or abs(np.sin(16 * phase) / np.sin(phase / 2))
+        assert np.abs(raw.samples[0]).mean() == pytest.approx(wanted, rel=0.02)
