@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo compress backproject autofocus measure read concatenate devices
+verbs    echo compress backproject polar_format autofocus measure read concatenate devices
 """
 
 import sys
@@ -42,6 +42,7 @@ _HOME = {
     "echo": "echo",
     "compress": "compress",
     "backproject": "backproject",
+    "polar_format": "polar_format",
     "plan": "forecast",
     "Forecast": "forecast",
     "add_noise": "noise",
@@ -78,6 +79,7 @@ if TYPE_CHECKING:
     from .noise import add_noise as add_noise
     from .phase_history import PhaseHistory as PhaseHistory
     from .phase_history import concatenate as concatenate
+    from .polar_format import polar_format as polar_format
     from .quality import PointResponse as PointResponse
     from .quality import measure as measure
     from .radar import Radar as Radar
