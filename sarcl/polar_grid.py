@@ -15,7 +15,7 @@ from .planning import Clock
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 MOST_COUNTED = 2**20  # samples whose crowding is looked at
-CELLS = 32, 8  # a side of a tile on CPUs, whose caches hold one a processor, and on GPUs
+CELLS = 64, 8  # a side of a tile on CPUs, where it stays in a cache, and on GPUs, where many must be at work
 # Work of a sample, of each of its taps, and of a cell's FFT, measured on PoCL: only their ratios matter.
 SAMPLE_COST, TAP_COST, CELL_COST = 30.0, 0.9, 1.0
 
@@ -163,7 +163,6 @@ class Gridder:
         m0, m1 = self.plan.length
         band, block = self.blocks(budget)
         n_rows, n_tiles = len(self.cell), -(-m0 // self.tile)
-        columns = np.arange(shape[1]) - shape[1] // 2
         half = np.empty((shape[1], m0), np.complex64)  # columns of the image, rows of the grid
         samples = None
         for first in range(0, n_tiles, band):
@@ -185,17 +184,28 @@ class Gridder:
                 tell(0.8 * (first + (last - first) * stop / n_rows) / n_tiles)
             made = self.device.download(out, np.empty((rows, m1), np.complex64))
             wave = fft.rows(self.device, made, inverse=True)
-            half[:, first * self.tile : first * self.tile + rows] = wave[:, columns].T
+            _turned(wave, half[:, first * self.tile : first * self.tile + rows])
             clock.lap("fft")
-        image = fft.rows(self.device, half, inverse=True)[:, np.arange(shape[0]) - shape[0] // 2].T
+        image = np.empty(shape, np.complex64)
+        _turned(fft.rows(self.device, half, inverse=True), image)
         flat = [
             1 / self.plan.interpolator.transform((np.arange(n) - n // 2) / m)
             for n, m in zip(shape, self.plan.length, strict=True)
         ]
-        image = image * (flat[0].astype(np.float32)[:, None] * flat[1].astype(np.float32))
+        image *= flat[0].astype(np.float32)[:, None]
+        image *= flat[1].astype(np.float32)
         clock.lap("fft")
         tell(1.0)
         return image
+
+
+def _turned(wave: np.ndarray, out: np.ndarray) -> None:
+    """Transpose columns -n//2 ... of a spectrum (m, ...) into `out` (n, m), a few rows at a time: caches like it."""
+    low = len(out) // 2
+    for start in range(0, len(wave), 32):
+        part = slice(start, start + 32)
+        out[:low, part] = wave[part, wave.shape[1] - low :].T
+        out[low:, part] = wave[part, : len(out) - low].T
 
 
 def tile_of(device: cl.Device) -> int:
