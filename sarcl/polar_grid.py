@@ -11,7 +11,7 @@ import numpy as np
 from . import cl, fft
 from .accuracy import TERMS, U32, Interpolator, interpolator, sum_rounding
 from .cl import size_text
-from .planning import Clock
+from .planning import LEAST_TOLERANCE, Clock
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 MOST_COUNTED = 2**20  # samples whose crowding is looked at
@@ -70,11 +70,12 @@ def make_plan(
             cost = len(turns) * n_samples * (SAMPLE_COST + TAP_COST * taps**2) + CELL_COST * cells * np.log2(cells)
             if error <= tolerance and (best is None or cost < best.cost):
                 best = GridPlan(kernel, (length[0], length[1]), crowding, error, cost)
-    if best is None:
+    if best is None or tolerance < LEAST_TOLERANCE:
+        least = max(least, LEAST_TOLERANCE)
         digits = 10.0 ** (np.floor(np.log10(least)) - 1)
         raise ValueError(
             f"tolerance {tolerance:.1e} cannot be met by a polar format image; the best here is "
-            f"{np.ceil(least / digits) * digits:.1e}: backproject goes further"
+            f"{np.ceil(least / digits - 1e-9) * digits:.1e}: backproject goes further"
         )
     return best
 
