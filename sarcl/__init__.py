@@ -14,7 +14,7 @@ Two equations carry everything::
     I        data                             Image
 
 nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo beam ambiguity compress backproject autofocus measure read concatenate devices
+verbs    echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices
 """
 
 import sys
@@ -45,6 +45,7 @@ _HOME = {
     "Ambiguity": "ambiguity",
     "compress": "compress",
     "backproject": "backproject",
+    "polar_format": "polar_format",
     "plan": "forecast",
     "Forecast": "forecast",
     "add_noise": "noise",
@@ -84,6 +85,7 @@ if TYPE_CHECKING:
     from .noise import add_noise as add_noise
     from .phase_history import PhaseHistory as PhaseHistory
     from .phase_history import concatenate as concatenate
+    from .polar_format import polar_format as polar_format
     from .quality import PointResponse as PointResponse
     from .quality import measure as measure
     from .radar import Radar as Radar

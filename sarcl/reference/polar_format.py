@@ -1,0 +1,52 @@
+"""The image of plane waves, term by term, and what spreads samples on a grid."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..accuracy import Interpolator
+from ..check import SPEED_OF_LIGHT
+from ..phase_history import PhaseHistory
+from .geometry import half_path
+
+
+def polar_format(
+    raw: PhaseHistory,
+    points: np.ndarray,
+    center: np.ndarray,
+    sample_weight: np.ndarray | None = None,
+    row_weight: np.ndarray | None = None,
+) -> tuple[np.ndarray, float]:
+    """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), as if waves were plane.
+
+    tau = (2/c)(|T - c| - u.(x - c)), u the unit vector from `center` c, m (3,), to the antenna T.
+    Returns I complex128 (n,) and the norm it would have if samples had random phases.
+    """
+    n = np.arange(raw.n_samples)
+    sample_weight = np.ones(raw.n_samples) if sample_weight is None else sample_weight
+    row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
+    image, power = np.zeros(len(points), np.complex128), 0.0
+    for p in range(raw.n_rows):
+        shift = half_path(raw.tx[p], raw.tx[p], center[None], raw.reference_range[p])[0]
+        away = (raw.tx[p] - center).astype(np.longdouble)
+        along = (points - center) @ (away / np.sqrt((away**2).sum()))
+        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * (shift - along)
+        samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
+        first = (raw.frequency[p] * delay) % 1
+        step = (raw.frequency_step[p] * delay) % 1
+        turns = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
+        image += (np.exp(2j * np.pi * turns) * samples).sum(axis=1)
+        power += float((abs(samples) ** 2).sum())
+    return image, float(np.sqrt(len(points) * power))
+
+
+def spread(samples: np.ndarray, place: np.ndarray, kernel: Interpolator, length: tuple[int, int]) -> np.ndarray:
+    """Samples (n,) at places (n, 2), in cells, on a grid complex128 of `length` that repeats: kernels/polar.cl."""
+    out = np.zeros(length, np.complex128)
+    first = np.floor(place).astype(int) - kernel.taps // 2 + 1
+    weights = kernel.weights(place % 1 - 0.5)
+    for i in range(kernel.taps):
+        for j in range(kernel.taps):
+            at = (first[:, 0] + i) % length[0], (first[:, 1] + j) % length[1]
+            np.add.at(out, at, samples * weights[:, 0, i] * weights[:, 1, j])
+    return out
