@@ -166,11 +166,13 @@ def test_frequency_steps_do_not_resolve_more_than_phase_centres_do():
         wave_form = single if step == 0 else sarcl.Waveform.tone(center=F0 - 3.5 * step, duration=1 / step)
         own = {"channels": "separated", "receive": "own"}
         for array, wanted in ((small[step], 1.327), (wide[step], 1.056)):
-            raw = sarcl.echo(scene, wave_form, flight, array=array, **own, **options)
-            assert width(raw) == pytest.approx(wanted, abs=0.008 if step else 0.004)
+            # about the middle of the array: off it, carriers that rise with the place change the width by 0.7 %
+            middle = sarcl.Trajectory(flight.times, flight.positions - array.positions.mean(axis=0))
+            raw = sarcl.echo(scene, wave_form, middle, array=array, **own, **options)
+            assert width(raw) == pytest.approx(wanted, abs=0.004)
     for receive, wanted in (("all", 1.172), ("reference", 1.242)):
         raw = sarcl.echo(scene, single, flight, array=wide[0.0], channels="separated", receive=receive, **options)
-        assert width(raw) == pytest.approx(wanted, abs=0.008 if step else 0.004)
+        assert width(raw) == pytest.approx(wanted, abs=0.004)
 
 
 def test_shorthand_of_backproject_maps_first():
