@@ -9,19 +9,22 @@ import numpy as np
 
 from . import echo_rows
 from .array import AntennaArray
+from .array_between import Between
 from .array_rows import CHANNELS, RECEIVE, Rows, Sides, antennas_of
-from .channels import Channel, Sampling, channels_of, sampling, warn_of
+from .array_sum import Apart, Layout, during
+from .channels import channels_of, sampling, warn_of
 from .check import choice, sealed
 from .echo_work import Order, Work, band_of
 from .gains import Beam
 from .gains_error import beam_error
 from .phase_history import PhaseHistory
+from .planning import LEAST_TOLERANCE
 from .report import Report
 from .scene import Scene
 from .trajectory import Trajectory
 from .waveform import Waveform
 
-EQUAL = "equal channels"  # why channels are left out
+EQUAL, BETWEEN = "equal channels", "interpolated channels"  # why channels are left out
 
 
 def array_echo(
@@ -52,44 +55,35 @@ def array_echo(
         together = sides.together(weights, array.positions - middle, array.weights, middle)
         if _within(together, scene, whole, order):
             weights, sent = together, channels_of(array, waveform.center, len(track), "carriers")
-    work = Work(order, given, scene, whole, everywhere, weights)
     rows = Rows(array, sides, point, channels, receive, order.polarizations)
-    n = grid.width if rows.separated else grid.n
-    count = int(np.prod(rows.shape))
-    samples = echo_rows.zeros(count, len(order.polarizations), n, near, far)
-    samples = samples.reshape(*rows.shape, len(order.polarizations), n)
-    total = work.scatterers * sum((c.stop - c.first) * len(rows.receivers(c)) for c in sent)
-    worst = 0.0
-    for channel in sent:
-        part, frequencies = _samples(channel, grid, rows.separated)
-        spectrum = _spectrum(channel, waveform, frequencies, compressed) * work.weights.factor(frequencies)
-        band = band_of(waveform, channel.carrier, len(frequencies) * grid.step)
-        at = slice(channel.first, channel.stop)
-        for number, heard in rows.receivers(channel):
-            _, rx, reference = rows.ends(channel.offset, heard)
-            tx = sides.senders(channel.offset)
-            n_here, edges = len(frequencies), (near, far)
-            antennas = antennas_of(tx[at], rx[at], reference[at], float(frequencies[0]), grid, edges, n_here)
-            beam = work.weights.seen_from(antennas.tx, antennas.tx if antennas.rx is None else antennas.rx, at)
-            made = np.zeros((len(antennas.tx), len(order.polarizations), len(frequencies)), np.complex64)
-            work.add(antennas, band, frequencies, made, total, channel.first, beam)
-            made *= spectrum.astype(np.complex64)
-            worst = max(worst, work.predicted_error)
-            rows.put(samples, channel, number, part, made)
+    layout = Layout(rows, sent, grid, (near, far), waveform, compressed)
+    shape = layout.shape(len(track))
+    samples = echo_rows.zeros(int(np.prod(shape[:3])), shape[3], shape[4], near, far).reshape(shape)
+    for way, its_order in _ways(layout, scene, order):
+        try:
+            work = Work(its_order, given, scene, whole, everywhere, weights)
+            worst = _filled(way, work, samples)
+            break
+        except ValueError:  # what float32 cannot keep between places it may keep without
+            if isinstance(way, Apart):
+                raise
+            samples[:] = 0
     work.must_show(near, far)
     order.clock.lap("spectra")
     measured = None
-    overlap = len(sent) if rows.separated else max(1.0, sum(grid.width for _ in sent) / grid.n)
+    overlap = len(sent) if rows.separated else layout.overlap
     if work.worth_checking(check, overlap):
-        measured = _measured(work, rows, sent, grid, samples, (near, far), waveform, compressed)
+        measured = _measured(work, layout, samples)
         order.clock.lap("check")
-    equal = work.scatterers * sum((c.stop - c.first) * len(rows.receivers(c)) * (len(c.elements) - 1) for c in sent)
-    counted = work.counted(total // max(1, work.scatterers * len(track)))
-    if equal:
-        counted["contributions_skipped"][EQUAL] = equal
-    how = work.plan() | {"channels": channels, "carriers": len(sent), "receivers": len(rows.heard)}
+    counted = work.counted(way.runs // len(track))
+    left_out = {
+        EQUAL: sum((c.stop - c.first) * rows.hearing * (len(c.elements) - 1) for c in sent),
+        BETWEEN: layout.runs - way.runs,
+    }
+    counted["contributions_skipped"] |= {why: work.scatterers * n for why, n in left_out.items() if n}
+    how = work.plan() | {"channels": channels, "carriers": len(sent), "receivers": rows.hearing} | way.describe()
     return PhaseHistory(
-        sealed(samples.reshape(-1, n)), **rows.geometry(waveform.center, grid, track, receiver or track),
+        sealed(samples.reshape(-1, shape[-1])), **rows.geometry(waveform.center, grid, track, receiver or track),
         waveform=waveform, array=array, compressed=compressed,
         report=Report(
             plan=how, tolerance=order.tolerance, predicted_error=worst, measured_error=measured,
@@ -97,6 +91,27 @@ def array_echo(
             seconds=order.clock.seconds, device=order.device.info.name, seed=order.seed,
         ),
     )  # fmt: skip
+
+
+def _ways(layout: Layout, scene: Scene, order: Order) -> list[tuple[Apart | Between, Order]]:
+    """Ways to make the samples, the cheaper first, and what is asked of the engines there."""
+    ways: list[tuple[Apart | Between, Order]] = [(Apart(layout), order)]
+    shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
+    if BETWEEN in order.skips and layout.runs > len(layout.rows.sides.tx) and shared:
+        between = Between(layout, scene, order.tolerance)
+        scatterers = len(scene.positions) + len(scene.triangles)
+        if between.tolerance >= LEAST_TOLERANCE and between.pays(scatterers) and between.fits(scene):
+            ways.insert(0, (between, replace(order, tolerance=between.tolerance)))
+    return ways
+
+
+def _filled(way: Apart | Between, work: Work, samples: np.ndarray) -> float:
+    """Fill samples; returns the predicted error."""
+    worst, total = 0.0, work.scatterers * way.runs
+    block = way.pulses(work.order.budget)
+    for start in range(0, len(samples), block):
+        worst = max(worst, way.fill(work, samples[start : start + block], start, total))
+    return worst
 
 
 def _within(beam: Beam, scene: Scene, whole: Waveform, order: Order) -> bool:
@@ -111,26 +126,10 @@ def _within(beam: Beam, scene: Scene, whole: Waveform, order: Order) -> bool:
     return float(found.over_band.min(where=found.over_band > 0, initial=np.inf)) < 0.2 * order.tolerance
 
 
-def _samples(channel: Channel, grid: Sampling, separated: bool) -> tuple[slice, np.ndarray]:
-    """A channel's samples in its rows, and their frequencies, Hz."""
-    if separated:
-        own = grid.of(channel.carrier)
-        return slice(0, own.n), own.frequency + own.step * np.arange(own.n)
-    part = grid.part(channel.carrier)
-    return part, grid.frequency + grid.step * np.arange(grid.n)[part]
-
-
-def _spectrum(channel: Channel, waveform: Waveform, frequencies: np.ndarray, compressed: bool) -> np.ndarray:
-    pulse = replace(waveform, center=channel.carrier).pulse_spectrum(frequencies)
-    return np.asarray(np.abs(pulse) ** 2 if compressed else pulse)
-
-
-def _measured(
-    work: Work, rows: Rows, sent: list[Channel], grid: Sampling, samples: np.ndarray, window: tuple[float, float],
-    waveform: Waveform, compressed: bool,
-) -> float:  # fmt: skip
+def _measured(work: Work, layout: Layout, samples: np.ndarray) -> float:
     """Relative error of 256 random samples, 16 each of 16 rows, against the exact sum over channels and scatterers; of
     fewer where there are many facets, as `measure_error` does for one channel, or more than seven channels."""
+    rows, sent, grid = layout.rows, layout.sent, layout.grid
     random, draws = np.random.default_rng(0), min(work.draws, 16 if len(sent) < 8 else 4)
     sums = np.zeros(3)
     for _ in range(draws):
@@ -138,19 +137,19 @@ def _measured(
         some = random.integers(0, samples.shape[-1], draws)
         wanted = np.zeros((len(work.order.polarizations), draws), np.complex128)
         power = np.zeros(wanted.shape)
-        for channel in sent:
-            part, frequencies = _samples(channel, grid, rows.separated)
+        for channel, _, _ in during(sent, pulse, 1):
+            part, frequencies = layout.samples(channel)
             inside = (some >= part.start) & (some < part.stop)
-            its = not rows.separated or sender in channel.elements
-            if not (channel.first <= pulse < channel.stop and inside.any() and its):
+            if not inside.any() or (rows.separated and sender not in channel.elements):
                 continue
             f = frequencies[some[inside] - part.start]
-            heard = channel.offset if rows.receive == "own" else rows.heard[receiver]
-            _, rx, reference = rows.ends(channel.offset, heard)
-            antennas = antennas_of(rows.sides.senders(channel.offset), rx, reference, float(f[0]), grid, window, 1)
+            _, rx, reference = rows.ends(channel.offset, which=slice(receiver, receiver + 1))
+            antennas = antennas_of(
+                rows.sides.senders(channel.offset), rx[:, 0], reference[:, 0], float(f[0]), grid, layout.window, 1
+            )
             beam = work.weights.seen_from(antennas.tx, antennas.tx if antennas.rx is None else antennas.rx, slice(None))
             weight = rows.array.weights[sender] if rows.separated else channel.weight
-            factor = weight * _spectrum(channel, waveform, f, compressed) * work.weights.factor(f)
+            factor = weight * layout.spectrum(channel, f) * work.weights.factor(f)
             values, powers = work.exact(antennas, pulse, f, beam)
             wanted[:, inside] += values * factor
             power[:, inside] += powers * np.abs(factor) ** 2

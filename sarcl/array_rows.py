@@ -36,19 +36,19 @@ class Sides:
         back = track if receiver is None else receiver
         return cls(track.positions, echo_rows.receiver_positions(track, receiver), track.attitude, back.attitude)
 
-    def senders(self, offset: np.ndarray) -> np.ndarray:
-        """Where an element at `offset`, m (3,), stands, (n, 3)."""
-        return self.tx + _turned(self.turn_tx, offset)
+    def senders(self, places: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+        """Where elements at `places`, m (..., 3), stand at pulses `at`, (n, ..., 3)."""
+        return _stand(self.tx, self.turn_tx, places, at)
+
+    def receivers(self, places: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+        """The same on the receiving side."""
+        return _stand(self.rx, self.turn_rx, places, at)
 
     def together(self, weights: Beam, places: np.ndarray, shares: np.ndarray, middle: np.ndarray) -> Beam:
         """The weights of elements at places off `middle`, m (m, 3), as one antenna there."""
         turned = places @ np.swapaxes(self.turn_tx, 1, 2) if self.turn_tx is not None else places
         every = np.broadcast_to(turned, (len(self.tx), *places.shape))
         return weights.of_elements(every, shares, self.senders(middle))
-
-    def receivers(self, offset: np.ndarray) -> np.ndarray:
-        """The same on the receiving side."""
-        return self.rx + _turned(self.turn_rx, offset)
 
 
 class Rows:
@@ -66,39 +66,51 @@ class Rows:
         """Pulses, senders, receivers of each."""
         return len(self.sides.tx), self.array.n if self.separated else 1, len(self.heard)
 
-    def receivers(self, channel: Channel) -> list[tuple[int, np.ndarray]]:
-        """Number and place of what hears a channel."""
-        return [(0, channel.offset)] if self.receive == "own" else list(enumerate(self.heard))
+    @property
+    def hearing(self) -> int:
+        """Receivers of a channel."""
+        return 1 if self.receive == "own" else len(self.heard)
 
-    def ends(self, sender: np.ndarray, receiver: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Positions of a row's antennas at every pulse, m (n, 3), and its reference range (n,)."""
-        tx = self.sides.senders(sender) if self.separated else self.sides.tx
-        rx = self.sides.receivers(receiver)
-        return tx, rx, echo_rows.half_path(tx, rx, self.point)
+    def receivers(self, sender: np.ndarray) -> np.ndarray:
+        """Places of what hears a channel sent from `sender`, m (n, 3)."""
+        return sender[None] if self.receive == "own" else self.heard
 
-    def put(self, samples: np.ndarray, channel: Channel, receiver: int, part: slice, made: np.ndarray) -> None:
-        """Add a channel, (n, n_polarizations, width), to samples (pulses, senders, receivers, polarizations, n)."""
-        at = slice(channel.first, channel.stop)
+    def ends(
+        self, sender: np.ndarray, at: Any = slice(None), which: slice = slice(None)
+    ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Antennas of a channel's rows at pulses `at` and some receivers.
+
+        Returns tx (n, 3) and rx (n, receivers, 3), m, and reference ranges (n, receivers).
+        """
+        tx = self.sides.senders(sender, at) if self.separated else self.sides.tx[at]
+        rx = self.sides.receivers(self.receivers(sender)[which], at)
+        return tx, rx, echo_rows.half_path(tx[:, None], rx, self.point)
+
+    def put(self, samples: np.ndarray, channel: Channel, receivers: slice, part: slice, made: np.ndarray) -> None:
+        """Add a channel at some receivers, (n, receivers, n_polarizations, width), to samples of its pulses.
+
+        samples  (n, senders, receivers, n_polarizations, n_samples)
+        """
         if not self.separated:
-            samples[at, 0, receiver, :, part] += np.complex64(channel.weight) * made
+            samples[:, 0, receivers, :, part] += np.complex64(channel.weight) * made
             return
         for element in channel.elements.tolist():
-            samples[at, element, receiver] = np.complex64(self.array.weights[element]) * made
+            samples[:, element, receivers] = np.complex64(self.array.weights[element]) * made
 
     def geometry(self, center: float, sampling: Sampling, track: Trajectory, back: Trajectory) -> dict[str, Any]:
         """What a PhaseHistory holds of every row."""
         pulses, senders, receivers = self.shape
         n, names = pulses * senders * receivers, self.polarizations
-        tx, rx, reference = np.empty((*self.shape, 3)), np.empty((*self.shape, 3)), np.empty(self.shape)
+        places = self.array.positions
+        tx = self.sides.senders(places)[:, :, None] if self.separated else self.sides.tx[:, None, None]
+        own = self.receive == "own"
+        rx = self.sides.receivers(places)[:, :, None] if own else self.sides.receivers(self.heard)[:, None]
+        reference = np.broadcast_to(echo_rows.half_path(tx, rx, self.point), self.shape)
+        tx, rx = (np.broadcast_to(ends, (*self.shape, 3)) for ends in (tx, rx))
         frequency = np.full(self.shape, sampling.frequency)
-        offsets = np.stack([self.array.offsets_at(p) for p in range(pulses)]) if self.separated else None
-        for sender in range(senders):
-            place = self.array.positions[sender] if self.separated else np.zeros(3)
-            for receiver, heard in enumerate(place[None] if self.receive == "own" else self.heard):
-                at = (slice(None), sender, receiver)
-                tx[at], rx[at], reference[at] = self.ends(place, heard)
-                if offsets is not None:
-                    frequency[at] = center + offsets[:, sender] - (sampling.width - 1) / 2 * sampling.step
+        if self.separated:
+            offsets = np.stack([self.array.offsets_at(p) for p in range(pulses)])
+            frequency[:] = (center + offsets - (sampling.width - 1) / 2 * sampling.step)[:, :, None]
         pulse, sender_of, receiver_of = (i.ravel() for i in np.indices(self.shape))
         out: dict[str, Any] = {
             "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
@@ -129,5 +141,6 @@ def antennas_of(
     )
 
 
-def _turned(turn: np.ndarray | None, offset: np.ndarray) -> np.ndarray:
-    return offset if turn is None else turn @ offset
+def _stand(ends: np.ndarray, turn: np.ndarray | None, places: np.ndarray, at: Any) -> np.ndarray:
+    spread = ends[at].reshape(-1, *(1,) * (places.ndim - 1), 3)
+    return np.asarray(spread + (places if turn is None else np.einsum("nij,...j->n...i", turn[at], places)))

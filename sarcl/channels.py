@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -102,6 +102,12 @@ class Sampling:
         """The samples of a channel."""
         first = round((carrier - self.frequency) / self.step - (self.width - 1) / 2)
         return slice(max(first, 0), min(first + self.width, self.n))
+
+    def holds(self, carriers: Iterable[float]) -> bool:
+        """Whether the samples of each channel alone are among these."""
+        places = (np.fromiter(carriers, float) - self.frequency) / self.step - (self.width - 1) / 2
+        inside = (places > -0.5) & (places + self.width < self.n + 0.5)
+        return bool((inside & (np.abs(places - np.rint(places)) < 1e-6)).all())
 
     def of(self, carrier: float) -> Sampling:
         """Samples of one channel alone."""

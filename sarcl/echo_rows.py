@@ -10,6 +10,7 @@ from .check import SPEED_OF_LIGHT, finite, instance
 from .cl import size_text
 from .scene import Scene
 from .trajectory import Trajectory
+from .triangles import corners
 from .waveform import Waveform
 
 LEAST_SAMPLES = 64  # of the default range window: a lone point still gets a profile to look at
@@ -43,9 +44,8 @@ def window(
             raise ValueError(f"range_window ({pair[0]:g}, {pair[1]:g}) is empty; near must be less than far")
         return float(pair[0]), float(pair[1])
     low, high = scene.bounds
-    corners = np.stack(np.meshgrid(*zip(low, high, strict=True), indexing="ij"), axis=-1).reshape(-1, 1, 3)
     # distance is convex: the farthest point of a box is a corner, the nearest is the antenna clipped to the box
-    farthest = half_path(tx, rx, corners).max(axis=0) - reference_range
+    farthest = half_path(tx, rx, corners(scene.bounds)[:, None]).max(axis=0) - reference_range
     clipped = [np.linalg.norm(e - np.clip(e, low, high), axis=1) for e in (tx, rx)]
     nearest = (clipped[0] + clipped[1]) / 2 - reference_range
     least = LEAST_SAMPLES * SPEED_OF_LIGHT / (4 * waveform.bandwidth)

@@ -15,6 +15,11 @@ def box(points: np.ndarray) -> np.ndarray:
     return np.stack([[c.min() for c in points.T], [c.max() for c in points.T]])
 
 
+def corners(bounds: np.ndarray) -> np.ndarray:
+    """Corners of the box between a lower and an upper one (2, 3): (8, 3)."""
+    return np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3)
+
+
 def edges(triangles: np.ndarray) -> np.ndarray:
     """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
     d = (triangles[:, (i + 1) % 3] - triangles[:, i] for i in range(3))
