@@ -48,6 +48,8 @@ _HOME = {
     "polar_format": "polar_format",
     "plan": "forecast",
     "Forecast": "forecast",
+    "plan_echo": "echo_forecast",
+    "EchoForecast": "echo_forecast",
     "add_noise": "noise",
     "autofocus": "autofocus",
     "map_aperture": "aperture",
@@ -77,6 +79,8 @@ if TYPE_CHECKING:
     from .cl import devices as devices
     from .compress import compress as compress
     from .echo import echo as echo
+    from .echo_forecast import EchoForecast as EchoForecast
+    from .echo_forecast import plan_echo as plan_echo
     from .forecast import Forecast as Forecast
     from .forecast import plan as plan
     from .grid import ImageGrid as ImageGrid

@@ -136,23 +136,33 @@ class Between:
             rounded = np.asarray(path - 2 * reference, np.float64)
             if np.abs(rounded).max() * frequencies[-1] > 1e-9 * SPEED_OF_LIGHT:  # thousands of kilometres away
                 made[i, j] *= _turn(-rounded, frequencies)[:, None]
-        for channel, at, here in during(self.layout.sent, start, len(samples)):
-            self._channel(work, channel, at, made[:, :, here], samples[here])
+        heard = None if self.own else self._heard(sides.receivers(self.layout.rows.heard, at))
+        for channel, now, here in during(self.layout.sent, start, len(samples)):
+            ears = heard or self._heard(sides.receivers(channel.offset[None], now))
+            self._channel(work, channel, now, made[:, :, here], samples[here], *(e[here] if heard else e for e in ears))
         work.order.clock.lap("channels")
         return self.error + self.growth * worst
 
-    def _channel(self, work: Work, channel: Channel, at: slice, made: np.ndarray, samples: np.ndarray) -> None:
+    def _heard(self, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Lengths from receivers (n, m, 3) to the scene's centre, in extended precision, and to the reference, m."""
+        return _length(rx, self.center), np.linalg.norm(rx - self.layout.rows.point, axis=-1)
+
+    def _channel(
+        self, work: Work, channel: Channel, at: slice, made: np.ndarray, samples: np.ndarray, back: np.ndarray,
+        back_to_reference: np.ndarray,
+    ) -> None:  # fmt: skip
         """Add a channel at every receiver to samples of pulses `at`, from those made at the places."""
         layout, rows = self.layout, self.layout.rows
         part, frequencies = layout.samples(channel)
         sender = self.tx.basis[self.sender[id(channel)]].astype(np.float32)
         some = np.tensordot(sender, made[..., layout.grid.part(channel.carrier)], 1)
         values = np.moveaxis(np.tensordot(self.rx.basis.astype(np.float32), some, 1), 0, 1)
-        _, rx, reference = rows.ends(channel.offset, at)
-        sent = _length(rows.sides.senders(channel.offset, at), self.center)
-        back = np.asarray(sent[:, None] + _length(rx, self.center) - 2 * reference, np.float64)
+        tx = rows.sides.senders(channel.offset, at)
+        sent_to_reference = np.linalg.norm((tx if rows.separated else rows.sides.tx[at]) - rows.point, axis=-1)
+        reference = (sent_to_reference[:, None] + back_to_reference) / 2  # as `Rows.geometry` rounds it
+        path = np.asarray(_length(tx, self.center)[:, None] + back - 2 * reference, np.float64)
         spectrum = layout.spectrum(channel, frequencies) * work.weights.factor(frequencies)
-        values = values * (_turn(back, frequencies) * spectrum).astype(np.complex64)[:, :, None]
+        values = values * (_turn(path, frequencies) * spectrum).astype(np.complex64)[:, :, None]
         rows.put(samples, channel, slice(None), part, values)
 
     def describe(self) -> dict[str, int]:

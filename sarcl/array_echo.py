@@ -13,7 +13,8 @@ from .array_between import Between
 from .array_rows import CHANNELS, RECEIVE, Rows, Sides, antennas_of
 from .array_sum import Apart, Layout, during
 from .channels import channels_of, sampling, warn_of
-from .check import choice, sealed
+from .check import choice
+from .echo_target import Target
 from .echo_work import Order, Work, band_of
 from .gains import Beam
 from .gains_error import beam_error
@@ -30,7 +31,7 @@ EQUAL, BETWEEN = "equal channels", "interpolated channels"  # why channels are l
 def array_echo(
     array: AntennaArray, scene: Scene, given: Scene, waveform: Waveform, track: Trajectory,
     receiver: Trajectory | None, point: np.ndarray, range_window: Any, weights: Beam, order: Order, *, channels: str,
-    receive: str, compressed: bool, check: bool | None,
+    receive: str, compressed: bool, check: bool | None, out: Any,
 ) -> PhaseHistory:  # fmt: skip
     """What `sarcl.echo` returns with an array; arguments as there. given  the scene before random heights.
 
@@ -57,40 +58,38 @@ def array_echo(
             weights, sent = together, channels_of(array, waveform.center, len(track), "carriers")
     rows = Rows(array, sides, point, channels, receive, order.polarizations)
     layout = Layout(rows, sent, grid, (near, far), waveform, compressed)
-    shape = layout.shape(len(track))
-    samples = echo_rows.zeros(int(np.prod(shape[:3])), shape[3], shape[4], near, far).reshape(shape)
-    for way, its_order in _ways(layout, scene, order):
-        try:
-            work = Work(its_order, given, scene, whole, everywhere, weights)
-            worst = _filled(way, work, samples)
-            break
-        except ValueError:  # what float32 cannot keep between places it may keep without
-            if isinstance(way, Apart):
-                raise
-            samples[:] = 0
-    work.must_show(near, far)
-    order.clock.lap("spectra")
-    measured = None
-    overlap = len(sent) if rows.separated else layout.overlap
-    if work.worth_checking(check, overlap):
-        measured = _measured(work, layout, samples)
-        order.clock.lap("check")
-    counted = work.counted(way.runs // len(track))
-    left_out = {
-        EQUAL: sum((c.stop - c.first) * rows.hearing * (len(c.elements) - 1) for c in sent),
-        BETWEEN: layout.runs - way.runs,
-    }
-    counted["contributions_skipped"] |= {why: work.scatterers * n for why, n in left_out.items() if n}
-    how = work.plan() | {"channels": channels, "carriers": len(sent), "receivers": rows.hearing} | way.describe()
-    return PhaseHistory(
-        sealed(samples.reshape(-1, shape[-1])), **rows.geometry(waveform.center, grid, track, receiver or track),
-        waveform=waveform, array=array, compressed=compressed,
-        report=Report(
-            plan=how, tolerance=order.tolerance, predicted_error=worst, measured_error=measured,
-            **counted,
-            seconds=order.clock.seconds, device=order.device.info.name, seed=order.seed,
-        ),
-    )  # fmt: skip
+    with Target(layout.shape(len(track)), out, order.budget, (near, far)) as target:
+        for way, its_order in _ways(layout, scene, order):
+            try:
+                work = Work(its_order, given, scene, whole, everywhere, weights)
+                worst = _filled(way, work, target)
+                break
+            except ValueError:  # what float32 cannot keep between places it may keep without
+                if isinstance(way, Apart):
+                    raise
+        work.must_show(near, far)
+        order.clock.lap("spectra")
+        measured = None
+        overlap = len(sent) if rows.separated else layout.overlap
+        if work.worth_checking(check, overlap):
+            measured = _measured(work, layout, target)
+            order.clock.lap("check")
+        counted = work.counted(way.runs // len(track))
+        left_out = {
+            EQUAL: sum((c.stop - c.first) * rows.hearing * (len(c.elements) - 1) for c in sent),
+            BETWEEN: layout.runs - way.runs,
+        }
+        counted["contributions_skipped"] |= {why: work.scatterers * n for why, n in left_out.items() if n}
+        how = work.plan() | {"channels": channels, "carriers": len(sent), "receivers": rows.hearing} | way.describe()
+        return target.finish(
+            **rows.geometry(waveform.center, grid, track, receiver or track),
+            waveform=waveform, array=array, compressed=compressed,
+            report=Report(
+                plan=how, tolerance=order.tolerance, predicted_error=worst, measured_error=measured,
+                **counted,
+                seconds=order.clock.seconds, device=order.device.info.name, seed=order.seed,
+            ),
+        )  # fmt: skip
 
 
 def _ways(layout: Layout, scene: Scene, order: Order) -> list[tuple[Apart | Between, Order]]:
@@ -105,12 +104,14 @@ def _ways(layout: Layout, scene: Scene, order: Order) -> list[tuple[Apart | Betw
     return ways
 
 
-def _filled(way: Apart | Between, work: Work, samples: np.ndarray) -> float:
-    """Fill samples; returns the predicted error."""
+def _filled(way: Apart | Between, work: Work, target: Target) -> float:
+    """Fill the target; returns the predicted error."""
     worst, total = 0.0, work.scatterers * way.runs
-    block = way.pulses(work.order.budget)
-    for start in range(0, len(samples), block):
-        worst = max(worst, way.fill(work, samples[start : start + block], start, total))
+    pulses = min(way.pulses(work.order.budget), target.pulses)
+    for start in range(0, len(target), pulses):
+        block = target.block(start, min(start + pulses, len(target)))
+        worst = max(worst, way.fill(work, block, start, total))
+        target.keep(start, block)
     return worst
 
 
@@ -126,7 +127,7 @@ def _within(beam: Beam, scene: Scene, whole: Waveform, order: Order) -> bool:
     return float(found.over_band.min(where=found.over_band > 0, initial=np.inf)) < 0.2 * order.tolerance
 
 
-def _measured(work: Work, layout: Layout, samples: np.ndarray) -> float:
+def _measured(work: Work, layout: Layout, samples: Target) -> float:
     """Relative error of 256 random samples, 16 each of 16 rows, against the exact sum over channels and scatterers; of
     fewer where there are many facets, as `measure_error` does for one channel, or more than seven channels."""
     rows, sent, grid = layout.rows, layout.sent, layout.grid
@@ -153,6 +154,6 @@ def _measured(work: Work, layout: Layout, samples: np.ndarray) -> float:
             values, powers = work.exact(antennas, pulse, f, beam)
             wanted[:, inside] += values * factor
             power[:, inside] += powers * np.abs(factor) ** 2
-        made = samples[pulse, sender, receiver][:, some]
+        made = samples[pulse][sender, receiver][:, some]
         sums += [np.sum(np.abs(made - wanted) ** 2), np.sum(np.abs(wanted) ** 2), power.sum()]
     return float(np.sqrt(sums[0] / max(sums[1], sums[2]))) if sums[0] else 0.0

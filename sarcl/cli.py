@@ -84,6 +84,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
         help="focus too and write .png or .h5; repeatable (default, where there is a grid: FILE.png)",
     )
     p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
+    p.add_argument("--dry-run", action="store_true", help="say what the echoes will take, and write nothing")
     p.add_argument(
         "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
     )

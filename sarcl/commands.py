@@ -87,9 +87,16 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
         options["tolerance"] = args.tolerance
-    raw = scenario.simulate(**options, progress=job.progress)
-    job.check()
-    raw.save(output)
+    if args.dry_run:
+        print(scenario.plan(**options))
+        return 0
+    if scenario.noise is None:  # pulse after pulse into the file
+        raw = scenario.simulate(**options, out=output, progress=job.progress)
+        job.check()
+    else:
+        raw = scenario.simulate(**options, progress=job.progress)
+        job.check()
+        raw.save(output)
     _say_report("echo", raw.report, job)
     job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
     if images:

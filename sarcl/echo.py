@@ -12,8 +12,9 @@ from .array import AntennaArray
 from .array_echo import array_echo
 from .channels import is_single
 from .check import array as numbers
-from .check import choice, count, direction, instance, sealed
+from .check import choice, count, direction, instance
 from .check import tolerance as allowed_error
+from .echo_target import Target
 from .echo_work import Order, Progress, Work
 from .facets import POLARIZATIONS
 from .geometry import Antennas
@@ -47,6 +48,7 @@ def echo(
     compressed: bool = True,
     max_edge: float | str | None = "auto",
     max_bytes: float | None = None,
+    out: Any = None,
     tolerance: float = 1e-3,
     check: bool | None = None,
     device: Any = None,
@@ -82,7 +84,8 @@ def echo(
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
                   resolution cell too; None: left as they are
-    max_bytes     memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
+    max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU
+    out           a file of sarcl's (.h5): samples are written there pulse after pulse, and read as they are needed
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
     check         recompute 256 random samples exactly; None: where that costs less than 2 %
@@ -112,11 +115,10 @@ def echo(
         if not is_single(array):
             return array_echo(
                 array, scene, given, waveform, track, receiver, point, range_window, weights, order,
-                channels=channels, receive=receive, compressed=compressed, check=check,
+                channels=channels, receive=receive, compressed=compressed, check=check, out=out,
             )  # fmt: skip
     near, far = echo_rows.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_rows.sampling(waveform, near, far, compressed)
-    samples = echo_rows.zeros(len(tx), len(order.polarizations), n_samples, near, far)
     rows = np.ones(len(tx))
     antennas = Antennas(
         tx=tx,
@@ -127,48 +129,55 @@ def echo(
         near=near * rows,
         far=far * rows,
     )
-    if progress:
-        progress("scene", 0, 3)
-    work = Work(order, given, scene, waveform, antennas, weights)
-    frequencies = frequency + step * np.arange(n_samples)
-    work.add(antennas, waveform, frequencies, samples, work.scatterers * len(tx))
-    work.must_show(near, far)
-    pulse = waveform.pulse_spectrum(frequencies)
-    spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
-    samples *= spectrum.astype(np.complex64)
-    order.clock.lap("spectra")
-    measured = work.measured(antennas, frequencies, spectrum, samples, check)
     n = len(order.polarizations)
+    with Target((len(tx), n, n_samples), out, order.budget, (near, far)) as target:
+        frequencies = frequency + step * np.arange(n_samples)
+        pulse = waveform.pulse_spectrum(frequencies)
+        if progress:
+            progress("scene", 0, 3)
+        work, worst = Work(order, given, scene, waveform, antennas, weights), 0.0
+        spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
+        for start in range(0, len(tx), target.pulses):
+            at = slice(start, min(start + target.pulses, len(tx)))
+            block = target.block(start, at.stop)
+            some = antennas.picked(np.arange(start, at.stop))
+            beam = work.weights.seen_from(some.tx, some.tx if some.rx is None else some.rx, at)
+            work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start, beam)
+            worst = max(worst, work.predicted_error)
+            block *= spectrum.astype(np.complex64)
+            target.keep(start, block)
+        work.must_show(near, far)
+        order.clock.lap("spectra")
+        measured = work.measured(antennas, frequencies, spectrum, target, check)
 
-    def every(values: Any) -> Any:
-        return values if n == 1 or values is None else np.repeat(values, n, axis=0)
+        def every(values: Any) -> Any:
+            return values if n == 1 or values is None else np.repeat(values, n, axis=0)
 
-    velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
-    return PhaseHistory(
-        sealed(samples.reshape(-1, n_samples)),
-        frequency=frequency,
-        frequency_step=step,
-        tx=every(tx),
-        rx=None if receiver is None else every(rx),
-        reference_range=every(reference_range),
-        time=every(track.times),
-        polarization=np.tile(order.polarizations, len(tx)),
-        tx_velocity=every(velocities[0]),
-        rx_velocity=every(velocities[1]),
-        waveform=waveform,
-        array=array,
-        compressed=compressed,
-        report=Report(
-            plan=work.plan(),
-            tolerance=order.tolerance,
-            predicted_error=work.predicted_error,
-            measured_error=measured,
-            **work.counted(),
-            seconds=order.clock.seconds,
-            device=opened.info.name,
-            seed=seed,
-        ),
-    )
+        velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
+        return target.finish(
+            frequency=frequency,
+            frequency_step=step,
+            tx=every(tx),
+            rx=None if receiver is None else every(rx),
+            reference_range=every(reference_range),
+            time=every(track.times),
+            polarization=np.tile(order.polarizations, len(tx)),
+            tx_velocity=every(velocities[0]),
+            rx_velocity=every(velocities[1]),
+            waveform=waveform,
+            array=array,
+            compressed=compressed,
+            report=Report(
+                plan=work.plan(),
+                tolerance=order.tolerance,
+                predicted_error=worst,
+                measured_error=measured,
+                **work.counted(),
+                seconds=order.clock.seconds,
+                device=opened.info.name,
+                seed=seed,
+            ),
+        )
 
 
 def _polarizations(asked: Any) -> tuple[str, ...]:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from typing import Any
 
 import numpy as np
 
@@ -15,7 +16,7 @@ from .scatterers import Points
 
 def measure_error(
     points: Points | None, facets: Facets | None, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray,
-    samples: np.ndarray, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
+    samples: Any, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
 ) -> float:  # fmt: skip
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of 16 where
     there are more than 20 000 facets, of 4 where there are more than 2 million.

@@ -7,7 +7,6 @@ from typing import Any
 import numpy as np
 
 from .check import SPEED_OF_LIGHT, finite, instance
-from .cl import size_text
 from .scene import Scene
 from .trajectory import Trajectory
 from .triangles import corners
@@ -61,15 +60,3 @@ def sampling(waveform: Waveform, near: float, far: float, compressed: bool) -> t
     n_samples = max(1, int(np.ceil(period * waveform.bandwidth * (1 - 1e-12))))
     step = waveform.bandwidth / n_samples
     return waveform.center - waveform.bandwidth / 2 + step / 2, step, n_samples
-
-
-def zeros(n_pulses: int, n_polarizations: int, n_samples: int, near: float, far: float) -> np.ndarray:
-    """Samples to add to, complex64; MemoryError says how many bytes they would take."""
-    try:
-        return np.zeros((n_pulses, n_polarizations, n_samples), np.complex64)
-    except (MemoryError, ValueError):
-        raise MemoryError(
-            f"echoes of {n_pulses} pulses x {n_polarizations} polarisations x {n_samples} samples need "
-            f"{size_text(8.0 * n_samples * n_pulses * n_polarizations)}, more "
-            f"than there is; narrow range_window (now {near:g} to {far:g} m) or split the track"
-        ) from None

@@ -203,7 +203,7 @@ class Work:
         return out[0], out[1].real
 
     def measured(
-        self, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray, samples: np.ndarray,
+        self, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any,
         check: bool | None,
     ) -> float | None:  # fmt: skip
         """Error of a channel's samples, where it is asked for, or costs next to nothing."""

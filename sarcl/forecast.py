@@ -45,10 +45,10 @@ class Forecast:
     cheaper: tuple[float, float] | None
 
     def __str__(self) -> str:
-        text = f"{self.method}: about {_duration(self.seconds)}, {cl.size_text(self.bytes)}"
+        text = f"{self.method}: about {duration(self.seconds)}, {cl.size_text(self.bytes)}"
         text += f", error below {self.predicted_error:.1e}"
         if self.cheaper:
-            text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {_duration(self.cheaper[1])})"
+            text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
         return text
 
 
@@ -164,7 +164,7 @@ def _speed(device: cl.Device) -> float:
         side *= 2
 
 
-def _duration(seconds: float) -> str:
+def duration(seconds: float) -> str:
     """Seconds as text a person reads."""
     if seconds < 120:
         return f"{seconds:.2g} s"

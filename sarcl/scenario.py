@@ -5,7 +5,7 @@ from __future__ import annotations
 import inspect
 import re
 import tomllib
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
@@ -18,6 +18,7 @@ from .schema import Where
 
 if TYPE_CHECKING:
     from .array import AntennaArray
+    from .echo_forecast import EchoForecast
     from .grid import ImageGrid
     from .image import Image
     from .phase_history import PhaseHistory
@@ -163,14 +164,7 @@ class Scenario:
         """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
         import sarcl
 
-        self._check_focus()
-        pieces = (self.build_scene(), self.build_waveform(), self.build_track())
-        given = self._options("echo", options)
-        with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
-            raw = sarcl.echo(
-                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), array=self.build_array(),
-                radar=self.build_radar(), **given,
-            )  # fmt: skip
+        raw = self._echo(sarcl.echo, options)
         if self.noise is None:
             return raw
         level = self._options("noise", {})
@@ -178,6 +172,22 @@ class Scenario:
             level.setdefault("grid", None if "cell_area" in level else self.build_grid())
         with self.where.blame(("noise",), level):
             return sarcl.add_noise(raw, **level)
+
+    def plan(self, **options: Any) -> EchoForecast:
+        """What `simulate` with these options will take: rows, bytes, time, error."""
+        import sarcl
+
+        return self._echo(sarcl.plan_echo, options)
+
+    def _echo(self, verb: Callable[..., Any], options: dict[str, Any]) -> Any:
+        self._check_focus()
+        pieces = (self.build_scene(), self.build_waveform(), self.build_track())
+        given = self._options("echo", options)
+        with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
+            return verb(
+                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), array=self.build_array(),
+                radar=self.build_radar(), **given,
+            )  # fmt: skip
 
     def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Any) -> Image:
         """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""

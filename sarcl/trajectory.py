@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -48,6 +48,12 @@ class Trajectory:
 
     def __len__(self) -> int:
         return len(self.times)
+
+    def picked(self, pulses: Any) -> Trajectory:
+        """These pulses, a slice or numbers in order."""
+        whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        some: dict[str, Any] = {name: None if value is None else value[pulses] for name, value in whole.items()}
+        return replace(self, **some)
 
     @classmethod
     def line(cls, *, start: Any, velocity: Any, prf: float, n_pulses: int) -> Trajectory:

@@ -8,21 +8,15 @@ asked for.
 
 from __future__ import annotations
 
-import errno
-import logging
-import os
-import re
-import shutil
-from collections.abc import Iterator
-from contextlib import contextmanager
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
 from . import hdf5, paths
+from .unfinished import Unfinished
 
-log = logging.getLogger(__name__)
+ROW_BYTES = 130  # of a row: its geometry, numbers and the name of its polarisation
 
 if TYPE_CHECKING:
     from ..grid import ImageGrid
@@ -38,31 +32,33 @@ def save_phase_history(raw: PhaseHistory, path: Any) -> None:
     """
     import h5py
 
-    from ..phase_history import PER_ROW
-
     dtype = np.dtype(raw.samples.dtype)
     with (
         paths.atomic(path, raw.n_rows * raw.n_samples * dtype.itemsize) as part,
         h5py.File(part, "w") as file,
     ):
         hdf5.sign(file, "phase_history")
-        for name in ("frequency", "frequency_step", "reference_range", "tx", *PER_ROW):
-            hdf5.put(file, name, getattr(raw, name))
-        if raw.rx is not raw.tx:
-            hdf5.put(file, "rx", raw.rx)
-        file.attrs["compressed"] = bool(raw.compressed)
-        if raw.waveform is not None:
-            group = file.create_group("waveform")
-            for name in raw.waveform.__dataclass_fields__:
-                hdf5.put(group, name, getattr(raw.waveform, name))
-        if raw.array is not None:
-            group = file.create_group("array")
-            for name in raw.array.__dataclass_fields__:
-                hdf5.put(group, name, getattr(raw.array, name))
-        hdf5.put_report(file, raw.report)
+        _put_phase_history(file, raw)
         samples = file.create_dataset("samples", (raw.n_rows, raw.n_samples), dtype)
         for a, b in hdf5.blocks(samples):
             samples[a:b] = raw.read(a, b)
+
+
+def _put_phase_history(file: Any, raw: PhaseHistory) -> None:
+    """All but the samples."""
+    from ..phase_history import PER_ROW
+
+    for name in ("frequency", "frequency_step", "reference_range", "tx", *PER_ROW):
+        hdf5.put(file, name, getattr(raw, name))
+    if raw.rx is not raw.tx:
+        hdf5.put(file, "rx", raw.rx)
+    file.attrs["compressed"] = bool(raw.compressed)
+    for name, noun in (("waveform", raw.waveform), ("array", raw.array)):
+        if noun is not None:
+            group = file.create_group(name)
+            for field in noun.__dataclass_fields__:
+                hdf5.put(group, field, getattr(noun, field))
+    hdf5.put_report(file, raw.report)
 
 
 def save_image(image: Image, path: Any) -> None:
@@ -108,55 +104,27 @@ class ImageWriter:
 
     data   of the grid's shape and dtype, read and written in slices like an h5py.Dataset, zero until written; write
            whole rows where you can
-    A write that fails, on a full disk, raises OSError with what would do.
     finish(...) puts the file in its place; abandon() removes it. As a context manager it abandons what was
     not finished. With `claim`, one run at a time makes this file, and takes over what a killed one left.
     """
 
     def __init__(self, path: Any, grid: ImageGrid, dtype: Any, claim: bool = False) -> None:
-        import h5py
-
         self.path, self.grid = Path(path), grid
-        dtype = np.dtype(dtype)
-        nbytes = self._wanted = grid.size * dtype.itemsize
-        self._part: Path | None
-        self._lock: int | None
-        self._part, self._lock = paths.claim(path, nbytes) if claim else (paths.begin(path, nbytes), None)
+        self._made = Unfinished(path, "image", grid.size * np.dtype(dtype).itemsize, claim)
         try:
-            with self._writing():
-                # our own lock is held already, and HDF5's would collide with it
-                self._file = h5py.File(self._part, "w", locking=False if claim else None)
-                hdf5.sign(self._file, "image")
-                group = self._file.create_group("grid")
+            with self._made.writing():
+                group = self._made.file.create_group("grid")
                 for name in grid.__dataclass_fields__:
                     hdf5.put(group, name, getattr(grid, name))
-                self.data = _Pixels(self, self._file.create_dataset("data", tuple(grid.shape), dtype))
+            self.data = self._made.dataset("data", tuple(grid.shape), dtype)
         except BaseException:
             self.abandon()
             raise
 
-    @contextmanager
-    def _writing(self) -> Iterator[None]:
-        """Turn what HDF5 says of a failed write into what to do about it."""
-        try:
-            yield
-        except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
-            found = re.search(r"errno = (\d+)", str(exc))
-            number = int(found[1]) if found else getattr(exc, "errno", None)
-            why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
-            free, wanted = shutil.disk_usage(self.path.parent or ".").free, self._wanted
-            room = "raise the limit on files' sizes (ulimit -f)" if number == errno.EFBIG else "make room there"
-            remedy = f"{room} for {wanted / 1e9:.2f} GB and give the same call again"
-            if self._lock is not None:
-                remedy += "; it goes on from its tiles where some were kept"
-            text = f"cannot write {str(self.path)!r}: {why}; the image needs {wanted / 1e9:.2f} GB, its disk has "
-            text += f"{free / 1e9:.2f} GB free: {remedy}"
-            raise OSError(text) from exc
-
     def mark(self, job: str) -> None:
         """Note which job made this file, for `job_of`."""
-        with self._writing():
-            self._file.attrs["job"] = job
+        with self._made.writing():
+            self._made.file.attrs["job"] = job
 
     def finish(
         self, *, gain: float = 1.0, frequency: Any = None, tx: Any = None, rx: Any = None, report: Any = None
@@ -170,39 +138,22 @@ class ImageWriter:
         """Complete the file and move it to its path."""
         from ..image import Image
 
-        if self._part is None:
+        if not self._made.is_open:
             raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
         try:
             image = Image(self.data, self.grid, **fields)  # checks the fields
-            with self._writing():
+            with self._made.writing():
                 for name in ("gain", "frequency", "tx", "rx"):
-                    hdf5.put(self._file, name, getattr(image, name))
-                hdf5.put_report(self._file, image.report)
-                self._file.close()
-            paths.commit(self._part, self.path)
-            self._part = None
-            self._unlock()
+                    hdf5.put(self._made.file, name, getattr(image, name))
+                hdf5.put_report(self._made.file, image.report)
+            self._made.commit()
         except BaseException:
             self.abandon()
             raise
 
     def abandon(self) -> None:
         """Remove the unfinished file; `path` is as it was. Nothing happens after `finish`."""
-        if self._part is not None:
-            part, self._part = self._part, None
-            try:
-                if hasattr(self, "_file"):
-                    self._file.close()
-            except (OSError, RuntimeError) as exc:  # HDF5 cannot write what it still holds: nobody wants it
-                log.debug("%s could not be closed in order: %s", part, exc)
-            finally:
-                part.unlink(missing_ok=True)
-                self._unlock()
-
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
+        self._made.abandon()
 
     def __enter__(self) -> ImageWriter:
         return self
@@ -211,19 +162,36 @@ class ImageWriter:
         self.abandon()
 
 
-class _Pixels:
-    """The dataset of an image in the making."""
+class EchoWriter:
+    """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `finish` or `abandon`."""
 
-    def __init__(self, writer: ImageWriter, dataset: Any) -> None:
-        self.writer, self.dataset = writer, dataset
-        self.shape, self.dtype = dataset.shape, dataset.dtype
+    def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
+        self.path = Path(path)
+        # beside its samples, a row's geometry and numbers take about as much as this
+        self._made = Unfinished(path, "phase_history", n_rows * (n_samples * np.dtype(dtype).itemsize + ROW_BYTES))
+        try:
+            self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
+        except BaseException:
+            self.abandon()
+            raise
 
-    def __getitem__(self, at: Any) -> Any:
-        return self.dataset[at]
+    def finish(self, **fields: Any) -> PhaseHistory:
+        """Complete the file with the other fields of a PhaseHistory, and return that, read as it is needed."""
+        from ..phase_history import PhaseHistory
 
-    def __setitem__(self, at: Any, values: Any) -> None:
-        with self.writer._writing():
-            self.dataset[at] = values
+        try:
+            with self._made.writing():
+                _put_phase_history(self._made.file, PhaseHistory(self.samples, **fields))
+            self._made.commit()
+        except BaseException:
+            self.abandon()
+            raise
+        raw: Any = load(self.path)
+        return raw
+
+    def abandon(self) -> None:
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `finish`."""
+        self._made.abandon()
 
 
 def image_writer(path: Any, grid: ImageGrid, dtype: Any = np.complex64, claim: bool = False) -> ImageWriter:

@@ -1,0 +1,90 @@
+"""What echoes will take before they are made: rows, bytes, time, error."""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from . import check, cl, echo_rows, forecast
+from .array import AntennaArray
+from .echo import echo
+from .files import store
+from .scene import Scene
+from .trajectory import Trajectory
+from .waveform import Waveform
+
+FEW, MORE = 8, 40  # pulses from the middle of the track that are really made
+
+
+@dataclass(frozen=True, eq=False)
+class EchoForecast:
+    """What `echo` would do with the same arguments.
+
+    n_rows, n_samples  of the phase history;  bytes  of its samples and geometry, in a file or in memory
+    seconds            about, on this device as fast as it is now
+    contributions      pairs of scatterer, pulse and channel that will be added up, about
+    plan               as in the report;  predicted_error  bound of the relative error
+    """
+
+    n_rows: int
+    n_samples: int
+    bytes: float
+    seconds: float
+    contributions: float
+    plan: dict[str, Any]
+    predicted_error: float
+
+    def __str__(self) -> str:
+        text = f"{self.n_rows} rows of {self.n_samples} samples: {cl.size_text(self.bytes)}, "
+        text += f"about {forecast.duration(self.seconds)}, error below {self.predicted_error:.1e}"
+        return text
+
+
+def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Any) -> EchoForecast:
+    """How `echo(scene, waveform, track, ...)` would go with these options: an EchoForecast, before any of it is kept.
+
+    Up to 40 pulses from the middle of the track are made, and timed. Raises what `echo` would, `out` is not touched.
+    """
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        check.instance(name, value, kind)
+    receiver, array = options.get("receiver"), options.get("array")
+    given = {k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")}
+    real, rx = scene.realized(options.get("seed", 0)), echo_rows.receiver_positions(track, receiver)
+    point = scene.center if options.get("reference") is None else np.asarray(options["reference"], float)
+    reference_range = echo_rows.half_path(track.positions, rx, point)
+    window = echo_rows.window(
+        real, waveform, track.positions, rx, reference_range, options.get("range_window")
+    )  # of the whole track
+
+    def made(n: int) -> tuple[float, Any]:
+        first = (len(track) - n) // 2
+        at = slice(first, first + n)
+        some = array
+        if isinstance(array, AntennaArray) and array.plan is not None and len(array.plan) == len(track):
+            some = replace(array, plan=array.plan[at])
+        start = time.perf_counter()
+        raw = echo(
+            scene, waveform, track.picked(at), receiver=None if receiver is None else receiver.picked(at), array=some,
+            check=False, **{**given, "reference": point, "range_window": window},
+        )  # fmt: skip
+        return time.perf_counter() - start, raw
+
+    quiet = logging.getLogger("sarcl.echo_target")
+    level = quiet.level
+    quiet.setLevel(logging.WARNING)  # these few pulses are not what was asked for
+    try:
+        few, more = min(FEW, len(track)), min(MORE, len(track))
+        made(few)  # builds kernels
+        (once, _), (longer, raw) = made(few), made(more)
+    finally:
+        quiet.setLevel(level)
+    slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more
+    rows = raw.n_rows // more * len(track)
+    return EchoForecast(
+        rows, raw.n_samples, rows * (8.0 * raw.n_samples + store.ROW_BYTES), longer + slope * (len(track) - more),
+        raw.report.contributions_done / more * len(track), dict(raw.report.plan), raw.report.predicted_error,
+    )  # fmt: skip
