@@ -1,129 +1,29 @@
 """Experiments on frequency-diverse apertures: what a mapping does to a point, to its neighbours, and to the data.
 
-Every case is collected once, mapped in every way asked for, and set beside a conventional antenna at the array's mean
-phase centre with the same band and track. What is measured: docs/fda.md.
+Every case is collected once, mapped in every way asked for, and set beside a conventional antenna with the same phase
+centres, band and track. What is flown: fda_case.py; what is measured: docs/fda.md.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
-from . import check
-from .aperture import MAPPINGS, map_aperture
-from .array import AntennaArray
+from .aperture import map_aperture
 from .check import SPEED_OF_LIGHT
-from .echo import echo
+from .fda_case import RAW, Case
+from .fda_sweep import sweep
 from .phase_history import PhaseHistory
-from .scene import Scene
-from .trajectory import Trajectory
-from .waveform import Waveform
 
-CONVENTIONAL, RAW = "conventional", "unmodified"
+__all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "run", "spatial_frequencies", "sweep"]
+
+CONVENTIONAL = "conventional"
 STEPS = 24  # places in a null width of the conventional aperture
 DRAWN = 2000  # spatial frequencies
 REACH = 12.0  # null widths on each side of a cut
-
-
-@dataclass(frozen=True)
-class Case:
-    """A linear array with a linear frequency progression on a straight, broadside, level track.
-
-    n, spacing m, frequency_step Hz   elements at -i spacing along the track, as Farooq's; spacing None: half a wave of
-                                      the centre frequency
-    center                            f0, Hz;  distance m;  aperture m;  n_pulses
-    mirrored                          the progression changes sign at mid-aperture, the centre frequency stays
-    mappings                          of `sarcl.map_aperture`, and "unmodified"
-    points                            cross-range places of lone points, m
-    separations                       of two points about the centre, m
-    """
-
-    name: str
-    n: int = 45
-    frequency_step: float = 20e6
-    center: float = 10e9
-    spacing: float | None = None
-    distance: float = 5e3
-    aperture: float = 430.0
-    n_pulses: int = 431
-    mirrored: bool = True
-    mappings: tuple[str, ...] = ("unmodified", "corrected", "apparent", "channels")
-    points: tuple[float, ...] = (0.0, 2.0, 2.25)
-    separations: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25)
-
-    def __post_init__(self) -> None:
-        for name in ("n", "n_pulses"):
-            object.__setattr__(self, name, check.count(name, getattr(self, name), 2))
-        for name in ("center", "distance", "aperture"):
-            object.__setattr__(self, name, check.number(name, getattr(self, name), above=0))
-        object.__setattr__(self, "frequency_step", check.number("frequency_step", self.frequency_step))
-        if self.frequency_step == 0:
-            raise ValueError(
-                "frequency_step is 0: a constant-frequency array has nothing to map; the conventional antenna that is "
-                "run beside every case is that"
-            )
-        if self.spacing is not None:
-            object.__setattr__(self, "spacing", check.number("spacing", self.spacing, above=0))
-        for name in ("points", "separations"):
-            values = check.array(name, getattr(self, name), np.float64, ("n",))
-            object.__setattr__(self, name, tuple(values.tolist()))
-        if any(s <= 0 for s in self.separations):
-            raise ValueError(f"separations are {self.separations}; two points need to be some way apart")
-        for mapping in self.mappings:
-            check.choice("mappings", mapping, (RAW, *MAPPINGS))
-
-    @property
-    def bandwidth(self) -> float:
-        """n |frequency_step|, Hz."""
-        return self.n * abs(self.frequency_step)
-
-    @property
-    def middle(self) -> float:
-        """Centre frequency, Hz."""
-        return self.center + (self.n - 1) / 2 * self.frequency_step
-
-    @property
-    def step(self) -> float:
-        """Spacing of the elements, m."""
-        return SPEED_OF_LIGHT / self.middle / 2 if self.spacing is None else self.spacing
-
-    @property
-    def null(self) -> float:
-        """How far the first null of the conventional aperture lies off the peak, m."""
-        return SPEED_OF_LIGHT / self.middle * self.distance / (2 * self.aperture)
-
-    def track(self) -> Trajectory:
-        """Along y, the scene at +x."""
-        y = self.aperture * (np.arange(self.n_pulses) / (self.n_pulses - 1) - 0.5)
-        return Trajectory(np.arange(self.n_pulses), np.stack([np.full(len(y), -self.distance), y, 0 * y], axis=1))
-
-    def array(self) -> AntennaArray:
-        """The array, over all pulses."""
-        made = AntennaArray.linear(self.n, spacing=self.step, frequency_step=self.frequency_step, axis=(0.0, -1.0, 0.0))
-        return made.mirrored(self.n_pulses // 2, self.n_pulses) if self.mirrored else made
-
-    def collect(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
-        """Echoes of unit points at (0, y, 0), channels added up at the reference element."""
-        tone = Waveform.tone(center=self.center, duration=1 / abs(self.frequency_step))
-        window = 0.49 * SPEED_OF_LIGHT / (2 * abs(self.frequency_step))
-        return echo(
-            _points(places), tone, self.track(), array=self.array(), reference=(0, 0, 0),
-            range_window=(-window, window), tolerance=1e-4, device=device,
-        )  # fmt: skip
-
-    def conventional(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
-        """The same points as one antenna at the mean phase centre sees them, with a chirp of the same band."""
-        track = self.track()
-        mean = np.array([0.0, -(self.n - 1) / 4 * self.step, 0.0])  # of sender and receiver
-        chirp = Waveform.chirp(center=self.middle, bandwidth=self.bandwidth, duration=1 / abs(self.frequency_step))
-        window = 0.49 * SPEED_OF_LIGHT / (2 * abs(self.frequency_step))
-        return echo(
-            _points(places), chirp, replace(track, positions=track.positions + mean), reference=(0, 0, 0),
-            range_window=(-window, window), tolerance=1e-4, device=device,
-        )  # fmt: skip
+RESOLVED = 3.0  # dB between two points that are told apart
 
 
 def run(
@@ -141,8 +41,12 @@ def run(
 
 
 def measure(case: Case, device: Any = None) -> dict[str, Any]:
-    """Responses at every place, dips at every separation and the data's support, of every mapping."""
-    names = (CONVENTIONAL, *case.mappings)
+    """Responses at every place, dips at every separation and the data's support, of every mapping that applies.
+
+    "not_applicable" holds the others, with the reason. "collected" is the support of the channels themselves.
+    """
+    names, refused = (CONVENTIONAL, *case.mappings), _not_applicable(case, device)
+    names = tuple(name for name in names if name not in refused)
     rows: dict[str, dict[str, Any]] = {name: {"points": [], "dips": []} for name in names}
     for y in case.points:
         for name, raw in _mapped(case, [y], names, device):
@@ -156,18 +60,35 @@ def measure(case: Case, device: Any = None) -> dict[str, Any]:
             rows[name]["dips"].append({"separation": separation, "dip_db": dip(at, values, separation)})
     setting = {name: getattr(case, name) for name in Case.__dataclass_fields__}
     derived = {"bandwidth": case.bandwidth, "middle": case.middle, "spacing": case.step, "null": case.null}
-    return {**setting, **derived, "mapped": rows}
+    more = {"swept": dict(case.swept), "is_wide": case.is_wide, "not_applicable": refused, "collected": collected(case)}
+    return {**setting, **derived, **more, "mapped": rows}
+
+
+def _not_applicable(case: Case, device: Any) -> dict[str, str]:
+    """Mappings that these data cannot be mapped by, and why."""
+    out = {}
+    raw = case.collect(case.points[:1], device)
+    for name in case.mappings:
+        try:
+            _map(case, raw, name)
+        except ValueError as exc:
+            out[name] = str(exc)
+    return out
+
+
+def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
+    if raw.tx_channel is not None and name in (RAW, "channels"):
+        if name == RAW:
+            raise ValueError("every row holds its own channel's place and carrier as it is: that is 'channels'")
+        return raw
+    return raw if name == RAW else map_aperture(raw, name, attitude=case.track().attitude)
 
 
 def _mapped(case: Case, places: Sequence[float], names: Sequence[str], device: Any) -> list[tuple[str, PhaseHistory]]:
     raw = case.collect(places, device)
-    out = []
-    for name in names:
-        if name == CONVENTIONAL:
-            out.append((name, case.conventional(places, device)))
-        else:
-            out.append((name, raw if name == RAW else map_aperture(raw, name)))
-    return out
+    return [
+        (name, case.conventional(places, device) if name == CONVENTIONAL else _map(case, raw, name)) for name in names
+    ]
 
 
 def cut(raw: PhaseHistory, case: Case, y: float, device: Any = None) -> tuple[np.ndarray, np.ndarray]:
@@ -219,25 +140,44 @@ def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
 
 
 def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:
-    """Lengths of the positions backprojected from, and the spatial frequencies they claim, turns/m."""
-    y = raw.tx[:, 1]
-    support = spatial_frequencies(raw)
-    across = support[:, 1]
+    """Lengths of the phase centres backprojected from, and the spatial frequencies that they claim, turns/m."""
+    centers = (raw.tx + raw.rx) / 2
+    if case.path == "line":
+        along = centers @ case.ahead
+    else:
+        along = case.ground * np.arctan2(centers[:, 1], -centers[:, 0])
     return {
-        "length": float(np.ptp(y)),
-        "gap": float(np.diff(np.unique(np.round(y, 6))).max(initial=0.0)),
-        "claimed": float(np.ptp(across)),
-        "support": np.random.default_rng(0).permutation(support)[:DRAWN].round(4).tolist(),
+        "length": float(np.ptp(along)),
+        "gap": float(np.diff(np.unique(np.round(along, 6))).max(initial=0.0)),
+        **_support(spatial_frequencies(raw)),
     }
+
+
+def _support(found: np.ndarray) -> dict[str, Any]:
+    some = np.random.default_rng(0).permutation(found)[:DRAWN]
+    return {"claimed": float(np.ptp(found[:, 1])), "support": some.round(4).tolist()}
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
     """K = f/c (u_T + u_R) at the origin, of up to `most` samples of every row, turns/m (n, 2): along x and y."""
     some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
-    look = sum(end / np.linalg.norm(end, axis=1, keepdims=True) for end in (raw.tx, raw.rx))
+    look = _unit(raw.tx) + _unit(raw.rx)
     return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
 
 
-def _points(places: Sequence[float]) -> Scene:
-    return Scene.points([[0.0, y, 0.0] for y in places])
+def collected(case: Case, most: int = 101) -> dict[str, Any]:
+    """Spread across, turns/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
+    pulses."""
+    array, track = case.channels(), case.track()
+    pulses = np.unique(np.linspace(0, case.n_pulses - 1, most).astype(int))
+    turn = np.eye(3)[None] if track.attitude is None else track.attitude[pulses]
+    tx = track.positions[pulses, None] + np.einsum("pij,nj->pni", turn, array.positions)
+    f = case.center + np.stack([array.offsets_at(int(p)) for p in pulses])
+    ends = {"reference": track.positions[pulses, None, None], "own": tx[:, :, None], "all": tx[:, None]}
+    look = _unit(tx)[:, :, None] + _unit(ends[case.receive])
+    return _support((f[:, :, None, None] / SPEED_OF_LIGHT * look[..., :2]).reshape(-1, 2))
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
