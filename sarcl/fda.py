@@ -176,7 +176,7 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, flo
 def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = RESOLVED) -> float | None:
     """The smallest separation, m, from which on two points are told apart; None: not even at the largest.
 
-    That is a dip of `least` dB, peaks within a quarter of the null width, m, of the points, no other within 3 dB of them.
+    That is a dip of `least` dB, peaks within a quarter of the null width, m, of the points, no other within 3 dB.
     """
     out = None
     for row in sorted(dips, key=lambda d: -d["separation"]):

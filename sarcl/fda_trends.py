@@ -10,6 +10,7 @@ import numpy as np
 from . import page
 from .fda import CONVENTIONAL, nearer
 from .fda_sweep import UNITS, shown
+from .fda_words import at_most
 
 DECADE = 20.0  # ratio of values from which on their logarithm is drawn
 Result = Mapping[str, Any]
@@ -73,8 +74,8 @@ def words(cases: Sequence[Result]) -> list[str]:
         some = "" if len(there) == len(cases) else f" (it applies to {len(there)} of {len(cases)} cases)"
         out.append(
             f"{name}{some}: nulls of the first point {_range(rows, 0)} m out (conventional {_range(plain, 0)}), "
-            f"highest side lobes {_range(rows, 2)} dB (conventional {_range(plain, 2)}), points displaced by up to "
-            f"{max(worst(row) for row in rows):.3f} m. Two points are told apart nearer together than by the "
+            f"highest side lobes {_range(rows, 2)} dB (conventional {_range(plain, 2)}), no point displaced by more "
+            f"than {at_most(max(worst(row) for row in rows))} m. Two points are told apart nearer together than by the "
             f"conventional antenna in {found.count(1)} of {len(there)} cases, from the same separation on in "
             f"{found.count(0)}, only farther apart or not at all in {found.count(-1)}, and by neither in "
             f"{found.count(None)}."
@@ -88,6 +89,7 @@ def _range(rows: Sequence[Mapping[str, Any]], quantity: int) -> str:
     if not found:
         return "nowhere"
     ends = [form.format(v) for v in (min(found), max(found))]
+    ends = [end if float(end) else end.lstrip("-") for end in ends]
     return ends[0] if ends[0] == ends[1] else " to ".join(ends)
 
 

@@ -97,7 +97,7 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
     if abs(worst["error"]) > 0.1 * usual["null"]:
         text += f"; the point at {worst['place']:g} m comes out {worst['error']:+.3f} m off"
     else:
-        text += f"; on its cut no point comes out more than {max(abs(worst['error']), 1e-3):.3f} m off"
+        text += f"; on its cut no point comes out more than {at_most(worst['error'])} m off"
     alike = nearer(row, plain, null) == 0 and row["told_apart"] != plain["told_apart"]
     same = ", with dips that differ by less than 0.2 dB" if alike else ""
     return (
@@ -108,6 +108,11 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
 def decibels(value: float) -> str:
     """With one decimal, and no minus before 0."""
     return f"{round(value, 1) + 0.0:.1f} dB"
+
+
+def at_most(length: float) -> str:
+    """Its modulus, m, rounded up to millimetres."""
+    return f"{max(np.ceil(1e3 * abs(length)), 1.0) / 1e3:.3f}"
 
 
 def _apart(row: Mapping[str, Any]) -> str:
