@@ -13,7 +13,7 @@ import numpy as np
 
 from .aperture import map_aperture
 from .check import SPEED_OF_LIGHT
-from .fda_case import RAW, Case
+from .fda_case import RAW, REACH, Case
 from .fda_sweep import sweep
 from .phase_history import PhaseHistory
 
@@ -22,7 +22,6 @@ __all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "
 CONVENTIONAL = "conventional"
 STEPS = 24  # places in a null width of the conventional aperture
 DRAWN = 2000  # spatial frequencies
-REACH = 12.0  # null widths on each side of a cut
 RESOLVED = 3.0  # dB between two points that are told apart
 ALIKE = 0.2  # dB by which dips may differ that say the same
 NEAR = 0.25  # of a null width: how far their peaks may stand from them

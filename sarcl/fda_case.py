@@ -22,6 +22,7 @@ from .waveform import Waveform
 
 RAW = "unmodified"
 PATHS = ("line", "circle")
+REACH = 12.0  # null widths on each side of a cut
 WIDE = 0.05  # of the aperture: phase centres spread over less widen nothing by more than a thousandth
 STEEPEST = 1.55  # rad of squint
 
@@ -88,8 +89,12 @@ class Case:
             self._put(name, tuple(values.tolist()))
         if any(s <= 0 for s in self.separations):
             raise ValueError(f"separations are {self.separations}; two points need to be some way apart")
-        if isinstance(self.mappings, str):
-            raise ValueError(f"mappings is {self.mappings!r}; give a list of them")
+        if not isinstance(self.name, str):
+            raise ValueError(f"name is {self.name!r:.60}; give a text")
+        if not isinstance(self.mirrored, bool):
+            raise ValueError(f"mirrored is {self.mirrored!r:.60}; give true or false")
+        if isinstance(self.mappings, str) or len(set(self.mappings)) < len(self.mappings):
+            raise ValueError(f"mappings is {self.mappings!r:.60}; give a list, each of them once")
         for mapping in self.mappings:
             check.choice("mappings", mapping, (RAW, *MAPPINGS))
         n, step = fda_array.size(self.progression, self.n, self.frequency_step)
@@ -133,7 +138,14 @@ class Case:
             )
 
     def _window(self) -> None:
-        """Refuse points whose echoes leave the range window: they would be gated out, pulse by pulse."""
+        """Refuse what would be measured wrongly: separations beyond the cut, and points whose echoes leave the range
+        window and would be gated out, pulse by pulse."""
+        reach = REACH * self.null
+        if max(self.separations) > reach:
+            raise ValueError(
+                f"separations reach {max(self.separations):g} m, but the cut {reach:.3g} m to each side, {REACH:g} "
+                "null widths; give smaller ones"
+            )
         track, centers = self.track(), self.phase_centers
         ends = [_moved(track, centers[i]).positions for i in (0, -1)]
         for y in (*self.points, *(s / 2 for s in self.separations), *(-s / 2 for s in self.separations)):

@@ -46,8 +46,6 @@ def load(path: Any) -> tuple[str, list[Case]]:
     for i, table in enumerate(given):
         where = f"{path}: case {i + 1}"
         fields = {"name": f"case {i + 1}", **_plain({**shared, **table}, (*KEYS, "name"), where)}
-        if not isinstance(fields.get("mirrored", True), bool):
-            raise ValueError(f"{where}: mirrored is {fields['mirrored']!r}; give true or false")
         try:
             if "sweep" in tables:
                 where = f"{path}: [sweep] of case {i + 1}"

@@ -182,7 +182,7 @@ def test_on_a_circle_the_centre_is_focused_as_it_is_and_the_mapping_narrows_it_a
 
 def test_steps_across_the_track_move_a_point_in_range_only():
     low, high = (rows_of(progression="vertical", height=h)[1] for h in (0.0, 300.0))
-    # at the height of the track nothing differs; above it, d sin(depression) f0/df in range, off the cut
+    # at the height of the track nothing differs; above it points move in range by 0.93 m, off the cut
     assert low["unmodified"]["level_db"] > -0.01 and high["unmodified"]["level_db"] < -10
     for name in ("corrected", "channels", "apparent"):
         assert high[name]["irw"] == pytest.approx(low["conventional"]["irw"], rel=0.01)
@@ -318,6 +318,10 @@ BAD = {
     "height = 5e3": "give less",
     "points = [500.0]": "one sample a channel",
     'mappings = "apparent"': "give a list",
+    'mappings = ["apparent", "apparent"]': "each of them once",
+    "name = 3": "give a text",
+    "separations = [2.1]": "the cut 2 m to each side",
+    "[sweep]\nmirrored = [true, 3]": "mirrored 3: mirrored is 3; give true or false",
     'receive = "some"': "choose one of",
     "series = 3": "unknown key 'series'",
     "[sweep]": "a sweep without keys",
