@@ -1,129 +1,30 @@
 """Experiments on frequency-diverse apertures: what a mapping does to a point, to its neighbours, and to the data.
 
-Every case is collected once, mapped in every way asked for, and set beside a conventional antenna at the array's mean
-phase centre with the same band and track. What is measured: docs/fda.md.
+Every case is collected once, mapped in every way asked for, and set beside a conventional antenna with the same phase
+centres, band and track. What is flown: fda_case.py; what is measured: docs/fda.md.
 """
 
 from __future__ import annotations
 
-from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from collections.abc import Callable, Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
 
-from . import check
-from .aperture import MAPPINGS, map_aperture
-from .array import AntennaArray
+from .aperture import map_aperture
 from .check import SPEED_OF_LIGHT
-from .echo import echo
+from .fda_case import RAW, REACH, Case
+from .fda_sweep import sweep
 from .phase_history import PhaseHistory
-from .scene import Scene
-from .trajectory import Trajectory
-from .waveform import Waveform
 
-CONVENTIONAL, RAW = "conventional", "unmodified"
+__all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "run", "sweep", "told_apart"]
+
+CONVENTIONAL = "conventional"
 STEPS = 24  # places in a null width of the conventional aperture
 DRAWN = 2000  # spatial frequencies
-REACH = 12.0  # null widths on each side of a cut
-
-
-@dataclass(frozen=True)
-class Case:
-    """A linear array with a linear frequency progression on a straight, broadside, level track.
-
-    n, spacing m, frequency_step Hz   elements at -i spacing along the track, as Farooq's; spacing None: half a wave of
-                                      the centre frequency
-    center                            f0, Hz;  distance m;  aperture m;  n_pulses
-    mirrored                          the progression changes sign at mid-aperture, the centre frequency stays
-    mappings                          of `sarcl.map_aperture`, and "unmodified"
-    points                            cross-range places of lone points, m
-    separations                       of two points about the centre, m
-    """
-
-    name: str
-    n: int = 45
-    frequency_step: float = 20e6
-    center: float = 10e9
-    spacing: float | None = None
-    distance: float = 5e3
-    aperture: float = 430.0
-    n_pulses: int = 431
-    mirrored: bool = True
-    mappings: tuple[str, ...] = ("unmodified", "corrected", "apparent", "channels")
-    points: tuple[float, ...] = (0.0, 2.0, 2.25)
-    separations: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25)
-
-    def __post_init__(self) -> None:
-        for name in ("n", "n_pulses"):
-            object.__setattr__(self, name, check.count(name, getattr(self, name), 2))
-        for name in ("center", "distance", "aperture"):
-            object.__setattr__(self, name, check.number(name, getattr(self, name), above=0))
-        object.__setattr__(self, "frequency_step", check.number("frequency_step", self.frequency_step))
-        if self.frequency_step == 0:
-            raise ValueError(
-                "frequency_step is 0: a constant-frequency array has nothing to map; the conventional antenna that is "
-                "run beside every case is that"
-            )
-        if self.spacing is not None:
-            object.__setattr__(self, "spacing", check.number("spacing", self.spacing, above=0))
-        for name in ("points", "separations"):
-            values = check.array(name, getattr(self, name), np.float64, ("n",))
-            object.__setattr__(self, name, tuple(values.tolist()))
-        if any(s <= 0 for s in self.separations):
-            raise ValueError(f"separations are {self.separations}; two points need to be some way apart")
-        for mapping in self.mappings:
-            check.choice("mappings", mapping, (RAW, *MAPPINGS))
-
-    @property
-    def bandwidth(self) -> float:
-        """n |frequency_step|, Hz."""
-        return self.n * abs(self.frequency_step)
-
-    @property
-    def middle(self) -> float:
-        """Centre frequency, Hz."""
-        return self.center + (self.n - 1) / 2 * self.frequency_step
-
-    @property
-    def step(self) -> float:
-        """Spacing of the elements, m."""
-        return SPEED_OF_LIGHT / self.middle / 2 if self.spacing is None else self.spacing
-
-    @property
-    def null(self) -> float:
-        """How far the first null of the conventional aperture lies off the peak, m."""
-        return SPEED_OF_LIGHT / self.middle * self.distance / (2 * self.aperture)
-
-    def track(self) -> Trajectory:
-        """Along y, the scene at +x."""
-        y = self.aperture * (np.arange(self.n_pulses) / (self.n_pulses - 1) - 0.5)
-        return Trajectory(np.arange(self.n_pulses), np.stack([np.full(len(y), -self.distance), y, 0 * y], axis=1))
-
-    def array(self) -> AntennaArray:
-        """The array, over all pulses."""
-        made = AntennaArray.linear(self.n, spacing=self.step, frequency_step=self.frequency_step, axis=(0.0, -1.0, 0.0))
-        return made.mirrored(self.n_pulses // 2, self.n_pulses) if self.mirrored else made
-
-    def collect(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
-        """Echoes of unit points at (0, y, 0), channels added up at the reference element."""
-        tone = Waveform.tone(center=self.center, duration=1 / abs(self.frequency_step))
-        window = 0.49 * SPEED_OF_LIGHT / (2 * abs(self.frequency_step))
-        return echo(
-            _points(places), tone, self.track(), array=self.array(), reference=(0, 0, 0),
-            range_window=(-window, window), tolerance=1e-4, device=device,
-        )  # fmt: skip
-
-    def conventional(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
-        """The same points as one antenna at the mean phase centre sees them, with a chirp of the same band."""
-        track = self.track()
-        mean = np.array([0.0, -(self.n - 1) / 4 * self.step, 0.0])  # of sender and receiver
-        chirp = Waveform.chirp(center=self.middle, bandwidth=self.bandwidth, duration=1 / abs(self.frequency_step))
-        window = 0.49 * SPEED_OF_LIGHT / (2 * abs(self.frequency_step))
-        return echo(
-            _points(places), chirp, replace(track, positions=track.positions + mean), reference=(0, 0, 0),
-            range_window=(-window, window), tolerance=1e-4, device=device,
-        )  # fmt: skip
+RESOLVED = 3.0  # dB between two points that are told apart
+ALIKE = 0.2  # dB by which dips may differ that say the same
+NEAR = 0.25  # of a null width: how far their peaks may stand from them
 
 
 def run(
@@ -141,33 +42,54 @@ def run(
 
 
 def measure(case: Case, device: Any = None) -> dict[str, Any]:
-    """Responses at every place, dips at every separation and the data's support, of every mapping."""
-    names = (CONVENTIONAL, *case.mappings)
-    rows: dict[str, dict[str, Any]] = {name: {"points": [], "dips": []} for name in names}
+    """Responses at every place, dips at every separation and the data's support, of every mapping that applies.
+
+    "not_applicable" holds the others, with the reason. "collected" is the support of the channels themselves.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    refused: dict[str, str] = {}
     for y in case.points:
-        for name, raw in _mapped(case, [y], names, device):
+        for name, raw in _mapped(case, [y], refused, device):
             at, values = cut(raw, case, y, device)
-            rows[name]["points"].append({"place": y, **response(at, values, y)})
-            if y == case.points[0]:
-                rows[name] |= _described(raw, case)
+            row = rows.setdefault(name, {"points": [], "dips": []})
+            row["points"].append({"place": y, **response(at, values, y)})
+            if len(row["points"]) == 1:
+                row |= _described(raw, case)
     for separation in case.separations:
-        for name, raw in _mapped(case, [-separation / 2, separation / 2], names, device):
+        for name, raw in _mapped(case, [-separation / 2, separation / 2], refused, device):
             at, values = cut(raw, case, 0.0, device)
-            rows[name]["dips"].append({"separation": separation, "dip_db": dip(at, values, separation)})
+            rows[name]["dips"].append({"separation": separation, **pair(at, values, separation)})
+    for row in rows.values():
+        row["told_apart"] = told_apart(row["dips"], case.null)
     setting = {name: getattr(case, name) for name in Case.__dataclass_fields__}
     derived = {"bandwidth": case.bandwidth, "middle": case.middle, "spacing": case.step, "null": case.null}
-    return {**setting, **derived, "mapped": rows}
+    more = {"swept": dict(case.swept), "is_wide": case.is_wide, "not_applicable": refused, "collected": collected(case)}
+    return {**setting, **derived, **more, "mapped": rows}
 
 
-def _mapped(case: Case, places: Sequence[float], names: Sequence[str], device: Any) -> list[tuple[str, PhaseHistory]]:
+def _mapped(
+    case: Case, places: Sequence[float], refused: dict[str, str], device: Any
+) -> Iterator[tuple[str, PhaseHistory]]:
+    """The conventional data and those of every mapping that applies; `refused` gains the others, with the reason."""
+    yield CONVENTIONAL, case.conventional(places, device)
     raw = case.collect(places, device)
-    out = []
-    for name in names:
-        if name == CONVENTIONAL:
-            out.append((name, case.conventional(places, device)))
+    for name in case.mappings:
+        if name in refused:
+            continue
+        try:
+            mapped = _map(case, raw, name)
+        except ValueError as exc:
+            refused[name] = str(exc)
         else:
-            out.append((name, raw if name == RAW else map_aperture(raw, name)))
-    return out
+            yield name, mapped
+
+
+def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
+    if raw.tx_channel is not None and name in (RAW, "channels"):
+        if name == RAW:
+            raise ValueError("every row holds its own channel's place and carrier as it is: that is 'channels'")
+        return raw
+    return raw if name == RAW else map_aperture(raw, name, attitude=case.track().attitude)
 
 
 def cut(raw: PhaseHistory, case: Case, y: float, device: Any = None) -> tuple[np.ndarray, np.ndarray]:
@@ -183,7 +105,10 @@ def cut(raw: PhaseHistory, case: Case, y: float, device: Any = None) -> tuple[np
 
 
 def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:
-    """Of one point: error of the peak's place and its level, null and half-power widths, m, PSLR and ISLR, dB."""
+    """Of one point: error of the peak's place and its level, null and half-power widths, m, PSLR and ISLR, dB.
+
+    "inside" is False where the highest value is the cut's first or last: what was measured is then no peak.
+    """
     from scipy.interpolate import CubicSpline
 
     fine = np.linspace(at[0], at[-1], 8 * len(at))
@@ -196,48 +121,125 @@ def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, floa
     half = np.flatnonzero(power[left : right + 1] >= power[peak] / 2) + left
     sides = np.concatenate([power[:left], power[right + 1 :]])
     return {
-        "error": float(fine[peak] - place),
+        "error": _vertex(fine, power, peak) - place,
         "level_db": float(10 * np.log10(power[peak])),
-        "null": float(fine[right] - fine[left]) / 2,
-        "irw": float(fine[half[-1]] - fine[half[0]]),
-        "pslr_db": float(10 * np.log10(sides.max() / power[peak])),
-        "islr_db": float(10 * np.log10(sides.sum() / power[left : right + 1].sum())),
+        "null": (_vertex(fine, power, right) - _vertex(fine, power, left)) / 2,
+        "irw": _crossing(fine, power, half[-1], 1) - _crossing(fine, power, half[0], -1),
+        "pslr_db": float(10 * np.log10(sides.max(initial=1e-12 * power[peak]) / power[peak])),
+        "islr_db": float(10 * np.log10(max(sides.sum(), 1e-12 * power[peak]) / power[left : right + 1].sum())),
+        "inside": bool(0 < peak < len(power) - 1),
     }
+
+
+def _vertex(x: np.ndarray, y: np.ndarray, i: int) -> float:
+    """Where the parabola through an extreme sample and its neighbours has its own."""
+    if not 0 < i < len(y) - 1:
+        return float(x[i])
+    bend, slope = y[i - 1] - 2 * y[i] + y[i + 1], (y[i - 1] - y[i + 1]) / 2
+    return float(x[i] + np.clip(slope / bend if bend else 0.0, -0.5, 0.5) * (x[1] - x[0]))
+
+
+def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
+    """Where power falls through half its peak, next to sample i."""
+    if not 0 <= i + side < len(power):
+        return float(x[i])
+    share = (power[i] - power.max() / 2) / max(power[i] - power[i + side], 1e-300)
+    return float(x[i] + np.clip(share, 0, 1) * (x[i + side] - x[i]))
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
     """How far the image falls between two points, dB below the lower of their peaks; 0 where there is but one peak."""
+    return pair(at, values, separation)["dip_db"]
+
+
+def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, float]:
+    """Of two points about 0: the `dip`, dB; shift, how far the worse of their peaks stands from its point, m; false_db,
+    the highest other peak over the lower of the two, dB. Zeros where there is but one peak."""
     found = []
     for side in (-1, 1):
         near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
         peak = int(near[values[near].argmax()])
         if peak in (near[0], near[-1]):  # it only rises towards the middle, or goes on rising outwards
-            return 0.0
+            return {"dip_db": 0.0, "shift": 0.0, "false_db": 0.0}
         found.append(peak)
     lower, between = float(values[found].min()), float(values[found[0] : found[1] + 1].min())
-    return float(20 * np.log10(lower / max(between, 1e-6 * lower)))
+    peaks = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])) + 1
+    others = values[np.setdiff1d(peaks, found)].max(initial=1e-6 * lower)
+    return {
+        "dip_db": float(20 * np.log10(lower / max(between, 1e-6 * lower))),
+        "shift": max(abs(_vertex(at, values, i) - s * separation / 2) for i, s in zip(found, (-1, 1), strict=True)),
+        "false_db": float(20 * np.log10(others / lower)),
+    }
+
+
+def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = RESOLVED) -> float | None:
+    """The smallest separation, m, from which on two points are told apart; None: not even at the largest.
+
+    That is a dip of `least` dB, peaks within a quarter of the null width, m, of the points, no other within 3 dB.
+    """
+    out = None
+    for row in sorted(dips, key=lambda d: -d["separation"]):
+        if row["dip_db"] < least or row["shift"] > NEAR * null or row["false_db"] > -RESOLVED:
+            break
+        out = row["separation"]
+    return out
+
+
+def nearer(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> int | None:
+    """1 where `row` tells two points apart nearer together than `plain` does, -1 only farther apart or not at all, 0 at
+    the same separation (dips that differ by less than 0.2 dB are one), None where neither does."""
+    mine, other = (_no_less(row["told_apart"]), _no_less(plain["told_apart"]))
+    if mine == other:
+        return None if mine == np.inf else 0
+    late, early = (row, plain) if mine > other else (plain, row)
+    if _no_less(told_apart(late["dips"], null, RESOLVED - ALIKE)) <= _no_less(early["told_apart"]):
+        return 0
+    return 1 if mine < other else -1
+
+
+def _no_less(separation: float | None) -> float:
+    return np.inf if separation is None else separation
 
 
 def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:
-    """Lengths of the positions backprojected from, and the spatial frequencies they claim, turns/m."""
-    y = raw.tx[:, 1]
-    support = spatial_frequencies(raw)
-    across = support[:, 1]
+    """Lengths of the phase centres backprojected from, and the spatial frequencies that they claim, turns/m."""
+    centers = (raw.tx + raw.rx) / 2
+    if case.path == "line":
+        along = centers @ case.ahead
+    else:
+        along = case.ground * np.arctan2(centers[:, 1], -centers[:, 0])
     return {
-        "length": float(np.ptp(y)),
-        "gap": float(np.diff(np.unique(np.round(y, 6))).max(initial=0.0)),
-        "claimed": float(np.ptp(across)),
-        "support": np.random.default_rng(0).permutation(support)[:DRAWN].round(4).tolist(),
+        "length": float(np.ptp(along)),
+        "gap": float(np.diff(np.unique(np.round(along, 6))).max(initial=0.0)),
+        **_support(spatial_frequencies(raw)),
     }
+
+
+def _support(found: np.ndarray) -> dict[str, Any]:
+    some = np.random.default_rng(0).permutation(found)[:DRAWN]
+    return {"claimed": float(np.ptp(found[:, 1])), "support": some.round(4).tolist()}
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
     """K = f/c (u_T + u_R) at the origin, of up to `most` samples of every row, turns/m (n, 2): along x and y."""
     some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
-    look = sum(end / np.linalg.norm(end, axis=1, keepdims=True) for end in (raw.tx, raw.rx))
+    look = _unit(raw.tx) + _unit(raw.rx)
     return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
 
 
-def _points(places: Sequence[float]) -> Scene:
-    return Scene.points([[0.0, y, 0.0] for y in places])
+def collected(case: Case, most: int = 101) -> dict[str, Any]:
+    """Spread across, turns/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
+    pulses."""
+    array, track = case.channels(), case.track()
+    pulses = np.unique(np.linspace(0, case.n_pulses - 1, most).astype(int))
+    turn = np.eye(3)[None] if track.attitude is None else track.attitude[pulses]
+    tx = track.positions[pulses, None] + np.einsum("pij,nj->pni", turn, array.positions)
+    f = case.center + np.stack([array.offsets_at(int(p)) for p in pulses])
+    ends = {"reference": track.positions[pulses, None, None], "own": tx[:, :, None], "all": tx[:, None]}
+    look = _unit(tx)[:, :, None] + _unit(ends[case.receive])
+    return _support((f[:, :, None, None] / SPEED_OF_LIGHT * look[..., :2]).reshape(-1, 2))
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))
