@@ -45,6 +45,11 @@ def _note(text: str) -> str:
     return f'<p class="note">{escape(text)}</p>'
 
 
+def listed(texts: Sequence[str]) -> str:
+    """Paragraphs as a list."""
+    return "<ul>" + "".join(f"<li>{escape(text)}</li>" for text in texts) + "</ul>"
+
+
 def table(head: Sequence[str], rows: Sequence[Sequence[Any]], text: bool = False) -> str:
     """Rows of numbers, each under its head; text: of words, all set to the left."""
     line = "".join(f"<th>{escape(str(h))}</th>" for h in head)
@@ -54,10 +59,13 @@ def table(head: Sequence[str], rows: Sequence[Sequence[Any]], text: bool = False
 
 
 def plot(
-    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, caption: str, *, dots: bool = False,
-    same_scale: bool = False, log_x: bool = False,
+    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, caption: str, *,
+    dots: bool | Sequence[str] = False, same_scale: bool = False, log_x: bool = False,
 ) -> str:  # fmt: skip
-    """Curves (name, x (n,), y (n,)) or clouds of dots in one frame, with a caption; log_x: x > 0, in decades."""
+    """Curves (name, x (n,), y (n,)) or clouds of dots in one frame, with a caption.
+
+    dots  True: all are dots; names: those are, and larger;  log_x  x > 0, in decades
+    """
     xs, ys = (np.concatenate([np.asarray(c[i], float) for c in curves]) for i in (1, 2))
     (x0, x1), (y0, y1) = (_range(v) for v in (np.log10(xs) if log_x else xs, ys))
     wide, high = WIDTH - LEFT - 10, HEIGHT - BOTTOM - TOP
@@ -66,12 +74,12 @@ def plot(
         x0, x1 = ((x0 + x1) / 2 + s * scale * wide / 2 for s in (-1, 1))
         y0, y1 = ((y0 + y1) / 2 + s * scale * high / 2 for s in (-1, 1))
     out = [_axes((x0, x1), (y0, y1), log_x)]
-    for i, (_, x, y) in enumerate(curves):
+    for i, (name, x, y) in enumerate(curves):
         px, py = _at(np.log10(x) if log_x else x, y, (x0, x1), (y0, y1))
         color, pairs = COLORS[i % len(COLORS)], zip(px.tolist(), py.tolist(), strict=True)
-        if dots:
-            path = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in pairs)
-            out.append(f'<path d="{path}" stroke="{color}" stroke-width="2" stroke-linecap="round" opacity=".6"/>')
+        if dots is True or (dots and name in dots):
+            path, size = "".join(f"M{a:.1f} {b:.1f}h0" for a, b in pairs), 2 if dots is True else 6
+            out.append(f'<path d="{path}" stroke="{color}" stroke-width="{size}" stroke-linecap="round" opacity=".6"/>')
         else:
             line = " ".join(f"{a:.1f},{min(max(b, TOP), TOP + high):.1f}" for a, b in pairs)
             out.append(f'<polyline points="{line}" fill="none" stroke="{color}" stroke-width="1.5"/>')

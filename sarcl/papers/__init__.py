@@ -11,11 +11,12 @@
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from .. import schema
 
 if TYPE_CHECKING:
+    from .lab import Lab
     from .paper import Paper
 
 PAPERS = {
@@ -34,3 +35,11 @@ def find(name: str) -> Paper:
 def listing() -> str:
     """A line for each paper: its name, and what it is."""
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
+
+
+def open_lab(device: Any = None, quick: bool = False) -> Lab:
+    """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
+    from ..cl import open_device
+    from .lab import Lab
+
+    return Lab(open_device(device), quick)

@@ -56,7 +56,9 @@ def waveform(lab: Lab) -> Section:
     out.states(
         "neighbouring channels cross", "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing
     )
-    out.say("Boresight, exact field. A pulse as long as the period holds one peak; its spectrum is nine tones in a row.")
+    out.say(
+        "Boresight, exact field. A pulse as long as the period holds one peak; its spectrum is nine tones in a row."
+    )
     shown = (f >= 7e9) & (f <= 21e9)
     out.draw(
         page.plot([("1 GHz", 1e9 * t, made[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2)."),
@@ -77,9 +79,7 @@ def spectra() -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
     f = np.fft.fftshift(np.fft.fftfreq(len(t), 2.5e-12))
 
     def spectrum(n: int, f0: float) -> np.ndarray:
-        pulse = closed.waveform(
-            f0, n, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=0.0, retarded=t, pulsed=True
-        )
+        pulse = closed.waveform(f0, n, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=0.0, retarded=t, pulsed=True)
         return np.abs(np.fft.fftshift(np.fft.fft(pulse))) * 2.5e-12 * STEP
 
     return f, [spectrum(1, F0 + i * STEP) for i in range(N)], spectrum(N, F0)

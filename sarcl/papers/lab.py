@@ -73,17 +73,19 @@ class Lab:
         edges = (-HALF[1], HALF[1]), (-HALF[0], HALF[0])
         return page.picture(self.image(raw), *edges, "cross-range, m", "range, m", caption, floor_db=floor_db)
 
-    def cut(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, n: int = 801) -> tuple[np.ndarray, np.ndarray]:
+    def cut(
+        self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, n: int = 801, about: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
         """Places along range (axis 0) or cross-range (1), m (n,), and amplitudes (n,), 1 of a focused unit point."""
-        at = np.linspace(-half, half, n)
+        at = about + np.linspace(-half, half, n)
         places = np.zeros((n, 3))
         places[:, axis] = at
         made = backproject(raw, ImageGrid.points(places), tolerance=1e-3, check=False, device=self.device)
         return at, np.abs(np.asarray(made.data)) / made.gain
 
-    def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0) -> dict[str, float]:
-        """Of a point at the origin: what `sarcl.fda.response` tells of a cut."""
-        return response(*self.cut(raw, axis, half), 0.0)
+    def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
+        """Of a point `about` m along the axis: what `sarcl.fda.response` tells of a cut."""
+        return response(*self.cut(raw, axis, half, about=about), about)
 
 
 def _window(step: float) -> tuple[float, float]:
