@@ -1,4 +1,4 @@
-"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | papers NAME |
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | papers |
 bench.
 
 Only the parser is here, so that --help answers at once; sarcl/commands.py does the work.

@@ -15,7 +15,8 @@ table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e4e4; }
 th:first-child, td:first-child { text-align: left; } th { font-weight: 600; }
 table.text th, table.text td { text-align: left; vertical-align: top; }
-figure { display: inline-block; margin: .5rem 1rem .5rem 0; } figcaption { font-size: .85rem; color: #555; max-width: 400px; }
+figure { display: inline-block; margin: .5rem 1rem .5rem 0; }
+figcaption { max-width: 400px; font-size: .85rem; color: #555; }
 svg text { font: 11px system-ui, sans-serif; fill: #444; } .note { color: #555; }
 """
 COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")

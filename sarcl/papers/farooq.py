@@ -1,4 +1,4 @@
-"""Farooq 2009: frequency-diverse arrays and synthetic aperture radar. Every figure and table, published beside measured.
+"""Farooq 2009: frequency-diverse arrays in synthetic aperture radar. Every figure and table, published beside measured.
 
 Source: J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, Air Force Institute
 of Technology, AFIT/DEE/ENG/09-04, 2009. Figures, tables and equations are numbered as there.
@@ -22,9 +22,9 @@ from . import (
 from .paper import Paper
 
 ABOUT = (
-    "An array whose elements send a carrier each makes a pulse, by the sum of its carriers, that passes at another time in "
-    "every direction. The dissertation makes images of such echoes, and proposes to backproject them from apparent "
-    "places, so that a short aperture does what a longer one would. This page does all of it again. Source: "
+    "An array whose elements send a carrier each makes a pulse, by the sum of its carriers, that passes at another "
+    "time in every direction. The dissertation makes images of such echoes, and proposes to backproject them from "
+    "apparent places, so that a short aperture does what a longer one would. This page does all of it again. Source: "
     + PAPERS["farooq"] + " (AFIT/DEE/ENG/09-04)."
 )  # fmt: skip
 

@@ -40,8 +40,8 @@ def steady(lab: Lab) -> Section:
             )  # fmt: skip
         nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
         remark = "" if step > 0 else (
-            f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section 5.3.1), "
-            f"whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
+            f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
+            f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
         )  # fmt: skip
         out.number(f"{name}: nulls in cross-range", f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark)
         out.states(

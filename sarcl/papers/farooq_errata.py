@@ -19,12 +19,12 @@ def section(lab: Lab) -> Section:
     """Equations that miss a sign or a subscript, figures with the wrong time, a length with the wrong exponent."""
     out = Section("errata", "Errors in print")
     words = (
-        "Figure 3.7: the beam at (30, -60) deg belongs to retarded time -250 us. At +250 us equations 3.53 and 3.54, and "
-        "the exact field, have (-30, 60). Figures 3.8 and 3.9 have it right.",
+        "Figure 3.7: the beam at (30, -60) deg belongs to retarded time -250 us. At +250 us equations 3.53 and 3.54, "
+        "and the exact field, have (-30, 60). Figures 3.8 and 3.9 have it right.",
         "Equations 3.39 and 3.40 look at the corner (N, P), where steps of opposite signs cancel; along the edges they "
         "do not. Equation 3.40 gives twice what 3.59 has, since the steps along y meet the elements along z as well.",
-        "Figure 3.14: within 45 deg the closed form errs by up to 0.60 of the peak power, not insignificantly; equation "
-        "3.60 itself has 3.5 times the phase that 3.40 allows.",
+        "Figure 3.14: within 45 deg the closed form errs by up to 0.60 of the peak power, not insignificantly; "
+        "equation 3.60 itself has 3.5 times the phase that 3.40 allows.",
         "Equations 4.1 and 4.30: in the denominators dk_y and dk_z, and kappa_z and kappa_y, have changed places. At "
         "r' = 0 the second is left: numerator and denominator no longer vanish together, and the factor has poles.",
         "Equation 4.27 leaves out the phase n^2 dk d sin(azimuth), whose linear part moves the peak to "
@@ -36,10 +36,10 @@ def section(lab: Lab) -> Section:
         "Section 5.4: lambda_c/2 is 0.0144 m, not 0.14 m; the sizes printed beside it, 0.12 and 12 m, go with 0.0144.",
         "Figure 5.5: with -2 MHz from f0 = 10 GHz the centre frequency is 9.55 GHz, as section 5.3.1 says, and 430 m "
         "resolve 0.182 m, not 0.167.",
-        "Equation 5.36 expects nulls of 0.143 and 0.125 m of apertures with a gap: they come nearer, with side lobes of "
-        "-7.8 and -5.1 dB.",
-        "Abstract: a 33 % longer aperture saves 25 % of the time, and 4.5 dB is 20 log10 of the 1 MHz case's length, or of "
-        "the 2 MHz case's nulls.",
+        "Equation 5.36 expects nulls of 0.143 and 0.125 m of apertures with a gap: they come nearer, with side lobes "
+        "of -7.8 and -5.1 dB.",
+        "Abstract: a 33 % longer aperture saves 25 % of the time, and 4.5 dB is 20 log10 of the 1 MHz case's length, "
+        "or of the 2 MHz case's nulls.",
     )
     out.parts.append(page.listed(words))
     case = system(9, 100e6)
@@ -71,7 +71,8 @@ def _poles(out: Section) -> None:
     worst = float(np.nanmax(printed))
     out.states(
         "largest array factor, over N P", "equation 4.1", "1 (equation 3.46)", f"poles as printed, {worst:.0f} "
-        f"on a grid of 1 deg; {right.max():.3f} mended", worst < 1.01, "kappa_y stands for kappa_z in a denominator", worst,
+        f"on a grid of 1 deg; {right.max():.3f} mended", worst < 1.01,
+        "kappa_y stands for kappa_z in a denominator", worst,
     )  # fmt: skip
     for what, level in (("mended", right), ("as printed, cut at 1", np.minimum(printed, 1.0))):
         out.draw(page.picture(

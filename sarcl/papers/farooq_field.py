@@ -49,8 +49,8 @@ def delays(lab: Lab) -> Section:
     _systems(out, lab)
     out.say(
         "The closed form's peak passes d f0 sin(azimuth)/(c df) late. The exact one does not: of the phase "
-        "n^2 dk d sin(azimuth) that the closed form leaves out, the part n (N - 1) is linear in n and moves the peak to "
-        "(f0 + (N - 1) df) d sin(azimuth)/(c df); what is left smears it."
+        "n^2 dk d sin(azimuth) that the closed form leaves out, the part n (N - 1) is linear in n and moves the peak "
+        "to (f0 + (N - 1) df) d sin(azimuth)/(c df); what is left smears it."
     )
     out.draw(
         page.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12)."),
@@ -114,9 +114,9 @@ def snapshots(lab: Lab) -> Section:
             ))  # fmt: skip
             _orders(out, level * gate, distance, azimuth)
     out.say(
-        "Modulus of the field of 9 elements at (0, -n d), cut to the pulse's length. In the closed form the bright line "
-        "winds through the pulse, late on one side and early on the other: planes of equal amplitude are not planes of "
-        "equal phase. In the exact field it is bright about boresight only, where the carriers still come together."
+        "Modulus of the field of 9 elements at (0, -n d), cut to the pulse's length. In the closed form the bright "
+        "line winds through the pulse, late on one side and early on the other: planes of equal amplitude are not "
+        "planes of equal phase. In the exact field it is bright about boresight only, where the carriers still meet."
     )
     return out
 

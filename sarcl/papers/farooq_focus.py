@@ -50,8 +50,8 @@ def section(lab: Lab) -> Section:
         out.states(
             f"equations 5.4 and 5.5 alone, {name}", "section 5.1", "focused",
             f"null {linear['null']:.3f} m, peak {linear['level_db']:.2f} dB, PSLR {linear['pslr_db']:.1f} dB", not off,
-            "" if not off else f"they leave the quadratic phase of the elements, {phase:.1f} rad at the aperture's end; "
-            "it must be undone frequency by frequency", [linear["null"], linear["level_db"], linear["pslr_db"]],
+            "" if not off else f"they leave the quadratic phase of the elements, {phase:.1f} rad at the aperture's "
+            "end; it must be undone frequency by frequency", [linear["null"], linear["level_db"], linear["pslr_db"]],
         )  # fmt: skip
         table.append([name, f"{lost:.1f}", f"{phase:.2f}", f"{linear['null']:.3f}", f"{linear['level_db']:.2f}",
                       f"{linear['pslr_db']:.1f}", f"{whole['null']:.3f}", f"{whole['pslr_db']:.1f}"])  # fmt: skip
@@ -59,9 +59,9 @@ def section(lab: Lab) -> Section:
             at, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
             curves.append((f"{name}, {label}", at, values))
     out.say(
-        "Every pulse's peak stands at its own wrong range, by equation 4.27, so that the image of figure 5.1 is smeared. "
-        "Taking delay and phase out focuses it. The paper takes out what is linear in the element's number; for 225 and "
-        "450 elements the quadratic rest is no longer small."
+        "Every pulse's peak stands at its own wrong range, by equation 4.27, so that the image of figure 5.1 is "
+        "smeared. Taking delay and phase out focuses it. The paper takes out what is linear in the element's number; "
+        "for 225 and 450 elements the quadratic rest is no longer small."
     )
     out.parts.append(page.table(
         ["", "as it is, dB", "quadratic phase, rad", "linear: null, m", "peak, dB", "PSLR, dB", "all: null, m",

@@ -76,9 +76,9 @@ def patterns(lab: Lab) -> Section:
         figures.append(_sky(power, f"Diverse carriers at t' = {sign * 250:+d} us (figure 3.7)."))
     _over_range(out, figures, diverse, lab)
     out.say(
-        "Exact fields of all 81 elements, 10 km away. Elements stand at -n d, as in equation 3.1; t' is the time since a "
-        "wave from the reference element passed. Figures 3.8 and 3.9 are taken at t = 0, where t' = -r/c: farther out "
-        "is earlier, and there the paper's signs are right."
+        "Exact fields of all 81 elements, 10 km away. Elements stand at -n d, as in equation 3.1; t' is the time since "
+        "a wave from the reference element passed. Figures 3.8 and 3.9 are taken at t = 0, where t' = -r/c: farther "
+        "out is earlier, and there the paper's signs are right."
     )
     out.draw(*figures)
     return out
@@ -152,8 +152,8 @@ def errors(lab: Lab) -> Section:
     bound = closed.quadratic_phase(shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(30e6, 0), cosines=(1, 0))
     out.number("quadratic phase of scenario A", "equation 3.59", np.pi / 4, bound, 0.03, "rad")
     out.say(
-        "Largest difference of the two power patterns over a period of time, both over the peak's power. The closed form "
-        "drops a phase that grows with the square of the element's number; it vanishes at broadside only."
+        "Largest difference of the two power patterns over a period of time, both over the peak's power. The closed "
+        "form drops a phase that grows with the square of the element's number; it vanishes at broadside only."
     )
     out.draw(page.plot(curves, "azimuth, deg", "difference", "Difference of the patterns (figure 3.14)."))
     return out

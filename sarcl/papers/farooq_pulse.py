@@ -107,7 +107,8 @@ def ambiguities(lab: Lab) -> Section:
     ridge = _ridge(tones, slope, length)
     out.states(
         "tones: largest value on the chirp's ridge", "figure 4.7", "no ridge",
-        f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more", ridge < 0.25, value=ridge,
+        f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more", ridge < 0.25,
+        value=ridge,
     )  # fmt: skip
     cuts = [(name, a.magnitude[:, int(np.abs(a.dopplers).argmin())]) for name, a in (("FDA", tones), ("LFM", chirp))]
     nulls = [1e9 * tones.delays[tones.delays > 0][int((np.diff(c[tones.delays > 0]) > 0).argmax())] for _, c in cuts]

@@ -46,10 +46,10 @@ def section(lab: Lab) -> Section:
     out.parts.insert(0, page.words(
         f"{radar.n} elements send carriers {radar.step / 1e3:g} kHz apart at a PRF of {radar.prf / 1e3:g} kHz: "
         f"{radar.step / radar.prf:g} turns from pulse to pulse, a quarter beyond whole ones. Echoes from "
-        f"{radar.depth / 1e3:.0f} km farther come a pulse late, and in step with a wave over the elements that turns by a "
-        "quarter from one to the next: four zones are orthogonal there. A point stands in each; the receiver records "
-        "their sum; every zone is focused from it. Equal carriers leave them one upon another. This is no claim of the "
-        "paper: it is what an array of diverse carriers does that an array of one cannot."
+        f"{radar.depth / 1e3:.0f} km farther come a pulse late, and in step with a wave over the elements that turns "
+        "by a quarter from one to the next: four zones are orthogonal there. A point stands in each; the receiver "
+        "records their sum; every zone is focused from it. Equal carriers leave them one upon another. This is no "
+        "claim of the paper: it is what an array of diverse carriers does that an array of one cannot."
     ))  # fmt: skip
     out.say(
         "The price: as many elements told apart at the receiver as there are zones, or more, and directions that are "
@@ -68,7 +68,7 @@ def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.nd
 
 
 def matrix(radar: RangeZones, device: Any = None) -> np.ndarray:
-    """Levels (point, image), dB: of each zone's point alone, the highest within 5 m of where it folds to, over its own."""
+    """Levels (point, image), dB: each zone's point alone, the highest within 5 m of where it folds to, over its own."""
     out = np.empty((ZONES, ZONES))
     for p, beyond in enumerate(BEYOND):
         empty: list[Scene | None] = [None] * p

@@ -45,14 +45,14 @@ class Section:
     seconds: float = 0.0
 
     def number(
-        self, item: str, source: str, published: float, measured: float, within: float, unit: str = "", form: str = ".3f",
-        why: str = "",
+        self, item: str, source: str, published: float, measured: float, within: float, unit: str = "",
+        form: str = ".3f", why: str = "",
     ) -> None:  # fmt: skip
         """A row that holds where `measured` lies within `within` of the number printed."""
-        texts = (f"{v:{form}} {unit}".strip() for v in (published, measured))
+        here, printed = (f"{v:{form}} {unit}".strip() for v in (measured, published))
         self.rows.append(
-            Row(item, source, *texts, bool(abs(measured - published) <= within), why, float(measured))
-        )  # fmt: skip
+            Row(item, source, printed, here, bool(abs(measured - published) <= within), why, plain(measured))
+        )
 
     def states(
         self, item: str, source: str, published: str, measured: str, holds: Any, why: str = "", value: Any = None
@@ -122,8 +122,8 @@ class Paper:
         parts += [
             page.heading("Published and measured"),
             page.words(
-                f"{fine} of {len(rows)} figures and statements come out as printed. Where one errs, the last column says "
-                "why. All of the third column was measured in this run."
+                f"{fine} of {len(rows)} figures and statements come out as printed. Where one errs, the last column "
+                "says why. All of the third column was measured in this run."
             ),
             page.table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True),
         ]  # fmt: skip
