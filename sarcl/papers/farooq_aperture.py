@@ -89,7 +89,10 @@ def switched(lab: Lab) -> Section:
             _outer(out, lab, figure)
             curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
         curves.append((name, raw.tx[::THIN, 1], found["published"].tx[::THIN, 1]))
-        out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."))
+        out.draw(
+            lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."),
+            lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", 8.0, PRINTED),
+        )
     out.say(
         "Half the aperture is moved one way and half the other, so that a gap opens amid them: 2 d f0/df of it. The "
         "printed lengths follow with d half a wave of the CENTRE frequency, f0 = 10 GHz in both halves, and the range "
@@ -111,7 +114,7 @@ def _outer(out: Section, lab: Lab, figure: str) -> None:
     out.states(
         "side lobes of the outer targets", figure, "most noticeable there",
         f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it", outer > inner + 1,
-        "the error of the last section but two, seen by the paper and put down to side lobes", [outer, inner],
+        "what points off the centre suffer from: measured again below", [outer, inner],
     )  # fmt: skip
 
 

@@ -42,7 +42,7 @@ def section(lab: Lab) -> Section:
         "or of the 2 MHz case's nulls.",
     )
     out.parts.append(page.listed(words))
-    case = system(9, 100e6)
+    case = system(45, 20e6)
     out.number("half a wave of the centre frequency", "section 5.4", 0.14, case.step, 1e-3, "m", ".4f",
                "a zero is missing: 0.014 m")  # fmt: skip
     sizes = [n * system(n, s).step for n, s in ((9, 100e6), (900, 1e6))]

@@ -74,7 +74,7 @@ def _systems(out: Section, lab: Lab) -> None:
         found = float(t[made.argmax()])
         offset = SPEED_OF_LIGHT / 2 * (found - plain)
         out.states(
-            f"delay at the aperture's end, N {n}, {step / 1e6:g} MHz", "equation 4.27", f"{1e9 * plain:.4g} ns",
+            f"delay at the aperture's end, N {n}, {step / 1e6:g} MHz", "equation 4.27", f"{1e9 * plain:.4g} ns by it",
             f"{1e9 * found:.4g} ns, {100 * (found / plain - 1):.1f} % more", abs(found / plain - 1) < 0.02,
             f"the peak stands at f0 + (N - 1) df: {1e3 * offset:.0f} mm of range, beside a resolution of 167 mm",
             found / plain,
@@ -100,7 +100,7 @@ def snapshots(lab: Lab) -> Section:
         gate = np.abs(retarded) <= 0.5 / STEP
         exact = np.abs(beam(array, F0, times=t, positions=place, device=lab.device)) * gate
         out.draw(page.picture(
-            _db(exact / N), *edges, "cross-range, m", "range, m", f"Exact field, {ns} ns after the pulse's middle.",
+            _db(exact / N), *edges, "cross-range, m", "range, m", f"Exact field, {ns} ns after the pulse left.",
             floor_db=-15,
         ))  # fmt: skip
         if ns == 2:

@@ -17,7 +17,7 @@ def section(lab: Lab) -> Section:
     """Table 5.1, figures 5.1 and 5.2."""
     out = Section("correction", "Unmodified and corrected backprojection (table 5.1, figures 5.1 and 5.2)")
     table, first = [], system(*SYSTEMS[0], mirrored=False)
-    out.number("centre frequency", "table 5.1", 10.44, first.middle / 1e9, 0.005, "GHz", ".2f")
+    out.number("centre frequency, N 45, 20 MHz", "table 5.1", 10.44, first.middle / 1e9, 0.005, "GHz", ".2f")
     curves = []
     for n, step in SYSTEMS:
         if not lab.small_enough(n):

@@ -44,7 +44,7 @@ def waveform(lab: Lab) -> Section:
     )  # fmt: skip
     f, channels, whole = spectra()
     middle = float((f * whole**2).sum() / (whole**2).sum())
-    out.number("centre frequency", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
+    out.number("centre frequency of the pulse", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
     # about the middle: what a flat band of N df holds, but for the tails of the outer tones
     inside = np.abs(f - 14e9) <= N * STEP / 2
     share = float((whole[inside] ** 2).sum() / (whole**2).sum())

@@ -60,18 +60,20 @@ class Lab:
             tolerance=1e-4, check=False, device=self.device,
         )  # fmt: skip
 
-    def image(self, raw: PhaseHistory) -> np.ndarray:
-        """dB (along range, cross-range) about the origin, over HALF m each way; a focused unit point has 0."""
+    def image(self, raw: PhaseHistory, zoom: float = 1.0) -> np.ndarray:
+        """dB (along range, cross-range) about the origin, over HALF/zoom m each way; a focused unit point has 0."""
         shape = tuple(2 * round(half / STEP) + 1 for half in HALF[::-1])
-        made = backproject(
-            raw, ImageGrid.plane(shape=shape, spacing=STEP), tolerance=1e-3, check=False, device=self.device
-        )
+        grid = ImageGrid.plane(shape=shape, spacing=STEP / zoom)
+        made = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
         return np.maximum(made.decibels().T, -200.0)
 
-    def picture(self, raw: PhaseHistory, caption: str, floor_db: float = -30.0) -> str:
-        """The same as a drawing, over its brightest pixel."""
-        edges = (-HALF[1], HALF[1]), (-HALF[0], HALF[0])
-        return page.picture(self.image(raw), *edges, "cross-range, m", "range, m", caption, floor_db=floor_db)
+    def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> str:
+        """The same as a drawing, over its brightest pixel; box: half the side of a dashed square, m."""
+        edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
+        square = None if box is None else (box, box)
+        return page.picture(
+            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square
+        )  # fmt: skip
 
     def cut(
         self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, n: int = 801, about: float = 0.0
