@@ -14,7 +14,7 @@ h1 { font-size: 1.6rem; } h2 { font-size: 1.25rem; margin-top: 2.5rem; border-bo
 table { border-collapse: collapse; margin: 1rem 0; font-variant-numeric: tabular-nums; }
 th, td { padding: .25rem .7rem; text-align: right; border-bottom: 1px solid #e4e4e4; }
 th:first-child, td:first-child { text-align: left; } th { font-weight: 600; }
-table.text th, table.text td { text-align: left; vertical-align: top; }
+table.text th, table.text td { text-align: left; vertical-align: top; } td.errs { color: #c0392b; }
 figure { display: inline-block; margin: .5rem 1rem .5rem 0; }
 figcaption { max-width: 400px; font-size: .85rem; color: #555; }
 svg text { font: 11px system-ui, sans-serif; fill: #444; } .note { color: #555; }

@@ -23,6 +23,10 @@ THIN = 5  # of the places drawn
 def steady(lab: Lab) -> Section:
     """Figures 5.3 to 5.5."""
     out = Section("steady", "Apparent apertures without the switch (table 5.2, figures 5.3 to 5.5)")
+    out.say(
+        "Mapping moves the whole aperture sideways by d f0/df, with the sign of the step. Its length stays, and so do "
+        "the nulls."
+    )
     curves = []
     for n, step, figure in ((45, 20e6, "5.3"), (450, 2e6, "5.4"), (450, -2e6, "5.5")):
         if not lab.small_enough(n):
@@ -54,10 +58,6 @@ def steady(lab: Lab) -> Section:
             out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
         elif step > 0:
             out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
-    out.say(
-        "Mapping moves the whole aperture sideways by d f0/df, with the sign of the step. Its length stays, and so do "
-        "the nulls."
-    )
     out.draw(page.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))
     return out
 
@@ -65,6 +65,12 @@ def steady(lab: Lab) -> Section:
 def switched(lab: Lab) -> Section:
     """Figures 5.6 to 5.8."""
     out = Section("switched", "Apparent apertures with the sign switched at mid-aperture (figures 5.6 to 5.8)")
+    out.say(
+        "Half the aperture is moved one way and half the other, so that a gap opens amid them: 2 d f0/df of it. The "
+        "printed lengths follow with d half a wave of the CENTRE frequency, f0 = 10 GHz in both halves, and the range "
+        "offset of equation 5.15 as printed, which takes the two-way path c dt for a one-way one. Half of it, which is "
+        "right, makes half the growth."
+    )
     curves, table = [], []
     for n, step, length, growth, _, figure in SWITCHED:
         if not lab.small_enough(n):
@@ -79,7 +85,9 @@ def switched(lab: Lab) -> Section:
         out.number(f"{name}: apparent length", figure, length, here, 1.0, "m", ".1f")
         out.number(f"{name}: longer by", figure, growth, 100 * (here / case.aperture - 1), 0.6, "%", ".1f")
         table.append([name, f"{length:.0f}", f"{here:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
-        out.keep(**{name: {"published": length, "half a wave of fc": here, "d 0.015 m": wide, **lengths}})
+        out.keep(
+            **{name: {"printed": length, "half a wave of fc": here, "d 0.015 m": wide, "halved": lengths["halved"]}}
+        )
         gap = float(np.diff(found["published"].tx[:, 1]).max())
         if n == 45:
             out.states(
@@ -93,12 +101,6 @@ def switched(lab: Lab) -> Section:
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."),
             lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", 8.0, PRINTED),
         )
-    out.say(
-        "Half the aperture is moved one way and half the other, so that a gap opens amid them: 2 d f0/df of it. The "
-        "printed lengths follow with d half a wave of the CENTRE frequency, f0 = 10 GHz in both halves, and the range "
-        "offset of equation 5.15 as printed, which takes the two-way path c dt for a one-way one. Half of it, which is "
-        "right, makes half the growth."
-    )
     head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
     out.parts.append(page.table(head, table))
     out.draw(page.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))

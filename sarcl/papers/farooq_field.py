@@ -20,6 +20,11 @@ PRINTED = 0.35  # ns, figures 4.11 and 4.12
 def delays(lab: Lab) -> Section:
     """Equation 4.27, figures 4.10 to 4.12."""
     out = Section("delay", "A delay that depends on azimuth (equation 4.27, figures 4.10 to 4.12)")
+    out.say(
+        "The closed form's peak passes d f0 sin(azimuth)/(c df) late. The exact one does not: of the phase "
+        "n^2 dk d sin(azimuth) that the closed form leaves out, the part n (N - 1) is linear in n and moves the peak "
+        "to (f0 + (N - 1) df) d sin(azimuth)/(c df); what is left smears it."
+    )
     array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
     t = np.linspace(-0.5e-9, 0.5e-9, 4001)
     curves, exact_curves = [], []
@@ -47,11 +52,6 @@ def delays(lab: Lab) -> Section:
         "together there", peak,
     )  # fmt: skip
     _systems(out, lab)
-    out.say(
-        "The closed form's peak passes d f0 sin(azimuth)/(c df) late. The exact one does not: of the phase "
-        "n^2 dk d sin(azimuth) that the closed form leaves out, the part n (N - 1) is linear in n and moves the peak "
-        "to (f0 + (N - 1) df) d sin(azimuth)/(c df); what is left smears it."
-    )
     out.draw(
         page.plot(curves, "t', ns", "modulus", "Closed form in three directions (figures 4.10 to 4.12)."),
         page.plot(exact_curves, "t', ns", "modulus", "The exact field in the same directions."),
@@ -88,6 +88,11 @@ def _systems(out: Section, lab: Lab) -> None:
 def snapshots(lab: Lab) -> Section:
     """Figures 4.9 and 4.13: the pulse on its way, over a plane."""
     out = Section("snapshots", "The pulse on its way (figures 4.9 and 4.13)")
+    out.say(
+        "Modulus of the field of 9 elements at (0, -n d), cut to the pulse's length. In the closed form the bright "
+        "line winds through the pulse, late on one side and early on the other: planes of equal amplitude are not "
+        "planes of equal phase. In the exact field it is bright about boresight only, where the carriers still meet."
+    )
     x, y = np.linspace(0.0, 1.6, 161), np.linspace(-1.2, 1.2, 241)
     place = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
     distance = np.linalg.norm(place, axis=-1)
@@ -113,11 +118,6 @@ def snapshots(lab: Lab) -> Section:
                 "Closed form, 2 ns: what figure 4.9 shows.", floor_db=-15,
             ))  # fmt: skip
             _orders(out, level * gate, distance, azimuth)
-    out.say(
-        "Modulus of the field of 9 elements at (0, -n d), cut to the pulse's length. In the closed form the bright "
-        "line winds through the pulse, late on one side and early on the other: planes of equal amplitude are not "
-        "planes of equal phase. In the exact field it is bright about boresight only, where the carriers still meet."
-    )
     return out
 
 

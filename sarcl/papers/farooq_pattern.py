@@ -107,6 +107,10 @@ def _over_range(out: Section, figures: list[str], array: AntennaArray, lab: Lab)
 def errors(lab: Lab) -> Section:
     """Figures 3.10 to 3.14."""
     out = Section("closed form", "The closed form against the exact pattern (table 3.3, figures 3.10 to 3.14)")
+    out.say(
+        "Largest difference of the two power patterns over a period of time, both over the peak's power. The closed "
+        "form drops a phase that grows with the square of the element's number; it vanishes at broadside only."
+    )
     azimuth = np.radians(np.linspace(-90, 90, 361))
     degrees = np.degrees(azimuth)
     curves = []
@@ -155,10 +159,6 @@ def errors(lab: Lab) -> Section:
         shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(150e6, 0), cosines=(np.sin(np.pi / 4), 0)
     )
     out.number("quadratic phase of scenario B at 45 deg", "equation 3.60", 3.5, steep / (np.pi / 4), 0.1, "pi/4", ".2f")
-    out.say(
-        "Largest difference of the two power patterns over a period of time, both over the peak's power. The closed "
-        "form drops a phase that grows with the square of the element's number; it vanishes at broadside only."
-    )
     out.draw(page.plot(curves, "azimuth, deg", "difference", "Difference of the patterns (figure 3.14)."))
     return out
 

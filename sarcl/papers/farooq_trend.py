@@ -39,7 +39,7 @@ def trends(lab: Lab) -> Section:
         )  # fmt: skip
         out.states(
             "nulls from 10 to 1 MHz", "figure 5.10", "drastically improved", f"{much:.0f} % of 0.167 m",
-            much > 3 * little, "so they are for the centre point, and for it alone: see the last sections", much,
+            much > 3 * little, "so they are for the centre point, and for it alone: see below", much,
         )  # fmt: skip
         rise = [found[a][1] - found[b][1] for a, b in ((10e6, 100e6), (1e6, 10e6))]
         out.states(

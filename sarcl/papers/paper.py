@@ -125,7 +125,9 @@ class Paper:
                 f"{fine} of {len(rows)} figures and statements come out as printed. Where one errs, the last column "
                 "says why. All of the third column was measured in this run."
             ),
-            page.table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True),
+            page.table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True).replace(
+                "<td>errs", '<td class="errs">errs'
+            ),
         ]  # fmt: skip
         for section in sections:
             parts += [page.heading(section.title), *section.parts]
