@@ -1,4 +1,5 @@
-"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | bench.
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | papers |
+bench.
 
 Only the parser is here, so that --help answers at once; sarcl/commands.py does the work.
 """
@@ -63,6 +64,9 @@ def parser() -> argparse.ArgumentParser:
     measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
     measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
     _fda(command("fda", "measure what aperture mappings of frequency-diverse arrays gain: a page and a JSON", device))
+    _papers(
+        command("papers", "list the papers done again, or do one: published beside measured, a page and a JSON", device)
+    )
     _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
     return top
 
@@ -144,6 +148,19 @@ def _focus(p: argparse.ArgumentParser) -> None:
 def _fda(p: argparse.ArgumentParser) -> None:
     p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/fda.md)")
     p.add_argument("-o", "--output", metavar="PATH", help="the page, default FILE.html, with FILE.json beside it")
+
+
+def _papers(p: argparse.ArgumentParser) -> None:
+    p.add_argument("paper", nargs="?", metavar="NAME", help="the paper to do again (docs/papers.md); none: list them")
+    p.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        help="the page, or a folder for it, default NAME.html, with NAME.json beside it",
+    )
+    p.add_argument(
+        "--quick", action="store_true", help="without arrays of more than 100 elements, in a fifth of the time"
+    )
 
 
 def _bench(p: argparse.ArgumentParser) -> None:

@@ -31,6 +31,7 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
         "focus": focus,
         "measure": measure,
         "fda": fda,
+        "papers": papers,
         "bench": bench,
     }[args.command]
     with Job(outputs) as job:
@@ -191,6 +192,42 @@ def fda(args: argparse.Namespace, job: Job) -> int:
         job.say(f"{result['name']}: {fda_page.setting(result)}")
         for verdict in fda_page.verdicts(result):
             job.say(f"  {verdict}")
+    job.say(f"wrote {output} and {numbers}")
+    return 0
+
+
+def papers(args: argparse.Namespace, job: Job) -> int:
+    """The papers there are, or one of them done again: a page and its numbers."""
+    import json
+
+    from . import papers as shelf
+    from .files import paths
+
+    if args.paper is None:
+        job.say(shelf.listing())
+        return 0
+    paper = shelf.find(args.paper)
+    output = Path(f"{paper.name}.html" if args.output is None else args.output)
+    if output.suffix.lower() not in (".html", ".htm"):  # a folder
+        output = output / f"{paper.name}.html"
+    numbers = output.with_suffix(".json")
+    for path in (output, numbers):
+        job.expect(path)
+    lab, sections = shelf.open_lab(args.device, args.quick), []
+    for section in paper.run(lab):
+        sections.append(section)
+        job.progress("papers", len(sections), len(paper.sections))
+        # what is measured is kept, whatever comes of the next section
+        text = json.dumps(paper.document(sections, lab), allow_nan=False)
+        for path, whole in ((numbers, text), (output, paper.html(sections, lab))):
+            with paths.atomic(path) as part:
+                part.write_text(whole, encoding="utf-8")
+        fine = sum(row.holds for row in section.rows)
+        tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
+        job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
+        for row in section.rows:
+            if not row.holds:
+                job.say(f"  errs: {row.item}: printed {row.published}, measured {row.measured}")
     job.say(f"wrote {output} and {numbers}")
     return 0
 

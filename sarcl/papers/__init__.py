@@ -1,0 +1,45 @@
+"""Papers done again with sarcl: what each one prints beside what comes out here.
+
+`sarcl papers` lists them, `sarcl papers farooq` writes a page and its numbers (docs/papers.md).
+
+    paper.py     what a paper is made of: sections, rows of published and measured, the page
+    lab.py       echoes and images that several sections share
+    farooq.py    Farooq 2009, frequency-diverse arrays: its sections in order; farooq_*.py are these sections
+    zones.py     range zones told apart by carriers that run on from pulse to pulse
+"""
+
+from __future__ import annotations
+
+from importlib import import_module
+from typing import TYPE_CHECKING, Any
+
+from .. import schema
+
+if TYPE_CHECKING:
+    from .lab import Lab
+    from .paper import Paper
+
+PAPERS = {
+    "farooq": "J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, AFIT 2009",
+}
+
+
+def find(name: str) -> Paper:
+    """The paper of this name. ValueError names those there are."""
+    if name not in PAPERS:
+        raise ValueError(schema.unknown(name, list(PAPERS), "paper"))
+    paper: Paper = import_module(f".{name}", __name__).PAPER
+    return paper
+
+
+def listing() -> str:
+    """A line for each paper: its name, and what it is."""
+    return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
+
+
+def open_lab(device: Any = None, quick: bool = False) -> Lab:
+    """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
+    from ..cl import open_device
+    from .lab import Lab
+
+    return Lab(open_device(device), quick)

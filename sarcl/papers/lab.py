@@ -1,0 +1,108 @@
+"""What the sections of a paper on arrays share: systems flown, echoes kept, images and cuts."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from .. import page
+from ..aperture import map_aperture
+from ..backproject import backproject
+from ..echo import echo
+from ..fda import Case, response
+from ..grid import ImageGrid
+from ..phase_history import PhaseHistory
+from ..scene import Scene
+from ..waveform import Waveform
+
+CENTER = ((0.0, 0.0, 0.0),)
+HALF, STEP = (2.64, 4.0), 0.04  # of a picture along range and cross-range: half its sides and a pixel, m
+
+
+class Lab:
+    """Echoes of `sarcl.fda.Case`s, collected once and kept.
+
+    device  an OpenCL device as elsewhere;  quick  leave out arrays of more than 100 elements
+    """
+
+    def __init__(self, device: Any = None, quick: bool = False) -> None:
+        self.device, self.quick = device, quick
+        self._kept: dict[Any, PhaseHistory] = {}
+
+    def small_enough(self, n: int) -> bool:
+        """Whether an array of n elements is flown."""
+        return not self.quick or n <= 100
+
+    def collect(self, case: Case, points: Any = CENTER) -> PhaseHistory:
+        """Echoes of unit points, m (n, 3), channels added up at the reference element."""
+        points = tuple(tuple(float(v) for v in p) for p in points)
+        key = (replace(case, name=""), points)
+        if key not in self._kept:
+            step = abs(case.frequency_step)
+            tone = Waveform.tone(center=case.center, duration=1 / step)
+            self._kept[key] = echo(
+                Scene.points(points), tone, case.track(), array=case.array(), reference=(0, 0, 0),
+                range_window=_window(step), tolerance=1e-4, check=False, device=self.device,
+            )  # fmt: skip
+        return self._kept[key]
+
+    def mapped(self, case: Case, mapping: str | None, points: Any = CENTER, **options: Any) -> PhaseHistory:
+        """The same, mapped; None: as collected."""
+        raw = self.collect(case, points)
+        return raw if mapping is None else map_aperture(raw, mapping, **options)
+
+    def single(self, case: Case, waveform: Waveform, points: Any = CENTER) -> PhaseHistory:
+        """Echoes of one antenna on the case's track."""
+        return echo(
+            Scene.points(points), waveform, case.track(), reference=(0, 0, 0), range_window=(-5.0, 5.0),
+            tolerance=1e-4, check=False, device=self.device,
+        )  # fmt: skip
+
+    def image(self, raw: PhaseHistory, zoom: float = 1.0) -> np.ndarray:
+        """dB (along range, cross-range) about the origin, over HALF/zoom m each way; a focused unit point has 0."""
+        shape = tuple(2 * round(half / STEP) + 1 for half in HALF[::-1])
+        grid = ImageGrid.plane(shape=shape, spacing=STEP / zoom)
+        made = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
+        return np.maximum(made.decibels().T, -200.0)
+
+    def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> str:
+        """The same as a drawing, over its brightest pixel; box: half the side of a dashed square, m."""
+        edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
+        square = None if box is None else (box, box)
+        return page.picture(
+            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square
+        )  # fmt: skip
+
+    def cut(
+        self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, n: int = 801, about: float = 0.0
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Places along range (axis 0) or cross-range (1), m (n,), and amplitudes (n,), 1 of a focused unit point."""
+        at = about + np.linspace(-half, half, n)
+        places = np.zeros((n, 3))
+        places[:, axis] = at
+        made = backproject(raw, ImageGrid.points(places), tolerance=1e-3, check=False, device=self.device)
+        return at, np.abs(np.asarray(made.data)) / made.gain
+
+    def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
+        """Of a point `about` m along the axis: what `sarcl.fda.response` tells of a cut."""
+        return response(*self.cut(raw, axis, half, about=about), about)
+
+
+def _window(step: float) -> tuple[float, float]:
+    """Just inside the unambiguous range of carriers `step` Hz apart, m."""
+    from ..check import SPEED_OF_LIGHT
+
+    half = 0.49 * SPEED_OF_LIGHT / (2 * step)
+    return -half, half
+
+
+def system(n: int, step: float, *, mirrored: bool = True, spacing: float | None = None, pulses: int = 431) -> Case:
+    """Farooq's collection (tables 5.1 and 5.2): f0 10 GHz, 430 m of track 5 km away.
+
+    spacing  m; None: half a wave of the centre frequency, as section 5.4 has it
+    """
+    return Case(
+        f"N {n}, {step / 1e6:g} MHz", n=n, frequency_step=step, mirrored=mirrored, spacing=spacing, n_pulses=pulses
+    )
