@@ -64,7 +64,7 @@ class Case:
     mirrored: bool = True
     mappings: tuple[str, ...] = ("unmodified", "corrected", "apparent", "channels")
     points: tuple[float, ...] = (0.0, 2.0, 2.25)
-    separations: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25)
+    separations: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.35)
     progression: str = "linear"
     groups: int | None = None
     steer: float = 0.0

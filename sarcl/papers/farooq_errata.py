@@ -83,9 +83,10 @@ def _poles(out: Section) -> None:
 
 def _mirror(out: Section, lab: Lab) -> None:
     """Equation 5.14 as printed, and mended, beside what `map_aperture` makes."""
-    case = system(45, 20e6, mirrored=False)
+    step = 20e6
+    case = system(45, step, mirrored=False)
     actual, mapped = lab.collect(case).tx, lab.mapped(case, "apparent").tx
-    g = case.step * case.center / case.frequency_step
+    g = case.step * case.center / step
     towards = -actual
     r = np.linalg.norm(towards, axis=1)
     kx, ky = towards[:, 0] / r, towards[:, 1] / r

@@ -40,7 +40,7 @@ class Lab:
         points = tuple(tuple(float(v) for v in p) for p in points)
         key = (replace(case, name=""), points)
         if key not in self._kept:
-            step = abs(case.frequency_step)
+            step = case.channel_step
             tone = Waveform.tone(center=case.center, duration=1 / step)
             self._kept[key] = echo(
                 Scene.points(points), tone, case.track(), array=case.array(), reference=(0, 0, 0),
