@@ -37,8 +37,8 @@ def map_aperture(
     offset     "published": the apparent angle takes c dt of the peak for a one-way path; "halved": for a two-way path
     vertical   the apparent position keeps its elevation above the plane across it (3,)
 
-    ValueError: no array, channels kept apart already or sharing samples, elements or carriers that do not progress in
-    even steps, a center that is not the data's.
+    ValueError: no array, channels kept apart already, sharing samples or outside the sampled band, elements or carriers
+    that do not progress in even steps, a center that is not the data's.
     """
     check.instance("raw", raw, PhaseHistory)
     check.choice("mapping", mapping, MAPPINGS)
@@ -149,6 +149,14 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
             raise ValueError(
                 "the array's channels share carriers, or are not evenly spaced, so that samples cannot be told apart "
                 "by frequency; make the echoes with channels='separated'"
+            )
+        low, high = frequencies[rows].min(axis=1).max() - apart / 2, frequencies[rows].max(axis=1).min() + apart / 2
+        outside = np.flatnonzero((carriers < low) | (carriers > high))
+        if len(outside):
+            raise ValueError(
+                f"{len(outside)} of the array's {array.n} channels lie outside the sampled band of "
+                f"{(low + apart / 2) / 1e9:.6g} to {(high - apart / 2) / 1e9:.6g} GHz, such as element {outside[0]} at "
+                f"{carriers[outside[0]] / 1e9:.6g} GHz; keep all samples that echo returned"
             )
         order = np.argsort(carriers)
         place = np.rint((frequencies[rows] - carriers[order[0]]) / apart)

@@ -13,7 +13,7 @@ MOST = 10_000  # elements
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
-@dataclass(frozen=True, eq=False, kw_only=True)
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class AntennaArray:
     """Isotropic elements, each sending its own carrier. Make one with `single`, `linear`, `planar` or `costas`.
 
@@ -51,6 +51,14 @@ class AntennaArray:
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        wide = np.linalg.norm(np.ptp(self.positions, axis=0))
+        plans = f", {len(self.offsets)} plans" if len(self.offsets) > 1 else ""
+        return (
+            f"AntennaArray({self.n} elements over {wide:.4g} m, offsets {self.offsets.min():.4g} to "
+            f"{self.offsets.max():.4g} Hz{plans})"
+        )
 
     @classmethod
     def single(cls) -> AntennaArray:

@@ -199,6 +199,10 @@ BAD = {
     "one carrier": (
         lambda: map_aperture(replace(simple(), array=AntennaArray.linear(5, spacing=1)), "corrected"), "share carriers"
     ),
+    "channels outside the samples": (
+        lambda: map_aperture(replace(simple(), samples=simple().samples[:, :3]), "corrected"),
+        r"2 of the array's 5 channels lie outside the sampled band of 10 to 10.04 GHz, such as element 3 at 10.06 GHz",
+    ),
     "costas": (
         lambda: map_aperture(replace(simple(), array=AntennaArray.costas(5, spacing=0.1, frequency_step=20e6)),
                              "apparent"),

@@ -155,3 +155,8 @@ def test_fields_are_read_only_and_public():
 def test_what_does_not_fit_is_refused_by_name(make, message):
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_an_array_says_what_it_is_in_a_line():
+    text = repr(AntennaArray.linear(45, spacing=0.015, frequency_step=20e6).mirrored(2, 4))
+    assert text == "AntennaArray(45 elements over 0.66 m, offsets 0 to 8.8e+08 Hz, 2 plans)"

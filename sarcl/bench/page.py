@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from . import echo_page, figures, pareto, table
+from . import channels_page, echo_page, figures, pareto, table
 from .backproject import FORMAT
 
 INTRODUCTION = """# Results
@@ -16,6 +16,7 @@ Made by `make results` from the JSON files under bench/results; `make bench` mea
 [notes](#how-to-read-this) at the end.
 
 """
+OTHER = {"echo": echo_page.section, "channels": channels_page.section}  # kinds of documents that are not of images
 README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "of that in kernels"]
 
 
@@ -31,8 +32,8 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     written = []
     page = INTRODUCTION
     for name, document in documents.items():
-        if document.get("kind") == "echo":
-            page += echo_page.section(name, document)
+        if document.get("kind") in OTHER:
+            page += OTHER[document["kind"]](name, document)
             continue
         drawn = any(figures.ran(case) for case in document["cases"])
         if drawn:

@@ -1,0 +1,170 @@
+"""Channels of arrays: run time against achieved error, and how it grows with their number.
+
+    python bench/channels.py --json bench/results/4-channels-pocl.json
+
+growth   points in front of 9, 45 and 450 elements half a wave apart, a carrier each, 900 MHz in all: by one call of echo;
+         by the same with every channel made by itself; and by a call of echo for every element as a single antenna
+one      9 and 45 elements of one carrier: as `AntennaArray.linear` without a step, the same array given element by
+         element, interpolated between places, every element by itself, and a single element
+many     450 senders and 450 receivers, written to a file within 100 MB
+
+A contribution is a pair of scatterer and pulse for every sender and receiver. Errors are achieved ones, by echo's own
+check against exact sums. The shortest run counts, of runs that take turns; compiling is not in it.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+import time
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+import sarcl
+from sarcl.fda_case import Case
+
+BAND, PULSES = 900e6, 101
+POINTS = {"100 points in 1 m": (100, 0.5), "10 000 points in 5 m": (10_000, 2.5)}
+CHANNELS = {"equal channels", "interpolated channels"}  # what `skip` leaves out of arrays
+OTHERS = {"zero reflectivity", "facing away", "range window", "out of beam"}
+Row = dict[str, Any]
+
+
+def main() -> None:
+    """Measure, print the tables, and write the JSON file."""
+    from sarcl import cl
+    from sarcl.bench import backproject, channels_page
+
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--repeats", type=int, default=3)
+    parser.add_argument("--device", default=None)
+    parser.add_argument("--json", type=Path)
+    args = parser.parse_args()
+    document = backproject.header([cl.open_device(args.device)])
+    document |= {"kind": "channels", "pulses": PULSES, "growth": [], "one": [], "many": []}
+    for name, part in (("growth", growth), ("one", one), ("many", many)):
+        document[name] = part(args)
+        if args.json:  # what comes later may fail
+            backproject.write(document, args.json)
+    document["machine"]["load"] += backproject.load()
+    print(channels_page.section("channels", document))
+    if args.json:
+        backproject.write(document, args.json)
+
+
+def growth(args: argparse.Namespace) -> list[Row]:
+    """Rows of every number of channels and points."""
+    out = []
+    for name, (count, half) in POINTS.items():
+        scene = scatter(count, half)
+        for n in (9, 45, 450):
+            case = Case("growth", n=n, frequency_step=BAND / n, n_pulses=PULSES, mirrored=False)
+            array, track = case.array(), case.track()
+            tone = sarcl.Waveform.tone(center=case.center, duration=n / BAND)
+            window = (-half - 2, half + 2)
+            options: Row = {"reference": (0, 0, 0), "range_window": window, "tolerance": 1e-3, "device": args.device}
+
+            def together(
+                skip: Any, array: Any = array, options: Row = options, what: Any = (scene, tone, track)
+            ) -> Any:
+                return sarcl.echo(*what, array=array, skip=skip, check=True, **options)
+
+            def singly(
+                scene: Any = scene, array: Any = array, track: Any = track, tone: Any = tone, options: Row = options
+            ) -> Any:
+                from dataclasses import replace
+
+                worst = None
+                for place, offset in zip(array.positions, array.offsets[0], strict=True):
+                    wave = replace(tone, center=tone.center + float(offset))
+                    moved = replace(track, positions=track.positions + place)
+                    raw = sarcl.echo(scene, wave, moved, receiver=track, check=False, **options)
+                    worst = raw if worst is None or raw.report.predicted_error > worst.report.predicted_error else worst
+                return worst
+
+            ways: dict[str, Callable[[], Any]] = {
+                "one call": lambda f=together: f(True),  # type: ignore[misc]
+                "one call, each channel made": lambda f=together: f(OTHERS | {"equal channels"}),  # type: ignore[misc]
+                "a call a channel": singly,
+            }
+            out += measured(args, f"{name}", n, n * PULSES * count, ways)
+    return out
+
+
+def one(args: argparse.Namespace) -> list[Row]:
+    """Rows of arrays of one carrier."""
+    out = []
+    scene, tolerance = scatter(20_000, 5.0), 1e-3
+    chirp = sarcl.Waveform.chirp(center=10e9, bandwidth=300e6, duration=1e-6)
+    for n in (9, 45):
+        track = Case("one", n=n, n_pulses=PULSES).track()
+        even = sarcl.AntennaArray.linear(n, spacing=0.015, axis=(0, -1, 0))
+        listed = sarcl.AntennaArray(positions=even.positions, offsets=np.zeros((1, n)))
+
+        def made(array: Any, skip: Any = True, track: Any = track) -> Callable[[], Any]:
+            return lambda: sarcl.echo(
+                scene, chirp, track, array=array, skip=skip, reference=(0, 0, 0), tolerance=tolerance, check=True,
+                device=args.device,
+            )  # fmt: skip
+
+        ways = {
+            "without a step": made(even), "listed": made(listed),
+            "between places": made(even, OTHERS | {"interpolated channels"}), "each element": made(even, OTHERS),
+            "a single element": made(None),
+        }  # fmt: skip
+        out += measured(args, "20 000 points in 10 m", n, n * PULSES * 20_000, ways)
+    return out
+
+
+def many(args: argparse.Namespace) -> list[Row]:
+    """Rows of 450 senders and 450 receivers, into a file."""
+    case = Case("many", n=450, frequency_step=2e6, n_pulses=PULSES, mirrored=False)
+    tone = sarcl.Waveform.tone(center=case.center, duration=1 / 2e6)
+    out = []
+    with tempfile.TemporaryDirectory() as folder:
+        for name, (count, half) in POINTS.items():
+            scene = scatter(count, half)
+            ways = {
+                "one call": lambda scene=scene: sarcl.echo(
+                    scene, tone, case.track(), array=case.array(), receive="all", reference=(0, 0, 0),
+                    range_window=(-36, 36), tolerance=1e-3, max_bytes=1e8, out=Path(folder) / "raw.h5", check=True,
+                    device=args.device,
+                )
+            }  # fmt: skip
+            out += measured(args, name, 450 * 450, 450 * 450 * PULSES * count, ways)
+    return out
+
+
+def scatter(count: int, half: float) -> sarcl.Scene:
+    """Points within `half` m of the origin."""
+    random = np.random.default_rng(0)
+    return sarcl.Scene.points(random.uniform(-half, half, (count, 3)) * [1, 1, 0.1], random.normal(size=count) + 0j)
+
+
+def measured(
+    args: argparse.Namespace, name: str, n: int, contributions: int, ways: dict[str, Callable[[], Any]]
+) -> list[Row]:
+    """A row of each way; runs take turns, after one that builds kernels."""
+    rows: dict[str, Row] = {}
+    for turn in range(args.repeats + 1):
+        for way, call in ways.items():
+            start = time.perf_counter()
+            raw = call()
+            seconds = time.perf_counter() - start - raw.report.seconds.get("check", 0.0)
+            row = rows.setdefault(
+                way,
+                {"scene": name, "n": n, "way": way, "contributions": contributions, "seconds": [],
+                 "error": raw.report.measured_error, "predicted": raw.report.predicted_error,
+                 "visited": raw.report.contributions_done, "places": raw.report.plan.get("places")},
+            )  # fmt: skip
+            if turn:
+                row["seconds"].append(seconds)
+    return list(rows.values())
+
+
+if __name__ == "__main__":
+    sys.exit(main())
