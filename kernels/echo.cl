@@ -24,7 +24,7 @@
 // global size (pulses of this block, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   scatterers  (2, n_tiles TILE)    re, im of amplitude
-//   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, N_AXES), range, reach (6)   see gains.clh
+//   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see gains.clh
 //   radius      (n_tiles)   m, of the points about their reference
 //   last        scatterers in the last tile; the rest of it is blank
 //   flush       tiles added in float32 before they join the compensated total
@@ -54,7 +54,7 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
 #endif
 #endif
 #if CULL
-        if (out_of_beam(from_tx, from_rx, radius[k], axes + N_AXES * (size_t)p, reach)) {
+        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
             unlit_count += real;
             continue;
         }
@@ -87,7 +87,7 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
 #if BISTATIC
             ur = toward(from_rx, x, &rx_range);
 #endif
-            sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + N_AXES * (size_t)p, range);
+            sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)p, range);
             complex_v gain;
             for (int m = 0; m < NODES; m++) {
                 if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[m]);

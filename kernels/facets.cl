@@ -74,7 +74,7 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 //   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
 //   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and what takes its place along it
-//   patterns, second, axes (knots, N_AXES), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
+//   patterns, second, axes (knots, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
 //   out      (knots, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
 //   marks    (knots, tiles of this call, TILE)                       FRONT, BRIGHT
@@ -97,7 +97,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #endif
     int dark = as_int(c[C_STATE]) == OUTSIDE;
 #if CULL
-    dark = dark || out_of_beam(from_tx, from_rx, radius[k], axes + N_AXES * (size_t)q, reach);
+    dark = dark || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
 #endif
     for (int i = 0; i < TILE / VW; i++) {
         size_t at = (size_t)k * (TILE / VW) + i, to = here * (TILE / VW) + i;
@@ -148,7 +148,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
         fv b = t_dot(both, one), g = t_dot(both, two);
         scattering s;
 #if WEIGHTS
-        sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + N_AXES * (size_t)q, range);
+        sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)q, range);
         complex_v gain;
 #endif
         for (int m = 0; m < NODES; m++) {
@@ -202,7 +202,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
 //   knots    (n_used, 2)              first of the KNOTS knots of a pulse, and the nearest
 //   shares   (n_used, KNOTS)          what each of them counts for
-//   axes (n_used, N_AXES), reach, radius  see gains.clh
+//   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
 //   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
@@ -229,7 +229,7 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
 #if BISTATIC
         from_rx = load_direction(c, C_RX, C_RX_LOW);
 #endif
-        if (out_of_beam(from_tx, from_rx, radius[k], axes + N_AXES * (size_t)p, reach)) {
+        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
             unlit_count += real;
             continue;
         }

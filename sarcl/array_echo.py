@@ -17,7 +17,6 @@ from .check import choice
 from .echo_target import Target
 from .echo_work import Order, Work, band_of
 from .gains import Beam
-from .gains_error import beam_error
 from .phase_history import PhaseHistory
 from .planning import LEAST_TOLERANCE
 from .report import Report
@@ -42,8 +41,7 @@ def array_echo(
     if receive == "own" and channels != "separated":
         raise ValueError("receive='own' keeps every element's own channel apart; say channels='separated' too")
     sides = Sides.of(track, receiver)
-    merge = "places" if EQUAL in order.skips else "none"
-    sent = channels_of(array, waveform.center, len(track), merge)
+    sent = channels_of(array, waveform.center, len(track), EQUAL in order.skips)
     carriers = np.array([c.carrier for c in sent])
     warn_of(array, waveform, carriers)
     reference_range = echo_rows.half_path(sides.tx, sides.rx, point)
@@ -51,11 +49,6 @@ def array_echo(
     grid = sampling(carriers, waveform, near, far, compressed)
     whole = band_of(waveform, grid.frequency + (grid.n - 1) / 2 * grid.step, grid.n * grid.step)
     everywhere = antennas_of(sides.tx, sides.rx, reference_range, grid.frequency, grid, (near, far))
-    if merge == "places" and channels == "simultaneous" and array.is_constant and np.ptp(array.positions, axis=0).any():
-        middle = array.positions.mean(axis=0)
-        together = sides.together(weights, array.positions - middle, array.weights, middle)
-        if _within(together, scene, whole, order):
-            weights, sent = together, channels_of(array, waveform.center, len(track), "carriers")
     rows = Rows(array, sides, point, channels, receive, order.polarizations)
     layout = Layout(rows, sent, grid, (near, far), waveform, compressed)
     with Target(layout.shape(len(track)), out, order.budget, (near, far)) as target:
@@ -113,18 +106,6 @@ def _filled(way: Apart | Between, work: Work, target: Target) -> float:
         worst = max(worst, way.fill(work, block, start, total))
         target.keep(start, block)
     return worst
-
-
-def _within(beam: Beam, scene: Scene, whole: Waveform, order: Order) -> bool:
-    """Whether elements of one carrier may be one antenna: in float32, at a few frequencies of the band.
-
-    Where they cancel almost wholly, each has to be added by itself.
-    """
-    try:
-        found = beam_error(beam, scene, whole, order.polarizations, order.vertical, 0.7 * order.tolerance)
-    except ValueError:
-        return False
-    return float(found.over_band.min(where=found.over_band > 0, initial=np.inf)) < 0.2 * order.tolerance
 
 
 def _measured(work: Work, layout: Layout, samples: Target) -> float:

@@ -10,7 +10,6 @@ import numpy as np
 from . import echo_rows
 from .array import AntennaArray
 from .channels import Channel, Sampling
-from .gains import Beam
 from .geometry import Antennas
 from .trajectory import Trajectory
 
@@ -43,12 +42,6 @@ class Sides:
     def receivers(self, places: np.ndarray, at: Any = slice(None)) -> np.ndarray:
         """The same on the receiving side."""
         return _stand(self.rx, self.turn_rx, places, at)
-
-    def together(self, weights: Beam, places: np.ndarray, shares: np.ndarray, middle: np.ndarray) -> Beam:
-        """The weights of elements at places off `middle`, m (m, 3), as one antenna there."""
-        turned = places @ np.swapaxes(self.turn_tx, 1, 2) if self.turn_tx is not None else places
-        every = np.broadcast_to(turned, (len(self.tx), *places.shape))
-        return weights.of_elements(every, shares, self.senders(middle))
 
 
 class Rows:

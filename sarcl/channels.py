@@ -19,8 +19,7 @@ EVEN = 1e-9  # of the carriers' spacing: what lies no further off its multiples 
 class Channel:
     """What elements of one carrier and one place send, from pulse `first` to `stop`.
 
-    elements  their numbers;  offset  their place, m (3,), or the middle of theirs;  carrier  Hz
-    weight    the sum of theirs, complex; 1 where they stand at several places
+    elements  their numbers;  offset  their place, m (3,);  carrier  Hz;  weight  the sum of theirs, complex
     """
 
     elements: np.ndarray
@@ -36,10 +35,10 @@ def is_single(array: AntennaArray) -> bool:
     return array.n == 1 and not (array.positions.any() or array.offsets.any()) and array.weights[0] == 1
 
 
-def channels_of(array: AntennaArray, center: float, n_pulses: int, merge: str = "places") -> list[Channel]:
-    """Channels of an array about a base frequency, Hz. ValueError for carriers of 0 Hz or less.
+def channels_of(array: AntennaArray, center: float, n_pulses: int, merge: bool = True) -> list[Channel]:
+    """Channels of an array about a base frequency, Hz; equal ones are one (merge), or each is by itself.
 
-    merge  elements that are one channel: "places": of one carrier and place; "carriers": of one carrier; "none"
+    ValueError for carriers of 0 Hz or less.
     """
     low = center + float(array.offsets.min())
     if low <= 0:
@@ -51,16 +50,14 @@ def channels_of(array: AntennaArray, center: float, n_pulses: int, merge: str = 
     out = []
     for plan, first, stop in _runs(array, n_pulses):
         keys = np.column_stack([array.offsets[plan], array.positions])
-        keys = {"places": keys, "carriers": keys[:, :1], "none": np.arange(array.n)[:, None]}[merge]
+        keys = keys if merge else np.arange(array.n)[:, None]
         _, start, index = np.unique(keys, axis=0, return_index=True, return_inverse=True)
         for group in np.argsort(start, kind="stable").tolist():
             elements = np.flatnonzero(index.ravel() == group)
             one = int(elements[0])
             carrier = center + float(array.offsets[plan, one])
-            apart = bool(np.ptp(array.positions[elements], axis=0).any())
-            place = array.positions[elements].mean(axis=0) if apart else array.positions[one]
-            weight = 1.0 + 0j if apart else complex(array.weights[elements].sum())
-            out.append(Channel(elements, place, carrier, weight, first, stop))
+            weight = complex(array.weights[elements].sum())
+            out.append(Channel(elements, array.positions[one], carrier, weight, first, stop))
     return out
 
 

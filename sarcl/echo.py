@@ -79,8 +79,8 @@ def echo(
                   (docs/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
-                  "out of beam", "equal channels" (elements of one carrier are one antenna), "interpolated
-                  channels" (echoes from few places of an array stand for all its elements)
+                  "out of beam", "equal channels" (of one carrier and place), "interpolated channels" (echoes from few
+                  places of an array stand for all its elements)
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
                   resolution cell too; None: left as they are

@@ -10,14 +10,13 @@ import numpy as np
 
 from . import cl
 from .antenna import Antenna, pair_of
-from .check import SPEED_OF_LIGHT, instance
+from .check import instance
 from .radar import Radar, spreading
 from .trajectory import Trajectory
 from .triangles import box
 from .waveform import Waveform
 
 MOST_NODES = 16
-ANGLE = 3e-7  # what float32 errs of a path along an array, relative to its length
 LEBESGUE = 4.0  # 1 + the Lebesgue constant of up to 16 Chebyshev nodes: what interpolation adds to the best fit's error
 
 
@@ -70,7 +69,6 @@ class Beam:
     pair    antennas as `antenna.pair_of` gives them, None: gains of 1;  axes  theirs in the scene, (n, 3, 3) each
     radar   None: no loss by spreading;  range  R, m: where spreading is counted from
     limits  beyond which either antenna need not be asked (6,), as kernels/gains.clh reads them; zeros: none
-    elements, shares   of an array of one carrier, off tx, m (n, m, 3), and their complex weights (m,); None: one, at tx
     """
 
     tx: np.ndarray
@@ -81,13 +79,11 @@ class Beam:
     radar: Radar | None = None
     range: float = 1.0
     limits: np.ndarray = field(default_factory=lambda: np.zeros(6, np.float32))
-    elements: np.ndarray | None = None
-    shares: np.ndarray | None = None
 
     @property
     def weighs(self) -> bool:
         """Anything at all is asked for."""
-        return self.pair is not None or self.radar is not None or self.elements is not None
+        return self.pair is not None or self.radar is not None
 
     @property
     def ways(self) -> list[Antenna]:
@@ -97,9 +93,7 @@ class Beam:
     @property
     def varies(self) -> bool:
         """Gains differ from frequency to frequency."""
-        return self.elements is not None or any(
-            one.kind == "aperture" or one.frequency is not None for one in self.ways
-        )
+        return any(one.kind == "aperture" or one.frequency is not None for one in self.ways)
 
     @property
     def alike(self) -> bool:
@@ -109,8 +103,7 @@ class Beam:
     @property
     def peak(self) -> float:
         """Largest gain there and back, an amplitude."""
-        together = 1.0 if self.shares is None else float(np.abs(self.shares).sum())
-        return together * float(np.prod([one.amplitude for one in self.ways]))
+        return float(np.prod([one.amplitude for one in self.ways]))
 
     def factor(self, frequencies: np.ndarray) -> np.ndarray:
         """What all scatterers share at frequencies, Hz (n,): the radar equation's, over R^2."""
@@ -126,29 +119,12 @@ class Beam:
             out *= two_way_gain(self.pair, (self.axes[0][pulse], self.axes[1][pulse]), tx, rx, points, frequency)
         if self.radar is not None:
             out *= self.range**2 * spreading(*(np.linalg.norm(points - end, axis=1) for end in (tx, rx)))
-        if self.elements is not None and self.shares is not None:
-            out *= self._together(tx - points, pulse, frequency)
         return out
-
-    def _together(self, to_tx: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
-        """Sum of what elements send towards points, with vectors to tx, m (n, 3)."""
-        assert self.elements is not None and self.shares is not None
-        out, away = np.zeros(len(to_tx), np.complex128), np.linalg.norm(to_tx, axis=1)
-        for place, share in zip(self.elements[pulse], self.shares.tolist(), strict=True):
-            path = (2 * to_tx @ place + place @ place) / (away + np.linalg.norm(to_tx + place, axis=1))
-            out += share * np.exp(-2j * np.pi * frequency / SPEED_OF_LIGHT * path)
-        return out
-
-    def of_elements(self, places: np.ndarray, shares: np.ndarray, tx: np.ndarray) -> Beam:
-        """The same, with elements at places, m (n, m, 3), off tx, m (n, 3), that send together."""
-        rx = tx if self.rx is self.tx else self.rx
-        return replace(self, tx=tx, rx=rx, elements=places, shares=shares)
 
     def seen_from(self, tx: np.ndarray, rx: np.ndarray, pulses: slice) -> Beam:
         """The weights of some pulses from other places, m (n, 3): an array's elements."""
         axes = None if self.axes is None else (self.axes[0][pulses], self.axes[1][pulses])
-        elements = None if self.elements is None else self.elements[pulses]
-        return replace(self, tx=tx, rx=rx, axes=axes, elements=elements)
+        return replace(self, tx=tx, rx=rx, axes=axes)
 
     def within(self, level: float, waveform: Waveform) -> Beam:
         """The same, leaving out places where weights are below `level` of the peak, over the waveform's band."""
@@ -172,14 +148,6 @@ class Beam:
             if len(inside):
                 spreading(cKDTree(points).query(end[inside])[0], 1.0)
 
-    @property
-    def elements_error(self) -> float:
-        """Roundings of what elements send together, relative to all of them in phase."""
-        if self.elements is None:
-            return 0.0
-        size = float(np.linalg.norm(self.elements, axis=-1).max())
-        return 2 * np.pi * self.frequency / SPEED_OF_LIGHT * size * ANGLE + 1e-6
-
     def describe(self, error: BeamError) -> dict[str, Any]:
         """For a report."""
         out: dict[str, Any] = {}
@@ -201,7 +169,6 @@ class Beam:
             "VARIES": int(n_nodes > 1 and self.varies),
             "CULL": int(self.limits.any()),
             "SPREADING": int(self.radar is not None),
-            "ELEMENTS": 0 if self.shares is None else len(self.shares),
         }
 
     def upload(self, device: cl.Device) -> tuple[Any, int]:
@@ -210,19 +177,11 @@ class Beam:
         return device.upload(np.concatenate(packed)), len(packed[0])
 
     def turned(self, pulses: np.ndarray) -> np.ndarray:
-        """What kernels/gains.clh wants of pulses (n,): axes of both antennas and elements, float32."""
-        if self.axes is None and self.elements is None:
+        """Axes of both antennas at pulses (n,), one axis after another, float32 (n, 18)."""
+        if self.axes is None:
             return np.zeros((1, 18), np.float32)
-        both = np.zeros((len(pulses), 18))
-        if self.axes is not None:
-            both = np.stack([a[pulses].swapaxes(1, 2) for a in self.axes], axis=1).reshape(-1, 18)
-        if self.elements is None or self.shares is None:
-            return np.ascontiguousarray(both, np.float32)
-        places = self.elements[pulses]
-        shares = np.broadcast_to(np.stack([self.shares.real, self.shares.imag], axis=1), (*places.shape[:2], 2))
-        of = np.concatenate([places, shares], axis=2).reshape(len(pulses), -1)
-        wave = np.full((len(pulses), 1), self.frequency / SPEED_OF_LIGHT)
-        return np.concatenate([both, wave, of], axis=1).astype(np.float32)
+        both = np.stack([a[pulses].swapaxes(1, 2) for a in self.axes], axis=1)
+        return np.ascontiguousarray(both, np.float32).reshape(-1, 18)
 
 
 def beam_of(

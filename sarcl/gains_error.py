@@ -93,7 +93,6 @@ def _sampled(
         return None
     dim = max(1.0, beam.peak * float(np.sqrt(total / seen)))
     rounding = len(beam.ways) * PATTERN * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + 5e-7
-    rounding += beam.elements_error * beam.peak * float(np.sqrt(total / seen))
     return BeamError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
 
 
