@@ -19,6 +19,8 @@ import sys
 import tempfile
 import time
 from collections.abc import Callable
+from dataclasses import replace
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -59,39 +61,31 @@ def growth(args: argparse.Namespace) -> list[Row]:
     """Rows of every number of channels and points."""
     out = []
     for name, (count, half) in POINTS.items():
-        scene = scatter(count, half)
         for n in (9, 45, 450):
             case = Case("growth", n=n, frequency_step=BAND / n, n_pulses=PULSES, mirrored=False)
-            array, track = case.array(), case.track()
-            tone = sarcl.Waveform.tone(center=case.center, duration=n / BAND)
-            window = (-half - 2, half + 2)
-            options: Row = {"reference": (0, 0, 0), "range_window": window, "tolerance": 1e-3, "device": args.device}
-
-            def together(
-                skip: Any, array: Any = array, options: Row = options, what: Any = (scene, tone, track)
-            ) -> Any:
-                return sarcl.echo(*what, array=array, skip=skip, check=True, **options)
-
-            def singly(
-                scene: Any = scene, array: Any = array, track: Any = track, tone: Any = tone, options: Row = options
-            ) -> Any:
-                from dataclasses import replace
-
-                worst = None
-                for place, offset in zip(array.positions, array.offsets[0], strict=True):
-                    wave = replace(tone, center=tone.center + float(offset))
-                    moved = replace(track, positions=track.positions + place)
-                    raw = sarcl.echo(scene, wave, moved, receiver=track, check=False, **options)
-                    worst = raw if worst is None or raw.report.predicted_error > worst.report.predicted_error else worst
-                return worst
-
-            ways: dict[str, Callable[[], Any]] = {
-                "one call": lambda f=together: f(True),  # type: ignore[misc]
-                "one call, each channel made": lambda f=together: f(OTHERS | {"equal channels"}),  # type: ignore[misc]
-                "a call a channel": singly,
+            what = scatter(count, half), sarcl.Waveform.tone(center=case.center, duration=n / BAND), case.track()
+            options: Row = {"reference": (0, 0, 0), "range_window": (-half - 2, half + 2), "tolerance": 1e-3}
+            options["device"] = args.device
+            array = case.array()
+            ways = {
+                "one call": partial(sarcl.echo, *what, array=array, **options),
+                "one call, each channel made": partial(
+                    sarcl.echo, *what, array=array, skip=OTHERS | {"equal channels"}, **options
+                ),
+                "a call a channel": partial(singly, *what, array, options),
             }
-            out += measured(args, f"{name}", n, n * PULSES * count, ways)
+            out += measured(args, name, n, n * PULSES * count, ways)
     return out
+
+
+def singly(scene: Any, tone: Any, track: Any, array: Any, options: Row, *, check: bool) -> Any:
+    """A call for every element as a single antenna; returns the echoes that are predicted to err most."""
+    made = []
+    for place, offset in zip(array.positions, array.offsets[0], strict=True):
+        wave = replace(tone, center=tone.center + float(offset))
+        moved = replace(track, positions=track.positions + place)
+        made.append(sarcl.echo(scene, wave, moved, receiver=track, check=False, **options))
+    return max(made, key=lambda raw: raw.report.predicted_error)
 
 
 def one(args: argparse.Namespace) -> list[Row]:
@@ -104,16 +98,13 @@ def one(args: argparse.Namespace) -> list[Row]:
         even = sarcl.AntennaArray.linear(n, spacing=0.015, axis=(0, -1, 0))
         listed = sarcl.AntennaArray(positions=even.positions, offsets=np.zeros((1, n)))
 
-        def made(array: Any, skip: Any = True, track: Any = track) -> Callable[[], Any]:
-            return lambda: sarcl.echo(
-                scene, chirp, track, array=array, skip=skip, reference=(0, 0, 0), tolerance=tolerance, check=True,
-                device=args.device,
-            )  # fmt: skip
-
-        ways = {"without a step": made(even), "listed": made(listed), "a single element": made(None)}
+        made = partial(
+            sarcl.echo, scene, chirp, track, reference=(0, 0, 0), tolerance=tolerance, device=args.device
+        )  # fmt: skip
+        ways = {"without a step": partial(made, array=even), "listed": partial(made, array=listed)}
         if n < 100:
-            ways["each element made"] = made(even, OTHERS)
-        out += measured(args, "20 000 points in 10 m", n, n * PULSES * 20_000, ways)
+            ways["each element made"] = partial(made, array=even, skip=OTHERS)
+        out += measured(args, "20 000 points in 10 m", n, n * PULSES * 20_000, ways | {"a single element": made})
     return out
 
 
@@ -125,13 +116,11 @@ def many(args: argparse.Namespace) -> list[Row]:
     with tempfile.TemporaryDirectory() as folder:
         for name, (count, half) in POINTS.items():
             scene = scatter(count, half)
-            ways = {
-                "one call": lambda scene=scene: sarcl.echo(
-                    scene, tone, case.track(), array=case.array(), receive="all", reference=(0, 0, 0),
-                    range_window=(-36, 36), tolerance=1e-3, max_bytes=1e8, out=Path(folder) / "raw.h5", check=True,
-                    device=args.device,
-                )
-            }  # fmt: skip
+            call = partial(
+                sarcl.echo, scene, tone, case.track(), array=case.array(), receive="all", reference=(0, 0, 0),
+                range_window=(-36, 36), tolerance=1e-3, max_bytes=1e8, out=Path(folder) / "raw.h5", device=args.device,
+            )  # fmt: skip
+            ways = {"one call": call}
             out += measured(args, name, 450 * 450, 450 * 450 * PULSES * count, ways)
     return out
 
@@ -143,15 +132,15 @@ def scatter(count: int, half: float) -> sarcl.Scene:
 
 
 def measured(
-    args: argparse.Namespace, name: str, n: int, contributions: int, ways: dict[str, Callable[[], Any]]
+    args: argparse.Namespace, name: str, n: int, contributions: int, ways: dict[str, Callable[..., Any]]
 ) -> list[Row]:
     """A row of each way; runs take turns, after one that builds kernels."""
     rows: dict[str, Row] = {}
     for turn in range(args.repeats + 1):
         for way, call in ways.items():
             start = time.perf_counter()
-            raw = call()
-            seconds = time.perf_counter() - start - raw.report.seconds.get("check", 0.0)
+            raw = call(check=turn == 0)
+            seconds = time.perf_counter() - start
             row = rows.setdefault(
                 way,
                 {"scene": name, "n": n, "way": way, "contributions": contributions, "seconds": [],

@@ -183,12 +183,15 @@ class PhaseHistory:
             picked["rx"] = None
         return replace(self, samples=pick(self.samples, index), **picked)
 
-    def select(self, *, polarization: str | None = None, channel: int | None = None) -> PhaseHistory:
-        """Rows of one polarisation ("HV") and/or one receive channel. ValueError lists what there is."""
+    def select(
+        self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
+    ) -> PhaseHistory:
+        """Rows of one polarisation ("HV"), receive channel, sending element. ValueError lists what there is."""
         keep, where = np.ones(self.n_rows, bool), "these data"
         for name, field, wanted in (
             ("polarization", self.polarization, polarization),
             ("channel", self.rx_channel, channel),
+            ("sender", self.tx_channel, sender),
         ):
             if wanted is None:
                 continue

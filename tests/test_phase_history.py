@@ -475,3 +475,13 @@ def test_other_bad_arguments():
         history().time_signal(0)
     with pytest.raises(TypeError, match="frequency_stop"):
         history(frequency_stop=1)
+
+
+def test_selecting_what_one_element_sent():
+    raw = history(
+        np.ones((6, 4), complex), tx_channel=[0, 1, 2, 0, 1, 2], rx_channel=[0, 0, 0, 1, 1, 1], time=np.arange(6.0)
+    )
+    assert (raw.select(sender=1).time == raw.time[1::3]).all()
+    assert (raw.select(sender=1, channel=1).time == raw.time[4:5]).all()
+    with pytest.raises(ValueError, match=r"sender 5 is not in these data; there are \[0, 1, 2\]"):
+        raw.select(sender=5)
