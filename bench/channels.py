@@ -79,13 +79,13 @@ def growth(args: argparse.Namespace) -> list[Row]:
 
 
 def singly(scene: Any, tone: Any, track: Any, array: Any, options: Row, *, check: bool) -> Any:
-    """A call for every element as a single antenna; returns the echoes that are predicted to err most."""
+    """A call for every element as a single antenna; returns the echoes that err most."""
     made = []
     for place, offset in zip(array.positions, array.offsets[0], strict=True):
         wave = replace(tone, center=tone.center + float(offset))
         moved = replace(track, positions=track.positions + place)
-        made.append(sarcl.echo(scene, wave, moved, receiver=track, check=False, **options))
-    return max(made, key=lambda raw: raw.report.predicted_error)
+        made.append(sarcl.echo(scene, wave, moved, receiver=track, check=check, **options))
+    return max(made, key=lambda raw: (raw.report.measured_error or 0.0, raw.report.predicted_error))
 
 
 def one(args: argparse.Namespace) -> list[Row]:
