@@ -7,6 +7,8 @@ once a channel: 450 elements in front of a small scene are a dozen places, 450 b
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from .array_places import Extra, Places, places_of
@@ -24,7 +26,7 @@ WORTHWHILE = 0.7  # of what the channels cost apart
 SHARE = 0.3  # of the tolerance, for what is interpolated
 FAR = 0.02  # of the distance: from all over an array no larger than this, gains and facets look nearly the same
 GRAZING = 0.3  # facets that some elements see and others do not are about (array/distance)^1.5 of the echo
-LOOKED_AT = 33  # pulses, for the turns of the scene's corners
+LOOKED_AT = 33  # pulses along the track at which turns are looked at
 BLOCK = 256  # pulses whose paths are made at a time
 
 
@@ -56,11 +58,11 @@ class Between:
         self.runs = len(self.tx) * len(self.rx) * len(rows.sides.tx)
 
     def _turns(self, scene: Scene) -> tuple[Extra, Extra]:
-        """How echoes of the scene's corners turn at places of senders and of receivers, less the centre's."""
+        """How echoes of the scene's outermost places turn at places of senders and of receivers, less the centre's."""
         sides, grid = self.layout.rows.sides, self.layout.grid
         wave = (grid.frequency + grid.n * grid.step) / SPEED_OF_LIGHT
-        at = np.unique(np.linspace(0, len(sides.tx) - 1, LOOKED_AT).astype(int))
         off = corners(scene.bounds) - self.center
+        off = np.concatenate([off, np.diag(off[-1]), -np.diag(off[-1])])  # the middles of faces: nearest to antennas
 
         def extra(ends: np.ndarray) -> np.ndarray:
             d = ends - self.center  # (pulses, places, 3)
@@ -69,7 +71,22 @@ class Between:
             total = np.linalg.norm(d[..., None, :] - off, axis=-1) + away
             return np.asarray(wave * np.moveaxis(less / total, 1, 0).reshape(d.shape[1], -1))
 
-        return (lambda d: extra(sides.senders(d, at))), (lambda d: extra(sides.receivers(d, at)))
+        def widest(stand: Callable[..., np.ndarray], places: np.ndarray) -> np.ndarray:
+            """Pulses spread along the track, and those at which the array's box turns echoes most."""
+            box = corners(np.stack([places.min(axis=0), places.max(axis=0)]))
+            n, turns = len(sides.tx), np.zeros(len(sides.tx))
+            for start in range(0, n, BLOCK):
+                here = slice(start, min(start + BLOCK, n))
+                found = extra(stand(box, here)).reshape(len(box), -1, len(off))
+                turns[here] = np.ptp(found, axis=0).max(axis=-1)
+            spread = np.linspace(0, n - 1, LOOKED_AT).astype(int)
+            return np.unique(np.concatenate([spread, np.argsort(turns)[-LOOKED_AT // 4 :]]))
+
+        sending = widest(sides.senders, self.senders)
+        hearing = widest(sides.receivers, self.senders if self.own else self.layout.rows.heard)
+        if self.own:
+            sending = hearing = np.union1d(sending, hearing)
+        return (lambda d: extra(sides.senders(d, sending))), (lambda d: extra(sides.receivers(d, hearing)))
 
     def pays(self, scatterers: int) -> bool:
         """Whether this is quicker than every channel apart."""

@@ -153,3 +153,18 @@ def test_every_element_to_every_other_takes_few_places():
     turns = (np.array(path) - 2 * raw.reference_range[row]) * raw.frequency[row] / SPEED_OF_LIGHT
     wanted = np.exp(-2j * np.pi * np.mod(turns, 1).astype(float)).sum()
     assert abs(raw.samples[row, 0] - wanted) < 1e-3 * 2**0.5
+
+
+def test_a_single_pulse_close_by_is_seen():
+    # one pulse of 200 from a tenth of the distance, where the scene turns ten times as much over the array
+    positions = np.stack([np.full(200, -5e4), np.linspace(-50, 50, 200), np.full(200, 2e4)], axis=1)
+    positions[101] /= 10
+    track, array = sarcl.Trajectory(np.arange(200), positions), line(45, spacing=0.3)
+    scene = sarcl.Scene.points([[0.0, -3, 0], [0.5, 3, 0]])
+    raw = sarcl.echo(scene, TONE, track, array=array, reference=(0, 0, 0), range_window=WINDOW, tolerance=1e-3)
+    assert raw.report.contributions_skipped["interpolated channels"] > 0
+    close = sarcl.Trajectory([0.0], positions[101:102])
+    wanted = sarcl.echo(
+        scene, TONE, close, array=array, reference=(0, 0, 0), range_window=WINDOW, tolerance=1e-5, skip=EACH
+    ).samples[0]
+    assert np.linalg.norm(raw.samples[101] - wanted) <= 1e-3 * np.linalg.norm(wanted)
