@@ -5,7 +5,7 @@ Less the path to the scene's centre, an echo heard from an element turns as litt
     psi(d, x) = |T + d - x| - |T + d - c|,    exp(-j 2 pi f psi(d, x)/c) = sum_m L_m(d) exp(-j 2 pi f psi(d_m, x)/c)
 
 with L_m Lagrange's polynomials along the array's axes, d_m Chebyshev's places on them. How much that errs is computed
-at the elements themselves, for the corners of the scene's box, whose psi are the largest.
+at the elements themselves, for outermost places of the scene, whose psi are the largest.
 """
 
 from __future__ import annotations

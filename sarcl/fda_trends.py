@@ -5,14 +5,12 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
-import numpy as np
-
 from . import page
 from .fda import CONVENTIONAL, nearer
 from .fda_sweep import UNITS, shown
 from .fda_words import at_most
 
-DECADE = 20.0  # ratio of values from which on their logarithm is drawn
+DECADE = 20.0  # ratio of values from which on the axis is in decades
 Result = Mapping[str, Any]
 
 
@@ -116,7 +114,7 @@ def _drawings(cases: Sequence[Result]) -> list[str]:
         return []
     unit, scale = UNITS.get(key, ("", 1.0))
     many = min(values) > 0 and max(values) / min(values) >= DECADE
-    axis = f"{'log10 of ' if many else ''}{key}{' in' if many and unit else ','} {unit}".rstrip(" ,")
+    axis = f"{key}, {unit}".rstrip(" ,")
     others: dict[str, list[Result]] = {}
     for case in cases:
         rest = ", ".join(f"{k} {shown(k, v)}" for k, v in case["swept"].items() if k != key)
@@ -132,7 +130,7 @@ def _drawings(cases: Sequence[Result]) -> list[str]:
                     if name in case["mapped"] and (v := value(case["mapped"][name])) is not None
                 )
                 x, y = zip(*found, strict=True) if found else ((), ())
-                curves.append((name if found else f"({name}: none)", np.log10(x) if many else x, y))
+                curves.append((name if found else f"({name}: none)", x, y))
             if any(len(x) for _, x, _ in curves):
-                out.append(page.plot(curves, axis, title, f"{title}{'; ' if rest else ''}{rest}"))
+                out.append(page.plot(curves, axis, title, f"{title}{'; ' if rest else ''}{rest}", log_x=many))
     return out
