@@ -53,7 +53,7 @@ def map_aperture(
             f"reference_range[{worst}] is {raw.reference_range[worst]:.4f} m, but center is {away[worst]:.4f} m away; "
             "give the point that raw's phase is relative to as center (echo's reference)"
         )
-    turn = None if attitude is None else check.array("attitude", attitude, np.float64, ("n_pulses", 3, 3))[pulse]
+    turn = None if attitude is None else _rotations(attitude, int(pulse.max()) + 1)[pulse]
     element = _elements(raw, array, pulse)
     if mapping == "channels":
         return _apart(raw, array, element, turn)
@@ -104,6 +104,15 @@ def _apparent(
     )
 
 
+def _rotations(attitude: Any, n_pulses: int) -> np.ndarray:
+    turns = check.array("attitude", attitude, np.float64, (n_pulses, 3, 3))
+    off = np.abs(np.einsum("nij,nkj->nik", turns, turns) - np.eye(3)).max(axis=(1, 2))
+    if off.max() > LINE:
+        bad = int(off.argmax())
+        raise ValueError(f"attitude[{bad}] is no rotation; give the track's own, orthonormal")
+    return turns
+
+
 def _array_of(raw: PhaseHistory) -> AntennaArray:
     """The array whose channels are added up in raw's rows."""
     if not isinstance(raw.array, AntennaArray) or raw.waveform is None:
@@ -150,6 +159,11 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
                 "the array's channels share carriers, or are not evenly spaced, so that samples cannot be told apart "
                 "by frequency; make the echoes with channels='separated'"
             )
+        if raw.waveform.kind != "tone" and raw.waveform.bandwidth > apart * (1 + 1e-9):
+            raise ValueError(
+                f"channels {apart / 1e6:g} MHz apart share samples: their pulses are "
+                f"{raw.waveform.bandwidth / 1e6:g} MHz wide; make the echoes with channels='separated', or send tones"
+            )
         low, high = frequencies[rows].min(axis=1).max() - apart / 2, frequencies[rows].max(axis=1).min() + apart / 2
         outside = np.flatnonzero((carriers < low) | (carriers > high))
         if len(outside):
@@ -172,7 +186,12 @@ def _progression(array: AntennaArray) -> np.ndarray:
     off = np.abs(array.positions - np.arange(array.n)[:, None] * step).max()
     change = array.offsets[:, -1:] - array.offsets[:, :1]
     bent = np.abs(array.offsets - array.offsets[:, :1] - np.arange(array.n) / max(array.n - 1, 1) * change).max()
-    if array.n < 2 or off > LINE * np.linalg.norm(array.positions[-1]) or bent > LINE * np.abs(change).max():
+    if (
+        array.n < 2
+        or not step.any()
+        or off > LINE * np.linalg.norm(array.positions[-1])
+        or bent > LINE * np.abs(change).max()
+    ):
         raise ValueError(
             "apparent positions and the paper's linear correction are told from elements and carriers that progress in "
             "even steps along a line; use mapping='corrected' with quadratic=True, or 'channels'"

@@ -7,26 +7,26 @@ once a channel: 450 elements in front of a small scene are a dozen places, 450 b
 
 from __future__ import annotations
 
-from collections.abc import Callable
-
 import numpy as np
 
-from .array_places import Extra, Places, places_of
+from .array_places import Places, places_of
 from .array_rows import antennas_of
 from .array_sum import Layout, during, run
+from .array_views import Views
 from .channels import Channel
 from .check import SPEED_OF_LIGHT
 from .echo_work import Work, band_of
+from .gains import Beam
 from .scene import Scene
 from .triangles import corners
 
-# Cost of a pulse in a run of the engines, of a sample of its band, of a scatterer in it: us on two cores (PoCL)
-RUN, SAMPLE, SCATTERER = 15.0, 0.03, 0.003
+# us on two cores (PoCL): of a pulse in a run of the engines, a sample of its band, a scatterer in it; of a sample of a
+# channel that is interpolated
+RUN, SAMPLE, SCATTERER, CHANNEL = 15.0, 0.03, 0.003, 0.05
 WORTHWHILE = 0.7  # of what the channels cost apart
 SHARE = 0.3  # of the tolerance, for what is interpolated
-FAR = 0.02  # of the distance: from all over an array no larger than this, gains and facets look nearly the same
-GRAZING = 0.3  # facets that some elements see and others do not are about (array/distance)^1.5 of the echo
-LOOKED_AT = 33  # pulses along the track at which turns are looked at
+FAR = 0.02  # of the distance: no array larger than this is looked at
+GRAZING = 0.3  # of the tolerance: facets that face some elements alone are about (array/distance)^1.5 of the echo
 BLOCK = 256  # pulses whose paths are made at a time
 
 
@@ -38,81 +38,71 @@ class Between:
     runs       pulses at all places
     """
 
-    def __init__(self, layout: Layout, scene: Scene, tolerance: float) -> None:
+    def __init__(self, layout: Layout, scene: Scene, weights: Beam, vertical: np.ndarray, tolerance: float) -> None:
         rows, self.layout, self.center = layout.rows, layout, scene.center
         self.own = rows.receive == "own"
         # + 0.0: so that 0 and -0 are one place
         self.senders, index = np.unique(np.array([c.offset for c in layout.sent]) + 0.0, axis=0, return_inverse=True)
         self.sender = dict(zip(map(id, layout.sent), index.ravel().tolist(), strict=True))
-        allowed = SHARE * tolerance / np.sqrt(layout.overlap)
-        sending, hearing = self._turns(scene)
-        if self.own:
-            self.tx = places_of(self.senders, lambda d: sending(d) + hearing(d), allowed)
-            self.rx = Places(np.zeros((1, 3)), np.ones((1, 1)))
-        else:
-            self.tx = places_of(self.senders, sending, allowed / 2)
-            self.rx = places_of(rows.heard, hearing, allowed / 2 / self.tx.growth)
-        self.growth = float(np.sqrt(layout.overlap)) * self.tx.growth * self.rx.growth
-        self.error = float(np.sqrt(layout.overlap)) * (self.tx.error + self.tx.growth * self.rx.error)
+        self.heard = self.senders if self.own else rows.heard
+        # errors add up where channels do, the more so where their sum is small
+        together = float(np.sqrt(layout.overlap))
+        self.tx, self.rx = Places(self.senders), Places(np.zeros((1, 3)) if self.own else self.heard)
+        if self._fits(scene, vertical, tolerance):
+            grid = layout.grid
+            views = Views(rows.sides, scene, weights, grid.frequency + grid.n * grid.step, self.senders, self.heard)
+            allowed, most = SHARE * tolerance / together, self._most(len(scene.positions) + len(scene.triangles))
+            least = 2 if len(scene.triangles) else 1  # what facets send back changes evenly from place to place
+            if self.own:
+                self.tx = places_of(self.senders, views.same, allowed, most, least)
+            else:
+                self.tx = places_of(self.senders, views.sending, allowed / 2, most, least)
+                within = allowed / 2 / self.tx.growth
+                self.rx = places_of(self.heard, views.hearing, within, most / len(self.tx), least)
+        self.growth = together * self.tx.growth * self.rx.growth
+        self.error = together * (self.tx.error + self.tx.growth * self.rx.error)
         self.tolerance = (tolerance - self.error) / self.growth
         self.runs = len(self.tx) * len(self.rx) * len(rows.sides.tx)
 
-    def _turns(self, scene: Scene) -> tuple[Extra, Extra]:
-        """How echoes of the scene's outermost places turn at places of senders and of receivers, less the centre's."""
-        sides, grid = self.layout.rows.sides, self.layout.grid
-        wave = (grid.frequency + grid.n * grid.step) / SPEED_OF_LIGHT
-        off = corners(scene.bounds) - self.center
-        off = np.concatenate([off, np.diag(off[-1]), -np.diag(off[-1])])  # the middles of faces: nearest to antennas
+    @property
+    def interpolates(self) -> bool:
+        """Whether there are fewer places than elements, on either side."""
+        return self.tx.basis is not None or self.rx.basis is not None
 
-        def extra(ends: np.ndarray) -> np.ndarray:
-            d = ends - self.center  # (pulses, places, 3)
-            away = np.linalg.norm(d, axis=-1)[..., None]
-            less = (off**2).sum(axis=1) - 2 * d @ off.T
-            total = np.linalg.norm(d[..., None, :] - off, axis=-1) + away
-            return np.asarray(wave * np.moveaxis(less / total, 1, 0).reshape(d.shape[1], -1))
-
-        def widest(stand: Callable[..., np.ndarray], places: np.ndarray) -> np.ndarray:
-            """Pulses spread along the track, and those at which the array's box turns echoes most."""
-            box = corners(np.stack([places.min(axis=0), places.max(axis=0)]))
-            n, turns = len(sides.tx), np.zeros(len(sides.tx))
-            for start in range(0, n, BLOCK):
-                here = slice(start, min(start + BLOCK, n))
-                found = extra(stand(box, here)).reshape(len(box), -1, len(off))
-                turns[here] = np.ptp(found, axis=0).max(axis=-1)
-            spread = np.linspace(0, n - 1, LOOKED_AT).astype(int)
-            return np.unique(np.concatenate([spread, np.argsort(turns)[-LOOKED_AT // 4 :]]))
-
-        sending = widest(sides.senders, self.senders)
-        hearing = widest(sides.receivers, self.senders if self.own else self.layout.rows.heard)
-        if self.own:
-            sending = hearing = np.union1d(sending, hearing)
-        return (lambda d: extra(sides.senders(d, sending))), (lambda d: extra(sides.receivers(d, hearing)))
+    def _most(self, scatterers: int) -> float:
+        """Places that cost no more than every channel apart."""
+        layout, fixed = self.layout, RUN + SCATTERER * scatterers
+        width = min(layout.grid.width, layout.grid.n)
+        saved = layout.runs * (WORTHWHILE * (fixed + SAMPLE * width) - CHANNEL * width)
+        return saved / (len(layout.rows.sides.tx) * (fixed + SAMPLE * layout.grid.n))
 
     def pays(self, scatterers: int) -> bool:
         """Whether this is quicker than every channel apart."""
-        grid, fixed = self.layout.grid, RUN + SCATTERER * scatterers
-        apart = self.layout.runs * (fixed + SAMPLE * min(grid.width, grid.n))
-        return self.runs * (fixed + SAMPLE * grid.n) < WORTHWHILE * apart
+        return self.interpolates and len(self.tx) * len(self.rx) <= self._most(scatterers)
 
-    def fits(self, scene: Scene) -> bool:
+    def _fits(self, scene: Scene, vertical: np.ndarray, tolerance: float) -> bool:
         """Whether echoes are smooth over the array: antennas far off, no scatterer at an edge of the range window.
 
-        Paths are convex in the places of scatterers and elements: largest at corners of their boxes, and inside
-        no further below what they are there than `bow`.
+        Paths are convex in the places of scatterers and elements: largest at corners of their boxes, and inside no
+        further below what they are there than `bow`; to the reference, where it moves with the element, the other way.
         """
         layout, rows, sides = self.layout, self.layout.rows, self.layout.rows.sides
-        monostatic = sides.rx is sides.tx
         radius = float(np.linalg.norm(np.ptp(scene.bounds, axis=0))) / 2
-        places = [self.senders, self.senders if self.own else rows.heard]
+        places = [self.senders, self.heard]
         wide = max(float(np.linalg.norm(np.ptp(p, axis=0))) for p in places)
         reach = max(float(np.linalg.norm(p, axis=1).max()) for p in places)
-        near = min(float(np.linalg.norm(e - self.center, axis=1).min()) for e in (sides.tx, sides.rx))
-        near -= radius + reach
-        if wide > FAR * near:
+        antennas = (sides.tx, sides.rx)
+        near, near_point = (
+            min(float(np.linalg.norm(e - point, axis=1).min()) for e in antennas) - reach
+            for point in (self.center, rows.point)
+        )
+        near -= radius
+        if wide > FAR * near or (wide and near_point < 4 * wide):
             return False
-        if len(scene.triangles) and (not monostatic or (wide / near) ** 1.5 > GRAZING * self.tolerance):
+        if len(scene.triangles) and not self._facets_alike(wide / near, vertical, tolerance):
             return False
         bow = 2 * (radius + wide) ** 2 / near
+        over = wide**2 / near_point if wide else 0.0
         alias = 0.98 * SPEED_OF_LIGHT / (4 * layout.grid.step)
         ends = [corners(np.stack([p.min(axis=0), p.max(axis=0)])) for p in places]
         for start in range(0, len(sides.tx), BLOCK):
@@ -120,19 +110,33 @@ class Between:
             tx, rx = sides.senders(ends[0], at), sides.receivers(ends[1], at)
             sent, heard = (_paths(e, corners(scene.bounds)) for e in (tx, rx))
             sender = tx if rows.separated else sides.tx[at][:, None]
-            for point, first, last in ((rows.point, sender, layout.window), (self.center, tx, (-alias, alias))):
+            for point, first, last, room in (
+                (rows.point, sender, layout.window, over),
+                (self.center, tx, (-alias, alias), wide**2 / near),
+            ):
                 low, high = 0.0, 0.0
-                for paths, antennas in ((sent, first), (heard, rx)):
-                    off = paths - _paths(antennas, point[None])
+                for paths, others in ((sent, first), (heard, rx)):
+                    off = paths - _paths(others, point[None])
                     low, high = low + off.min(axis=1) / 2, high + off.max(axis=1) / 2
-                if np.min(low) - bow < last[0] or np.max(high) > last[1]:
+                if np.min(low) - bow < last[0] or np.max(high) + room > last[1]:
                     return False
         return True
 
+    def _facets_alike(self, angle: float, vertical: np.ndarray, tolerance: float) -> bool:
+        """Whether facets that face one element face all, and H and V lie alike there: angle, rad, of the array."""
+        sides = self.layout.rows.sides
+        look = sides.tx - self.center
+        off_vertical = np.linalg.norm(np.cross(look / np.linalg.norm(look, axis=1, keepdims=True), vertical), axis=1)
+        turned = angle / max(float(off_vertical.min()), 1e-12)
+        return sides.rx is sides.tx and max(angle**1.5, turned**2) <= GRAZING * tolerance
+
     def pulses(self, budget: float) -> int:
-        """Pulses to be filled at a time, so that what is made at the places takes half the budget."""
-        places, names = self.runs // len(self.layout.rows.sides.tx), len(self.layout.rows.polarizations)
-        return max(1, int(budget / 2 / (8 * places * names * self.layout.grid.n)))
+        """Pulses to be filled at a time: what is made at the places, and of a channel, takes half the budget."""
+        rows, grid = self.layout.rows, self.layout.grid
+        names = len(rows.polarizations)
+        at_places = 8 * len(self.tx) * len(self.rx) * names * grid.n
+        channel = rows.hearing * (min(grid.width, grid.n) * (48 + 24 * names) + 100)
+        return max(1, int(budget / 2 / (at_places + channel)))
 
     def fill(self, work: Work, samples: np.ndarray, start: int, total: int) -> float:
         """As `Apart.fill`."""
@@ -171,9 +175,13 @@ class Between:
         """Add a channel at every receiver to samples of pulses `at`, from those made at the places."""
         layout, rows = self.layout, self.layout.rows
         part, frequencies = layout.samples(channel)
-        sender = self.tx.basis[self.sender[id(channel)]].astype(np.float32)
-        some = np.tensordot(sender, made[..., layout.grid.part(channel.carrier)], 1)
-        values = np.moveaxis(np.tensordot(self.rx.basis.astype(np.float32), some, 1), 0, 1)
+        number, part_of_band = self.sender[id(channel)], made[..., layout.grid.part(channel.carrier)]
+        if self.tx.basis is None:
+            some = part_of_band[number]
+        else:
+            some = np.tensordot(self.tx.basis[number].astype(np.float32), part_of_band, 1)
+        every = some if self.rx.basis is None else np.tensordot(self.rx.basis.astype(np.float32), some, 1)
+        values = np.moveaxis(every, 0, 1)
         tx = rows.sides.senders(channel.offset, at)
         sent_to_reference = np.linalg.norm((tx if rows.separated else rows.sides.tx[at]) - rows.point, axis=-1)
         reference = (sent_to_reference[:, None] + back_to_reference) / 2  # as `Rows.geometry` rounds it

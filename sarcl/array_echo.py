@@ -15,7 +15,7 @@ from .array_sum import Apart, Layout, during
 from .channels import channels_of, sampling, warn_of
 from .check import choice
 from .echo_target import Target
-from .echo_work import Order, Work, band_of
+from .echo_work import Order, Progress, Work, band_of
 from .gains import Beam
 from .phase_history import PhaseHistory
 from .planning import LEAST_TOLERANCE
@@ -52,11 +52,14 @@ def array_echo(
     rows = Rows(array, sides, point, channels, receive, order.polarizations)
     layout = Layout(rows, sent, grid, (near, far), waveform, compressed)
     with Target(layout.shape(len(track)), out, order.budget, (near, far)) as target:
-        for way, its_order in _ways(layout, scene, order):
+        for way, its_order in _ways(layout, scene, weights, order):
             try:
                 work = Work(its_order, given, scene, whole, everywhere, weights)
                 worst = _filled(way, work, target)
                 break
+            except _Raised as exc:
+                assert exc.__cause__ is not None
+                raise exc.__cause__ from None
             except ValueError:  # what float32 cannot keep between places it may keep without
                 if isinstance(way, Apart):
                     raise
@@ -85,16 +88,31 @@ def array_echo(
         )  # fmt: skip
 
 
-def _ways(layout: Layout, scene: Scene, order: Order) -> list[tuple[Apart | Between, Order]]:
+def _ways(layout: Layout, scene: Scene, weights: Beam, order: Order) -> list[tuple[Apart | Between, Order]]:
     """Ways to make the samples, the cheaper first, and what is asked of the engines there."""
     ways: list[tuple[Apart | Between, Order]] = [(Apart(layout), order)]
     shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
     if BETWEEN in order.skips and layout.runs > len(layout.rows.sides.tx) and shared:
-        between = Between(layout, scene, order.tolerance)
+        between = Between(layout, scene, weights, order.vertical, order.tolerance)
         scatterers = len(scene.positions) + len(scene.triangles)
-        if between.tolerance >= LEAST_TOLERANCE and between.pays(scatterers) and between.fits(scene):
-            ways.insert(0, (between, replace(order, tolerance=between.tolerance)))
+        if between.tolerance >= LEAST_TOLERANCE and between.pays(scatterers):
+            ways.insert(0, (between, replace(order, tolerance=between.tolerance, progress=_outside(order.progress))))
     return ways
+
+
+class _Raised(Exception):
+    """What the caller's own progress raised: never a reason to try another way."""
+
+
+def _outside(progress: Progress | None) -> Progress | None:
+    def told(stage: str, done: int, total: int) -> Any:
+        assert progress is not None
+        try:
+            return progress(stage, done, total)
+        except ValueError as exc:
+            raise _Raised from exc
+
+    return told if progress else None
 
 
 def _filled(way: Apart | Between, work: Work, target: Target) -> float:

@@ -49,8 +49,13 @@ class Layout:
 
     @property
     def overlap(self) -> float:
-        """Channels that are added up on one sample."""
-        return 1.0 if self.rows.separated else max(1.0, len(self.sent) * self.grid.width / self.grid.n)
+        """Channels that are added up on one sample, at most."""
+        if self.rows.separated:
+            return 1.0
+        counts: dict[int, np.ndarray] = {}
+        for channel in self.sent:
+            counts.setdefault(channel.first, np.zeros(self.grid.n))[self.grid.part(channel.carrier)] += 1
+        return max(1.0, *(float(count.max()) for count in counts.values()))
 
 
 class Apart:

@@ -11,6 +11,7 @@ import numpy as np
 
 from . import check, cl, echo_rows, forecast
 from .array import AntennaArray
+from .channels import channels_of, is_single, sampling
 from .echo import echo
 from .files import store
 from .scene import Scene
@@ -54,24 +55,36 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: An
     receiver, array = options.get("receiver"), options.get("array")
     given = {k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")}
     real, rx = scene.realized(options.get("seed", 0)), echo_rows.receiver_positions(track, receiver)
-    point = scene.center if options.get("reference") is None else np.asarray(options["reference"], float)
+    asked = options.get("reference")
+    point = scene.center if asked is None else check.array("reference", asked, np.float64, (3,))
     reference_range = echo_rows.half_path(track.positions, rx, point)
-    window = echo_rows.window(
-        real, waveform, track.positions, rx, reference_range, options.get("range_window")
-    )  # of the whole track
+    near, far = echo_rows.window(real, waveform, track.positions, rx, reference_range, options.get("range_window"))
+    given |= {"reference": point, "range_window": (near, far)}  # of the whole track
+    n_samples = None
+    if isinstance(array, AntennaArray) and not is_single(array):
+        carriers = np.array([c.carrier for c in channels_of(array, waveform.center, len(track))])
+        grid = sampling(carriers, waveform, near, far, options.get("compressed", True))
+        n_samples = grid.width if options.get("channels") == "separated" else grid.n
 
     def made(n: int) -> tuple[float, Any]:
-        first = (len(track) - n) // 2
-        at = slice(first, first + n)
-        some = array
-        if isinstance(array, AntennaArray) and array.plan is not None and len(array.plan) == len(track):
-            some = replace(array, plan=array.plan[at])
-        start = time.perf_counter()
-        raw = echo(
-            scene, waveform, track.picked(at), receiver=None if receiver is None else receiver.picked(at), array=some,
-            check=False, **{**given, "reference": point, "range_window": window},
-        )  # fmt: skip
-        return time.perf_counter() - start, raw
+        """Seconds of n pulses from the middle of the track, else from where there is something to be seen."""
+        said = None
+        for first in ((len(track) - n) // 2, 0, len(track) - n):
+            at, some = slice(first, first + n), array
+            if isinstance(array, AntennaArray) and array.plan is not None:
+                some = replace(array, plan=array.plan[at])
+            start = time.perf_counter()
+            try:
+                raw = echo(
+                    scene, waveform, track.picked(at), receiver=None if receiver is None else receiver.picked(at),
+                    array=some, check=False, **given,
+                )  # fmt: skip
+            except ValueError as exc:
+                said = said or exc
+            else:
+                return time.perf_counter() - start, raw
+        assert said is not None
+        raise said
 
     quiet = logging.getLogger("sarcl.echo_target")
     level = quiet.level
@@ -84,7 +97,8 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: An
         quiet.setLevel(level)
     slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more
     rows = raw.n_rows // more * len(track)
+    n_samples = raw.n_samples if n_samples is None else n_samples
     return EchoForecast(
-        rows, raw.n_samples, rows * (8.0 * raw.n_samples + store.ROW_BYTES), longer + slope * (len(track) - more),
+        rows, n_samples, rows * (8.0 * n_samples + store.ROW_BYTES), longer + slope * (len(track) - more),
         raw.report.contributions_done / more * len(track), dict(raw.report.plan), raw.report.predicted_error,
     )  # fmt: skip

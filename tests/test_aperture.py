@@ -199,6 +199,20 @@ BAD = {
     "one carrier": (
         lambda: map_aperture(replace(simple(), array=AntennaArray.linear(5, spacing=1)), "corrected"), "share carriers"
     ),
+    "too few attitudes": (lambda: map_aperture(simple(), "corrected", attitude=np.eye(3)[None]), "attitude has shape"),
+    "no rotation": (
+        lambda: map_aperture(simple(), "corrected", attitude=7 * np.tile(np.eye(3), (7, 1, 1))), "no rotation"
+    ),
+    "bands that overlap": (
+        lambda: map_aperture(replace(simple(), waveform=sarcl.Waveform.chirp(center=10e9, bandwidth=50e6,
+                                                                             duration=1e-7)), "corrected"),
+        "channels 20 MHz apart share samples: their pulses are 50 MHz wide",
+    ),
+    "no length": (
+        lambda: map_aperture(replace(simple(), array=AntennaArray(positions=np.zeros((5, 3)),
+                                                                 offsets=20e6 * np.arange(5)[None])), "apparent"),
+        "even steps",
+    ),
     "channels outside the samples": (
         lambda: map_aperture(replace(simple(), samples=simple().samples[:, :3]), "corrected"),
         r"2 of the array's 5 channels lie outside the sampled band of 10 to 10.04 GHz, such as element 3 at 10.06 GHz",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_array_echo import EACH, F0, STEP, TONE, error, line, passing
+from test_array_echo import EACH, F0, SCENE, STEP, TONE, error, line, passing
 
 import sarcl
 from sarcl import AntennaArray, shapes
@@ -78,7 +78,7 @@ def test_places_are_two_a_turn_and_a_few():
     elements = np.stack([np.zeros(900), np.linspace(-1, 1, 900), np.zeros(900)], axis=1)
     for span in (0.1, 1.0, 10.0, 100.0):
         for allowed in (1e-2, 1e-6):
-            found = places_of(elements, lambda d, s=span: d[:, 1:2] * s / 2, allowed)
+            found = places_of(elements, lambda d, s=span: np.exp(-1j * np.pi * s * d[:, 1:2]), allowed)
             order = np.pi * span
             tail = (1.5 * np.log(10 / allowed)) ** (2 / 3) * max(1.0, order) ** (1 / 3)
             assert 2 * span <= len(found) <= order + tail + 2
@@ -91,7 +91,7 @@ def test_a_plane_array_is_a_grid_of_places_along_its_own_axes():
     y, z = np.meshgrid(np.arange(-15, 16) * 0.1, np.arange(-10, 11) * 0.1, indexing="ij")
     turned = np.stack([0 * y, (y + z) / 2**0.5, (y - z) / 2**0.5], axis=-1).reshape(-1, 3)
     for elements in (np.stack([0 * y, y, z], axis=-1).reshape(-1, 3), turned):
-        found = places_of(elements, lambda d: d @ np.array([[0.0], [0.1], [0.2]]), 1e-3)
+        found = places_of(elements, lambda d: np.exp(-2j * np.pi * d @ np.array([[0.0], [0.1], [0.2]])), 1e-3)
         assert len(found) <= 48 < len(elements) and found.error <= 1e-3
 
 
@@ -168,3 +168,157 @@ def test_a_single_pulse_close_by_is_seen():
         scene, TONE, close, array=array, reference=(0, 0, 0), range_window=WINDOW, tolerance=1e-5, skip=EACH
     ).samples[0]
     assert np.linalg.norm(raw.samples[101] - wanted) <= 1e-3 * np.linalg.norm(wanted)
+
+
+# Inputs that broke earlier ways to choose places
+def straight(n, distance, length, look):
+    look = np.array(look, float) / np.linalg.norm(look)
+    across = np.cross([0, 0, 1.0], look)
+    y = np.linspace(-length / 2, length / 2, n)
+    return sarcl.Trajectory(np.arange(n) / 100, look * distance + y[:, None] * across / np.linalg.norm(across))
+
+
+def both(scene, wave, track, tolerance, **options):
+    """Echoes as they come, and how far off those of every channel they are."""
+    raw, each = (
+        sarcl.echo(scene, wave, track, reference=(0, 0, 0), tolerance=tolerance, skip=skip, **options)
+        for skip in (True, EACH)
+    )
+    return raw, np.linalg.norm(raw.samples[:] - each.samples[:]) / np.linalg.norm(each.samples[:])
+
+
+def test_two_elements():
+    four = AntennaArray(positions=line(2).positions.repeat(2, axis=0), offsets=np.arange(4)[None] * STEP)
+    for array in (line(2, spacing=0.3), four):
+        _, off = both(SCENE, TONE, passing(6), 1e-3, array=array, range_window=WINDOW)
+        assert off <= 2e-3
+
+
+@pytest.mark.parametrize("width", [0.1, 0.02, 0.005])
+def test_beams_differ_from_element_to_element(width):
+    track = sarcl.pointing.spotlight(straight(4, 1000, 20, (-1, 0, 0)), (0, 0, 0))
+    array = AntennaArray.linear(31, spacing=16 / 30, frequency_step=STEP)
+    _, off = both(
+        sarcl.Scene.points([[0.0, 0, 0]]), TONE, track, 1e-3, array=array, channels="separated", range_window=WINDOW,
+        antenna=sarcl.Antenna.gaussian(width=(width, width)),
+    )  # fmt: skip
+    assert off <= 2e-3
+
+
+@pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
+def test_echoes_fall_with_range_from_element_to_element(tolerance):
+    array = AntennaArray.linear(31, spacing=0.6, frequency_step=STEP, axis=(1, 0, 0))
+    raw, off = both(
+        SCENE, TONE, straight(4, 1000, 20, (-1, 0, 0.2)), tolerance, array=array, channels="separated",
+        range_window=(-40, 40), radar=sarcl.Radar(power=1.0),
+    )  # fmt: skip
+    assert off <= 2 * raw.report.predicted_error
+
+
+def interleaved():
+    i = np.arange(65)
+    places = np.where((i % 2 == 0)[:, None], [0.0, -1000, 100], [-1000.0, 0, 100]) + i[:, None] * [0.1, 0.1, 0]
+    return sarcl.Trajectory(i / 100, places)
+
+
+def passed_by():
+    i = np.arange(129)
+    return sarcl.Trajectory(i / 100, np.stack([np.full(129, 500.0), (i - 66) * 600.0, np.full(129, 300.0)], axis=1))
+
+
+def turning():
+    from scipy.spatial.transform import Rotation
+
+    track = straight(65, 1000, 30, (-1, 0, 0.1))
+    turns = Rotation.from_rotvec(np.outer(np.arange(65) * np.pi / 2, [0, 0, 1])).as_matrix()
+    return sarcl.Trajectory(track.times, track.positions, attitude=turns)
+
+
+@pytest.mark.parametrize("fly", [interleaved, passed_by, turning])
+def test_every_pulse_counts(fly):
+    scene = sarcl.Scene.points([[0.0, 0, 0], [10, 3, 0], [-10, 5, 0], [0, -10, 0], [3, 10, 0]])
+    tone = sarcl.Waveform.tone(center=F0, duration=1 / 2e6)
+    array = AntennaArray.linear(45, spacing=0.2 if fly is not passed_by else 0.1, frequency_step=2e6)
+    _, off = both(scene, tone, fly(), 1e-3, array=array, range_window=(-36, 36))
+    assert off <= 2e-3
+
+
+def test_a_reference_beside_the_array_bends_the_range_window():
+    track = sarcl.Trajectory(np.arange(4) / 10, np.arange(4)[:, None] * [0.0, 0.1, 0])
+    places = np.stack([np.zeros(41), np.linspace(-10, 10, 41), np.zeros(41)], axis=1)
+    array, chirp = (
+        AntennaArray(positions=places, offsets=np.zeros((1, 41))),
+        sarcl.Waveform.chirp(center=F0, bandwidth=10e6, duration=1e-6),
+    )
+    scene = sarcl.Scene.points([[2000.0, 0, 0], [2000, 1, 0]], [1, 1j])
+    raw, each = (
+        sarcl.echo(
+            scene, chirp, track, array=array, channels="separated", receive="own", reference=(5.0, 0, 0),
+            range_window=(-1992.0, 1992.0), tolerance=1e-2, skip=skip,
+        )
+        for skip in (True, EACH)
+    )  # fmt: skip
+    assert np.linalg.norm(raw.samples - each.samples) <= 2e-2 * np.linalg.norm(each.samples)
+
+
+@pytest.mark.filterwarnings("ignore::sarcl.SarclWarning")
+def test_channels_that_cancel_add_their_errors_up():
+    m = 200
+    y = np.concatenate([1 + np.arange(m) * 1e-5, -1 - np.arange(m) * 1e-5, [0]])
+    array = AntennaArray(
+        positions=np.stack([0 * y, y, 0 * y], axis=1), offsets=[np.append(np.zeros(2 * m), 2e9)],
+        weights=np.concatenate([np.ones(m), -np.ones(m), [1e-3]]),
+    )  # fmt: skip
+    chirp = sarcl.Waveform.chirp(center=F0, bandwidth=20e6, duration=1e-6)
+    for x in (0.04, 0.17, 0.69):
+        scene, track = sarcl.Scene.points([[0.0, x, 0], [0, -x, 0]], [1, 1e-6]), sarcl.Trajectory([0.0], [[-5e3, 0, 0]])
+        raw = sarcl.echo(
+            scene, chirp, track, array=array, reference=(0, 0, 0), range_window=(-60, 60), tolerance=0.1, check=True
+        )
+        assert raw.report.measured_error <= raw.report.predicted_error <= 0.1
+
+
+def test_facets_seen_along_the_vertical_are_made_channel_by_channel():
+    array = AntennaArray.linear(30, spacing=0.1, frequency_step=2e6, axis=(1, 0, 0))
+    tone = sarcl.Waveform.tone(center=F0, duration=1 / 2e6)
+    raw = sarcl.echo(
+        shapes.plate((1.0, 1.0)), tone, straight(5, 3000, 1, (-0.001, 0, 1)), array=array, reference=(0, 0, 0),
+        range_window=(-36, 36), tolerance=1e-2, check=True,
+    )  # fmt: skip
+    assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
+
+
+def test_a_search_for_places_that_cannot_pay_is_short_and_small():
+    import time
+
+    array, chirp = line(2500, spacing=1.0, step=0.0), sarcl.Waveform.chirp(center=F0, bandwidth=1e6, duration=1e-6)
+    scene = sarcl.Scene.points([[0.0, -1e4, 0], [0, 1e4, 0]])
+    track = sarcl.Trajectory(np.arange(2), [[-5e5, 0, 0], [-5e5, 10, 0]])
+    from sarcl.array_rows import Sides
+    from sarcl.array_views import Views
+    from sarcl.gains import beam_of
+
+    sides = Sides.of(track, None)
+    beam = beam_of(None, None, track, None, chirp, scene.center)
+    views = Views(sides, scene, beam, F0, array.positions, np.zeros((1, 3)))
+    calls = []
+
+    def counted(places):
+        calls.append(len(places))
+        return views.sending(places)
+
+    start = time.perf_counter()
+    found = places_of(array.positions, counted, 1e-3, most=200.0)
+    assert found.basis is None and max(calls) <= 400 and time.perf_counter() - start < 60
+
+
+def test_what_progress_raises_is_not_lost():
+    calls = []
+
+    def stop(stage, done, total):
+        calls.append(stage)
+        raise ValueError("mine")
+
+    with pytest.raises(ValueError, match="mine"):
+        sarcl.echo(SCENE, TONE, passing(6), array=line(45, spacing=0.0144), progress=stop, range_window=WINDOW)
+    assert len(calls) == 1

@@ -108,6 +108,59 @@ def test_a_forecast_is_what_comes(name):
     assert str(told).startswith(f"{raw.n_rows} rows of {raw.n_samples} samples: ")
 
 
+def test_a_forecast_knows_plans_that_come_later():
+    array = line(5, step=20e6).switched(line(5, step=40e6), 10, 120)
+    tone = sarcl.Waveform.tone(center=F0, duration=1 / 40e6)
+    with pytest.warns(sarcl.SarclWarning, match="centre frequency jumps"):
+        raw = sarcl.echo(SCENE, tone, passing(120), array=array, reference=(0, 0, 0), range_window=WINDOW)
+        told = sarcl.plan_echo(SCENE, tone, passing(120), array=array, reference=(0, 0, 0), range_window=WINDOW)
+    assert (told.n_rows, told.n_samples) == raw.samples.shape
+
+
+def test_a_forecast_looks_where_there_is_something_to_see():
+    # the antenna turns away from the scene after a third of the track
+    track, away = (sarcl.pointing.spotlight(passing(120), (0, y, 0)) for y in (0, 3e3))
+    turns = np.where((np.arange(120) < 40)[:, None, None], track.attitude, away.attitude)
+    track = sarcl.Trajectory(track.times, track.positions, attitude=turns)
+    beam = sarcl.Antenna.gaussian(width=(0.02, 0.02))
+    options = {"antenna": beam, "reference": (0, 0, 0), "range_window": (-40, 40)}
+    chirp = sarcl.Waveform.chirp(center=F0, bandwidth=100e6, duration=1e-6)
+    told = sarcl.plan_echo(SCENE, chirp, track, **options)
+    assert told.n_rows == sarcl.echo(SCENE, chirp, track, **options).n_rows
+
+
+def test_a_full_disk_ends_in_words(tmp_path):
+    script = tmp_path / "full.py"
+    script.write_text(FULL)
+    for room in ("0.3", "0.9", "1.0", "1.1"):
+        found = subprocess.run(
+            [sys.executable, "-W", "ignore", str(script), str(tmp_path / "a.h5"), room], capture_output=True, text=True,
+            check=False,
+        )  # fmt: skip
+        assert found.returncode == 0 and "cannot write" in found.stdout and "raise the limit" in found.stdout, found
+        assert [p.name for p in tmp_path.iterdir()] == ["full.py"]
+
+
+FULL = """
+import resource, signal, sys, numpy as np, sarcl
+signal.signal(signal.SIGXFSZ, signal.SIG_IGN)
+track = sarcl.Trajectory.line(start=(-5e3, -150, 800), velocity=(0, 300, 0), prf=400.0, n_pulses=400)
+options = {"array": sarcl.AntennaArray.linear(5, spacing=0.015), "receive": "all", "range_window": (-40, 40)}
+wave, scene = sarcl.Waveform.chirp(center=10e9, bandwidth=100e6, duration=1e-7), sarcl.Scene.points([[0.0, 0, 0]])
+whole = sarcl.echo(scene, wave, track, **options)
+limit = int(float(sys.argv[2]) * whole.samples.nbytes)
+resource.setrlimit(resource.RLIMIT_FSIZE, (limit, resource.RLIM_INFINITY))
+for call in (
+    lambda: sarcl.echo(scene, wave, track, out=sys.argv[1], max_bytes=1e6, **options),
+    lambda: whole.save(sys.argv[1]),
+):
+    try:
+        call()
+    except OSError as exc:
+        print(exc)
+"""
+
+
 def test_a_forecast_refuses_what_echo_would():
     with pytest.raises(ValueError, match="tolerance"):
         sarcl.plan_echo(SCENE, TONE, passing(), tolerance=0)
@@ -115,6 +168,10 @@ def test_a_forecast_refuses_what_echo_would():
         sarcl.plan_echo(SCENE, TONE, passing(12), array=line(3).mirrored(1, 3), range_window=WINDOW)
     with pytest.raises(TypeError, match="track"):
         sarcl.plan_echo(SCENE, TONE, None)
+    with pytest.raises(ValueError, match="plan names 8 pulses but the track has 120"):
+        sarcl.plan_echo(SCENE, TONE, passing(120), array=line(3).mirrored(4, 8), range_window=WINDOW)
+    with pytest.raises(ValueError, match="reference"):
+        sarcl.plan_echo(SCENE, TONE, passing(), reference=(0, 0))
 
 
 def test_dry_run_says_what_simulating_takes_and_writes_nothing(tmp_path, monkeypatch, capsys):

@@ -13,9 +13,10 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from . import hdf5, paths
+from . import hdf5
 from .unfinished import Unfinished
 
+FILE_BYTES = 2**17  # of the rest: a waveform, a report, HDF5's own
 ROW_BYTES = 130  # of a row: its geometry, numbers and the name of its polarisation
 
 if TYPE_CHECKING:
@@ -30,18 +31,14 @@ def save_phase_history(raw: PhaseHistory, path: Any) -> None:
     ValueError for a NaN or Inf in lazily read samples; FileNotFoundError, PermissionError and the like before
     anything is written. On any exception `path` is as it was.
     """
-    import h5py
 
-    dtype = np.dtype(raw.samples.dtype)
-    with (
-        paths.atomic(path, raw.n_rows * raw.n_samples * dtype.itemsize) as part,
-        h5py.File(part, "w") as file,
-    ):
-        hdf5.sign(file, "phase_history")
-        _put_phase_history(file, raw)
-        samples = file.create_dataset("samples", (raw.n_rows, raw.n_samples), dtype)
-        for a, b in hdf5.blocks(samples):
-            samples[a:b] = raw.read(a, b)
+    writer = EchoWriter(path, raw.n_rows, raw.n_samples, raw.samples.dtype)
+    try:
+        for a, b in hdf5.blocks(writer.samples):
+            writer.samples[a:b] = raw.read(a, b)
+        writer.close(raw)
+    finally:
+        writer.abandon()
 
 
 def _put_phase_history(file: Any, raw: PhaseHistory) -> None:
@@ -166,11 +163,25 @@ class EchoWriter:
     """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `finish` or `abandon`."""
 
     def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
-        self.path = Path(path)
-        # beside its samples, a row's geometry and numbers take about as much as this
-        self._made = Unfinished(path, "phase_history", n_rows * (n_samples * np.dtype(dtype).itemsize + ROW_BYTES))
+        self.path, nbytes = Path(path), n_rows * n_samples * np.dtype(dtype).itemsize
+        self._made = Unfinished(path, "phase_history", nbytes + n_rows * ROW_BYTES)
         try:
             self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
+            self._made.reserve(nbytes + n_rows * ROW_BYTES)
+        except BaseException:
+            self.abandon()
+            raise
+
+    def close(self, raw: PhaseHistory) -> None:
+        """Complete the file with all of `raw` but its samples, and move it to its path."""
+        try:
+            array = (
+                0 if raw.array is None else sum(np.size(getattr(raw.array, n)) for n in raw.array.__dataclass_fields__)
+            )
+            self._made.reserve(raw.n_rows * ROW_BYTES + 16 * array + FILE_BYTES)
+            with self._made.writing():
+                _put_phase_history(self._made.file, raw)
+            self._made.commit()
         except BaseException:
             self.abandon()
             raise
@@ -179,18 +190,12 @@ class EchoWriter:
         """Complete the file with the other fields of a PhaseHistory, and return that, read as it is needed."""
         from ..phase_history import PhaseHistory
 
-        try:
-            with self._made.writing():
-                _put_phase_history(self._made.file, PhaseHistory(self.samples, **fields))
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
+        self.close(PhaseHistory(self.samples, **fields))
         raw: Any = load(self.path)
         return raw
 
     def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `finish`."""
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
         self._made.abandon()
 
 

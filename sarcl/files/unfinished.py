@@ -71,11 +71,27 @@ class Unfinished:
         with self.writing():
             return Filled(self, self.file.create_dataset(name, shape, dtype))
 
+    def reserve(self, n_bytes: int) -> None:
+        """Take room for so many more bytes: HDF5 loses what it cannot write as it closes a dataset, or crashes."""
+        if not hasattr(os, "posix_fallocate"):
+            return
+        with self.writing():
+            self.file.flush()
+            descriptor = self.file.id.get_vfd_handle()
+            try:
+                os.posix_fallocate(descriptor, os.fstat(descriptor).st_size, n_bytes)
+            except OSError as exc:
+                if exc.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                    raise
+
     def commit(self) -> None:
         """Close the file and move it to its path."""
         assert self._part is not None
         with self.writing():
+            self.file.flush()
+            size = self.file.id.get_filesize()
             self.file.close()
+            os.truncate(self._part, size)  # what was reserved and not used
         paths.commit(self._part, self.path)
         self._part = None
         self._unlock()
@@ -85,13 +101,23 @@ class Unfinished:
         if self._part is not None:
             part, self._part = self._part, None
             try:
-                if hasattr(self, "file"):
+                if hasattr(self, "file") and self.file:
+                    self._forget()
                     self.file.close()
             except (OSError, RuntimeError) as exc:  # HDF5 cannot write what it still holds: nobody wants it
                 log.debug("%s could not be closed in order: %s", part, exc)
             finally:
                 part.unlink(missing_ok=True)
                 self._unlock()
+
+    def _forget(self) -> None:
+        """Send what is still to be written nowhere: where a disk is full, HDF5 crashes as it closes its file."""
+        try:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            os.dup2(nowhere, self.file.id.get_vfd_handle())
+            os.close(nowhere)
+        except (OSError, RuntimeError, TypeError, NotImplementedError) as exc:
+            log.debug("%s is closed as it is: %s", self.path, exc)
 
     def _unlock(self) -> None:
         if self._lock is not None:
