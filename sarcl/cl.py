@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import functools
-import math
 import os
 import re
 import time
@@ -19,7 +18,7 @@ import numpy as np
 
 REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
 
-GROUP = 32  # work-items of a group on a CPU, at most, where a kernel does not care
+GROUP = 16  # work-items of a group on a CPU, or 1, where a kernel does not care
 STALE = 5.0  # s, after which a lock on the cache of binaries is nobody's
 
 
@@ -283,10 +282,10 @@ class Device:
     def run(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any) -> None:
         """Enqueue a kernel; Python ints become int32, buffers and numpy scalars go as they are.
 
-        group None: the driver's choice, on CPUs one of few sizes: PoCL builds a kernel anew for every size of group.
+        group None: the driver's choice, on CPUs one of two sizes: PoCL builds a kernel anew for every size of group.
         """
         if group is None and self.is_cpu:
-            group = (math.gcd(size[0], GROUP), *(1 for _ in size[1:]))
+            group = (1 if size[0] % GROUP else GROUP, *(1 for _ in size[1:]))
         with self._explain(f"kernel {kernel.function_name}"):
             kernel(self.queue, size, group, *(np.int32(a) if isinstance(a, int) else a for a in args))
 
