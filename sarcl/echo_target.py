@@ -26,6 +26,8 @@ class Target:
     """
 
     def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
+        if out is not None and not isinstance(out, (str, os.PathLike)):
+            raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
         n_rows = shape[0] * self.a_pulse

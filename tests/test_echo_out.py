@@ -74,6 +74,11 @@ def test_nothing_is_left_of_echoes_that_failed(tmp_path):
         )
 
 
+def test_out_is_a_name():
+    with pytest.raises(TypeError, match="out is a int; give the name of a file"):
+        sarcl.echo(SCENE, TONE, passing(), out=5, range_window=WINDOW)
+
+
 def test_geometry_of_more_rows_than_memory_holds_is_refused(monkeypatch, tmp_path):
     monkeypatch.setattr(echo_target, "_memory", lambda: 1e5)
     with pytest.raises(MemoryError, match=r"1000 rows, whose geometry alone takes .*'simultaneous'"):
