@@ -79,12 +79,12 @@ def growth(args: argparse.Namespace) -> list[Row]:
 
 
 def singly(scene: Any, tone: Any, track: Any, array: Any, options: Row, *, check: bool) -> Any:
-    """A call for every element as a single antenna; returns the echoes that err most."""
-    made = []
-    for place, offset in zip(array.positions, array.offsets[0], strict=True):
+    """A call for every element as a single antenna; returns the echoes that err most, of nine that are checked."""
+    made, some = [], max(1, array.n // 9)
+    for i, (place, offset) in enumerate(zip(array.positions, array.offsets[0], strict=True)):
         wave = replace(tone, center=tone.center + float(offset))
         moved = replace(track, positions=track.positions + place)
-        made.append(sarcl.echo(scene, wave, moved, receiver=track, check=check, **options))
+        made.append(sarcl.echo(scene, wave, moved, receiver=track, check=check and i % some == 0, **options))
     return max(made, key=lambda raw: (raw.report.measured_error or 0.0, raw.report.predicted_error))
 
 

@@ -20,7 +20,7 @@ HEAD = [
 ]
 EXPLAINED = """A contribution: a scatterer seen by a pulse of a sender at a receiver. Few are visited where a scene lets
 channels be interpolated between places of the array (docs/fda.md); the last column compares shortest runs. The error of
-calls a channel is the largest of theirs.
+calls a channel is the largest of nine of them.
 """
 
 
