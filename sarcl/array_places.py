@@ -79,12 +79,11 @@ class _Grid:
         wide = np.flatnonzero(self.half)
         counts, some = [1, 1, 1], _some(self.along)
         for axis in wide.tolist():  # each alone
-            line = np.zeros((max(64, 2 * len(self.along)), 3))
-            line[:, axis] = np.linspace(-self.half[axis], self.half[axis], len(line))
-            line = line[_some(line)]
 
-            def do(count: int, axis: int = axis, line: np.ndarray = line) -> bool:
+            def do(count: int, axis: int = axis) -> bool:
                 alone = [count if i == axis else 1 for i in range(3)]
+                line = np.zeros((max(32, 4 * count), 3))
+                line[:, axis] = np.linspace(-self.half[axis], self.half[axis], len(line))
                 return self._error(alone, line, self.centre + line @ self.axes) <= allowed / (2 * len(wide))
 
             few, counts[axis] = least - 1, least
