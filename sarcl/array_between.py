@@ -2,7 +2,7 @@
 
 A run of the engines at a place takes the whole band. Less the path to the scene's centre, its samples are interpolated
 to every element, which turns them back by its own path, in extended precision. Scatterers are visited once a place, not
-once a channel: 450 elements in front of a small scene are a dozen places, 450 by 450 a hundred.
+once a channel: 450 elements in front of a small scene are a handful of places, 450 by 450 some twenty.
 """
 
 from __future__ import annotations

@@ -15,7 +15,7 @@ from .array_sum import Apart, Layout, during
 from .channels import channels_of, sampling, warn_of
 from .check import choice
 from .echo_target import Target
-from .echo_work import Order, Progress, Work, band_of
+from .echo_work import Order, Progress, Work, band_of, bounded
 from .gains import Beam
 from .phase_history import PhaseHistory
 from .planning import LEAST_TOLERANCE
@@ -40,6 +40,7 @@ def array_echo(
     choice("receive", receive, RECEIVE)
     if receive == "own" and channels != "separated":
         raise ValueError("receive='own' keeps every element's own channel apart; say channels='separated' too")
+    bounded(float(np.abs(scene.amplitudes).max(initial=0.0)) * weights.peak * float(np.abs(array.weights).sum()))
     sides = Sides.of(track, receiver)
     sent = channels_of(array, waveform.center, len(track), EQUAL in order.skips)
     carriers = np.array([c.carrier for c in sent])

@@ -14,7 +14,7 @@ from .files import store
 from .phase_history import PhaseHistory
 
 log = logging.getLogger(__name__)
-COPIES = 2  # of rows' geometry, while a PhaseHistory is made of it
+COPIES = 3  # of rows' geometry, while a PhaseHistory is made of it: 320 bytes a row were measured
 SHARE = 0.25  # of max_bytes, for samples on their way into a file
 
 

@@ -88,7 +88,7 @@ class Work:
             reasons = ", ".join(why for why, n in self.skipped.items() if n) or "the scene is empty"
             raise ValueError(f"nothing is left to reflect: {reasons}; move the track or the scene")
         if self.points is not None:
-            _bounded(self.points.largest() * weights.peak)
+            bounded(self.points.largest() * weights.peak)
             weights.clear_of(self.points.positions)
         self.plans: list[tuple[float, dict[str, Any]]] = []
         self.pairs = self.gated = self.behind = self.unlit = 0
@@ -259,7 +259,8 @@ def _warned(*judgements: fineness.Fineness | speckle.Speckle) -> dict[str, Any]:
     return out
 
 
-def _bounded(largest: float) -> None:
+def bounded(largest: float) -> None:
+    """ValueError for an amplitude too large for complex64."""
     if largest > LARGEST:
         text = f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}"
         raise ValueError(text + ": scale them down")

@@ -322,3 +322,22 @@ def test_what_progress_raises_is_not_lost():
     with pytest.raises(ValueError, match="mine"):
         sarcl.echo(SCENE, TONE, passing(6), array=line(45, spacing=0.0144), progress=stop, range_window=WINDOW)
     assert len(calls) == 1
+
+
+def test_paths_beyond_float64_are_made_up_for():
+    # at 36 000 km a reference range is rounded by 4e-9 m: 1e-5 rad at 100 GHz there and back, more than is asked here
+    tone, distance = sarcl.Waveform.tone(center=100e9, duration=1 / STEP), 3.6e7
+    y = np.linspace(-3e3, 3e3, 40)
+    track = sarcl.Trajectory(
+        np.arange(40), np.stack([np.full(40, -0.8 * distance), y, np.full(40, 0.6 * distance)], axis=1)
+    )
+    scene, array = sarcl.Scene.points([[0.0, 0, 0], [1.0, 2, 0.3]]), line(9, spacing=0.0015)
+    raw = sarcl.echo(scene, tone, track, array=array, reference=(0, 0, 0), range_window=WINDOW, tolerance=6e-6)
+    assert raw.report.contributions_skipped["interpolated channels"] > 0
+    assert error(raw, scene, tone, array, track) <= raw.report.predicted_error <= 6e-6
+
+
+def test_weights_that_overflow_are_refused():
+    scene = sarcl.Scene.points([[0.0, 0, 0]], 1e29)
+    with pytest.raises(ValueError, match=r"amplitudes reach 4e\+49; .* scale them down"):
+        sarcl.echo(scene, TONE, passing(3), array=line(4, weights=[1e20] * 4), range_window=WINDOW)
