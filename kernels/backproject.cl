@@ -2,7 +2,7 @@
 //
 //   I(x) = sum_p v_p(x) s~_p(2 delta_p(x)/c) exp(+j 2 pi kappa_p delta_p(x)),   delta = half path - reference range
 //
-// source    DESIGN.md, image equation; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
+// source    the image equation of sarcl/__init__.py; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
 // symbols   delta, kappa as in geometry.clh;  s~_p  range profile, interpolated as in interp.clh
 // macros    VW, FP64, BISTATIC, WRAP, LOCAL, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers
 //           VECTORS   vectors of pixels a work-item

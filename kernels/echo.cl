@@ -3,7 +3,7 @@
 //   g_pm[i] = sum_k a_k w_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   w of interp.clh
 //   s_p(f)  = sum_m L_m(f) (FFT of g_pm over w's transform), on the host;   L_m(f) Lagrange's polynomials
 //
-// source    DESIGN.md, echo equation; type-1 nonuniform FFT in range
+// source    the echo equation of sarcl/__init__.py; type-1 nonuniform FFT in range
 // symbols   a_k          amplitude, |a|^2 = radar cross section, m^2; delta, kappa, sigma as in geometry.clh
 //           w_k(p, f)    the weight of gains.clh: antennas' gains and spreading
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers

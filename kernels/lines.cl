@@ -7,7 +7,7 @@
 //   delta(i, j) = A_i + j beta + rest_ij,    I_ij += sum_b W_b(i) T(n_i + b + FINE j),
 //   T(m) = s~(m beta/FINE) exp(+j 2 pi kappa m beta/FINE),    W_b(i) = w_b(z_i) exp(+j 2 pi kappa (A_i - (n_i + b) beta/FINE))
 //
-// source    DESIGN.md, image equation. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
+// source    the image equation of sarcl/__init__.py. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
 //           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn turns, whose place errs by
 //           more than limit_place samples or whose step is more than limit_step samples a pixel is added pixel by
 //           pixel instead, as are window edges: what was planned is held for every pulse.

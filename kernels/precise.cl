@@ -3,7 +3,8 @@
 //   I(x) = sum_p v_p(x) s~_p(2 delta_p(x)/c) exp(+j 2 pi kappa_p delta_p(x)),   delta = half path - reference range
 //   |T - x| = R0 + d,   d = (|q|^2 - 2 R0 a)/(R0 + |T - x|) = -a + w/(2 R0) (1 + a/R0 + ...),   w = |q|^2 - a^2
 //
-// source    DESIGN.md, image equation; the quotient is the difference of two square roots, which does not cancel
+// source    the image equation of sarcl/__init__.py; the quotient is the difference of two square roots, which does not
+//           cancel
 // symbols   T, R      antennas, m, in the caller's frame, as x is
 //           x0        a tile's reference point;  q = x - x0;  u, R0 from x0 to an antenna;  a = u.q
 //           kappa     2 fc/c, turns of phase per metre;  sigma  profile samples per metre

@@ -92,7 +92,7 @@ def echo(
     progress      called as progress(stage, done, total)
 
     Stop and go. Returns a PhaseHistory. ValueError, MemoryError, sarcl.NoDeviceError say what does not fit. Source:
-    DESIGN.md, echo equation.
+    the echo equation of sarcl/__init__.py.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)

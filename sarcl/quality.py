@@ -4,7 +4,7 @@
     cross-range  on the plane, perpendicular to range
 
 Cuts along both go through the interpolated peak (surface.py). docs/measure.md states every convention;
-reference/quality.py measures an exact image by brute force.
+sarcl/reference/quality.py measures an exact image by brute force.
 """
 
 from __future__ import annotations
@@ -81,7 +81,7 @@ def measure(image: Image, near: Any = None) -> PointResponse:
     Inf, a `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the
     response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
     than +-0.42 of the +-0.5 cycles a pixel.
-    Source: DESIGN.md's image equation for the carrier, TRUTH.md for the figures.
+    Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
     """
     _refuse(image)
     row, column = brightest(image) if near is None else peak_near(image, near)

@@ -154,7 +154,7 @@ def width(raw):
 
 
 def test_frequency_steps_do_not_resolve_more_than_phase_centres_do():
-    # TRUTH.md: 10 GHz, 10 km, 100 m; 8 elements half a wave, or 10 m, apart
+    # 10 GHz, 10 km, 100 m, widths at half power of the sums of exact phases; 8 elements half a wave, or 10 m, apart
     wave, flight = SPEED_OF_LIGHT / F0, track(100, 99.0, 10e3)  # 100 steps of 1 m
     scene, options = sarcl.Scene.points([CENTER]), {"reference": CENTER, "range_window": (-1, 1), "tolerance": 1e-4}
     single = sarcl.Waveform.tone(center=F0, duration=1e-6, bandwidth=1.0)

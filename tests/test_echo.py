@@ -52,14 +52,14 @@ def test_a_square_metre_of_metal_at_normal_incidence_has_41_101_dbsm(device):
     plate = sarcl.Scene.from_heights([-0.5, 0.5], [-0.5, 0.5], np.zeros((2, 2)))
     above = sarcl.Trajectory([0.0], [[0, 0, 2e6]])
     raw = sarcl.echo(plate, CHIRP, above, max_edge=0.02, shadows=False, tolerance=1e-5, device=device)
-    # TRUTH.md: 4 pi A^2/lambda^2 at 9.6 GHz, gate 1e-3 dB; amplitude is taken at the carrier
+    # 4 pi A^2/lambda^2 at 9.6 GHz, to 1e-3 dB; amplitude is taken at the carrier
     assert 20 * np.log10(np.abs(raw.samples).mean()) == pytest.approx(41.101, abs=1e-3)
 
 
 def test_a_unit_point_under_a_chirp_gives_modulus_one(device):
     raw = sarcl.echo(sarcl.Scene.points([[3, 4, 5]]), CHIRP, circle(), tolerance=1e-5, device=device)
     assert np.abs(np.abs(raw.samples) - 1).max() < 1e-4
-    # DESIGN.md: f_n = fc - B/2 + (n + 1/2) df with n_samples df = B
+    # f_n = fc - B/2 + (n + 1/2) df with n_samples df = B
     assert raw.frequency[0] == pytest.approx(9.3e9 + raw.frequency_step[0] / 2, abs=1)
     assert raw.n_samples * raw.frequency_step[0] == pytest.approx(600e6)
 
@@ -108,7 +108,7 @@ def test_backprojection_is_the_adjoint_of_echo(device):
         )
         image = sarcl.backproject(back, sarcl.ImageGrid.points(positions), **options)
         forward, backward = np.vdot(y, echoes.samples), np.vdot(image.data, x)
-        # DESIGN.md: |<Ax, y> - <x, A'y>| <= 1e-5 |Ax| |y|
+        # the image is the adjoint of the echoes: |<Ax, y> - <x, A'y>| <= 1e-5 |Ax| |y|
         assert abs(forward - backward) <= 1e-5 * np.linalg.norm(echoes.samples) * np.linalg.norm(y)
 
 

@@ -109,7 +109,7 @@ def test_points_send_back_what_they_are_sent():
 
 @pytest.mark.parametrize("angle, dbsm", [(0, 1.0302), (5, -3.7595), (10, -21.2624), (20, -23.5638), (60, -29.9208)])
 def test_a_small_plate_off_its_normal(device, angle, dbsm):
-    # TRUTH.md: side 10.16 cm, wavelength 3.25 cm; gate 0.01 dB off the nulls
+    # (4 pi A^2/lambda^2) cos^2 t sinc^2(k a sin t): side a = 10.16 cm, wavelength 3.25 cm; to 0.01 dB off the nulls
     tone = sarcl.Waveform.chirp(center=SPEED_OF_LIGHT / 0.0325, bandwidth=1e6, duration=1e-6)
     scene = sarcl.Scene.facets(plate(0.1016, 0.0), two_sided=False)
     raw = sarcl.echo(
@@ -130,7 +130,7 @@ def test_plates_at_normal_incidence(device, side, frequency, dbsm):
 def test_a_conducting_sphere_by_physical_optics(device, ka, ratio):
     import trimesh
 
-    # TRUTH.md: physical optics, not pi a^2; within 0.02 dB with facets small enough
+    # physical optics, pi a^2 |1 + (j/b)(1 - exp(-jb))|^2 with b = 2 k a, not pi a^2; within 0.02 dB with small facets
     frequency = ka * SPEED_OF_LIGHT / (2 * np.pi)
     tone = sarcl.Waveform.chirp(center=frequency, bandwidth=1e3, duration=1e-6)
     ball = trimesh.creation.icosphere(subdivisions=6)

@@ -123,7 +123,7 @@ def rows_of(**fields):
 
 
 def test_half_power_widths_are_those_of_published_truth(tmp_path):
-    # TRUTH.md: 10 GHz, 10 km, 100 m (100 steps of 1 m); what resolves is where phase centres are
+    # 10 GHz, 10 km, 100 m (100 steps of 1 m), widths as in test_aperture.py; what resolves is where phase centres are
     (tmp_path / "wide.toml").write_text(
         "[fda]\ncenter = 9.825e9\nfrequency_step = 50e6\nn = 8\nmirrored = false\ndistance = 10e3\n"
         'aperture = 99.0\nn_pulses = 100\nmappings = ["channels"]\npoints = [0.0]\nseparations = [2.0]\n'
@@ -215,7 +215,7 @@ def trend(tmp_path, steps):
     return [case.n for case in cases], [(p["null"], p["pslr_db"]) for p in points]
 
 
-# Farooq 2009, figures 5.9 to 5.11, as measured (SYSTEMS.md): millimetres, tenths of a decibel
+# Farooq 2009, figures 5.9 to 5.11, as measured here: to millimetres and tenths of a decibel
 def test_side_lobes_rise_as_the_frequency_step_falls(tmp_path):
     n, found = trend(tmp_path, [100e6, 20e6, 10e6])
     assert n == [9, 45, 90]

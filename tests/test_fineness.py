@@ -75,7 +75,7 @@ def sphere(mesh, n):
 
 
 def exact_sphere(ka):
-    """Radar cross section of a conducting sphere of 1 m by physical optics, m^2 (TRUTH.md)."""
+    """Radar cross section of a conducting sphere of 1 m by physical optics, m^2 (test_sphere_echo.py)."""
     b = 2 * ka
     return np.pi * abs(1 + 1j / b * (1 - np.exp(-1j * b))) ** 2
 

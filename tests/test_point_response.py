@@ -79,7 +79,7 @@ def test_phase_of_an_oracle_point_is_kept(distance, point):
     assert error <= 1e-3
 
 
-# TRUTH.md, impulse response: width in units of c/(2B) and lambda/(2 dtheta) (0.886 without), peak side lobe
+# The windows' transforms: width in units of c/(2B) and lambda/(2 dtheta) (0.886 without), peak side lobe
 WINDOWS = {"hamming": ("hamming", 1.303, -42.67), "taylor": (("taylor", 35, 5), 1.188, -35.22)}
 
 

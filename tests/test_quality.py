@@ -87,7 +87,7 @@ CENTRE, AWAY = (0.0, 0.0, 0.0), (28.0, 28.5, 0.0)  # the second 40 m off
 
 
 def test_figures_are_those_of_a_uniform_aperture():
-    """IRW 1 %, PSLR 0.1 dB, ISLR 0.15 dB, position 1 % of a cell: the gates of TRUTH.md and of the issue."""
+    """IRW 1 %, PSLR 0.1 dB, ISLR 0.15 dB, position 1 % of a cell: of the figures of sin(x)/x."""
     for distance, grazing, place, plane, turned in (
         (10e3, 30, CENTRE, "ground", 0),
         (10e3, 45, AWAY, "ground", 30),
@@ -160,7 +160,7 @@ def test_the_lobes_across_range_are_the_mean_of_every_frequencys_sinc():
     main = np.abs(u) < 1.0
     assert got.pslr[1] == pytest.approx(10 * np.log10(p[~main].max()), abs=0.01)
     assert got.islr[1] == pytest.approx(10 * np.log10(p[~main].sum() / p[main].sum()), abs=0.02)
-    p = cross_range_cut(u, 0.0) ** 2  # a single frequency: TRUTH.md
+    p = cross_range_cut(u, 0.0) ** 2  # a single frequency: sin(x)/x
     assert 10 * np.log10(p[~main].sum() / p[main].sum()) == pytest.approx(-10.22, abs=0.01)
 
 

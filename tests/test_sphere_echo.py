@@ -9,7 +9,7 @@ import sarcl
 from sarcl import shapes
 from sarcl.check import SPEED_OF_LIGHT
 
-# ka -> sigma/(pi a^2), TRUTH.md: |1 + (j/b)(1 - exp(-jb))|^2, b = 2 k a
+# ka -> sigma/(pi a^2) by physical optics: |1 + (j/b)(1 - exp(-jb))|^2, b = 2 k a
 RATIOS = {50: 1.01015, 100: 1.00876, 200: 1.00427}
 FACETS = {50: 80_000, 100: 80_000, 200: 320_000}
 VIEWS = [(0.4, 0.0), (1.0, 1.0), (1.9, 2.2), (2.8, -1.3)]
@@ -63,7 +63,7 @@ def globe(latitudes, sections):
 
 @pytest.mark.filterwarnings("ignore:mesh too coarse")
 def test_rings_too_wide_for_the_wavelength_err_by_decibels_seen_along_their_axis():
-    # TRUTH.md: ka = 50, 50 latitudes, pole-on: all errors of a ring add up
+    # ka = 50, 50 latitudes, pole-on: all errors of a ring add up
     pole, side = excess(globe(50, 200), 50, [(1e-9, 0.0), (np.pi / 2, 0.3)])
     assert pole == pytest.approx(-3.85, abs=0.02) and abs(side) < 0.1
     assert abs(excess(globe(100, 200), 50, [(1e-9, 0.0)])[0]) < 0.06

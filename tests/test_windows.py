@@ -1,4 +1,4 @@
-"""Windows: widths and side lobes of TRUTH.md, at any number of cells."""
+"""Windows: widths and side lobes of their continuous forms, at any number of cells."""
 
 import numpy as np
 import pytest
@@ -6,7 +6,7 @@ import pytest
 from sarcl.windows import parse, weights
 
 TAYLOR = ("taylor", 35, 5)
-# window, width at half power in cells of 1/B, highest side lobe in dB (TRUTH.md)
+# window, width at half power in cells of 1/B, highest side lobe in dB, of the continuous windows' transforms
 FIGURES = [(None, 0.886, -13.26), ("hamming", 1.303, -42.67), (TAYLOR, 1.188, -35.22)]
 
 

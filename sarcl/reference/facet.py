@@ -84,7 +84,7 @@ def normals_and_areas(triangles: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
 
 
 def fresnel(cosine: np.ndarray, permittivity: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """R_h, R_v complex128 (...): SARAS (A.7) with R_q as SYSTEMS S1 corrects it (-1, +1 for a perfect conductor).
+    """R_h, R_v complex128 (...): SARAS (A.7), R_q with the sign that (A.13) to (A.15) need (-1, +1 for a conductor).
 
     cosine        of the angle of incidence, 0..1;  permittivity  relative, eps_r - j sigma/(omega eps0), inf: conductor
     R_v is that of the magnetic field: R_v = -R_h at normal incidence. The root has Im <= 0: fields decay inside.
