@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-_HERE = os.path.dirname(os.path.realpath(__file__)) + os.sep
+# the folder of the whole package, wherever in it this file lies
+_HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")[0]].__file__))) + os.sep
 SPEED_OF_LIGHT = 299_792_458.0  # m/s, exact
 
 

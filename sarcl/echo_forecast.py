@@ -13,6 +13,7 @@ from . import check, cl, echo_rows, forecast
 from .array import AntennaArray
 from .channels import channels_of, is_single, sampling
 from .echo import echo
+from .echo_target import log as output_log
 from .files import store
 from .scene import Scene
 from .trajectory import Trajectory
@@ -86,15 +87,14 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: An
         assert said is not None
         raise said
 
-    quiet = logging.getLogger("sarcl.echo_target")
-    level = quiet.level
-    quiet.setLevel(logging.WARNING)  # these few pulses are not what was asked for
+    level = output_log.level
+    output_log.setLevel(logging.WARNING)  # these few pulses are not what was asked for
     try:
         few, more = min(FEW, len(track)), min(MORE, len(track))
         made(few)  # builds kernels
         (once, _), (longer, raw) = made(few), made(more)
     finally:
-        quiet.setLevel(level)
+        output_log.setLevel(level)
     slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more
     rows = raw.n_rows // more * len(track)
     n_samples = raw.n_samples if n_samples is None else n_samples
