@@ -7,7 +7,7 @@
 
 Exit status: 0 equal (or written), 1 different, 2 the file is of another machine, driver or library version.
 
-Only public names are used (`sarcl.X`, `from sarcl import shapes, pointing, motion`, `python -m sarcl`), so that the
+Only public names are used (of `sarcl`, `sarcl.shapes`, `.pointing` and `.motion`, and `python -m sarcl`), so that the
 script runs unchanged whatever modules are called. It takes about two minutes on two cores with kernels built before.
 
 Each task is hashed under several names: `task/samples`, `task/geometry`, `task/data`, `task/report` (numbers of the
