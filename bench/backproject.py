@@ -2,7 +2,7 @@
 
 import sys
 
-from sarcl.cli import main
+from sarcl.cli.parser import main
 
 if __name__ == "__main__":
     sys.exit(main(["bench", "backproject", *sys.argv[1:]]))

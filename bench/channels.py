@@ -27,7 +27,7 @@ from typing import Any
 import numpy as np
 
 import sarcl
-from sarcl.fda_case import Case
+from sarcl.experiments.fda.case import Case
 
 BAND, PULSES = 900e6, 101
 POINTS = {"100 points in 1 m": (100, 0.5), "10 000 points in 5 m": (10_000, 2.5)}
@@ -37,15 +37,15 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure, print the tables, and write the JSON file."""
-    from sarcl import cl
     from sarcl.bench import backproject, channels_page
+    from sarcl.opencl.device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=3)
     parser.add_argument("--device", default=None)
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
-    document = backproject.header([cl.open_device(args.device)])
+    document = backproject.header([open_device(args.device)])
     document |= {"kind": "channels", "pulses": PULSES, "growth": [], "one": [], "many": []}
     for name, part in (("growth", growth), ("one", one), ("many", many)):
         document[name] = part(args)

@@ -54,8 +54,8 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure, print the tables, and write the JSON file."""
-    from sarcl import cl
     from sarcl.bench import backproject, echo_page
+    from sarcl.opencl.device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=1_000_000)
@@ -66,7 +66,7 @@ def main() -> None:
     parser.add_argument("--peer-python")
     parser.add_argument("--json", type=Path)
     args = parser.parse_args()
-    document = backproject.header([cl.open_device(args.device)])
+    document = backproject.header([open_device(args.device)])
     document |= {"kind": "echo", "points": args.points, "pulses": args.pulses}
     document |= {"spread": [], "whole": [], "scenes": []}
 

@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 import sarcl
-from sarcl import cl
+from sarcl.opencl.device import open_device
 
 
 def resident() -> float:
@@ -60,7 +60,7 @@ def main() -> None:
     parser.add_argument("--max-bytes", type=float)
     parser.add_argument("--compare", action="store_true", help="focus again in one block and compare")
     args = parser.parse_args()
-    cl.open_device(args.device)
+    open_device(args.device)
     with tempfile.TemporaryDirectory() as folder:
         raw = write_raw(Path(folder, "raw.h5"), args.pulses, args.samples)
         grid = sarcl.ImageGrid.plane(shape=(args.size, args.size), spacing=0.02)

@@ -10,10 +10,10 @@
 // reference: sarcl/reference/backproject.py:backproject
 
 #include "common.clh"
-#include "wide.clh"
+#include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "phase.clh"
+#include "range_phase.clh"
 
 // global size (work-items a tile, tiles of this block), local size (work-items a tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`

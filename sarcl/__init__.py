@@ -22,83 +22,90 @@ from importlib import import_module
 from types import ModuleType
 from typing import TYPE_CHECKING, Any
 
-__version__ = "0.1.0"
-
 # Imported on first use: `sarcl --help` must not wait for numpy, and nothing probes a device at import.
 _HOME = {
-    "Waveform": "waveform",
-    "Trajectory": "trajectory",
-    "Scene": "scene",
-    "Material": "material",
-    "Antenna": "antenna",
-    "AntennaArray": "array",
-    "Radar": "radar",
-    "PhaseHistory": "phase_history",
-    "concatenate": "phase_history",
-    "ImageGrid": "grid",
-    "Image": "image",
-    "Report": "report",
-    "Scenario": "scenario",
-    "echo": "echo",
-    "beam": "beam",
-    "ambiguity": "ambiguity",
-    "Ambiguity": "ambiguity",
-    "compress": "compress",
-    "backproject": "backproject",
-    "polar_format": "polar_format",
-    "plan": "forecast",
-    "Forecast": "forecast",
-    "plan_echo": "echo_forecast",
-    "EchoForecast": "echo_forecast",
-    "add_noise": "noise",
-    "autofocus": "autofocus",
-    "map_aperture": "aperture",
-    "measure": "quality",
-    "PointResponse": "quality",
-    "read": "read",
-    "devices": "cl",
-    "NoDeviceError": "cl",
-    "SarclWarning": "check",
-    "ToleranceMissed": "check",
+    "Waveform": "model.waveform",
+    "Trajectory": "model.trajectory",
+    "Scene": "scene.scene",
+    "Material": "scene.material",
+    "Antenna": "model.antenna",
+    "AntennaArray": "model.antenna_array",
+    "Radar": "model.radar",
+    "PhaseHistory": "model.phase_history",
+    "concatenate": "model.phase_history",
+    "ImageGrid": "model.image_grid",
+    "Image": "model.image",
+    "Report": "base.report",
+    "Scenario": "scenario.scenario",
+    "echo": "simulation.echo",
+    "beam": "arrays.beam",
+    "ambiguity": "arrays.ambiguity",
+    "Ambiguity": "arrays.ambiguity",
+    "compress": "imaging.compress",
+    "backproject": "imaging.backproject",
+    "polar_format": "imaging.polar_format.polar_format",
+    "plan": "imaging.forecast",
+    "Forecast": "imaging.forecast",
+    "plan_echo": "simulation.echo_forecast",
+    "EchoForecast": "simulation.echo_forecast",
+    "add_noise": "effects.noise",
+    "autofocus": "phase_correction.autofocus",
+    "map_aperture": "arrays.map_aperture",
+    "measure": "analysis.point_response",
+    "PointResponse": "analysis.point_response",
+    "read": "model.store",
+    "devices": "opencl.device",
+    "NoDeviceError": "opencl.device",
+    "SarclWarning": "base.errors",
+    "ToleranceMissed": "base.errors",
+}
+
+# Public modules, by the file that holds them.
+_MODULES = {
+    "shapes": "scene.shapes",
+    "pointing": "model.pointing",
+    "motion": "effects.motion",
+    "fda": "experiments.fda.measure",
+    "papers": "papers",
 }
 
 __all__ = sorted(_HOME)
 
 if TYPE_CHECKING:
-    from .ambiguity import Ambiguity as Ambiguity
-    from .ambiguity import ambiguity as ambiguity
-    from .antenna import Antenna as Antenna
-    from .aperture import map_aperture as map_aperture
-    from .array import AntennaArray as AntennaArray
-    from .autofocus import autofocus as autofocus
-    from .backproject import backproject as backproject
-    from .beam import beam as beam
-    from .check import SarclWarning as SarclWarning
-    from .check import ToleranceMissed as ToleranceMissed
-    from .cl import NoDeviceError as NoDeviceError
-    from .cl import devices as devices
-    from .compress import compress as compress
-    from .echo import echo as echo
-    from .echo_forecast import EchoForecast as EchoForecast
-    from .echo_forecast import plan_echo as plan_echo
-    from .forecast import Forecast as Forecast
-    from .forecast import plan as plan
-    from .grid import ImageGrid as ImageGrid
-    from .image import Image as Image
-    from .material import Material as Material
-    from .noise import add_noise as add_noise
-    from .phase_history import PhaseHistory as PhaseHistory
-    from .phase_history import concatenate as concatenate
-    from .polar_format import polar_format as polar_format
-    from .quality import PointResponse as PointResponse
-    from .quality import measure as measure
-    from .radar import Radar as Radar
-    from .read import read as read
-    from .report import Report as Report
-    from .scenario import Scenario as Scenario
-    from .scene import Scene as Scene
-    from .trajectory import Trajectory as Trajectory
-    from .waveform import Waveform as Waveform
+    from .analysis.point_response import PointResponse as PointResponse
+    from .analysis.point_response import measure as measure
+    from .arrays.ambiguity import Ambiguity as Ambiguity
+    from .arrays.ambiguity import ambiguity as ambiguity
+    from .arrays.beam import beam as beam
+    from .arrays.map_aperture import map_aperture as map_aperture
+    from .base.errors import SarclWarning as SarclWarning
+    from .base.errors import ToleranceMissed as ToleranceMissed
+    from .base.report import Report as Report
+    from .effects.noise import add_noise as add_noise
+    from .imaging.backproject import backproject as backproject
+    from .imaging.compress import compress as compress
+    from .imaging.forecast import Forecast as Forecast
+    from .imaging.forecast import plan as plan
+    from .imaging.polar_format.polar_format import polar_format as polar_format
+    from .model.antenna import Antenna as Antenna
+    from .model.antenna_array import AntennaArray as AntennaArray
+    from .model.image import Image as Image
+    from .model.image_grid import ImageGrid as ImageGrid
+    from .model.phase_history import PhaseHistory as PhaseHistory
+    from .model.phase_history import concatenate as concatenate
+    from .model.radar import Radar as Radar
+    from .model.store import read as read
+    from .model.trajectory import Trajectory as Trajectory
+    from .model.waveform import Waveform as Waveform
+    from .opencl.device import NoDeviceError as NoDeviceError
+    from .opencl.device import devices as devices
+    from .phase_correction.autofocus import autofocus as autofocus
+    from .scenario.scenario import Scenario as Scenario
+    from .scene.material import Material as Material
+    from .scene.scene import Scene as Scene
+    from .simulation.echo import echo as echo
+    from .simulation.echo_forecast import EchoForecast as EchoForecast
+    from .simulation.echo_forecast import plan_echo as plan_echo
 
 
 class _Package(ModuleType):
@@ -113,6 +120,8 @@ sys.modules[__name__].__class__ = _Package
 
 
 def __getattr__(name: str) -> Any:
+    if name in _MODULES:
+        return import_module(f".{_MODULES[name]}", __name__)
     if name not in _HOME:
         raise AttributeError(f"module 'sarcl' has no attribute {name!r}")
     value = getattr(import_module(f".{_HOME[name]}", __name__), name)

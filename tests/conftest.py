@@ -7,13 +7,13 @@ from pathlib import Path
 
 import pytest
 
-from sarcl import cl
+from sarcl.opencl.device import REMEDY, devices, open_device
 
 
 def _devices():
     """Every working device, each once more without float64, and CPUs once more with one lane, as GPUs run."""
     found = []
-    for info in cl.devices():
+    for info in devices():
         if info.works:
             name = f"{info.index}-{info.kind}"
             found.append(pytest.param((info.index, None), id=name))
@@ -30,9 +30,9 @@ def _devices():
 def device(request):
     """An open device; a kernel that fails on it fails the test."""
     if request.param is None:
-        pytest.fail(f"no OpenCL device works. {cl.REMEDY}")
+        pytest.fail(f"no OpenCL device works. {REMEDY}")
     index, twin = request.param
-    opened = cl.open_device(index)
+    opened = open_device(index)
     return getattr(opened, twin)() if twin else opened
 
 

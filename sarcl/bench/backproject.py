@@ -13,12 +13,13 @@ from typing import Any
 
 import numpy as np
 
-from .. import __version__, cl
-from ..check import choice, count, number
-from ..methods import METHODS
-from . import baseline, cases, ours, peers, table
-from .contestant import Absent
-from .measure import Paces, alternate, measure
+from ..base.validation import choice, count, number
+from ..base.version import __version__
+from ..imaging.choose_method import METHODS
+from ..opencl import device as opencl
+from . import _baseline, _cases, _contestant, _ours, _peers, _table
+from ._contestant import Absent
+from ._measure import Paces, alternate, measure
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
 FORMAT = 2  # of the document
@@ -27,7 +28,7 @@ Document = dict[str, Any]
 
 def run(
     *,
-    scenes: Sequence[str] = cases.SCENES,
+    scenes: Sequence[str] = _cases.SCENES,
     sizes: Sequence[int] = (1024,),
     tolerances: Sequence[float] = TOLERANCES,
     devices: Sequence[Any] | None = None,
@@ -58,15 +59,15 @@ def run(
     ValueError for what does not fit, before the work; NoDeviceError.
     """
     for scene in scenes:
-        choice("scene", scene, cases.SCENES)
+        choice("scene", scene, _cases.SCENES)
     for method in methods:
         choice("method", method, METHODS)
     wanted = [number(f"tolerances[{i}]", t, above=0) for i, t in enumerate(tolerances)]
     sizes = sorted({count(f"sizes[{i}]", n, least=8) for i, n in enumerate(sizes)})
     repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
     limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
-    python = peers.check_python(peer_python)
-    opened = [cl.open_device(d) for d in _listed(devices)]
+    python = _peers.check_python(peer_python)
+    opened = [opencl.open_device(d) for d in _listed(devices)]
     twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
     opened += twins
 
@@ -75,22 +76,22 @@ def run(
         peer = None
         if with_peers:
             try:
-                peer = stack.enter_context(peers.Peer(python))
+                peer = stack.enter_context(_peers.Peer(python))
                 found = {"version": peer.version, "python": peer.python, "backend": peer_backend}
             except Absent as exc:
                 found = {"absent": f"{exc}; --peer-python PATH names a Python that has it"}
             document["peers"].append({"name": "fastsar", **found})
-        for line in table.machine_text(document):
+        for line in _table.machine_text(document):
             say(line)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
         for scene in scenes:
             paces: Paces = {}
             for n in sizes:
                 progress("data", 0, 1)
-                case = cases.make(scene, n, data, pixels)
-                cases.save(case, folder)
+                case = _cases.make(scene, n, data, pixels)
+                _cases.save(case, folder)
                 progress("data", 1, 1)
-                lines = ours.contestants(case, folder, opened, methods, wanted)
+                lines = _ours.contestants(case, folder, opened, methods, wanted)
                 others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
                 rows = measure(
                     case,
@@ -113,40 +114,42 @@ def run(
                 document["cases"].append(result)
                 document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
-                say("\n" + table.text(result))
-    growth = table.growth_text(document["cases"])
+                say("\n" + _table.text(result))
+    growth = _table.growth_text(document["cases"])
     if growth:
         say("\n" + growth)
-    say("\n" + table.EXPLAINED)
+    say("\n" + _table.EXPLAINED)
     return document
 
 
-def _others(case: cases.Case, folder: Path, peer: peers.Peer | None, backend: str, methods: Sequence[str]) -> list[Any]:
+def _others(
+    case: _cases.Case, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
+) -> list[Any]:
     """The baseline, and the peer where there is one."""
     found = []
     if "direct" in methods:
-        found += baseline.contestants(case)
+        found += _baseline.contestants(case)
     if peer is not None:
         try:
             peer.load(folder)
-            found += peers.contestants(case, peer, methods, backend)
+            found += _peers.contestants(case, peer, methods, backend)
         except Absent as exc:
             lost = str(exc)
 
             def gone() -> Any:
                 raise Absent(lost)
 
-            found += [peers.Contestant(peer.name, backend, method, "any", gone) for method in methods]
+            found += [_contestant.Contestant(peer.name, backend, method, "any", gone) for method in methods]
     return found
 
 
 def _listed(devices: Sequence[Any] | None) -> list[Any]:
     if devices:
         return list(dict.fromkeys(devices))
-    return [info.index for info in cl.devices() if info.works] or [None]
+    return [info.index for info in opencl.devices() if info.works] or [None]
 
 
-def _device(device: cl.Device) -> dict[str, Any]:
+def _device(device: opencl.Device) -> dict[str, Any]:
     info = device.info
     return {
         "index": info.index,
@@ -159,7 +162,7 @@ def _device(device: cl.Device) -> dict[str, Any]:
     }
 
 
-def header(devices: Sequence[cl.Device]) -> Document:
+def header(devices: Sequence[opencl.Device]) -> Document:
     """What every document begins with: machine, devices, and room for peers."""
     return {"format": FORMAT, "machine": _machine(), "devices": [_device(d) for d in devices], "peers": []}
 
@@ -179,7 +182,7 @@ def _machine() -> dict[str, Any]:
     return {
         "processor": processor or platform.machine(),
         "processors": os.cpu_count(),
-        "threads": cl.threads(),
+        "threads": opencl.threads(),
         "system": platform.system(),
         "python": platform.python_version(),
         "numpy": np.__version__,
@@ -190,9 +193,9 @@ def _machine() -> dict[str, Any]:
 
 def write(document: Document, path: Path) -> None:
     """The document as a JSON file that appears whole."""
-    from ..files import paths
+    from ..io import output_paths
 
-    with paths.atomic(path) as part:
+    with output_paths.atomic(path) as part:
         part.write_text(json.dumps(document, indent=1, default=_plain) + "\n")
 
 

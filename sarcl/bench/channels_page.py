@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import table
+from . import _table
 
 Row = dict[str, Any]
 HEAD = [
@@ -26,14 +26,16 @@ calls a channel is the largest of nine of them.
 
 def section(name: str, document: Row) -> str:
     """One document: machine, tables."""
-    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in table.machine_text(document)) + "\n"
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in _table.machine_text(document)) + "\n"
     for part, title in (
         ("growth", f"Carriers of 900 MHz in all x {document['pulses']} pulses"),
         ("one", f"One carrier x {document['pulses']} pulses"),
         ("many", f"450 senders x 450 receivers x {document['pulses']} pulses, into a file within 100 MB"),
     ):
         if document[part]:
-            text += f"### {title}\n\n" + table.markdown(HEAD, [_line(r, document[part]) for r in document[part]]) + "\n"
+            text += (
+                f"### {title}\n\n" + _table.markdown(HEAD, [_line(r, document[part]) for r in document[part]]) + "\n"
+            )
     return text + EXPLAINED + "\n"
 
 

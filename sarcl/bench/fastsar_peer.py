@@ -1,6 +1,6 @@
 """fastsar, in an interpreter that has it: read requests from stdin, answer on stdout, one JSON object a line.
 
-Imports nothing of sarcl. Run by sarcl/bench/peers.py, or as  python fastsar_peer.py once FOLDER SPEC  to make one
+Imports nothing of sarcl. Run by sarcl/bench/_peers.py, or as  python fastsar_peer.py once FOLDER SPEC  to make one
 image in a process of its own.
 
 Requests: {"do": "load", "folder": ...}; {"do": "run", "spec": {"former": "exact" or "factorized", "options": {...}}}
@@ -19,7 +19,7 @@ import time
 
 
 def load(folder):
-    """(case, samples, tx, reference ranges) as sarcl/bench/cases.py saved them."""
+    """(case, samples, tx, reference ranges) as sarcl/bench/_cases.py saved them."""
     import numpy as np
 
     def array(name):

@@ -10,14 +10,15 @@ from pathlib import Path
 def main(folder: str, options: str) -> None:
     """Read the case in `folder`, open the device, make the image."""
     import sarcl
-    from sarcl import cl
-    from sarcl.bench import cases
+
+    from ..opencl.device import open_device
+    from . import _cases
 
     given = json.loads(options)
-    device = cl.open_device(given["device"])
+    device = open_device(given["device"])
     if not given["fp64"]:
         device = device.without_fp64()
-    raw, grid = cases.load(Path(folder))
+    raw, grid = _cases.load(Path(folder))
     sarcl.backproject(
         raw, grid, tolerance=given["tolerance"], method=given["method"], device=device, check=False
     )  # fmt: skip

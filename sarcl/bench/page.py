@@ -7,7 +7,7 @@ import re
 from pathlib import Path
 from typing import Any
 
-from . import channels_page, echo_page, figures, pareto, table
+from . import _figures, _table, channels_page, echo_page, pareto
 from .backproject import FORMAT
 
 INTRODUCTION = """# Results
@@ -35,13 +35,13 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
         if document.get("kind") in OTHER:
             page += OTHER[document["kind"]](name, document)
             continue
-        drawn = any(figures.ran(case) for case in document["cases"])
+        drawn = any(_figures.ran(case) for case in document["cases"])
         if drawn:
             picture = docs / f"results-{name}.png"
             pareto.picture(document["cases"]).save(picture)
             written.append(picture)
         page += section(name, document, drawn)
-    page += f"## How to read this\n\n{table.EXPLAINED}\n"
+    page += f"## How to read this\n\n{_table.EXPLAINED}\n"
     notes = docs / "results-notes.md"
     if notes.exists():
         page += "\n" + notes.read_text()
@@ -78,43 +78,43 @@ def read(path: Path) -> dict[str, Any]:
 
 def section(name: str, document: dict[str, Any], drawn: bool) -> str:
     """One document: machine, picture, tables."""
-    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in table.machine_text(document)) + "\n"
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in _table.machine_text(document)) + "\n"
     if drawn:
         text += f"![rate against achieved error, sarcl and its peers](results-{name}.png)\n\n"
     for case in document["cases"]:
-        text += f"### {table.title(case)}\n\n{table.markdown(table.HEAD, table.body(case))}\n"
-        text += "".join(f"- {line}\n" for line in table.missing(case))
-        matches = table.match_body(case)
+        text += f"### {_table.title(case)}\n\n{_table.markdown(_table.HEAD, _table.body(case))}\n"
+        text += "".join(f"- {line}\n" for line in _table.missing(case))
+        matches = _table.match_body(case)
         if matches:
             text += "\nPeer's seconds over sarcl's, at equal or smaller error:\n\n"
-            text += table.markdown(table.MATCH_HEAD, matches) + "\n"
+            text += _table.markdown(_table.MATCH_HEAD, matches) + "\n"
         plans = _plans(case)
         if plans:
             text += f"How sarcl met each tolerance:\n\n{plans}\n"
-    growth = table.growth_body(document["cases"])
+    growth = _table.growth_body(document["cases"])
     if growth:
-        text += f"### {name}: cost against size\n\n{table.markdown(table.GROWTH_HEAD, growth)}\n"
+        text += f"### {name}: cost against size\n\n{_table.markdown(_table.GROWTH_HEAD, growth)}\n"
     return text
 
 
-def _plans(case: figures.Result) -> str:
+def _plans(case: _figures.Result) -> str:
     lines = [
-        [table.name(row), row["setting"], f"{row['predicted']:.1e}", ", ".join(f"{k} {v}" for k, v in plan.items())]
-        for row in figures.ran(case)
+        [_table.name(row), row["setting"], f"{row['predicted']:.1e}", ", ".join(f"{k} {v}" for k, v in plan.items())]
+        for row in _figures.ran(case)
         if (plan := row.get("plan"))
     ]
-    return table.markdown(["", "tolerance", "predicted", "plan"], lines) if lines else ""
+    return _table.markdown(["", "tolerance", "predicted", "plan"], lines) if lines else ""
 
 
 def readme_table(document: dict[str, Any]) -> str:
     """sarcl's direct rows of the first case on the first device: whole calls."""
     case = document["cases"][0]
-    ours = [row for row in figures.ran(case) if figures.is_ours(row) and row["method"] == "direct"]
+    ours = [row for row in _figures.ran(case) if _figures.is_ours(row) and row["method"] == "direct"]
     lines = []
     for row in ours:
-        call, kernel = figures.best(row, "call"), figures.best(row, "kernel")
+        call, kernel = _figures.best(row, "call"), _figures.best(row, "kernel")
         if row["device"] == ours[0]["device"] and call and kernel:
-            rate = figures.rate(case, row, "call")
+            rate = _figures.rate(case, row, "call")
             cells = [row["setting"], f"{row['error']:.1e}", f"{row['predicted']:.1e}", f"{call:.2f}", f"{rate:.2f}"]
             lines.append([*cells, f"{kernel / call:.0%}"])
-    return table.markdown(README_HEAD, lines) if lines else ""
+    return _table.markdown(README_HEAD, lines) if lines else ""

@@ -6,8 +6,8 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..sheet import FAINT, INK, PAPER, Sheet
-from . import figures
+from ..figures.axes import FAINT, INK, PAPER, Sheet
+from . import _figures
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
@@ -18,11 +18,11 @@ OURS = [(22, 82, 148), (196, 68, 24), (90, 150, 215), (232, 140, 90)]
 THEIRS = [(16, 124, 88), (132, 70, 150), (184, 134, 11), (110, 110, 110), (60, 160, 170), (170, 60, 110)]
 MARKS = ("square", "diamond", "triangle", "cross")
 
-Series = dict[str, list[figures.Row]]
+Series = dict[str, list[_figures.Row]]
 Style = tuple[tuple[int, int, int], str]  # colour, mark
 
 
-def picture(cases: list[figures.Result]) -> Picture:
+def picture(cases: list[_figures.Result]) -> Picture:
     """The picture of a document's cases; those without a row that ran are left out.
 
     ValueError where none has any.
@@ -30,7 +30,7 @@ def picture(cases: list[figures.Result]) -> Picture:
     from PIL import Image
 
     styles = _styles(cases)
-    panels = [_panel(case, styles) for case in cases if figures.ran(case)]
+    panels = [_panel(case, styles) for case in cases if _figures.ran(case)]
     if not panels:
         raise ValueError("no case has a row that ran; there is nothing to draw")
     columns = 1 if len(panels) < 4 else 2
@@ -42,12 +42,12 @@ def picture(cases: list[figures.Result]) -> Picture:
     return whole.reduce(FINE)
 
 
-def series(case: figures.Result) -> Series:
+def series(case: _figures.Result) -> Series:
     """The rows of each curve, by its label; sarcl's first, the exact peers' by kind of interpolation."""
     found: Series = {}
-    for row in sorted(figures.ran(case), key=lambda row: not figures.is_ours(row)):
+    for row in sorted(_figures.ran(case), key=lambda row: not _figures.is_ours(row)):
         label = f"{row['who']} {row['method']}"
-        if figures.is_ours(row):
+        if _figures.is_ours(row):
             label += f", {row['device']}"
         elif row["method"] == "direct":
             label += f", {row['setting'].split(',')[0]}"
@@ -55,11 +55,11 @@ def series(case: figures.Result) -> Series:
     return found
 
 
-def _panel(case: figures.Result, styles: dict[str, Style]) -> Picture:
+def _panel(case: _figures.Result, styles: dict[str, Style]) -> Picture:
     curves = series(case)
-    rows = figures.ran(case)
+    rows = _figures.ran(case)
     x = np.log10([row["error"] for row in rows])
-    y = np.log10([figures.rate(case, row) for row in rows])
+    y = np.log10([_figures.rate(case, row) for row in rows])
     low, high = float(np.floor(x.min() - 0.1)), float(np.ceil(x.max() + 0.1))
     bottom, top = float(y.min() - 0.2), float(y.max() + 0.3)
     sheet = Sheet(
@@ -75,7 +75,7 @@ def _panel(case: figures.Result, styles: dict[str, Style]) -> Picture:
     for label, points in curves.items():
         colour, mark = styles[label]
         places = [_place(sheet, row, case) for row in points]
-        if figures.is_ours(points[0]) or points[0]["method"] == "direct":
+        if _figures.is_ours(points[0]) or points[0]["method"] == "direct":
             sheet.draw.line(places, fill=colour, width=2 * FINE, joint="curve")
         for place, row in zip(places, points, strict=True):
             _mark(sheet, place, mark, colour)
@@ -84,7 +84,7 @@ def _panel(case: figures.Result, styles: dict[str, Style]) -> Picture:
     return sheet.image
 
 
-def _styles(cases: list[figures.Result]) -> dict[str, Style]:
+def _styles(cases: list[_figures.Result]) -> dict[str, Style]:
     """Colour and mark of every curve, the same in all panels."""
     found: dict[str, Style] = {}
     ours = theirs = 0
@@ -92,7 +92,7 @@ def _styles(cases: list[figures.Result]) -> dict[str, Style]:
         for label, rows in series(case).items():
             if label in found:
                 continue
-            if figures.is_ours(rows[0]):
+            if _figures.is_ours(rows[0]):
                 found[label] = OURS[ours % len(OURS)], "circle"
                 ours += 1
             else:
@@ -101,11 +101,11 @@ def _styles(cases: list[figures.Result]) -> dict[str, Style]:
     return found
 
 
-def _place(sheet: Sheet, row: figures.Row, case: figures.Result) -> tuple[float, float]:
+def _place(sheet: Sheet, row: _figures.Row, case: _figures.Result) -> tuple[float, float]:
     left, top, right, bottom = sheet.frame
     (_, low, high, _), (_, least, most, _) = sheet.across, sheet.up
     x = (np.log10(row["error"]) - low) / (high - low)
-    y = (np.log10(figures.rate(case, row)) - least) / (most - least)
+    y = (np.log10(_figures.rate(case, row)) - least) / (most - least)
     return left + x * (right - left), bottom - y * (bottom - top)
 
 
@@ -156,7 +156,7 @@ def _mark(sheet: Sheet, place: tuple[float, float], mark: str, colour: Any) -> N
 
 
 def _label(
-    sheet: Sheet, place: tuple[float, float], row: figures.Row, colour: Any, taken: list[tuple[float, ...]]
+    sheet: Sheet, place: tuple[float, float], row: _figures.Row, colour: Any, taken: list[tuple[float, ...]]
 ) -> None:
     """sarcl's tolerance above its point, the exact peers' upsampling below theirs; where others stand, the other way.
 
@@ -165,7 +165,7 @@ def _label(
     from PIL import ImageFont
 
     above, below = (-8 * FINE, "mb"), (9 * FINE, "mt")
-    if figures.is_ours(row):
+    if _figures.is_ours(row):
         text, ways = row["setting"].replace("e-0", "e-"), (above, below)
     elif row["method"] == "direct":
         text, ways = row["setting"].split(";")[0].split(", ")[-1], (below, above)

@@ -4,8 +4,8 @@
 
     paper.py     what a paper is made of: sections, rows of published and measured, the page
     lab.py       echoes and images that several sections share
-    farooq.py    Farooq 2009, frequency-diverse arrays: its sections in order; farooq_*.py are these sections
-    zones.py     range zones told apart by carriers that run on from pulse to pulse
+    farooq/      Farooq 2009, frequency-diverse arrays: its sections in order, a file each
+                 range_zones.py: range zones told apart by carriers that run on from pulse to pulse
 """
 
 from __future__ import annotations
@@ -13,7 +13,7 @@ from __future__ import annotations
 from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
-from .. import schema
+from ..base import text
 
 if TYPE_CHECKING:
     from .lab import Lab
@@ -27,7 +27,7 @@ PAPERS = {
 def find(name: str) -> Paper:
     """The paper of this name. ValueError names those there are."""
     if name not in PAPERS:
-        raise ValueError(schema.unknown(name, list(PAPERS), "paper"))
+        raise ValueError(text.unknown(name, list(PAPERS), "paper"))
     paper: Paper = import_module(f".{name}", __name__).PAPER
     return paper
 
@@ -39,7 +39,7 @@ def listing() -> str:
 
 def open_lab(device: Any = None, quick: bool = False) -> Lab:
     """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
-    from ..cl import open_device
+    from ..opencl.device import open_device
     from .lab import Lab
 
     return Lab(open_device(device), quick)

@@ -7,15 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from .. import page
-from ..aperture import map_aperture
-from ..backproject import backproject
-from ..echo import echo
-from ..fda import Case, response
-from ..grid import ImageGrid
-from ..phase_history import PhaseHistory
-from ..scene import Scene
-from ..waveform import Waveform
+from ..arrays.map_aperture import map_aperture
+from ..experiments.fda.case import Case
+from ..experiments.fda.measure import response
+from ..figures import html
+from ..imaging.backproject import backproject
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..model.waveform import Waveform
+from ..scene.scene import Scene
+from ..simulation.echo import echo
 
 CENTER = ((0.0, 0.0, 0.0),)
 HALF, STEP = (2.64, 4.0), 0.04  # of a picture along range and cross-range: half its sides and a pixel, m
@@ -71,7 +72,7 @@ class Lab:
         """The same as a drawing, over its brightest pixel; box: half the side of a dashed square, m."""
         edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
         square = None if box is None else (box, box)
-        return page.picture(
+        return html.picture(
             self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square
         )  # fmt: skip
 
@@ -92,7 +93,7 @@ class Lab:
 
 def _window(step: float) -> tuple[float, float]:
     """Just inside the unambiguous range of carriers `step` Hz apart, m."""
-    from ..check import SPEED_OF_LIGHT
+    from ..base.constants import SPEED_OF_LIGHT
 
     half = 0.49 * SPEED_OF_LIGHT / (2 * step)
     return -half, half

@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from .. import page
+from ..figures.html import heading, page, table, words
 from .lab import Lab
 
 
@@ -62,7 +62,7 @@ class Section:
 
     def say(self, text: str) -> None:
         """A paragraph."""
-        self.parts.append(page.words(text))
+        self.parts.append(words(text))
 
     def draw(self, *figures: str) -> None:
         """Drawings."""
@@ -113,27 +113,27 @@ class Paper:
         """The page of the sections there are: the table of all rows first."""
         rows = [row for section in sections for row in section.rows]
         fine = sum(row.holds for row in rows)
-        parts = [page.words(self.about)]
+        parts = [words(self.about)]
         missing = len(self.sections) - len(sections)
         if missing:
-            parts.append(page.words(f"Not finished: {missing} sections are still to come.", True))
+            parts.append(words(f"Not finished: {missing} sections are still to come.", True))
         if lab.quick:
-            parts.append(page.words("A quick run: the largest arrays were left out.", True))
+            parts.append(words("A quick run: the largest arrays were left out.", True))
         parts += [
-            page.heading("Published and measured"),
-            page.words(
+            heading("Published and measured"),
+            words(
                 f"{fine} of {len(rows)} figures and statements come out as printed. Where one errs, the last column "
                 "says why. All of the third column was measured in this run."
             ),
-            page.table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True).replace(
+            table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True).replace(
                 "<td>errs", '<td class="errs">errs'
             ),
         ]  # fmt: skip
         for section in sections:
-            parts += [page.heading(section.title), *section.parts]
+            parts += [heading(section.title), *section.parts]
         seconds = sum(s.seconds for s in sections)
-        parts.append(page.words(f"Made in {seconds:.0f} s.", True))
-        return page.page(self.title, parts)
+        parts.append(words(f"Made in {seconds:.0f} s.", True))
+        return page(self.title, parts)
 
 
 def _cells(row: Row) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..check import SPEED_OF_LIGHT
+from ..base.constants import SPEED_OF_LIGHT
 from .geometry import half_path
 
 

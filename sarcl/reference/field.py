@@ -1,10 +1,10 @@
-"""Fields of arrays whose elements send a carrier each: kernels/field.cl in extended precision."""
+"""Fields of arrays whose elements send a carrier each: kernels/beam.cl in extended precision."""
 
 from __future__ import annotations
 
 import numpy as np
 
-from ..check import SPEED_OF_LIGHT
+from ..base.constants import SPEED_OF_LIGHT
 
 
 def field(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..accuracy import Interpolator
+from ..numerics.interpolation import Interpolator
 
 
 def interpolate(row: np.ndarray, places: np.ndarray, kernel: Interpolator) -> np.ndarray:

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..check import SPEED_OF_LIGHT
-from ..phase_history import PhaseHistory
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.phase_history import PhaseHistory
 from .geometry import half_path
 
 

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..accuracy import Interpolator
-from ..check import SPEED_OF_LIGHT
-from ..phase_history import PhaseHistory
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.phase_history import PhaseHistory
+from ..numerics.interpolation import Interpolator
 from .geometry import half_path
 
 
@@ -41,7 +41,7 @@ def polar_format(
 
 
 def spread(samples: np.ndarray, place: np.ndarray, kernel: Interpolator, length: tuple[int, int]) -> np.ndarray:
-    """Samples (n,) at places (n, 2), in cells, on a grid complex128 of `length` that repeats: kernels/polar.cl."""
+    """Samples (n,) at places (n, 2), in cells, on a grid complex128 of `length` that repeats: kernels/nufft2d.cl."""
     out = np.zeros(length, np.complex128)
     first = np.floor(place).astype(int) - kernel.taps // 2 + 1
     weights = kernel.weights(place % 1 - 0.5)

@@ -1,0 +1,27 @@
+// Sums of tiles as rows of an image.
+//
+// macros    none
+// reference: sarcl/imaging/tiling.py:GridTiling.place
+
+// global size (columns of the image, rows of these bands)
+//   totals   (4, pixels)   of tiles `high` x `wide` one after another: re, im, and what rounding took from them
+//   slot     (bands, across): where a tile stands among them
+//   out      (rows, columns, 2)
+__kernel void untile(__global const float *restrict totals, ulong pixels, __global const int *restrict slot, int across,
+                     int high, int wide, int columns, __global float *restrict out) {
+    int column = get_global_id(0), row = get_global_id(1);
+    size_t tile = slot[(row / high) * across + column / wide];
+    size_t i = tile * high * wide + (row % high) * wide + column % wide;
+    size_t o = 2 * ((size_t)row * columns + column);
+    out[o] = totals[i] + totals[i + 2 * pixels];
+    out[o + 1] = totals[i + pixels] + totals[i + 3 * pixels];
+}
+
+// Copies the sums of tiles to where they stand among others. global size (pixels of a tile, tiles)
+//   from     (4, n_from);  to (4, n_to);  slot (tiles)
+__kernel void move(__global const float *restrict from, ulong n_from, __global const int *restrict slot,
+                   __global float *restrict to, ulong n_to) {
+    size_t per_tile = get_global_size(0), i = get_global_id(1) * per_tile + get_global_id(0);
+    size_t o = (size_t)slot[get_global_id(1)] * per_tile + get_global_id(0);
+    for (int plane = 0; plane < 4; plane++) to[plane * n_to + o] = from[plane * n_from + i];
+}

@@ -1,0 +1,175 @@
+// Factorised backprojection: profiles of many pulses about a tile become those of fewer, about a smaller tile.
+//
+//   g_p(m) = sum_b w_b(z_p) s_p(k_p + m + b) exp(+j 2 pi kappa D_p),     D_p = delta_p(x') - delta_p(x)
+//   G_v(m) = sum_p W(p - v) g_p(m)
+//
+// About the centre x' of a small tile, what the tile's pixels see of a pulse changes slowly from pulse to pulse, once the
+// pulse is moved to x' (first line); so a low-pass filter W can thin the pulses out (second line): every H-th antenna
+// position remains, a node, with the profile that makes the same image of the tile.
+//
+// source    quadtree backprojection (McCorkle and Rofheart 1996), with interpolation between pulses instead of plain sums
+// symbols   x, x'     centres of the tile the profiles are about, and of the new one, m;  delta, kappa, sigma as in geometry.clh
+//           k_p, z_p  sample and fraction of D_p, see interp.clh;  m sample of the new profile, 0 at x'
+//           W         (taps of W, per pulse of a block): the pulses between two nodes share their nodes
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS as in the headers
+//           FROM_CENTRE  1: profiles are the pulses' own, about their reference range; 0: about the tile's centre x
+//           NODES        taps of W
+//           SPAN         vectors of a profile a work-item
+// reference: sarcl/reference/merge.py:merge
+
+#define RANGE 0
+#include "common.clh"
+#include "doubleword.clh"
+#include "geometry.clh"
+#include "interp.clh"
+
+// Record of a (new tile, pulse): first sample, then TAPS complex weights.
+#define N_SHIFT (2 + 2 * TAPS)
+
+// global size (n/VW, new tiles of this call)
+//   pulse   (2, N_PULSE, n)     see geometry.clh
+//   parents (2, 3, n_parents)   x of the old tiles about the scene's centre, m, hi and lo parts
+//   tile    (2, 3, n_tiles)     x' about the scene's centre
+//   parent  (n_tiles)           which old tile a new one lies in
+//   used    n_used <= n         pulses that are real
+//   reach   samples before the new profiles' centre, and `samples` in all; stride, origin: of the old profiles
+//   out     (tiles of this call, n_used, N_SHIFT)
+__kernel void shifts(__global const float *restrict pulse, __global const float *restrict parents,
+                     int n_parents,
+                     __global const float *restrict tile, __global const int *restrict parent,
+                     __global const float *restrict table, int n, int n_used, int n_tiles, int first, int reach,
+                     int samples, int stride, int origin, __global float *restrict out) {
+    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
+    point x = load_point(tile, k, n_tiles), d;
+    wv r;
+    point T = load_antenna(pulse, P_TX, g, n, 0);
+    wv length = w_load(pulse + P_TR * n, g, lo);
+#if BISTATIC
+    point R = load_antenna(pulse, P_RX, g, n, 0);
+    wv rx_length = w_load(pulse + P_RR * n, g, lo);
+#endif
+#if !FROM_CENTRE
+    point c;
+    c.x = w_load1(parents, parent[k], 3 * (size_t)n_parents);
+    c.y = w_load1(parents + n_parents, parent[k], 3 * (size_t)n_parents);
+    c.z = w_load1(parents + 2 * n_parents, parent[k], 3 * (size_t)n_parents);
+    x.x = w_sub(x.x, c.x);
+    x.y = w_sub(x.y, c.y);
+    x.z = w_sub(x.z, c.z);
+    T.x = w_sub(T.x, c.x);
+    T.y = w_sub(T.y, c.y);
+    T.z = w_sub(T.z, c.z);
+    length = w_sqrt(w_dot(T, T));
+#if BISTATIC
+    R.x = w_sub(R.x, c.x);
+    R.y = w_sub(R.y, c.y);
+    R.z = w_sub(R.z, c.z);
+    rx_length = w_sqrt(w_dot(R, R));
+#endif
+#endif
+    wv delta = path_difference(T, length, x, &r, &d);
+#if BISTATIC
+    wv second = path_difference(R, rx_length, x, &r, &d);
+    delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
+#endif
+    wv turns = w_mul(delta, w_load(pulse + P_KAPPA * n, g, lo)), places = w_mul(delta, w_load(pulse + P_SIGMA * n, g, lo));
+#if FROM_CENTRE
+    turns = w_add(turns, w_load(pulse + P_TURN * n, g, lo));
+    places = w_add(places, w_load(pulse + P_PLACE * n, g, lo));
+#endif
+    iv unused, base;
+    fv turn = w_split(turns, &unused);
+    fv t = w_split(places, &base) - (fv)(0.5f * (TAPS - 1));
+    iv at = base + nearest_int(t);
+    fv z = t - nearest(t);
+#if WRAP
+    at = at % WRAP;
+    at -= nearest_int(TO_FLOAT_INT(at) * (1.0f / WRAP)) * WRAP;
+#endif
+    // tiles that leave their rows are kept from here by the host; no rounding may touch memory that is not the row's
+    iv safe = clamp(at, (iv)(reach - origin), (iv)(stride - origin + reach - samples - TAPS));
+    fv w[TAPS], sine, cosine;
+    tap_weights(z, table, w);
+    sincos_turns(turn, &sine, &cosine);
+    int sample[VW];
+    float re[TAPS][VW], im[TAPS][VW];
+    STORE(safe, 0, sample);
+#pragma unroll
+    for (int b = 0; b < TAPS; b++) {
+        STORE(w[b] * cosine, 0, re[b]);
+        STORE(w[b] * sine, 0, im[b]);
+    }
+    out += (get_global_id(1) * (size_t)n_used + g * VW) * N_SHIFT;
+    int count = min(VW, n_used - (int)g * VW);
+    for (int l = 0; l < count; l++) {
+        out[l * N_SHIFT] = as_float(sample[l]);
+        out[l * N_SHIFT + 1] = 0;
+#pragma unroll
+        for (int b = 0; b < TAPS; b++) {
+            out[l * N_SHIFT + 2 + 2 * b] = re[b][l];
+            out[l * N_SHIFT + 3 + 2 * b] = im[b][l];
+        }
+    }
+}
+
+// WIDTH floats of interleaved complex numbers
+#if VW == 1
+#define WIDTH 2
+typedef float2 cv;
+#define LOAD_CV(p) vload2(0, p)
+#define STORE_CV(v, p) vstore2(v, 0, p)
+#define TURNED(x) ((float2)(-(x).s1, (x).s0))
+#else
+#define WIDTH 8
+typedef float8 cv;
+#define LOAD_CV(p) vload8(0, p)
+#define STORE_CV(v, p) vstore8(v, 0, p)
+#define TURNED(x) ((x).s10325476 * (float8)(-1, 1, -1, 1, -1, 1, -1, 1))
+#endif
+
+// global size (spans of a profile, new tiles of this call)
+//   source     profiles (old tiles from `first_parent` on, n_used, stride, 2); delay 0 or x stands at `origin`
+//   shift      from `shifts`
+//   blocks     (n_blocks, 4): first pulse, pulses, first node, first row of `filter`
+//   filter     (rows, NODES): W
+//   out        (tiles from out_first on, n_nodes, out_stride, 2), added to; x' stands at `reach`
+__kernel void merge(__global const float *restrict source, int stride, int origin, int first_parent,
+                    __global const int *restrict parent, __global const float *restrict shift, int n_used,
+                    __global const int *restrict blocks, int n_blocks, __global const float *restrict filter, int reach,
+                    int first, int out_first, int n_nodes, int out_stride, __global float *restrict out) {
+    int span = get_global_id(0) * SPAN, k = first + get_global_id(1);
+    __global const float *records = shift + get_global_id(1) * (size_t)n_used * N_SHIFT;
+#if !FROM_CENTRE
+    source += 2 * (size_t)(parent[k] - first_parent) * n_used * stride;
+#endif
+    out += (size_t)(k - out_first) * n_nodes * out_stride * 2;
+    int last = min(span + SPAN, (2 * out_stride + WIDTH - 1) / WIDTH);
+    for (int b = 0; b < n_blocks; b++) {
+        int p0 = blocks[4 * b], count = blocks[4 * b + 1], node = blocks[4 * b + 2], row = blocks[4 * b + 3];
+        for (int v = span; v < last; v++) {
+            cv total[NODES];
+#pragma unroll
+            for (int a = 0; a < NODES; a++) total[a] = 0;
+            for (int i = 0; i < count; i++) {
+                __global const float *c = records + (size_t)(p0 + i) * N_SHIFT;
+                __global const float *s = source + 2 * ((size_t)(p0 + i) * stride + origin - reach + as_int(c[0])) + v * WIDTH;
+                cv x = 0, y = 0;
+#pragma unroll
+                for (int t = 0; t < TAPS; t++) {
+                    cv value = LOAD_CV(s + 2 * t);
+                    x = fma(value, (cv)c[2 + 2 * t], x);
+                    y = fma(value, (cv)c[3 + 2 * t], y);
+                }
+                x += TURNED(y);
+                __global const float *w = filter + (size_t)(row + i) * NODES;
+#pragma unroll
+                for (int a = 0; a < NODES; a++) total[a] = fma(x, (cv)w[a], total[a]);
+            }
+#pragma unroll
+            for (int a = 0; a < NODES; a++) {
+                __global float *o = out + (size_t)(node + a) * out_stride * 2 + v * WIDTH;
+                STORE_CV(LOAD_CV(o) + total[a], o);
+            }
+        }
+    }
+}

@@ -1,0 +1,120 @@
+// Samples at uneven places of the plane of wavenumbers, spread on an even grid: a type-1 nonuniform FFT's first step.
+//
+//   g[c0, c1] = sum_p sum_n s_pn w(c0 - t0_p(n)) w(c1 - t1_p(n)),   indices modulo (M0, M1)
+//   t_p(n) = cell_p + rest_p + (n - MIDDLE) step_p,   in cells of the grid;  w of interp.clh
+//
+// source    Farooq 2009, equation 2.64 (its interpolation I, without a raster); sarcl/numerics/nufft2d.py
+// symbols   s_pn      sample n of row p, weighted
+//           cell, rest   (n_rows, 2) int, and in `line`: whole cells and the rest of the row's middle sample
+//           step      high + low: `high` has so few bits that n high is exact, and whole cells are told apart exactly;
+//                     the same sample falls into the same cell whichever tile looks at it
+//           line      (n_rows, 6): rest0, high0, low0, rest1, high1, low1
+//           table     (TAPS/2, 2, TERMS) as interp.clh reads it
+// macros    VW        1: the lanes are the taps of a sample
+//           TAPS, TERMS   of the kernel; TILE cells a side of a tile, M0, M1 >= TILE + 2 TAPS + 4
+// reference: sarcl/reference/polar_format.py:spread
+
+#include "common.clh"
+#include "interp.clh"
+
+// complex numbers of one row of taps, as one vector; six taps are padded: there is no vector of twelve
+#if TAPS == 2
+#define PAIRS 2
+typedef float4 taps_v;
+#define LOAD_TAPS(p) vload4(0, p)
+#define STORE_TAPS(v, p) vstore4(v, 0, p)
+#elif TAPS == 4
+#define PAIRS 4
+typedef float8 taps_v;
+#define LOAD_TAPS(p) vload8(0, p)
+#define STORE_TAPS(v, p) vstore8(v, 0, p)
+#else
+#define PAIRS 8
+typedef float16 taps_v;
+#define LOAD_TAPS(p) vload16(0, p)
+#define STORE_TAPS(v, p) vstore16(v, 0, p)
+#endif
+
+#define REACH (TILE + TAPS - 1) // first taps that touch a tile, along one axis
+#define ROWS (TILE + 2 * TAPS - 2)
+#define STRIDE (TILE + TAPS - 2 + PAIRS)
+
+// Samples first ... last of a line whose place on one axis, middle + n step, may lie in [low, high].
+inline void clip(float low, float high, float middle, float step, int *first, int *last) {
+    float slope = step == 0 ? 1e-30f : step, a = (low - middle) / slope, b = (high - middle) / slope;
+    *first = max(*first, (int)floor(clamp(fmin(a, b), -1e9f, 1e9f)));
+    *last = min(*last, (int)ceil(clamp(fmax(a, b), -1e9f, 1e9f)));
+}
+
+// Periods of m cells in which a line's samples first ... last may meet [low, high].
+inline void periods(float low, float high, float middle, float step, int m, int first, int last, int *from, int *to) {
+    float a = fma((float)first, step, middle), b = fma((float)last, step, middle);
+    *from = (int)ceil((fmin(a, b) - high) / m - 1e-3f);
+    *to = (int)floor((fmax(a, b) - low) / m + 1e-3f);
+}
+
+// First tap of sample n on one axis, counted from the row's whole cell, and where it lies between taps.
+inline int first_cell(float n, float rest, float high, float low, float *z) {
+    float whole = n * high, cell = floor(whole), place = (whole - cell) + fma(n, low, rest), more = floor(place);
+    *z = place - more - 0.5f;
+    return (int)cell + (int)more - TAPS / 2 + 1;
+}
+
+// global size (tiles along axis 1, tiles along axis 0 in this band): work-item owns one tile of the grid.
+//   samples  (n_rows, n_samples, 2)
+//   first    tile row of the band;  out (rows of the band, M1, 2);  add: to what is there, else it is overwritten
+__kernel void spread(__global const float *restrict samples, int n_rows, int n_samples,
+                     __global const int *restrict cell, __global const float *restrict line,
+                     __global const float *restrict table, int m0, int m1, int first, int add, __global float *out) {
+    int base0 = TILE * (first + (int)get_global_id(1)), base1 = TILE * (int)get_global_id(0);
+    int middle = n_samples / 2;
+    float sum[2 * ROWS * STRIDE];
+    for (int i = 0; i < 2 * ROWS * STRIDE; i++) sum[i] = 0;
+    for (int p = 0; p < n_rows; p++) {
+        __global const float *l = line + 6 * (size_t)p, *row = samples + 2 * ((size_t)p * n_samples + middle);
+        float t0 = cell[2 * p] + l[0], d0 = l[1] + l[2], t1 = cell[2 * p + 1] + l[3], d1 = l[4] + l[5];
+        float low0 = base0 - TAPS / 2 - 1, high0 = base0 + TILE + TAPS / 2;
+        float low1 = base1 - TAPS / 2 - 1, high1 = base1 + TILE + TAPS / 2;
+        int from0, to0, from1, to1;
+        periods(low0, high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
+        for (int q0 = from0; q0 <= to0; q0++) {
+            int begin = -middle, end = n_samples - 1 - middle;
+            float turn0 = (float)q0 * m0;
+            clip(low0 + turn0, high0 + turn0, t0, d0, &begin, &end);
+            if (begin > end) continue;
+            periods(low1, high1, t1, d1, m1, begin, end, &from1, &to1);
+            for (int q1 = from1; q1 <= to1; q1++) {
+                int start = begin, stop = end;
+                float turn1 = (float)q1 * m1;
+                clip(low1 + turn1, high1 + turn1, t1, d1, &start, &stop);
+                int shift0 = cell[2 * p] - q0 * m0 - base0 + TAPS - 1;
+                int shift1 = cell[2 * p + 1] - q1 * m1 - base1 + TAPS - 1;
+                for (int n = start; n <= stop; n++) {
+                    float z0, z1;
+                    int i = shift0 + first_cell(n, l[0], l[1], l[2], &z0);
+                    int j = shift1 + first_cell(n, l[3], l[4], l[5], &z1);
+                    if (i < 0 || i >= REACH || j < 0 || j >= REACH) continue;
+                    float w0[TAPS], w1[TAPS], pairs[2 * PAIRS];
+                    tap_weights(z0, table, w0);
+                    tap_weights(z1, table, w1);
+                    float2 s = vload2(n, row);
+#pragma unroll
+                    for (int k = 0; k < PAIRS; k++) {
+                        pairs[2 * k] = k < TAPS ? w1[k] * s.s0 : 0;
+                        pairs[2 * k + 1] = k < TAPS ? w1[k] * s.s1 : 0;
+                    }
+                    taps_v v = LOAD_TAPS(pairs);
+                    float *at = sum + 2 * (i * STRIDE + j);
+#pragma unroll
+                    for (int k = 0; k < TAPS; k++, at += 2 * STRIDE) STORE_TAPS(fma((taps_v)w0[k], v, LOAD_TAPS(at)), at);
+                }
+            }
+        }
+    }
+    for (int i = 0; i < TILE && base0 + i < m0; i++) {
+        __global float *to = out + 2 * ((size_t)(base0 - TILE * first + i) * m1 + base1);
+        float *from = sum + 2 * ((i + TAPS - 1) * STRIDE + TAPS - 1);
+        int n = 2 * min(TILE, m1 - base1);
+        for (int j = 0; j < n; j++) to[j] = add ? to[j] + from[j] : from[j];
+    }
+}

@@ -1,0 +1,127 @@
+// Which sample points of facets a viewpoint sees: rays through a tree of boxes.
+//
+//   bit s of hidden_i = 1 where some facet crosses the line from sample s of facet i to the eye
+//
+// source    ray and triangle: Woop, Benthin and Wald 2013 (watertight: facets that share an edge leave no gap), here
+//           without its division: with d = eye - p and A, B, C the corners seen from p, sheared so that d is the axis,
+//           U = Cx By - Cy Bx, ... have one sign, and the crossing at p + t d has t = (U Az + V Bz + W Cz)/(det dz)
+// symbols   facet     (n, 12), see facet_points.clh; the lift keeps a facet, its coplanar neighbours and its twin from hiding it
+//           index     facets to test, (size,); place (samples,) barycentric coordinates
+//           eye       the antenna, in units of the scene; shrink  a power of two that makes eye - p about one
+//           leaf      (n/8, 3, 3, 8): corners of eight facets, by corner and axis
+//           node      (., 2, 3, 8): lower and upper sides of the boxes of eight children; level l starts at base[l]
+//           side      1: the facet turned away from the eye is dark; 0: both sides are seen
+// macros    none
+// reference: sarcl/reference/shadow.py:hidden
+
+#include "facet_points.clh"
+
+#define DEPTH 12
+
+inline int any_bits(int8 m, int8 value) {
+    int8 b = m & value;
+    int4 c = b.lo | b.hi;
+    return c.s0 | c.s1 | c.s2 | c.s3;
+}
+
+#define BITS ((int8)(1, 2, 4, 8, 16, 32, 64, 128))
+
+// children of a node whose boxes, a little enlarged on the host, the ray touches
+inline int touched(__global const float *node, float3 p, float3 inverse) {
+    float8 ax = (vload8(0, node) - p.x) * inverse.x, bx = (vload8(3, node) - p.x) * inverse.x;
+    float8 ay = (vload8(1, node) - p.y) * inverse.y, by = (vload8(4, node) - p.y) * inverse.y;
+    float8 az = (vload8(2, node) - p.z) * inverse.z, bz = (vload8(5, node) - p.z) * inverse.z;
+    float8 in = fmax(fmax(fmin(ax, bx), fmin(ay, by)), fmin(az, bz));
+    float8 out = fmin(fmin(fmax(ax, bx), fmax(ay, by)), fmax(az, bz));
+    return any_bits((in <= out) & (out >= 0.0f), BITS);
+}
+
+// does any of eight facets cross the line from p along d, before the eye?
+inline int crossed(__global const float *leaf, float3 p, float3 d, int z, float shrink) {
+    int x = z == 2 ? 0 : z + 1, y = x == 2 ? 0 : x + 1;
+    float px = x == 0 ? p.x : x == 1 ? p.y : p.z, py = y == 0 ? p.x : y == 1 ? p.y : p.z;
+    float pz = z == 0 ? p.x : z == 1 ? p.y : p.z, dx = x == 0 ? d.x : x == 1 ? d.y : d.z;
+    float dy = y == 0 ? d.x : y == 1 ? d.y : d.z, dz = z == 0 ? d.x : z == 1 ? d.y : d.z;
+    float8 az = vload8(z, leaf) - pz, bz = vload8(3 + z, leaf) - pz, cz = vload8(6 + z, leaf) - pz;
+    float8 ax = (vload8(x, leaf) - px) * dz - az * dx, ay = (vload8(y, leaf) - py) * dz - az * dy;
+    float8 bx = (vload8(3 + x, leaf) - px) * dz - bz * dx, by = (vload8(3 + y, leaf) - py) * dz - bz * dy;
+    float8 cx = (vload8(6 + x, leaf) - px) * dz - cz * dx, cy = (vload8(6 + y, leaf) - py) * dz - cz * dy;
+    float8 u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
+    int8 inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0));
+    float8 det = (u + v + w) * dz, t = u * az + v * bz + w * cz;
+    int8 ahead = ((t > 0) & (det > 0) & (t * shrink < det)) | ((t < 0) & (det < 0) & (t * shrink > det));
+    return any_bits(inside & ahead, (int8)(1));
+}
+
+inline int blocked(__global const float *leaf, __global const float *node, __constant const int *base, int depth,
+                   float3 p, float3 eye, float shrink) {
+    float3 d = (eye - p) * shrink, size = fabs(d);
+    int z = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
+    // a ray along a wall of boxes: large, not infinite, so that zero times it is zero
+    float3 inverse;
+    inverse.x = 1 / (size.x < 1e-12f ? 1e-12f : d.x);
+    inverse.y = 1 / (size.y < 1e-12f ? 1e-12f : d.y);
+    inverse.z = 1 / (size.z < 1e-12f ? 1e-12f : d.z);
+    int todo[DEPTH];
+    int level = 0, at = 0;
+    todo[0] = touched(node, p, inverse);
+    while (level >= 0) {
+        if (!todo[level]) {
+            level--;
+            at >>= 3;
+            continue;
+        }
+        int child = 31 - clz(todo[level]);
+        todo[level] ^= 1 << child;
+        int next = 8 * at + child;
+        if (level == depth - 1) {
+            if (crossed(leaf + 72 * (size_t)next, p, d, z, shrink)) return 1;
+        } else {
+            level++;
+            at = next;
+            todo[level] = touched(node + 48 * ((size_t)base[level] + at), p, inverse);
+        }
+    }
+    return 0;
+}
+
+// Facets turned away start with every sample hidden, the others with none.
+__kernel void face(__global const float *restrict facet, __global const int *restrict index,
+                   __global const uchar *restrict side, float ex, float ey, float ez, float slack, int fresh,
+                   __global ulong *restrict hidden) {
+    size_t i = get_global_id(0);
+    __global const float *f = facet + 12 * (size_t)index[i];
+    float3 ahead = (float3)(ex, ey, ez) - (float3)(f[0], f[1], f[2]);
+    float above = f[9] * ahead.x + f[10] * ahead.y + f[11] * ahead.z;
+    float lift = f[9] * f[9] + f[10] * f[10] + f[11] * f[11];
+    float far = ahead.x * ahead.x + ahead.y * ahead.y + ahead.z * ahead.z;
+    int away = side[index[i]] && above < 0 && above * above > slack * slack * lift * far;
+    hidden[i] = away ? ~0UL : fresh ? 0UL : hidden[i];
+}
+
+__kernel void hidden(__global const float *restrict facet, __global const int *restrict index,
+                     __global const float2 *restrict place, int samples, float ex, float ey, float ez, float shrink,
+                     __global const float *restrict leaf, __global const float *restrict node,
+                     __constant const int *restrict base, int depth, __global ulong *restrict out) {
+    size_t i = get_global_id(0);
+    __global const float *f = facet + 12 * (size_t)index[i];
+    float3 eye = (float3)(ex, ey, ez);
+    ulong bits = out[i];
+    for (int s = 0; s < samples; s++)
+        if (!(bits >> s & 1) && blocked(leaf, node, base, depth, lifted(f, place[s], eye), eye, shrink)) bits |= 1UL << s;
+    out[i] = bits;
+}
+
+// What a ray caster on the host found, a byte a sample.
+__kernel void join(__global const uchar *restrict found, int samples, __global ulong *restrict hidden) {
+    size_t i = get_global_id(0);
+    for (int s = 0; s < samples; s++) hidden[i] |= (ulong)found[i * samples + s] << s;
+}
+
+// How many of the samples are not hidden.
+__kernel void seen(__global const ulong *restrict hidden, int samples, __global uchar *restrict out) {
+    size_t i = get_global_id(0);
+    int dark = 0;
+    for (int s = 0; s < samples; s++) dark += hidden[i] >> s & 1;
+    out[i] = samples - dark;
+}

@@ -1,0 +1,288 @@
+// Echoes of planar facets by physical optics: amplitudes at some pulses, spread into the range profiles of all.
+//
+//   g_pm[i] = sum_k a_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   x_k centroids
+//   a_k(p)  = sum_q c_pq a_k(q),   q pulses near p that amplitudes are computed at (knots), c Lagrange's weights
+//   s_p(f)  = f^e sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
+//
+// source    sarcl/scattering/physical_optics.py; amplitudes between NODES frequencies f_m and between knots by interpolation
+//           (docs/facets.md)
+// symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of gains.clh; delta, kappa, sigma as in
+//                      geometry.clh
+//           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
+//           NODES      frequencies f_m
+//           KNOTS      pulses that an amplitude is interpolated from; 1: each pulse has its own
+//           HH, HV, VH, VV   1: wanted (first letter received)
+//           METAL      1: every facet is a perfect conductor
+//           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
+//           ROUGH      1: materials with roughness finer than a facet
+//           TILE       facets a tile, a multiple of VW
+// reference: sarcl/reference/facet.py:facet_amplitude
+
+#include "common.clh"
+#include "doubleword.clh"
+#include "geometry.clh"
+#include "interp.clh"
+#include "range_phase.clh"
+#include "spread_sums.clh"
+#include "vec3_complex.clh"
+#include "pattern.clh"
+#include "gains.clh"
+#include "facet.clh"
+
+#define CHANNELS (NODES * (HH + HV + VH + VV))
+enum { F_EDGE = 0, F_FACTOR = 6, F_ROUGH = 7, F_M = ROUGH ? 13 : 7 };  // planes of `facets`
+
+inline triple load_triple(__global const float *restrict planes, size_t at, size_t n) {
+    return t_make(LOAD(at, planes), LOAD(at, planes + n), LOAD(at, planes + 2 * n));
+}
+
+#define FRONT 1  // bits of a facet's mark at a knot: seen from its front; sends something back
+#define BRIGHT 2
+
+inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
+    STORE(scale * a.re, 2 * channel, out);
+    STORE(scale * a.im, 2 * channel + 1, out);
+}
+
+#if ROUGH
+// Mean of exp(j q.rho) over a facet that is rough below its size: what is left of the coherent `mean`, and a random part
+// that re-radiates as the facet's diagram says (sarcl/scattering/_rough_surface.py:rough_mean).
+//   qn  turns/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
+//   of  planes: rms height, m; diagram (0 none, 1 isotropic, 2 cos, 3 cos^2, 4 exp); 1/width; 1/Omega; random re, im
+inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wave, __global const float *restrict of, size_t at,
+                            size_t n) {
+    fv height = LOAD(at, of), diagram = LOAD(at, of + n), inverse_width = LOAD(at, of + 2 * n);
+    fv turns = min(fabs(qn * height), (fv)3.0f), fall = exp((fv)-39.478418f * turns * turns);
+    fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, c = max(cosine, (fv)0.0f), d = 0;
+    d = diagram == 1.0f ? (fv)1.0f : d;
+    d = diagram == 2.0f ? c : d;
+    d = diagram == 3.0f ? c * c : d;
+    d = diagram == 4.0f ? exp(-delta * delta) : d;
+    fv coherent = sqrt(fall);
+    fv random = sqrt(d * ((fv)1.0f - fall) * LOAD(at, of + 3 * n) / max(area, (fv)1e-30f)) / wave;
+    return c_make(fma(coherent, mean.re, random * LOAD(at, of + 4 * n)), fma(coherent, mean.im, random * LOAD(at, of + 5 * n)));
+}
+#endif
+
+// Amplitudes at knots. global size (knots, tiles of this call).
+//   constants  of the knots, n of them a tile, as in backproject.cl, of all tiles
+//   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
+//   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
+//            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
+//   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
+//   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
+//   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
+//   up       (6)                      vertical, and what takes its place along it
+//   patterns, second, axes (knots, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
+//   first    this call's first tile
+//   out      (knots, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
+//   marks    (knots, tiles of this call, TILE)                       FRONT, BRIGHT
+__kernel void facet_amplitudes(int n, __global const float *restrict constants, __global const float *restrict offsets,
+                               int n_offsets, __global const float *restrict facets, __global const uchar *restrict seen,
+                               __global const uchar *restrict later, __global const float *restrict moments,
+                               __global const float *restrict nodes, __global const float *restrict up,
+                               __global const float *restrict patterns, int second, __global const float *restrict axes,
+                               float range, __global const float *restrict reach, __global const float *restrict radius,
+                               int first, __global float *restrict out, __global uchar *restrict marks) {
+    int q = get_global_id(0), k = first + get_global_id(1);
+    float3 vertical = vload3(0, up), other = vload3(1, up);
+    __global const float *c = constants + (k * (size_t)n + q) * N_CONST;
+    size_t here = (size_t)q * get_global_size(1) + get_global_id(1);
+    direction from_tx = load_direction(c, C_UX, C_LOW);
+#if BISTATIC
+    direction from_rx = load_direction(c, C_RX, C_RX_LOW);
+#elif CULL
+    direction from_rx = from_tx;
+#endif
+    int dark = as_int(c[C_STATE]) == OUTSIDE;
+#if CULL
+    dark = dark || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
+#endif
+    for (int i = 0; i < TILE / VW; i++) {
+        size_t at = (size_t)k * (TILE / VW) + i, to = here * (TILE / VW) + i;
+        __global float *put = out + to * CHANNELS * 2 * VW;
+        float share[VW], is_front[VW], is_bright[VW];
+#pragma unroll
+        for (int l = 0; l < VW; l++) {
+            float now = seen[at * VW + l];
+            share[l] = dark ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
+        }
+
+        offset x = load_offset(offsets, at, n_offsets);
+        triple one = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
+        triple two = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
+        fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
+        fv tx_range, rx_range;
+        triple normal = t_cross(one, two), u = toward(from_tx, x, &tx_range);
+        fv twice_area = sqrt(t_dot(normal, normal));
+        // blanks have no area
+        normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
+        fv cosine_tx = t_dot(normal, u);
+        iv turn_over = (factor < 0) & (cosine_tx < 0);
+        normal = t_scale(turn_over ? (fv)-1.0f : (fv)1.0f, normal);
+        cosine_tx = turn_over ? -cosine_tx : cosine_tx;
+        triple h, v;
+        polarisation(u, vertical, other, &h, &v);
+#if BISTATIC
+        triple ur = toward(from_rx, x, &rx_range), hr, vr;
+        polarisation(ur, vertical, other, &hr, &vr);
+        triple both = t_add(u, ur);
+        iv front = (cosine_tx > 0) & (t_dot(normal, ur) > 0);
+#else
+        triple both = t_scale((fv)2.0f, u), ur = u;
+        iv front = cosine_tx > 0;
+        rx_range = tx_range;
+#endif
+        fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share);
+        STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
+        STORE(fabs(amplitude), 0, is_bright);
+#pragma unroll
+        for (int l = 0; l < VW; l++) marks[to * VW + l] = (is_front[l] != 0 ? FRONT : 0) | (is_bright[l] > 0 ? BRIGHT : 0);
+        if (largest(fabs(amplitude)) <= 0) {
+            for (int channel = 0; channel < CHANNELS; channel++)
+                put_channel(put, channel, c_make((fv)0.0f, (fv)0.0f), (fv)0.0f);
+            continue;
+        }
+
+        fv b = t_dot(both, one), g = t_dot(both, two);
+        scattering s;
+#if WEIGHTS
+        sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)q, range);
+        complex_v gain;
+#endif
+        for (int m = 0; m < NODES; m++) {
+            if (m == 0 || DISPERSIVE) {
+#if METAL
+                complex_v root = c_make((fv)0.0f, (fv)0.0f);
+#else
+                __global const float *of = facets + (F_M + 2 * m) * (size_t)n_offsets;
+                complex_v root = c_make(LOAD(at, of), LOAD(at, of + n_offsets));
+#endif
+#if BISTATIC
+                s = scatter(normal, u, h, v, ur, hr, vr, root);
+#else
+                s = scatter_back(normal, u, h, v, root);
+#endif
+            }
+            complex_v mean = triangle_mean(b * nodes[m], g * nodes[m]);
+#if ROUGH
+            fv along = t_dot(both, normal), size = max(sqrt(t_dot(both, both)), (fv)1e-6f);
+            mean = rough_mean(mean, along * nodes[m], along / size, (fv)0.5f * twice_area, nodes[m],
+                              facets + F_ROUGH * (size_t)n_offsets, at, n_offsets);
+#endif
+#if WEIGHTS
+            if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[2 * NODES + m]);
+            mean = c_mul(mean, gain);
+#endif
+            fv scale = amplitude * nodes[NODES + m];
+            int channel = m;
+#if HH
+            put_channel(put, channel, c_mul(s.hh, mean), scale);
+            channel += NODES;
+#endif
+#if HV
+            put_channel(put, channel, c_mul(s.hv, mean), scale);
+            channel += NODES;
+#endif
+#if VH
+            put_channel(put, channel, c_mul(s.vh, mean), scale);
+            channel += NODES;
+#endif
+#if VV
+            put_channel(put, channel, c_mul(s.vv, mean), scale);
+#endif
+        }
+    }
+}
+
+// What facets send back at a knot, or between knots, added to profiles. global size (pulses of this call, splits):
+// work-item (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
+//   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
+//   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
+//   knots    (n_used, 2)              first of the KNOTS knots of a pulse, and the nearest
+//   shares   (n_used, KNOTS)          what each of them counts for
+//   axes (n_used, 18), reach, radius  see gains.clh
+//   last     facets in the last tile; the rest of it is blank
+//   flush    tiles added in float32 before they join the compensated total
+//   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
+//   done     (3, splits, n_used)      counts go on: facets in the range window; of those seen from their front; left out of
+//            the beam
+__kernel void spread_facets(__global const float *restrict pulse, int n, int n_used,
+                            __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
+                            __global const float *restrict offsets, int n_offsets,
+                            __global const float *restrict amplitudes, __global const uchar *restrict marks, int first,
+                            int n_here, __global const int *restrict knots, __global const float *restrict shares,
+                            __global const float *restrict axes, __global const float *restrict reach,
+                            __global const float *restrict radius, __global const float *restrict table, int last, int flush,
+                            __global float *rows, int stride, int origin, __global int *restrict done) {
+    int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
+    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
+    int from = knots[2 * p], nearest_knot = knots[2 * p + 1];
+    for (int k = first + split; k < first + n_here; k += get_global_size(1)) {
+        __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
+        int state = as_int(c[C_STATE]);
+        if (state == OUTSIDE) continue;
+        int real = k == n_tiles - 1 ? last : TILE;
+#if CULL
+        direction from_tx = load_direction(c, C_UX, C_LOW), from_rx = from_tx;
+#if BISTATIC
+        from_rx = load_direction(c, C_RX, C_RX_LOW);
+#endif
+        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
+            unlit_count += real;
+            continue;
+        }
+#endif
+        for (int i = 0; i < TILE / VW; i++) {
+            size_t at = (size_t)k * (TILE / VW) + i, held[KNOTS];
+#pragma unroll
+            for (int q = 0; q < KNOTS; q++) held[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
+            size_t judge = ((size_t)nearest_knot * n_here + (k - first)) * (TILE / VW) + i;
+            offset x = load_offset(offsets, at, n_offsets);
+            about_centre(&x, tile, k, n_tiles);
+            place where = locate(c, pulse, p, n, x);
+            fv inside = 1;
+            if (state == CROSSING) inside = keep_inside(c, &where);
+            float is_inside[VW];
+            STORE(inside, 0, is_inside);
+            int any = 0;
+#pragma unroll
+            for (int l = 0; l < VW; l++) {
+                int counts = is_inside[l] != 0 && i * VW + l < real;
+                inside_count += counts;
+                front_count += counts && (marks[judge * VW + l] & FRONT);
+#pragma unroll
+                for (int q = 0; q < KNOTS; q++) any |= counts ? marks[held[q] * VW + l] : 0;
+            }
+            if (!(any & BRIGHT)) continue;
+
+            fv sine, cosine, w[TAPS];
+            sincos_turns(where.turn, &sine, &cosine);
+            sine *= inside;
+            cosine *= inside;
+            iv j;
+            tap_weights(first_tap(where.t, where.base, stride, origin, &j), table, w);
+            for (int channel = 0; channel < CHANNELS; channel++) {
+                complex_v a = c_make((fv)0.0f, (fv)0.0f);
+#pragma unroll
+                for (int q = 0; q < KNOTS; q++) {
+                    __global const float *from_knot = amplitudes + (held[q] * CHANNELS + channel) * 2 * VW;
+                    fv part = (fv)(KNOTS == 1 ? 1.0f : shares[KNOTS * p + q]);
+                    a.re = fma(part, LOAD(0, from_knot), a.re);
+                    a.im = fma(part, LOAD(1, from_knot), a.im);
+                }
+                // times exp(-j 2 pi turn)
+                add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),
+                         fma(a.im, cosine, -a.re * sine));
+            }
+        }
+        if (++added % flush == 0)
+            for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+    }
+    for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+    size_t mine = (size_t)split * n_used + p, all = (size_t)get_global_size(1) * n_used;
+    done[mine] += inside_count;
+    done[all + mine] += front_count;
+    done[2 * all + mine] += unlit_count;
+}

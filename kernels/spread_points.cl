@@ -1,0 +1,108 @@
+// Echoes of points, spread into range profiles.
+//
+//   g_pm[i] = sum_k a_k w_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   w of interp.clh
+//   s_p(f)  = sum_m L_m(f) (FFT of g_pm over w's transform), on the host;   L_m(f) Lagrange's polynomials
+//
+// source    the echo equation of sarcl/__init__.py; type-1 nonuniform FFT in range
+// symbols   a_k          amplitude, |a|^2 = radar cross section, m^2; delta, kappa, sigma as in geometry.clh
+//           w_k(p, f)    the weight of gains.clh: antennas' gains and spreading
+// macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
+//           NODES     frequencies f_m
+//           TILE      scatterers a tile, a multiple of VW
+// reference: sarcl/reference/echo.py:echo
+
+#include "common.clh"
+#include "doubleword.clh"
+#include "geometry.clh"
+#include "interp.clh"
+#include "range_phase.clh"
+#include "spread_sums.clh"
+#include "vec3_complex.clh"
+#include "pattern.clh"
+#include "gains.clh"
+
+// global size (pulses of this block, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
+//   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
+//   scatterers  (2, n_tiles TILE)    re, im of amplitude
+//   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see gains.clh
+//   radius      (n_tiles)   m, of the points about their reference
+//   last        scatterers in the last tile; the rest of it is blank
+//   flush       tiles added in float32 before they join the compensated total
+//   rows        (splits, n_used, NODES, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
+//   done        (2, splits, n_used)    scatterers added, and left out of the beam
+__kernel void spread(__global const float *restrict pulse, int n, int n_used,
+                     __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
+                     __global const float *restrict offsets, int n_offsets,
+                     __global const float *restrict scatterers, __global const float *restrict nodes,
+                     __global const float *restrict patterns, int second, __global const float *restrict axes, float range,
+                     __global const float *restrict reach, __global const float *restrict radius,
+                     __global const float *restrict table, int last, int flush, __global float *rows, int stride,
+                     int origin, __global int *restrict done) {
+    int p = get_global_id(0), split = get_global_id(1), count = 0, unlit_count = 0, added = 0;
+    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * NODES * stride, *row = sum + 2 * origin;
+    for (int k = split; k < n_tiles; k += get_global_size(1)) {
+        __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
+        int state = as_int(c[C_STATE]);
+        if (state == OUTSIDE) continue;
+        int real = k == n_tiles - 1 ? last : TILE;
+#if WEIGHTS
+        direction from_tx = load_direction(c, C_UX, C_LOW);
+#if BISTATIC
+        direction from_rx = load_direction(c, C_RX, C_RX_LOW);
+#else
+        direction from_rx = from_tx;
+#endif
+#endif
+#if CULL
+        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
+            unlit_count += real;
+            continue;
+        }
+#endif
+        if (state == INSIDE) count += real;
+        for (int i = 0; i < TILE / VW; i++) {
+            size_t at_vector = (size_t)k * (TILE / VW) + i;
+            offset x = load_offset(offsets, at_vector, n_offsets);
+            about_centre(&x, tile, k, n_tiles);
+            place at = locate(c, pulse, p, n, x);
+            fv re = LOAD(at_vector, scatterers), im = LOAD(at_vector, scatterers + n_offsets);
+            if (state == CROSSING) {
+                fv inside = keep_inside(c, &at);
+                re *= inside;
+                im *= inside;
+                float seen[VW];
+                STORE(inside, 0, seen);
+                for (int l = 0; l < VW; l++) count += seen[l] != 0 && i * VW + l < real;
+            }
+            fv sine, cosine;
+            sincos_turns(at.turn, &sine, &cosine);
+            fv a = fma(re, cosine, im * sine), b = fma(im, cosine, -re * sine);
+            iv j;
+            fv w[TAPS];
+            tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
+#if WEIGHTS
+            fv tx_range, rx_range;
+            triple u = toward(from_tx, x, &tx_range), ur = u;
+            rx_range = tx_range;
+#if BISTATIC
+            ur = toward(from_rx, x, &rx_range);
+#endif
+            sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)p, range);
+            complex_v gain;
+            for (int m = 0; m < NODES; m++) {
+                if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[m]);
+                complex_v weighted = c_mul(gain, c_make(a, b));
+                add_taps(row + 6 * (size_t)m * stride, j, w, weighted.re, weighted.im);
+            }
+#else
+            add_taps(row, j, w, a, b);
+#endif
+        }
+        if (++added % flush == 0)
+            for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
+    }
+    for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
+    size_t mine = (size_t)split * n_used + p;
+    done[mine] = count;
+    done[(size_t)get_global_size(1) * n_used + mine] = unlit_count;
+}

@@ -1,0 +1,72 @@
+"""Which pixel to measure: the brightest, or the peak near a place."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..model.image import Image
+
+
+def brightest(image: Image) -> tuple[int, int]:
+    """Pixel of the largest modulus; rows are read in blocks."""
+    best, at = 0.0, None
+    n_rows, n_columns = image.grid.shape
+    block = max(1, 2**22 // n_columns)
+    for first in range(0, n_rows, block):
+        part = np.asarray(image.data[first : first + block])
+        validation.finite("image data", part, first_row=first)
+        level = np.abs(part)
+        i = int(level.argmax())
+        if level.flat[i] > best:
+            best, at = float(level.flat[i]), (first + i // n_columns, i % n_columns)
+    if at is None:
+        raise ValueError("the image is zero everywhere; there is no point to measure")
+    return at
+
+
+def peak_near(image: Image, near: Any) -> tuple[int, int]:
+    """Pixel of the highest peak within two cells of `near`; a cell is what its own half power spans."""
+    near = validation.array("near", near, np.float64, (3,))
+    shape = np.array(image.grid.shape)
+    index = image.grid.index(near)
+    start = np.rint(index).astype(int)
+    if (start < 0).any() or (start >= shape).any():
+        raise ValueError(f"near {place(near)} is pixel {place(index, 1)}, outside of the image of {image.grid.shape}")
+    radius = np.array([2, 2])
+    while True:
+        low, high = np.maximum(start - 4 * radius, 0), np.minimum(start + 4 * radius + 1, shape)
+        level = np.abs(np.asarray(image.data[low[0] : high[0], low[1] : high[1]]))
+        if not np.isfinite(level).all():
+            raise ValueError(f"image data are NaN or Inf near {place(near)}; every value must be finite")
+        a, b = np.maximum(start - radius, 0) - low, start + radius + 1 - low
+        searched = level[a[0] : b[0], a[1] : b[1]]
+        i, j = np.array(np.unravel_index(searched.argmax(), searched.shape)) + a
+        if level[i, j] == 0:
+            raise ValueError(f"the image is zero around near {place(near)}; there is no point to measure")
+        wanted = 2 * np.array([_run(level[:, j], i), _run(level[i], j)])
+        if (wanted <= radius).all():
+            break
+        radius = np.maximum(radius, wanted)
+    if level[i, j] < level[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].max():
+        uphill = image.grid.at(i + low[0], j + low[1])
+        raise ValueError(
+            f"no peak lies within two resolution cells of near {place(near)}; the image still rises at "
+            f"{place(uphill)}: move near to the point, or leave it out to measure the brightest"
+        )
+    return int(i + low[0]), int(j + low[1])
+
+
+def _run(level: np.ndarray, at: int) -> int:
+    """Pixels about `at` in one piece where the power is at least half of that at `at`."""
+    below = level**2 < level[at] ** 2 / 2
+    after = below[at:].argmax() if below[at:].any() else len(level) - at
+    before = below[at::-1].argmax() if below[at::-1].any() else at + 1
+    return int(after + before - 1)
+
+
+def place(position: np.ndarray, digits: int = 3) -> str:
+    """A position as messages write it; + 0.0 turns a rounded -0 into 0."""
+    return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in np.round(position, digits)) + ")"

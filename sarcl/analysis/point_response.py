@@ -1,0 +1,216 @@
+"""Point response: where a reflector is, how sharp it is and how high its side lobes stand.
+
+    range        on the grid's plane, where the two-way path grows fastest: its gradient, projected
+    cross-range  on the plane, perpendicular to range
+
+Cuts along both go through the interpolated peak (_image_interpolator.py). docs/measure.md states every convention;
+sarcl/reference/quality.py measures an exact image by brute force.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..model.image import Image
+from ._image_interpolator import Surface, antennas
+from ._peaks import brightest, peak_near, place
+
+REACH = 10.0  # IRW on each side in which side lobes count
+LEAST_REACH = 3.0
+MARGIN = 18  # pixels that the interpolator may want on each side
+STEPS = 32  # points of a cut in one IRW
+NAMES = "range", "cross-range"
+
+
+@dataclass(frozen=True, eq=False)
+class PointResponse:
+    """A point's response; pairs are (range, cross-range) as projected on the grid.
+
+    position  of the interpolated peak, m (3,)
+    irw       width at half power (-3.01 dB), m
+    pslr      highest lobe outside the first nulls over the peak, dB
+    islr      energy outside the first nulls, within +-`reach` IRW, over the energy between the nulls, dB
+    peak      complex value of the image at `position`, in the unit of its data
+    gain      the image's gain: |peak/gain|^2 is the point's radar cross section, m^2
+    reach     IRW on each side that pslr and islr cover: 10, or what the image holds
+    """
+
+    position: np.ndarray
+    irw: tuple[float, float]
+    pslr: tuple[float, float]
+    islr: tuple[float, float]
+    peak: complex
+    gain: float = 1.0
+    reach: tuple[float, float] = (REACH, REACH)
+
+    def __str__(self) -> str:
+        amplitude = abs(self.peak) / self.gain
+        level = round(20 * np.log10(amplitude), 2) + 0.0  # no -0.00
+        rows = (
+            ("IRW, half power", self.irw, ".4f", "m"),
+            ("PSLR", self.pslr, ".2f", "dB"),
+            ("ISLR", self.islr, ".2f", "dB"),
+            ("lobes within +-", self.reach, ".1f", "IRW"),
+        )
+        lines = [
+            f"position         {place(self.position, 4)} m",
+            f"peak             {abs(self.peak):.6g} at {np.angle(self.peak):.4f} rad",
+            f"peak/gain        {amplitude:.6g}, RCS {level:.2f} dBsm if calibrated",
+            f"{'':15}{NAMES[0]:>12}{NAMES[1]:>14}",
+            *(f"{name:15}{a:>12{form}}{b:>14{form}} {unit}" for name, (a, b), form, unit in rows),
+        ]
+        return "\n".join(lines)
+
+
+def measure(image: Image, near: Any = None) -> PointResponse:
+    """Position, resolution and side lobes of one point of a complex image on a plane.
+
+    image  with frequency (Hz) and tx, rx (m; rx None is tx); of its data only what is needed is read
+    near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it
+           is measured. Default: the brightest pixel
+
+    Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR the highest
+    lobe outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or
+    as far as the image holds both sides. A uniform aperture has -13.26 and -10.22 dB.
+    ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or
+    Inf, a `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the
+    response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
+    than +-0.42 of the +-0.5 cycles a pixel.
+    Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
+    """
+    _refuse(image)
+    row, column = brightest(image) if near is None else peak_near(image, near)
+    axes = _axes(image, row, column)
+    surface = Surface.about(image, row, column)
+    assert image.grid.spacing is not None
+    step = min(image.grid.spacing) / 4
+    position = _climb(surface, image.grid.at(row, column), axes, step)
+
+    def cut(axis: np.ndarray, name: str) -> _Cut:
+        def power(t: np.ndarray) -> np.ndarray:
+            return np.abs(surface(position + t[:, None] * axis)) ** 2
+
+        made = _cut(power, surface.room(position, axis), step, name)
+        if made.pslr >= 0:
+            stronger = position + made.lobe * axis
+            raise ValueError(
+                f"the peak at {place(position)} lies in the response of something {made.pslr:.1f} dB "
+                f"stronger, {abs(made.lobe):.3g} m away in {name}; measure that with near={place(stronger)}"
+            )
+        return made
+
+    along, across = (cut(axis, name) for axis, name in zip(axes, NAMES, strict=True))
+    position.flags.writeable = False
+    return PointResponse(
+        position=position,
+        irw=(along.irw, across.irw),
+        pslr=(along.pslr, across.pslr),
+        islr=(along.islr, across.islr),
+        peak=complex(surface(position[None])[0]),
+        gain=image.gain,
+        reach=(along.reach, across.reach),
+    )
+
+
+def _refuse(image: Image) -> None:
+    if not image.is_complex:
+        raise ValueError("the image is detected (multilooked), its phase is gone; measure the complex image")
+    if not image.grid.is_plane:
+        raise ValueError("the grid lists its points; cuts need rows and columns: focus on an ImageGrid.plane")
+    wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
+    for name, what in wanted.items():
+        if getattr(image, name) is None:
+            raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {what}")
+
+
+def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors of range and cross-range on the plane, at a pixel."""
+    normal = image.grid.normal
+    point = image.grid.at(row, column)
+    gradient = -np.sum([validation.direction("antenna less point", end - point) for end in antennas(image)], axis=0)
+    along = gradient - (gradient @ normal) * normal
+    length = np.linalg.norm(along)
+    if length < 1e-3:
+        raise ValueError("the antennas stand straight above the grid: range has no direction on it; tilt it")
+    return along / length, np.cross(normal, along / length)
+
+
+def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, ...], step: float) -> np.ndarray:
+    """The maximum near `start`, m (3,): parabolas through log |I| at -step, 0, step, on each axis in turn."""
+    x = np.array(start)
+    for _ in range(40):
+        before = x
+        for axis in axes:
+            values = np.abs(surface(x + step * np.array([[-1], [0], [1]]) * axis))
+            left, middle, right = np.log(np.maximum(values, 1e-300))
+            bend = left - 2 * middle + right
+            move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
+            x = x + step * float(np.clip(move, -1, 1)) * axis
+        if np.linalg.norm(x - before) < 1e-5 * step:
+            return x
+        if np.linalg.norm(surface.image.grid.index(x) - surface.image.grid.index(start)) > 3:
+            break
+    raise ValueError(f"no peak was found at {place(start)}: the image only rises away from it")
+
+
+@dataclass(frozen=True)
+class _Cut:
+    irw: float
+    pslr: float
+    islr: float
+    reach: float
+    lobe: float  # where the highest side lobe lies, m from the peak
+
+
+def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, name: str) -> _Cut:
+    """Figures of a cut; power(t) is |I|^2 at t m from the peak, t (n,), known for |t| <= room."""
+    irw = _half_power(power, room, step) + _half_power(lambda t: power(-t), room, step)
+    reach = min(REACH, room / irw)
+    if not reach >= LEAST_REACH:
+        raise ValueError(
+            f"in {name} the image holds less than {LEAST_REACH:g} IRW on each side of the peak; focus a grid "
+            f"that reaches {REACH:g} resolution cells and {MARGIN} pixels beyond it"
+        )
+    n = int(np.ceil(reach * STEPS))
+    t = np.linspace(-reach * irw, reach * irw, 2 * n + 1)
+    p = power(t)
+    rising = np.diff(p) > 0
+    if not (rising[n:].any() and (~rising[:n]).any()):
+        raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused")
+    right, left = n + int(rising[n:].argmax()), n - int((~rising[:n])[::-1].argmax())
+    inside = _integral(p[left : right + 1])
+    lobes = np.where((t < t[left]) | (t > t[right]), p, 0)
+    i = int(lobes.argmax())
+    highest, lobe = lobes[i], t[i]
+    if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # the top of a parabola through three points
+        bend = p[i - 1] - 2 * p[i] + p[i + 1]
+        highest -= (p[i - 1] - p[i + 1]) ** 2 / (8 * bend)
+    decibels = 10 * np.log10(np.array([highest / p[n], _integral(p) / inside - 1]))
+    return _Cut(irw, float(decibels[0]), float(decibels[1]), reach, float(lobe))
+
+
+def _integral(p: np.ndarray) -> float:
+    """Trapezoid rule at unit steps."""
+    return float(p.sum() - (p[0] + p[-1]) / 2)
+
+
+def _half_power(power: Callable[[np.ndarray], np.ndarray], room: float, step: float) -> float:
+    """Distance, m, at which power(t) first falls to half of power(0); inf if it does not within `room`."""
+    start = 0.0
+    level = power(np.zeros(1))[0] / 2 if room > 0 else 0.0
+    while start < room:
+        t = np.minimum(start + step / 2 * np.arange(33), room)
+        below = power(t) < level
+        if below.any():
+            for _ in range(3):  # ever finer between the last point above and the first one below
+                i = int(below.argmax())
+                t = np.linspace(t[i - 1], t[i], 33)
+                below = power(t) < level
+            return float(t[int(below.argmax())])
+        start = float(t[-1])
+    return np.inf

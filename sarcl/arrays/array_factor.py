@@ -1,0 +1,180 @@
+"""Closed forms of linear and planar arrays: array factors, their validity, and the waveform of diverse carriers.
+
+Elements stand at +n dy y + p dz z from the reference, n < N, p < P, and send f0 + n dfy + p dfz, as
+`AntennaArray.planar` lays them out. Farooq (2009) puts them at -n dy and -p dz: turn the sign of `spacing` for his
+layout, and with it that of every angle. Directions are cosines (ky, kz) along y and z; azimuth and elevation have
+ky = cos(elevation) sin(azimuth), kz = sin(elevation). Retarded time t' = t - R/c, R from the reference element.
+
+    constant   sum exp(j k0 (n dy ky + p dz kz))                               his (3.23), for elements at -n d
+    diverse    sum exp(j (n Theta + p Psi))                                    his (3.46)
+               Theta = 2 pi dfy t' + k0 dy ky,  Psi = 2 pi dfz t' + k0 dz kz   his (3.44), (3.45) with - k0 d k
+
+Multiplied by exp(j 2 pi f0 t') the factor is the far field, but for the phase of n^2 and n p that (3.40) bounds.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..base.constants import SPEED_OF_LIGHT
+
+# 2 pi in parts of 33 bits, so that up to 2^20 of each are exact, and what is left
+_TURN = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
+
+
+def reduced(x: Any) -> tuple[np.ndarray, np.ndarray]:
+    """x rad less its nearest whole turns, in [-pi, pi], and how many turns those are; |x| up to 6e6."""
+    x = np.asarray(x, np.float64)
+    validation.finite("angle", x)
+    whole = np.rint(x / (2 * np.pi))
+    if whole.size and np.abs(whole).max() >= 2**20:
+        raise ValueError(f"an angle of {np.abs(x).max():g} rad is too large to be reduced; keep below 6e6")
+    return ((x - whole * _TURN[0]) - whole * _TURN[1]) - whole * _TURN[2], whole
+
+
+def dirichlet(x: Any, n: int) -> np.ndarray:
+    """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. Errs by less than 1e-12 n."""
+    n = validation.count("n", n)
+    rest, whole = reduced(x)
+    flat = np.abs(rest) < 1e-300  # half of less may vanish
+    half = np.where(flat, 1.0, rest / 2)
+    ratio = np.where(flat, float(n), np.sin(n * half) / np.sin(half))
+    return np.asarray(np.where((whole % 2 != 0) & (n % 2 == 0), -ratio, ratio))
+
+
+def geometric(x: Any, n: int) -> np.ndarray:
+    """sum over 0 <= i < n of exp(j i x) = exp(j (n - 1) x/2) dirichlet(x, n)."""
+    rest, _ = reduced(x)
+    return np.asarray(np.exp(0.5j * (n - 1) * rest) * dirichlet(rest, n))
+
+
+def constant_factor(f0: float, *, shape: Any, spacing: Any, cosines: Any) -> np.ndarray:
+    """Array factor of N by P elements on one carrier, (3.23). cosines (ky, kz), each (...)."""
+    return diverse_factor(f0, shape=shape, spacing=spacing, frequency_step=(0, 0), cosines=cosines, retarded=0.0)
+
+
+def diverse_factor(
+    f0: float, *, shape: Any, spacing: Any, frequency_step: Any, cosines: Any, retarded: Any
+) -> np.ndarray:
+    """Array factor of N by P elements, (3.46): closed, for arrays well within `quadratic_phase`'s bound.
+
+    shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz, cosines (ky, kz) and retarded s: (...), broadcast.
+    """
+    f0 = validation.number("f0", f0, above=0)
+    d = validation.array("spacing", spacing, np.float64, (2,))
+    df = validation.array("frequency_step", frequency_step, np.float64, (2,))
+    ky, kz = (np.asarray(k, np.float64) for k in cosines)
+    t = np.asarray(retarded, np.float64)
+    out = np.ones(np.broadcast_shapes(ky.shape, kz.shape, t.shape), np.complex128)
+    for i, cosine in enumerate((ky, kz)):
+        turns = df[i] * t
+        x = 2 * np.pi * ((turns - np.rint(turns)) + f0 * d[i] * cosine / SPEED_OF_LIGHT)
+        out = out * geometric(x, validation.count(f"shape[{i}]", shape[i]))
+    return out
+
+
+def power_pattern(factor: Any, peak: float | None = None) -> np.ndarray:
+    """|factor|^2 over `peak`^2; peak: the number of elements, or None: the largest |factor| given."""
+    power = np.abs(np.asarray(factor)) ** 2
+    return np.asarray(power / (power.max() if peak is None else validation.number("peak", peak, above=0) ** 2))
+
+
+def quadratic_phase(*, shape: Any, spacing: Any, frequency_step: Any, cosines: Any = (1.0, 1.0)) -> float:
+    """Largest phase that the closed form leaves out, rad: the terms of (3.39), each by its modulus.
+
+    Farooq holds pi/4 to be little enough. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59).
+    Moduli, because steps of opposite signs cancel at the corner (N, P), where the paper looks, and not elsewhere.
+    """
+    n, p = (validation.count(f"shape[{i}]", shape[i]) for i in range(2))
+    dy, dz = np.abs(
+        validation.array("spacing", spacing, np.float64, (2,)) * validation.array("cosines", cosines, np.float64, (2,))
+    )
+    steps = validation.array("frequency_step", frequency_step, np.float64, (2,))
+    ky, kz = 2 * np.pi * np.abs(steps) / SPEED_OF_LIGHT
+    return float(n * n * ky * dy + n * p * ky * dz + p * p * kz * dz + n * p * kz * dy)
+
+
+def beam_angles(
+    f0: float, *, spacing: Any, frequency_step: Any, retarded: Any, lobe: tuple[int, int] = (0, 0)
+) -> tuple[np.ndarray, np.ndarray]:
+    """(azimuth, elevation) rad of the beam at retarded time t', (3.53) and (3.54) for elements at +n d; NaN where none.
+
+    sin(elevation) = (c/(f0 dz)) (v - dfz t');  sin(azimuth) cos(elevation) = (c/(f0 dy)) (u - dfy t');  lobe (u, v).
+    Along y alone: sin(azimuth) = -(c/(f0 d)) df t'. Farooq's layout, -n d, has the opposite signs.
+    """
+    f0 = validation.number("f0", f0, above=0)
+    wave = SPEED_OF_LIGHT / f0
+    d = validation.array("spacing", spacing, np.float64, (2,))
+    df = validation.array("frequency_step", frequency_step, np.float64, (2,))
+    if not d.all():
+        raise ValueError(f"spacing is {d.tolist()}; elements at one place make no beam")
+    t = np.asarray(retarded, np.float64)
+    ky, kz = (wave / d[i] * (lobe[i] - df[i] * t) for i in range(2))
+    with np.errstate(invalid="ignore"):
+        elevation = np.arcsin(np.where(np.abs(kz) <= 1, kz, np.nan))
+        azimuth = np.arcsin(np.where(ky**2 + kz**2 <= 1, ky / np.cos(elevation), np.nan))
+    return azimuth, elevation
+
+
+def period(frequency_step: float) -> float:
+    """1/|df|, s: pulses of this length hold one peak, (4.15)."""
+    return 1 / abs(_step(frequency_step))
+
+
+def main_lobe(n: int, frequency_step: float) -> float:
+    """2/(n |df|), s between the nulls beside the peak, (4.14)."""
+    return 2 / (validation.count("n", n) * abs(_step(frequency_step)))
+
+
+def bandwidth(n: int, frequency_step: float) -> float:
+    """n |df|, Hz, of n pulses of length 1/|df|, (4.18)."""
+    return validation.count("n", n) * abs(_step(frequency_step))
+
+
+def time_bandwidth(n: int, frequency_step: float) -> float:
+    """bandwidth times period: n, (4.19)."""
+    return bandwidth(n, frequency_step) * period(frequency_step)
+
+
+def center_frequency(f0: float, n: int, frequency_step: float) -> float:
+    """f0 + (n - 1) df/2, Hz, (4.6)."""
+    return validation.number("f0", f0) + (validation.count("n", n) - 1) / 2 * validation.number(
+        "frequency_step", frequency_step
+    )
+
+
+def peak_delay(
+    f0: float, *, spacing: float, frequency_step: float, azimuth: Any, elevation: Any = 0.0, n: int = 1
+) -> np.ndarray:
+    """When the peak passes, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
+
+    n = 1: f = f0, the peak of the closed form, (4.27), whose other sign is that of elements at -n d.
+    n elements: f = f0 + (n - 1) df, that of the exact field: of its phase i^2 dk d k, the part i (n - 1) is linear.
+    """
+    f = validation.number("f0", f0, above=0) + (validation.count("n", n) - 1) * _step(frequency_step)
+    d = validation.number("spacing", spacing)
+    return np.asarray(-d * np.cos(elevation) * np.sin(azimuth) * f / (SPEED_OF_LIGHT * frequency_step))
+
+
+def waveform(
+    f0: float, n: int, *, spacing: float, frequency_step: float, azimuth: Any, retarded: Any, pulsed: bool = False
+) -> np.ndarray:
+    """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16)."""
+    t = np.asarray(retarded, np.float64)
+    steps = (validation.number("frequency_step", frequency_step), 0.0)
+    factor = diverse_factor(
+        f0, shape=(n, 1), spacing=(spacing, 0.0), frequency_step=steps, cosines=(np.sin(azimuth), 0.0), retarded=t
+    )
+    turns = f0 * t
+    out = np.exp(2j * np.pi * (turns - np.rint(turns))) * factor
+    return np.asarray(out * (np.abs(t) <= period(frequency_step) / 2) if pulsed else out)
+
+
+def _step(frequency_step: float) -> float:
+    step = validation.number("frequency_step", frequency_step)
+    if step == 0:
+        raise ValueError("frequency_step is 0: carriers that are all alike have no period, lobe or delay")
+    return step

@@ -1,0 +1,197 @@
+"""Fields of arrays: what elements that each send a carrier of their own add up to, anywhere and at any time."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base import float_pairs, text, validation
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.antenna_array import AntennaArray
+from ..opencl import device as opencl
+from ..opencl.device import Device, open_device
+from ._beam_plan import FINE, FLUSH, FieldPlan, blocks, make_plan, middle, whole_turns_off
+
+CHUNK = 64  # elements a work-item tabulates
+ROWS = 8  # entries of a tile of rows
+MOST_ROWS, MOST_LANES = 256, 2**16  # entries of a block
+SLICE = 2**18  # points whose ranges are taken at once on the host
+
+
+def beam(
+    array: AntennaArray,
+    f0: float,
+    *,
+    times: Any,
+    positions: Any,
+    reference: Any = (0.0, 0.0, 0.0),
+    tolerance: float = 1e-5,
+    device: Any = None,
+    max_bytes: float | None = None,
+    pulse: int = 0,
+) -> np.ndarray:
+    """The array's field, sum_n w_n exp(+j 2 pi f_n (t - |x - x_n|/c)): times.shape + positions.shape[:-1].
+
+    f0         base frequency, Hz; element n sends f_n = f0 + array.offsets_at(pulse)[n]
+    times      s (...), absolute: at t = 0 every element's carrier has phase arg w_n
+    positions  x, m (..., 3), in the array's axes;  reference  where its reference point stands, m (3,)
+    tolerance  largest error of any value, relative to sum |w_n|; below 1e-6 the result is complex128, else complex64
+    device     an OpenCL device: an index, "cpu", "gpu" or part of a name
+    max_bytes  memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
+
+    Distances to every element are exact, the phase is absolute, nothing falls off with range. An array of one carrier
+    is evaluated once a point. ValueError: bad input, or a tolerance that cannot be met, naming the best one;
+    MemoryError: max_bytes too small for one tile.
+    """
+    validation.instance("array", array, AntennaArray)
+    f0 = validation.number("f0", f0)
+    offsets = np.asarray(array.offsets_at(pulse), np.longdouble)
+    carriers = np.longdouble(f0) + offsets
+    if carriers.min() <= 0:
+        at = int(np.argmin(carriers))
+        raise ValueError(f"f0 + offset is {float(carriers[at]):g} Hz at element {at}; every carrier must be above 0 Hz")
+    tolerance = validation.tolerance(tolerance)
+    t = validation.converted("times", times, np.float64)
+    validation.finite("times", t)
+    x = validation.converted("positions", positions, np.float64)
+    if x.ndim == 0 or x.shape[-1] != 3:
+        raise ValueError(f"positions has shape {x.shape}, wanted (..., 3)")
+    validation.finite("positions", x)
+    origin = validation.array("reference", reference, np.float64, (3,))
+    opened = open_device(device)
+    budget = opencl.budget(opened, max_bytes)
+    points = x.reshape(-1, 3)
+    kind = np.complex64 if tolerance >= FINE else np.complex128
+    out = np.empty((t.size, len(points)), kind)
+    if not out.size:
+        return out.reshape(t.shape + x.shape[:-1])
+    extent = float(np.linalg.norm(array.positions, axis=1).max())
+    ranges = _ranges(points, origin)
+    plan = make_plan(opened, tolerance, float(carriers.max()), extent, float(np.abs(t).max()), float(ranges.max()))
+    work = _Field(opened, plan, array, carriers, points, ranges, origin, budget)
+    if np.ptp(offsets) == 0:  # time and place factor
+        work.add(np.zeros(1), once := np.empty((1, len(points)), kind))
+        turns = whole_turns_off(carriers[0] * t.ravel().astype(np.longdouble))
+        np.multiply.outer(np.exp(2j * np.pi * turns.astype(np.float64)).astype(kind), once[0], out=out)
+    else:
+        work.add(t.ravel(), out)
+    return out.reshape(t.shape + x.shape[:-1])
+
+
+def _ranges(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
+    out = np.empty(len(points), np.longdouble)
+    for i in range(0, len(points), SLICE):
+        v = points[i : i + SLICE].astype(np.longdouble) - origin
+        out[i : i + SLICE] = np.sqrt((v * v).sum(axis=1))
+    return out
+
+
+class _Field:
+    """Adds up one array's carriers at points, block by block of times and points."""
+
+    def __init__(
+        self,
+        device: Device,
+        plan: FieldPlan,
+        array: AntennaArray,
+        carriers: np.ndarray,
+        points: np.ndarray,
+        ranges: np.ndarray,
+        origin: np.ndarray,
+        budget: float,
+    ) -> None:
+        self.device, self.plan, self.budget = device, plan, budget
+        self.carriers, self.points, self.ranges, self.origin = carriers, points, ranges, origin
+        self.center = (carriers.min() + carriers.max()) / 2
+        self.offsets = carriers - self.center
+        self.elements = array.positions.T
+        self.real = np.float64 if plan.double else np.float32
+        self.item = 16 if plan.double else 8  # bytes of a complex number
+        self.weights = device.upload(np.stack([array.weights.real, array.weights.imag]).astype(self.real))
+        self.lane_width = 8 if device.is_cpu else 64
+        self.group = (1, 1) if device.is_cpu else None  # PoCL gives every work-item of a group its own stack
+
+    def add(self, times: np.ndarray, out: np.ndarray) -> None:
+        """Fill out (times, points). Lanes run along the longer of the two."""
+        n, most, c = len(self.carriers), np.abs(self.offsets).max(), np.longdouble(SPEED_OF_LIGHT)
+        along_times = len(times) > len(self.points)
+        room = min(self.budget / 4, self.device.info.max_alloc)
+        least = self.lane_width * n * self.item
+        if room < least:
+            raise MemoryError(
+                f"a tile of {self.lane_width} entries of {n} elements needs {text.size_text(4 * least)} in all; "
+                "pass a larger max_bytes"
+            )
+        rows = max(ROWS, min(MOST_ROWS, int(room / (n * self.item))) // ROWS * ROWS)
+        lanes = int(min(MOST_LANES, room / (n * self.item), room / (rows * self.item)))
+        lanes = max(self.lane_width, lanes // self.lane_width * self.lane_width)
+        reach = float(self.plan.reach / most) if most else np.inf  # s
+        t = times.astype(np.longdouble)
+        time_blocks = blocks(t, reach, lanes if along_times else rows)
+        range_blocks = blocks(self.ranges, reach * SPEED_OF_LIGHT, rows if along_times else lanes)
+
+        def time_table(which: np.ndarray) -> tuple[Any, int]:
+            t0 = middle(t[which])
+            entries = np.stack([t[which] - t0, whole_turns_off(self.center * (t[which] - t0))])
+            elements = np.stack([self.offsets, whole_turns_off(self.carriers * t0)])
+            return self._table("times", entries, elements, lanes_are=along_times)
+
+        def path_table(which: np.ndarray) -> tuple[Any, int]:
+            r0 = middle(self.ranges[which])
+            shift = self.ranges[which] - r0
+            v = (self.points[which].astype(np.longdouble) - self.origin).T
+            entries = np.stack([*v, self.ranges[which], shift, whole_turns_off(self.center * shift / c)])
+            start = whole_turns_off(self.carriers * r0 / c)
+            elements = np.stack([*self.elements, self.carriers / c, self.offsets / c, start])
+            return self._table("paths", entries, elements, lanes_are=not along_times)
+
+        outer, inner = (time_blocks, range_blocks) if along_times else (range_blocks, time_blocks)
+        outer_table, inner_table = (time_table, path_table) if along_times else (path_table, time_table)
+        kept = inner_table(inner[0]) if len(inner) == 1 else None
+        for lane_block in outer:
+            lane = outer_table(lane_block)
+            for row_block in inner:
+                made = self._sum(lane, kept or inner_table(row_block), len(row_block))[:, : len(lane_block)]
+                if along_times:
+                    out[np.ix_(lane_block, row_block)] = made.T
+                else:
+                    out[np.ix_(row_block, lane_block)] = made
+
+    def _table(self, name: str, entries: np.ndarray, elements: np.ndarray, *, lanes_are: bool) -> tuple[Any, int]:
+        """The table of kernel `name` and its number of entries, whole tiles, the last of them filled with repeats."""
+        device, n, lanes = self.device, elements.shape[1], self.device.info.vector_width
+        width = self.lane_width if lanes_are else ROWS
+        many = -(-entries.shape[1] // width) * width
+        entries = entries[:, np.minimum(np.arange(many), entries.shape[1] - 1)]
+        table = device.empty(self.item * n * many)
+        numbers = self._wide(entries), self._wide(elements)
+        weights = [self.weights] if name == "paths" else []
+        device.run(
+            self._kernel(name), (many // lanes, -(-n // CHUNK)), self.group,
+            numbers[0], many, numbers[1], n, *weights, table, width,
+        )  # fmt: skip
+        device.finish()  # before `numbers` go: on CPUs buffers are the arrays' own memory
+        return table, many
+
+    def _sum(self, lane: tuple[Any, int], row: tuple[Any, int], rows: int) -> np.ndarray:
+        """(rows, lanes) complex."""
+        used = next(k for k in (1, 2, 4, ROWS) if k >= min(rows, ROWS))
+        tiles = row[1] // ROWS
+        out = self.device.empty(self.item * tiles * used * lane[1])
+        self.device.run(
+            self._kernel("add", used), (lane[1] // self.device.info.vector_width, tiles), self.group,
+            lane[0], row[0], len(self.carriers), lane[1], out,
+        )  # fmt: skip
+        planes = self.device.download(out, np.empty((tiles * used, 2, lane[1]), self.real))
+        return np.asarray(planes[:rows, 0] + 1j * planes[:rows, 1])
+
+    def _kernel(self, name: str, used: int = ROWS) -> Any:
+        macros = {"DOUBLE": int(self.plan.double), "ROWS": ROWS, "USED": used, "LANES": self.lane_width}
+        return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK)
+
+    def _wide(self, values: np.ndarray) -> Any:
+        """(k, n) as the device's wide numbers: float64, or (k, 2, n) float32."""
+        if self.device.info.fp64:
+            return self.device.upload(values.astype(np.float64))
+        return self.device.upload(float_pairs.wide(values).swapaxes(0, 1))

@@ -1,0 +1,228 @@
+"""Phase histories of frequency-diverse arrays as others would have collected them: corrected, mapped, or told apart."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.antenna_array import AntennaArray
+from ..model.phase_history import PhaseHistory
+from .channels import spacing
+
+MAPPINGS = ("corrected", "apparent", "channels")
+OFFSETS = ("published", "halved")
+NEAR = 1e-3  # m by which reference ranges may differ from the distance to `center`
+LINE = 1e-9  # of an array's length: elements that lie no further off a line of even steps are on it
+
+
+def map_aperture(
+    raw: PhaseHistory, mapping: str, *, center: Any = (0.0, 0.0, 0.0), attitude: Any = None, quadratic: bool = True,
+    offset: str = "published", vertical: Any = (0.0, 0.0, 1.0),
+) -> PhaseHistory:  # fmt: skip
+    """Echoes of a frequency-diverse array, channels added up, for a backprojection that knows nothing of arrays.
+
+    mapping    "corrected": the delay and phase of every channel's element, as `center` sees it, are taken out: data of
+               one antenna at the reference point, for points at `center` (Farooq 2009, equations 5.4 and 5.5)
+               "apparent": the same, from the apparent positions that the wavefront of the peak points back to
+               (equations 5.14 to 5.18, signs corrected: docs/fda.md)
+               "channels": a row for each channel, at its own element and carrier: backprojection of these is the
+               matched filter of the whole model, at any point
+    center     the point whose phase and delay are removed from raw, m (3,): the `reference` of `sarcl.echo`
+    attitude   (n_pulses, 3, 3) of the track, if it had one
+    quadratic  False: only the part linear in the channel's number is taken out, as the paper does
+    offset     "published": the apparent angle takes c dt of the peak for a one-way path; "halved": for a two-way path
+    vertical   the apparent position keeps its elevation above the plane across it (3,)
+
+    ValueError: no array, channels kept apart already, sharing samples or outside the sampled band, elements or carriers
+    that do not progress in even steps, a center that is not the data's.
+    """
+    validation.instance("raw", raw, PhaseHistory)
+    validation.choice("mapping", mapping, MAPPINGS)
+    validation.choice("offset", offset, OFFSETS)
+    point = validation.array("center", center, np.float64, (3,))
+    array = _array_of(raw)
+    pulse = _pulses(raw, array)
+    away = (np.linalg.norm(raw.tx - point, axis=1) + np.linalg.norm(raw.rx - point, axis=1)) / 2
+    if np.abs(away - raw.reference_range).max() > NEAR:
+        worst = int(np.abs(away - raw.reference_range).argmax())
+        raise ValueError(
+            f"reference_range[{worst}] is {raw.reference_range[worst]:.4f} m, but center is {away[worst]:.4f} m away; "
+            "give the point that raw's phase is relative to as center (echo's reference)"
+        )
+    turn = None if attitude is None else _rotations(attitude, int(pulse.max()) + 1)[pulse]
+    element = _elements(raw, array, pulse)
+    if mapping == "channels":
+        return _apart(raw, array, element, turn)
+    towards = point - raw.tx
+    distance = np.linalg.norm(towards, axis=1)
+    frequencies = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
+    if quadratic:
+        steps = array.positions if turn is None else np.einsum("pij,nj->pni", turn, array.positions)
+        near = np.linalg.norm(towards[:, None] - steps, axis=2)
+        # |T + d - c| - |T - c| without cancellation
+        bent = ((steps**2).sum(axis=-1) - 2 * (towards[:, None] * steps).sum(axis=2)) / (near + distance[:, None])
+        turns = frequencies * np.take_along_axis(bent, element, axis=1) / SPEED_OF_LIGHT
+    else:
+        assert raw.waveform is not None
+        base = raw.waveform.center + array.offsets[_plan(array, pulse), 0]
+        along = -(towards * _turned(turn, _progression(array))).sum(axis=1) / distance
+        turns = element * (along * base / SPEED_OF_LIGHT)[:, None]
+    samples = np.asarray(raw.samples) * np.exp(2j * np.pi * np.mod(turns, 1.0))
+    moved = replace(raw, samples=validation.sealed(samples.astype(raw.samples.dtype)))
+    if mapping == "corrected":
+        return moved
+    up = validation.direction("vertical", vertical)
+    places = _apparent(raw, array, pulse, _turned(turn, _progression(array)), towards, up, offset == "halved")
+    return replace(moved, tx=point - places, rx=point - places, reference_range=np.linalg.norm(places, axis=1))
+
+
+def _apparent(
+    raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray, step: np.ndarray, towards: np.ndarray, up: np.ndarray,
+    halved: bool,
+) -> np.ndarray:  # fmt: skip
+    """From apparent positions to the point, m (n, 3): along the gradient of r + g kappa, r_app = r + g kappa away.
+
+    kappa = sin of the angle off the array's broadside, g = d f0/df; Farooq's elements lie at -n d y.
+    """
+    assert raw.waveform is not None
+    spacing_m = float(np.linalg.norm(_progression(array)))
+    change = array.offsets[:, 1] - array.offsets[:, 0]
+    g = (spacing_m * raw.waveform.center / change[_plan(array, pulse)] / (2 if halved else 1))[:, None]
+    axis = -np.broadcast_to(step / spacing_m, towards.shape)
+    r = np.linalg.norm(towards, axis=1, keepdims=True)
+    u = towards / r
+    kappa = (u * axis).sum(axis=1, keepdims=True)
+    gradient = u + g / r * (axis - kappa * u)
+    level = gradient - (gradient @ up)[:, None] * up
+    sine = (u @ up)[:, None]
+    return np.asarray(
+        (r + g * kappa) * (np.sqrt(1 - sine**2) * level / np.linalg.norm(level, axis=1, keepdims=True) + sine * up)
+    )
+
+
+def _rotations(attitude: Any, n_pulses: int) -> np.ndarray:
+    turns = validation.array("attitude", attitude, np.float64, (n_pulses, 3, 3))
+    off = np.abs(np.einsum("nij,nkj->nik", turns, turns) - np.eye(3)).max(axis=(1, 2))
+    if off.max() > LINE:
+        bad = int(off.argmax())
+        raise ValueError(f"attitude[{bad}] is no rotation; give the track's own, orthonormal")
+    return turns
+
+
+def _array_of(raw: PhaseHistory) -> AntennaArray:
+    """The array whose channels are added up in raw's rows."""
+    if not isinstance(raw.array, AntennaArray) or raw.waveform is None:
+        raise ValueError("raw has no array and waveform: map_aperture wants echoes made with array=")
+    if raw.tx_channel is not None:
+        raise ValueError(
+            "raw's channels are kept apart already, each with its own position and carrier: backproject them as they "
+            "are"
+        )
+    return raw.array
+
+
+def _pulses(raw: PhaseHistory, array: AntennaArray) -> np.ndarray:
+    """Number of each row's pulse (n_rows,)."""
+    if raw.time is None:
+        if array.plan is None:
+            return np.zeros(raw.n_rows, np.int64)
+        raise ValueError("raw has no time, so that its pulses cannot be told apart; keep all that echo returns")
+    pulse = np.unique(raw.time, return_inverse=True)[1].ravel()
+    if array.plan is not None and pulse.max() + 1 != len(array.plan):
+        raise ValueError(
+            f"raw has {pulse.max() + 1} pulses, but the array's plan {len(array.plan)}; map all pulses, then choose"
+        )
+    return pulse
+
+
+def _plan(array: AntennaArray, pulse: np.ndarray) -> np.ndarray:
+    """Row of array.offsets that each row uses."""
+    return np.zeros(len(pulse), np.int64) if array.plan is None else array.plan[pulse]
+
+
+def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.ndarray:
+    """The element whose channel each sample is of (n_rows, n_samples)."""
+    assert raw.waveform is not None
+    out = np.empty(raw.samples.shape, np.int64)
+    frequencies = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
+    plan = _plan(array, pulse)
+    for number, offsets in enumerate(array.offsets):
+        rows = plan == number
+        carriers = raw.waveform.center + offsets
+        apart = spacing(carriers)
+        if apart is None or len(np.unique(carriers)) < array.n:
+            raise ValueError(
+                "the array's channels share carriers, or are not evenly spaced, so that samples cannot be told apart "
+                "by frequency; make the echoes with channels='separated'"
+            )
+        if raw.waveform.kind != "tone" and raw.waveform.bandwidth > apart * (1 + 1e-9):
+            raise ValueError(
+                f"channels {apart / 1e6:g} MHz apart share samples: their pulses are "
+                f"{raw.waveform.bandwidth / 1e6:g} MHz wide; make the echoes with channels='separated', or send tones"
+            )
+        low, high = frequencies[rows].min(axis=1).max() - apart / 2, frequencies[rows].max(axis=1).min() + apart / 2
+        outside = np.flatnonzero((carriers < low) | (carriers > high))
+        if len(outside):
+            raise ValueError(
+                f"{len(outside)} of the array's {array.n} channels lie outside the sampled band of "
+                f"{(low + apart / 2) / 1e9:.6g} to {(high - apart / 2) / 1e9:.6g} GHz, such as element {outside[0]} at "
+                f"{carriers[outside[0]] / 1e9:.6g} GHz; keep all samples that echo returned"
+            )
+        order = np.argsort(carriers)
+        place = np.rint((frequencies[rows] - carriers[order[0]]) / apart)
+        steps = np.rint((carriers[order] - carriers[order[0]]) / apart)
+        at = np.clip(np.searchsorted(steps, place), 0, array.n - 1)
+        out[rows] = order[at]
+    return out
+
+
+def _progression(array: AntennaArray) -> np.ndarray:
+    """Step from element to element, m (3,). ValueError where positions or carriers do not progress evenly."""
+    step = array.positions[-1] / max(array.n - 1, 1)
+    off = np.abs(array.positions - np.arange(array.n)[:, None] * step).max()
+    change = array.offsets[:, -1:] - array.offsets[:, :1]
+    bent = np.abs(array.offsets - array.offsets[:, :1] - np.arange(array.n) / max(array.n - 1, 1) * change).max()
+    if (
+        array.n < 2
+        or not step.any()
+        or off > LINE * np.linalg.norm(array.positions[-1])
+        or bent > LINE * np.abs(change).max()
+    ):
+        raise ValueError(
+            "apparent positions and the paper's linear correction are told from elements and carriers that progress in "
+            "even steps along a line; use mapping='corrected' with quadratic=True, or 'channels'"
+        )
+    return np.asarray(step)
+
+
+def _apart(raw: PhaseHistory, array: AntennaArray, element: np.ndarray, turn: np.ndarray | None) -> PhaseHistory:
+    """A row for each channel of each row, of the samples that are its own."""
+    width = int(np.bincount(element[0], minlength=array.n).max())
+    starts = np.array([np.searchsorted(np.sort(row), np.arange(array.n)) for row in np.sort(element, axis=1)])
+    order = np.argsort(element, axis=1, kind="stable")
+    index = np.take_along_axis(order, np.minimum(starts, raw.n_samples - width), axis=1)[:, :, None] + np.arange(width)
+    if (
+        np.take_along_axis(element, index.reshape(len(element), -1), 1).reshape(index.shape)
+        != np.arange(array.n)[:, None]
+    ).any():
+        raise ValueError("channels differ in their number of samples; make the echoes with channels='separated'")
+    n, rows = array.n, np.repeat(np.arange(raw.n_rows), array.n)
+    samples = np.take_along_axis(np.asarray(raw.samples), index.reshape(raw.n_rows, -1), axis=1).reshape(-1, width)
+    steps = np.broadcast_to(array.positions, (raw.n_rows, n, 3)) if turn is None else turn @ array.positions.T
+    steps = steps if turn is None else np.swapaxes(steps, 1, 2)
+    first = replace(raw, samples=validation.sealed(np.array(raw.samples[:, :1])))[rows]
+    return replace(
+        first,
+        samples=validation.sealed(samples),
+        frequency=(raw.frequency[:, None] + raw.frequency_step[:, None] * index[:, :, 0]).ravel(),
+        tx=(raw.tx[:, None] + steps).reshape(-1, 3),
+        tx_channel=np.tile(np.arange(n), raw.n_rows),
+    )
+
+
+def _turned(turn: np.ndarray | None, step: np.ndarray) -> np.ndarray:
+    return step if turn is None else turn @ step

@@ -1,0 +1,12 @@
+"""Numbers as pairs of float32, for kernels on devices without float64."""
+
+from __future__ import annotations
+
+import numpy as np
+
+
+def wide(values: np.ndarray) -> np.ndarray:
+    """Numbers as hi and lo float32 parts, (2, ...): about 48 bits of a float64 (or longdouble)."""
+    values = np.asarray(values)
+    hi = values.astype(np.float32)
+    return np.stack([hi, (values - hi).astype(np.float32)])

@@ -1,0 +1,32 @@
+"""Morton (Z-curve) order of points and cells: neighbours in space become neighbours in memory."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from .boxes import box
+
+
+def morton_order(positions: np.ndarray) -> np.ndarray:
+    """Order of points (n, 3) along the Z curve of the cube that holds them (1024 cells a side and more)."""
+    low, high = box(positions)
+    extent = float((high - low).max()) or 1.0
+    cell = ((positions - low) * ((2**20 - 1) / extent)).astype(np.uint64)
+    return np.argsort(interleaved(cell), kind="stable")
+
+
+def interleaved(cell: np.ndarray) -> np.ndarray:
+    """Place on the Z curve (Morton 1966) of cells (n, 3), uint64 below 2^21: uint64 (n,)."""
+    code = np.zeros(len(cell), np.uint64)
+    for axis in range(3):
+        x = cell[:, axis]
+        for shift, mask in (
+            (32, 0x1F00000000FFFF),
+            (16, 0x1F0000FF0000FF),
+            (8, 0x100F00F00F00F00F),
+            (4, 0x10C30C30C30C30C3),
+            (2, 0x1249249249249249),
+        ):
+            x = (x | (x << np.uint64(shift))) & np.uint64(mask)
+        code |= x << np.uint64(axis)
+    return code

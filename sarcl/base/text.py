@@ -1,0 +1,27 @@
+"""Quantities and suggestions as text for messages."""
+
+from __future__ import annotations
+
+
+def size_text(nbytes: float) -> str:
+    """Bytes as text a person reads: "6.1 GB"."""
+    units = ("B", "kB", "MB", "GB", "TB")
+    power = 0
+    while nbytes >= 1000 and power < len(units) - 1:
+        nbytes, power = nbytes / 1000, power + 1
+    return f"{nbytes:.3g} {units[power]}"
+
+
+def duration(seconds: float) -> str:
+    """Seconds as text a person reads."""
+    if seconds < 120:
+        return f"{seconds:.2g} s"
+    return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
+
+
+def unknown(key: str, known: list[str], what: str) -> str:
+    from difflib import get_close_matches
+
+    close = get_close_matches(key, known, 1)
+    guess = f"; did you mean {close[0]!r}?" if close else ";"
+    return f"unknown {what} {key!r}{guess} known: {', '.join(known)}"

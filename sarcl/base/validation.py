@@ -1,0 +1,123 @@
+"""Checks of user input: every message names the argument, what came, what was wanted and the remedy."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+
+def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np.ndarray:
+    """Return `value` as a finite array of `dtype` with `shape`; a str in `shape` is a free axis, named.
+
+    The result is a read-only copy in C order: the caller's array stays as it is. ValueError names the
+    argument, its shape or the index of its first NaN or Inf.
+    """
+    out = converted(name, value, dtype)
+    wanted = "(" + ", ".join(str(n) for n in shape) + ("," if len(shape) == 1 else "") + ")"
+    if out.ndim != len(shape) or any(isinstance(n, int) and n != m for n, m in zip(shape, out.shape, strict=False)):
+        raise ValueError(f"{name} has shape {out.shape}, wanted {wanted}")
+    if out.size == 0:
+        raise ValueError(f"{name} is empty (shape {out.shape}), wanted {wanted} with at least one element")
+    finite(name, out)
+    return sealed(out)
+
+
+def sealed(made: np.ndarray) -> np.ndarray:
+    """`made` itself, read-only from here on: for arrays that nobody else holds, so that no noun copies it."""
+    made.flags.writeable = False
+    return made
+
+
+def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
+    """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
+    wanted = np.dtype(dtype)
+    try:
+        given = np.asarray(value)
+        if given.dtype.kind not in "biufcO":
+            raise TypeError(f"type {given.dtype}")
+        if given.dtype.kind == "O" and any(v is None for v in given.flat):
+            raise TypeError("None is no number")
+        if given.dtype.kind == "c" and wanted.kind != "c":
+            raise TypeError(f"type {given.dtype}: take the real part or the modulus")
+        if np.ma.is_masked(value):
+            raise TypeError(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
+        if wanted.kind in "iu" and given.dtype.kind == "f" and not (given == np.rint(given)).all():
+            raise TypeError("not all are whole numbers")
+        return np.array(given, dtype=wanted, order="C")
+    except (TypeError, ValueError, OverflowError) as exc:
+        shown = " ".join(repr(value).split())
+        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({exc})") from None
+
+
+def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
+    """Raise ValueError naming the first NaN or Inf in `value`; rows are counted from `first_row`."""
+    good = np.isfinite(value)
+    if not good.all():
+        at = list(np.unravel_index(int(np.argmin(good)), value.shape))
+        bad = value[tuple(at)]
+        if at:
+            at[0] += first_row
+        index = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+        raise ValueError(f"{name}{index} is {bad}; every value must be finite: remove or replace it")
+
+
+def number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> float:
+    """Return `value` as a finite float, greater than `above` and not less than `least`."""
+    try:
+        if isinstance(value, (str, bytes, bool, np.bool_)):
+            raise TypeError
+        out = float(value)
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be a number, got {value!r:.80}") from None
+    if not np.isfinite(out):
+        raise ValueError(f"{name} is {out}; it must be finite")
+    if above is not None and not out > above:
+        raise ValueError(f"{name} is {out:g}; it must be greater than {above:g}")
+    if least is not None and not out >= least:
+        raise ValueError(f"{name} is {out:g}; it must be at least {least:g}")
+    return out
+
+
+def tolerance(value: Any) -> float:
+    """`value` as a relative error an image or echoes may have: above 0 and below 1."""
+    out = number("tolerance", value, above=0)
+    if out >= 1:
+        raise ValueError(f"tolerance is {out:g}; an error of 1 is no image at all: give less, such as 1e-1")
+    return out
+
+
+def count(name: str, value: Any, least: int = 1) -> int:
+    """Return `value` as an int of at least `least`; a float with a fraction is refused."""
+    try:
+        out = int(value)
+        whole = out == value
+    except (TypeError, ValueError, OverflowError):
+        raise ValueError(f"{name} must be a whole number, got {value!r}") from None
+    if not whole or isinstance(value, (bool, np.bool_)):
+        raise ValueError(f"{name} must be a whole number, got {value!r}")
+    if out < least:
+        raise ValueError(f"{name} is {out}; it must be at least {least}")
+    return out
+
+
+def direction(name: str, value: Any) -> np.ndarray:
+    """Return the unit vector along `value` (3,); a zero vector raises."""
+    v = array(name, value, np.float64, (3,))
+    if not v.any():
+        raise ValueError(f"{name} is (0, 0, 0); a direction needs a length")
+    v = v / np.abs(v).max()  # first, so that squares neither overflow nor vanish
+    return np.asarray(v / np.linalg.norm(v))
+
+
+def instance(name: str, value: Any, kind: type) -> None:
+    """Raise TypeError unless `value` is a `kind`."""
+    if not isinstance(value, kind):
+        raise TypeError(f"{name} is a {type(value).__name__}; wanted a sarcl.{kind.__name__}")
+
+
+def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
+    """Return `value` if it is one of `allowed`."""
+    if value not in allowed:
+        raise ValueError(f"{name} is {value!r}; choose one of {', '.join(map(repr, allowed))}")
+    return str(value)

@@ -1,0 +1,120 @@
+"""The data of the benchmark: two apertures, white noise or points, of any size."""
+
+from __future__ import annotations
+
+import json
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base.validation import choice, count
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..model.trajectory import Trajectory
+from . import _exact
+
+FREQUENCY = 9.3e9  # Hz, of sample 0
+N_POINTS = 400
+SCENES = ("spotlight", "straight")
+DATA = {"spotlight": "noise", "straight": "points"}
+BANDWIDTH = {"spotlight": 600e6, "straight": 300e6}  # Hz
+SPACING = {"spotlight": 0.1, "straight": 0.25}  # m
+WORDS = {
+    "spotlight": "X band, 600 MHz, an arc of 4 deg at 10 km, 0.1 m pixels",
+    "straight": "X band, 300 MHz, a straight aperture of 300 m at 10 km, 0.25 m pixels",
+}
+
+
+@dataclass(frozen=True, eq=False)
+class Case:
+    """Data and the exact sum at some of the pixels.
+
+    scene, data, n   "spotlight" or "straight"; "noise" or "points"; pulses = samples = pixels a side
+    raw, grid        what is focused, on what
+    at               (rows, columns) of the pixels that are checked, int64 (2, m)
+    wanted           exact sum there, complex128 (m,)
+    norm             norm it would have if contributions had random phases
+    """
+
+    scene: str
+    data: str
+    n: int
+    raw: PhaseHistory
+    grid: ImageGrid
+    at: np.ndarray
+    wanted: np.ndarray
+    norm: float
+
+    @property
+    def pairs(self) -> int:
+        """Pulses x pixels."""
+        return self.raw.n_rows * self.grid.size
+
+    def errors(self, values: np.ndarray) -> tuple[float, float]:
+        """Relative L2 error of an image's `values` at `at`: as docs/accuracy.md says, and relative to |I|."""
+        wrong = float(np.linalg.norm(values - self.wanted))
+        own = float(np.linalg.norm(self.wanted))
+        return wrong / max(own, self.norm), wrong / own
+
+
+def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> Case:
+    """Case `scene` of n pulses of n samples on n x n pixels, checked at `pixels` of them; seeded.
+
+    data  "noise": white, in every sample, so that most of the energy lies outside the scene of "straight";
+          "points": points of random amplitude over the scene, from the formula. None: DATA[scene]
+    ValueError: another scene or data, n below 8.
+    """
+    choice("scene", scene, SCENES)
+    data = choice("data", DATA[scene] if data is None else data, ("noise", "points"))
+    n = count("size", n, least=8)
+    random = np.random.default_rng(0)
+    if scene == "spotlight":
+        tx = Trajectory.circle(radius=8e3, height=6e3, arc=0.07, n_pulses=n).positions
+    else:
+        along = (np.arange(n) - (n - 1) / 2) * 300 / n
+        tx = np.stack([np.full(n, -8e3), along, np.full(n, 6e3)], axis=1)
+    step, spacing = BANDWIDTH[scene] / n, SPACING[scene]
+    reference = np.linalg.norm(tx, axis=1)
+    if data == "noise":
+        samples = np.empty((n, n), np.complex64)
+        for row in samples:
+            row[:] = random.standard_normal((n, 2)).view(np.complex128)[:, 0]
+    else:
+        positions = np.zeros((N_POINTS, 3))
+        positions[:, :2] = (random.random((N_POINTS, 2)) - 0.5) * 0.98 * n * spacing
+        amplitudes = random.standard_normal((N_POINTS, 2)).view(np.complex128)[:, 0]
+        samples = _exact.echo(tx, reference, FREQUENCY, step, n, positions, amplitudes)
+    raw = PhaseHistory(samples, frequency=FREQUENCY, frequency_step=step, tx=tx, reference_range=reference)
+    grid = ImageGrid.plane(shape=(n, n), spacing=spacing)
+    at = np.random.default_rng(1).integers(0, n, (2, count("pixels", pixels)))
+    return Case(scene, data, n, raw, grid, at, *_exact.backproject(raw, grid.at(*at)))
+
+
+def save(case: Case, folder: Path) -> None:
+    """Write what any process needs to make the image: samples.npy, tx.npy, reference_range.npy, case.json."""
+    np.save(folder / "samples.npy", case.raw.samples)
+    np.save(folder / "tx.npy", case.raw.tx)
+    np.save(folder / "reference_range.npy", case.raw.reference_range)
+    numbers = {
+        "frequency": FREQUENCY,
+        "frequency_step": float(case.raw.frequency_step[0]),
+        "spacing": SPACING[case.scene],
+        "n": case.n,
+        "at": case.at.tolist(),
+    }
+    (folder / "case.json").write_text(json.dumps(numbers))
+
+
+def load(folder: Path) -> tuple[PhaseHistory, ImageGrid]:
+    """The data and grid that `save` wrote."""
+    numbers: dict[str, Any] = json.loads((folder / "case.json").read_text())
+    raw = PhaseHistory(
+        np.load(folder / "samples.npy"),
+        frequency=numbers["frequency"],
+        frequency_step=numbers["frequency_step"],
+        tx=np.load(folder / "tx.npy"),
+        reference_range=np.load(folder / "reference_range.npy"),
+    )
+    return raw, ImageGrid.plane(shape=(numbers["n"], numbers["n"]), spacing=numbers["spacing"])

@@ -1,0 +1,61 @@
+"""The exact sum at some pixels, quick enough for apertures of thousands of pulses.
+
+`sarcl.reference.backproject` evaluates exp(j 2 pi f_n delay) for every sample. Here f_n = f_0 + n df is split at
+n = b c + d, so that exp(j 2 pi f_n delay) = coarse[c] fine[d] costs 2 sqrt(n_samples) exponentials a pixel, and
+the sum over samples is a small product of matrices. Float64 throughout, turns reduced in extended precision: the
+two agree to 1e-11.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.phase_history import PhaseHistory
+from ..reference.geometry import half_path
+
+
+def phases(delay: np.ndarray, frequency: float, step: float, n_samples: int) -> tuple[np.ndarray, np.ndarray]:
+    """(coarse (m, c), fine (m, b)) with exp(+j 2 pi (frequency + n step) delay) = coarse[:, n // b] fine[:, n % b].
+
+    delay  s, longdouble (m,)
+    """
+    b = int(2 ** np.ceil(np.log2(max(n_samples, 1)) / 2))
+    c = -(-n_samples // b)
+    each = (step * delay) % 1
+    block, first = ((each * b) % 1).astype(np.float64), ((frequency * delay) % 1).astype(np.float64)
+    coarse = np.exp(2j * np.pi * (first[:, None] + block[:, None] * np.arange(c)))
+    return coarse, np.exp(2j * np.pi * each.astype(np.float64)[:, None] * np.arange(b))
+
+
+def backproject(raw: PhaseHistory, points: np.ndarray) -> tuple[np.ndarray, float]:
+    """I complex128 (m,) at points, m (m, 3), and the norm it would have if contributions had random phases."""
+    image, power = np.zeros(len(points), np.complex128), 0.0
+    for p in range(raw.n_rows):
+        delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
+        coarse, fine = phases(delay, float(raw.frequency[p]), float(raw.frequency_step[p]), raw.n_samples)
+        samples = np.zeros(coarse.shape[1] * fine.shape[1], np.complex128)
+        samples[: raw.n_samples] = raw.read(p, p + 1)[0]
+        profile = ((coarse @ samples.reshape(coarse.shape[1], fine.shape[1])) * fine).sum(axis=1)
+        profile *= abs(delay) <= 1 / (2 * raw.frequency_step[p])
+        image += profile
+        power += float((abs(profile) ** 2).sum())
+    return image, float(np.sqrt(power))
+
+
+def echo(
+    tx: np.ndarray,
+    reference_range: np.ndarray,
+    frequency: float,
+    step: float,
+    n_samples: int,
+    positions: np.ndarray,
+    amplitudes: np.ndarray,
+) -> np.ndarray:
+    """s_p(f_n) = sum_k a_k exp(-j 2 pi f_n (tau - tau_ref)), complex64 (n_pulses, n_samples), of points, m (k, 3)."""
+    samples = np.empty((len(tx), n_samples), np.complex64)
+    for p in range(len(tx)):
+        delay = -2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx[p], tx[p], positions, reference_range[p])
+        coarse, fine = phases(delay, frequency, step, n_samples)
+        samples[p] = ((coarse * amplitudes[:, None]).T @ fine).ravel()[:n_samples]
+    return samples

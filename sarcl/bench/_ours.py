@@ -1,0 +1,85 @@
+"""sarcl as a contestant: one line a device, method and tolerance."""
+
+from __future__ import annotations
+
+import json
+import re
+import subprocess
+import sys
+import time
+from collections.abc import Sequence
+from pathlib import Path
+
+from ..opencl import device as opencl
+from ._cases import Case
+from ._contestant import Absent, Contestant, Reading
+
+BEFORE = ("plan",)  # stages of a report that depend on geometry and tolerance alone
+
+
+def contestants(
+    case: Case, folder: Path, devices: Sequence[opencl.Device], methods: Sequence[str], tolerances: Sequence[float]
+) -> list[Contestant]:
+    """sarcl on every device, by every method, at every tolerance; `folder` holds the saved case."""
+    return [
+        _contestant(case, folder, device, method, tolerance)
+        for device in devices
+        for method in methods
+        for tolerance in tolerances
+    ]
+
+
+def describe(device: opencl.Device) -> str:
+    """A device in a few words, no two alike: platform, processor, and whether it is its twin without float64."""
+    info = device.info
+    platform = "PoCL" if info.platform == "Portable Computing Language" else info.platform.split()[0].split("(")[0]
+    name = re.sub(r"^(pthread|cpu)-[^ ]*-", "", info.name)  # PoCL puts its target before the processor's name
+    words = name if platform.lower() in name.lower() else f"{platform} {name}"
+    alike = [d for d in opencl.devices() if d.works and (d.platform, d.name) == (info.platform, info.name)]
+    return words + (f" ({info.index})" if len(alike) > 1 else "") + ("" if info.fp64 else ", no float64")
+
+
+def _contestant(case: Case, folder: Path, device: opencl.Device, method: str, tolerance: float) -> Contestant:
+    def run() -> Reading:
+        import sarcl
+
+        start, busy = time.perf_counter(), time.process_time()
+        image = sarcl.backproject(
+            case.raw, case.grid, tolerance=tolerance, method=method, device=device, check=False
+        )  # fmt: skip
+        call, busy = time.perf_counter() - start, time.process_time() - busy
+        report = image.report
+        assert report is not None  # backproject always gives one
+        seconds = {
+            "call": call,
+            "form": call - sum(report.seconds.get(stage, 0.0) for stage in BEFORE),
+            "kernel": report.seconds["backproject"],
+        }
+        if device.is_cpu:
+            seconds["cpu"] = busy
+        total = report.contributions_done + sum(report.contributions_skipped.values())
+        notes = {
+            "predicted": report.predicted_error,
+            "plan": dict(report.plan),
+            "skipped": 1 - report.contributions_done / total,
+        }
+        return Reading(image.data[case.at[0], case.at[1]], seconds, notes)
+
+    def process() -> float:
+        options = {
+            "tolerance": tolerance,
+            "method": method,
+            "device": device.info.index,
+            "fp64": device.info.fp64,
+        }
+        command = [sys.executable, "-m", "sarcl.bench.once", str(folder), json.dumps(options)]
+        start = time.perf_counter()
+        done = subprocess.run(command, capture_output=True, text=True)
+        seconds = time.perf_counter() - start
+        if done.returncode:
+            raise Absent(f"the process ended with {done.returncode}: {done.stderr.strip()[-400:]}")
+        return seconds
+
+    info = device.info
+    facts = {"tolerance": tolerance, "kind": info.kind, "fp64": info.fp64}
+    return Contestant("sarcl", describe(device), method, f"{tolerance:.0e}", run, process, facts)

@@ -1,0 +1,176 @@
+"""The figures as tables: for the terminal and, in Markdown, for the page. No speed without its error."""
+
+from __future__ import annotations
+
+from typing import Any
+
+from . import _figures
+from ._cases import WORDS
+
+Cells = list[list[str]]
+HEAD = [
+    "",
+    "method",
+    "setting",
+    "error",
+    "of |I|",
+    "form s",
+    "median",
+    "call s",
+    "kernel s",
+    "process s",
+    "cpu s",
+    "Gbp/s",
+]
+MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
+GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
+EXPLAINED = (
+    "error: relative L2 against the exact sum, as docs/accuracy.md says; of |I|: relative to the image alone. form: "
+    "data in memory to finished image, without what can be worked out once for a geometry (sarcl's plan, fastsar's "
+    "former), shortest and median run; call: with it; kernel: of that in the device's kernels; process: a new "
+    "process that reads the data and makes one image; cpu: seconds of all processors together (sarcl's call, a peer's "
+    "form), which other programs on the machine hardly touch. Gbp/s: 1e9 pulses x pixels a second, from the shortest "
+    "form."
+)
+
+
+def title(result: _figures.Result) -> str:
+    """What a case is, in a line."""
+    return (
+        f"{result['scene']}, {result['data']}, n = {result['n']}: {WORDS[result['scene']]}; n pulses of n samples on "
+        f"n x n pixels"
+    )
+
+
+def name(row: _figures.Row) -> str:
+    """Who ran on what."""
+    return f"{row['who']}, {row['device']}"
+
+
+def body(result: _figures.Result) -> Cells:
+    """A line for every row that ran, under HEAD."""
+    return [
+        [
+            name(row),
+            row["method"],
+            row["setting"],
+            f"{row['error']:.1e}",
+            f"{_figures.decibels(row):.1f} dB",
+            _seconds(_figures.best(row)),
+            _seconds(_figures.middle(row)),
+            *(_seconds(_figures.best(row, key)) for key in ("call", "kernel", "process", "cpu")),
+            f"{_figures.rate(result, row):.3g}",
+        ]
+        for row in _figures.ran(result)
+    ]
+
+
+def match_body(result: _figures.Result) -> Cells:
+    """A line for every peer's row and device of sarcl's, under MATCH_HEAD."""
+    lines = []
+    for entry in _figures.matches(result):
+        peer, ours = entry["peer"], entry["ours"]
+        line = [
+            f"{peer['who']} {peer['method']}, {peer['setting'].split(';')[0]}",
+            f"{peer['error']:.1e}, {_figures.decibels(peer):.1f} dB",
+            f"{_figures.rate(result, peer):.3g}",
+        ]
+        if ours is None:
+            lines.append([*line, f"{entry['method']}: no row errs as little", *[""] * 7])
+            continue
+        ratios = [entry[key] for key in ("form", "median form", "call", "process", "cpu")]
+        lines.append(
+            [
+                *line,
+                f"{ours['method']}, {ours['setting']}, {ours['device']}",
+                f"{ours['error']:.1e}, {_figures.decibels(ours):.1f} dB",
+                f"{_figures.rate(result, ours):.3g}",
+                *("" if r is None else f"{r:.2f} x" for r in ratios),
+            ]
+        )
+    return lines
+
+
+def growth_body(results: list[_figures.Result]) -> Cells:
+    """A line for everything measured at two sizes or more, under GROWTH_HEAD."""
+    return [
+        [
+            name(entry),
+            f"{entry['method']}, {entry['scene']} {entry['data']}",
+            entry["setting"],
+            f"{entry['error']:.1e}",
+            ", ".join(str(n) for n in entry["sizes"]),
+            ", ".join(_seconds(s) for s in entry["seconds"]),
+            f"n^{entry['exponent']:.2f}",
+            "" if entry["cpu_exponent"] is None else f"n^{entry['cpu_exponent']:.2f}",
+        ]
+        for entry in _figures.growth(results)
+    ]
+
+
+def missing(result: _figures.Result) -> list[str]:
+    """A line for every row without figures, why it has none, equal reasons together; and one for disturbed runs."""
+    reasons: dict[tuple[str, str], list[str]] = {}
+    for row in result["rows"]:
+        if "absent" in row:
+            reasons.setdefault((f"{name(row)}, {row['method']}", row["absent"]), []).append(row["setting"])
+    lines = [f"{who} at {'; '.join(at)}: absent: {why}" for (who, why), at in reasons.items()]
+    disturbed = sum(row.get("disturbed", 0) for row in result["rows"])
+    return lines + ([f"{disturbed} runs began while other programs ran"] if disturbed else [])
+
+
+def text(result: _figures.Result) -> str:
+    """A case for the terminal."""
+    parts = [title(result), _aligned(HEAD, body(result)), *missing(result)]
+    lines = match_body(result)
+    if lines:
+        parts += ["", "ratios, peer's seconds over sarcl's, at equal or smaller error:", _aligned(MATCH_HEAD, lines)]
+    return "\n".join(parts)
+
+
+def growth_text(results: list[_figures.Result]) -> str:
+    """Cost against size for the terminal; empty where nothing was measured at two sizes."""
+    lines = growth_body(results)
+    return "cost against size:\n" + _aligned(GROWTH_HEAD, lines) if lines else ""
+
+
+def markdown(head: list[str], lines: Cells) -> str:
+    """A table in Markdown."""
+
+    def line(cells: list[str]) -> str:
+        return "| " + " | ".join(c.replace("|", "\\|") for c in cells) + " |\n"
+
+    return line(head) + "|" + "---|" * len(head) + "\n" + "".join(map(line, lines))
+
+
+def machine_text(document: dict[str, Any]) -> list[str]:
+    """The machine, the devices and the peers, a line each."""
+    m = document["machine"]
+    load = ", ".join(f"{v:.1f}" for v in m["load"]) or "unknown"
+    lines = [
+        f"{m['processor']}, {m['processors']} processors, {m['threads']} threads for all; sarcl {m['sarcl']}, "
+        f"Python {m['python']}, NumPy {m['numpy']}; load before and after: {load}"
+    ]
+    for d in document["devices"]:
+        fp64 = "float64" if d["fp64"] else "no float64"
+        lines.append(f"device {d['index']}: {d['name']} ({d['platform']}, driver {d['driver']}, {d['kind']}, {fp64})")
+    for p in document["peers"]:
+        if "absent" in p:
+            lines.append(f"peer {p['name']}: absent: {p['absent']}")
+        else:
+            lines.append(f"peer {p['name']} {p['version']} (Python {p['python']}, backend {p['backend']})")
+    return lines
+
+
+def _seconds(value: float | None) -> str:
+    return "" if value is None else f"{value:.3g}" if value < 100 else f"{value:.0f}"
+
+
+def _aligned(head: list[str], lines: Cells) -> str:
+    rows = [head, *lines]
+    widths = [max(len(row[i]) for row in rows) for i in range(len(head))]
+    left = [all(not row[i][:1].isdigit() for row in lines) for i in range(len(head))]
+    return "\n".join(
+        "  ".join(c.ljust(w) if flush else c.rjust(w) for c, w, flush in zip(row, widths, left, strict=True)).rstrip()
+        for row in rows
+    )

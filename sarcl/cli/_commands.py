@@ -1,0 +1,366 @@
+"""What the commands of sarcl/cli/parser.py do. Every output path is checked before the work starts."""
+
+from __future__ import annotations
+
+import argparse
+import logging
+import math
+import sys
+import warnings
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+from ._job import Job, Outputs
+
+if TYPE_CHECKING:
+    from ..base.report import Report
+    from ..model.image import Image
+    from ..model.image_grid import ImageGrid
+    from ..model.phase_history import PhaseHistory
+
+
+def run(args: argparse.Namespace, outputs: Outputs) -> int:
+    """Run the command in `args`; `outputs` gets what each output path is before the work."""
+    logging.basicConfig(level=logging.INFO if args.verbose else logging.WARNING, format="sarcl: %(message)s")
+    warnings.showwarning = _show_warning
+    command: Callable[[argparse.Namespace, Job], int] = {
+        "devices": devices,
+        "demo": demo,
+        "simulate": simulate,
+        "focus": focus,
+        "measure": measure,
+        "fda": fda,
+        "papers": papers,
+        "bench": bench,
+    }[args.command]
+    with Job(outputs) as job:
+        return command(args, job)
+
+
+def devices(args: argparse.Namespace, job: Job) -> int:
+    """Print the table of devices, the one in use marked; 3 where none works."""
+    import sarcl
+
+    from ..opencl.device import open_devices
+
+    found = sarcl.devices()
+    works = any(d.works for d in found)
+    try:
+        print(device_table(found, [d.info.index for d in open_devices(None)]))
+    except sarcl.NoDeviceError as exc:
+        print(device_table(found, []))
+        print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
+    return 0 if works else 3
+
+
+def demo(args: argparse.Namespace, job: Job) -> int:
+    """The demo scene, its picture and how long each step took."""
+    from ..experiments import demo as demo_scene
+
+    for path in demo_scene.outputs(args.out):
+        job.expect(path)
+    demo_scene.run(
+        args.out,
+        quick=args.quick,
+        device=args.device,
+        seed=args.seed,
+        progress=job.progress,
+        say=job.say,
+    )
+    return 0
+
+
+def simulate(args: argparse.Namespace, job: Job) -> int:
+    """Echoes of a scenario, and their image where there is a grid or --image asks for one."""
+    from ..opencl.device import open_device
+    from ..scenario.scenario import load
+
+    scenario = load(args.scenario)
+    stem = Path(args.scenario).stem
+    output = args.output or f"{stem}_raw.h5"
+    images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
+    _expect(job, [output], (".h5", ".hdf5"), [args.scenario])
+    _expect(job, images, (".png", ".h5", ".hdf5"), [args.scenario, output])
+    _check_floor(args.floor_db)
+    grid = scenario.build_grid() if scenario.grid is not None else None
+    options: dict[str, Any] = {"device": open_device(args.device)}
+    if args.tolerance is not None:
+        options["tolerance"] = args.tolerance
+    if args.dry_run:
+        print(scenario.plan(**options))
+        return 0
+    if scenario.noise is None:  # pulse after pulse into the file
+        raw = scenario.simulate(**options, out=output, progress=job.progress)
+        job.check()
+    else:
+        raw = scenario.simulate(**options, progress=job.progress)
+        job.check()
+        raw.save(output)
+    _say_report("echo", raw.report, job)
+    job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
+    if images:
+        raw = _compressed(raw, job)
+        grid = grid or _default_grid(raw, job, {})
+        _focus(
+            lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
+            images,
+            args.floor_db,
+            job,
+        )
+    return 0
+
+
+def focus(args: argparse.Namespace, job: Job) -> int:
+    """An image from echoes."""
+    import sarcl
+
+    from ..model.phase_history import PhaseHistory
+    from ..opencl.device import open_devices
+    from ..scenario.scenario import load
+
+    outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
+    for name in ("tile", "resume"):
+        if getattr(args, name) and all(Path(p).suffix.lower() == ".png" for p in outputs):
+            raise ValueError(f"--{name} keeps tiles beside an image in a file; give -o IMAGE.h5")
+    _expect(job, outputs, (".png", ".h5", ".hdf5"), [*args.raw, *([args.grid] if args.grid else [])])
+    _check_floor(args.floor_db)
+    given = _grid_options(args)
+    grid = None if args.grid is None else load(args.grid).build_grid()
+    raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
+    if not isinstance(raw, PhaseHistory):
+        raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
+    if args.polarization is not None or args.channel is not None:
+        raw = raw.select(polarization=args.polarization, channel=args.channel)
+    devices = open_devices(args.device)
+    job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
+    raw = _compressed(raw, job)
+    grid = grid or _default_grid(raw, job, given)
+    how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
+    how["beam"] = None if args.beam is None else math.radians(args.beam)
+    if args.dry_run:
+        print(sarcl.plan(raw, grid, **how, device=devices))
+        return 0
+    _focus(
+        lambda out: sarcl.backproject(
+            raw, grid, **how, out=out, device=devices, progress=job.progress,
+            tile=args.tile, resume=args.resume,
+        ),
+        outputs, args.floor_db, job,
+    )  # fmt: skip
+    return 0
+
+
+def measure(args: argparse.Namespace, job: Job) -> int:
+    """The point response near a position, or at the brightest pixel, as a table."""
+    import sarcl
+
+    from ..model.image import Image
+
+    image = sarcl.read(args.image)
+    if not isinstance(image, Image):
+        raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
+    print(sarcl.measure(image, near=args.near))
+    return 0
+
+
+def fda(args: argparse.Namespace, job: Job) -> int:
+    """The page and the numbers of an experiment on frequency-diverse apertures."""
+    import json
+
+    from ..experiments.fda import measure as experiment
+    from ..experiments.fda import page as fda_page
+    from ..experiments.fda.file import load
+    from ..experiments.fda.text import setting, verdicts
+    from ..io import output_paths
+    from ..opencl.device import open_device
+
+    title, cases = load(args.experiment)
+    output = args.output or f"{Path(args.experiment).stem}.html"
+    numbers = str(Path(output).with_suffix(".json"))
+    _expect(job, [output], (".html", ".htm"), [args.experiment])
+    job.expect(numbers)
+    results = []
+    for i, case in enumerate(cases):
+        results.append(experiment.measure(case, open_device(args.device)))
+        job.progress("fda", i + 1, len(cases))
+        # what is measured is kept, whatever comes of the next case
+        for path, text in ((numbers, json.dumps(results)), (output, fda_page.html(results, title))):
+            with output_paths.atomic(path) as part:
+                part.write_text(text, encoding="utf-8")
+    for result in results:
+        job.say(f"{result['name']}: {setting(result)}")
+        for verdict in verdicts(result):
+            job.say(f"  {verdict}")
+    job.say(f"wrote {output} and {numbers}")
+    return 0
+
+
+def papers(args: argparse.Namespace, job: Job) -> int:
+    """The papers there are, or one of them done again: a page and its numbers."""
+    import json
+
+    from .. import papers as shelf
+    from ..io import output_paths
+
+    if args.paper is None:
+        job.say(shelf.listing())
+        return 0
+    paper = shelf.find(args.paper)
+    output = Path(f"{paper.name}.html" if args.output is None else args.output)
+    if output.suffix.lower() not in (".html", ".htm"):  # a folder
+        output = output / f"{paper.name}.html"
+    numbers = output.with_suffix(".json")
+    for path in (output, numbers):
+        job.expect(path)
+    lab, sections = shelf.open_lab(args.device, args.quick), []
+    for section in paper.run(lab):
+        sections.append(section)
+        job.progress("papers", len(sections), len(paper.sections))
+        # what is measured is kept, whatever comes of the next section
+        text = json.dumps(paper.document(sections, lab), allow_nan=False)
+        for path, whole in ((numbers, text), (output, paper.html(sections, lab))):
+            with output_paths.atomic(path) as part:
+                part.write_text(whole, encoding="utf-8")
+        fine = sum(row.holds for row in section.rows)
+        tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
+        job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
+        for row in section.rows:
+            if not row.holds:
+                job.say(f"  errs: {row.item}: printed {row.published}, measured {row.measured}")
+    job.say(f"wrote {output} and {numbers}")
+    return 0
+
+
+def bench(args: argparse.Namespace, job: Job) -> int:
+    """Run time against achieved error: a table, and where asked JSON and a picture."""
+    from ..bench import backproject
+    from ..figures.decibels import write_png
+
+    if args.json is not None:
+        _expect(job, [args.json], (".json",), [])
+    if args.picture is not None:
+        _expect(job, [args.picture], (".png",), [])
+    names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
+    given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
+
+    def keep(document: dict[str, Any]) -> None:
+        if args.json is not None:
+            backproject.write(document, Path(args.json))
+
+    document = backproject.run(
+        **given, no_fp64=args.no_fp64, with_peers=not args.no_peers, say=job.say, progress=job.progress, keep=keep
+    )
+    if args.picture is not None:
+        from ..bench.pareto import picture
+
+        write_png(picture(document["cases"]), args.picture)
+    return 0
+
+
+def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...], inputs: list[str]) -> None:
+    """Refuse outputs that cannot be written, or would be written over what is read or over one another."""
+    taken = {Path(p).resolve() for p in inputs}
+    for path in paths:
+        if Path(path).resolve() in taken:
+            raise ValueError(f"output {path!r} is also read by this command; choose another name")
+        if Path(path).suffix.lower() not in suffixes:
+            wanted = " or ".join(s for s in suffixes if s != ".hdf5")
+            raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
+        job.expect(path)
+    if len({Path(p).resolve() for p in paths}) < len(paths):
+        raise ValueError(f"outputs {', '.join(paths)} name one file twice")
+
+
+def _check_floor(floor_db: float) -> None:
+    """Refuse, before the work, a floor that no picture can have."""
+    if not floor_db < 0:
+        raise ValueError(f"--floor-db is {floor_db:g}; it counts down from the brightest pixel: give e.g. -50")
+
+
+def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
+    """What the options say of the grid, refused before the data are read where it makes no plane."""
+    from ..model.image_grid import ImageGrid
+
+    names = ("center", "shape", "spacing", "normal", "x_axis")
+    given = {n: getattr(args, n) for n in names if getattr(args, n) is not None}
+    if args.grid is not None and given:
+        other = next(iter(given)).replace("_", "-")
+        raise ValueError(f"--grid and --{other} both describe the grid; give one or the other")
+    ImageGrid.plane(**{"shape": 1, "spacing": 1.0, **given})
+    return given
+
+
+def _default_grid(raw: PhaseHistory, job: Job, given: dict[str, Any]) -> ImageGrid:
+    from ..imaging.default_grid import default_grid
+
+    chosen = default_grid(raw, **given)
+    grid = chosen.grid
+    assert grid.spacing is not None and grid.center is not None
+    pixels = f"{grid.shape[0]} x {grid.shape[1]} pixels of {grid.spacing[0]:.4g} x {grid.spacing[1]:.4g} m"
+    job.say(f"grid: {pixels} about ({', '.join(f'{c:.6g}' for c in grid.center)})")
+    if chosen.why:
+        job.say(f"      from the data: {chosen.why}")
+    return grid
+
+
+def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
+    import sarcl
+
+    if raw.compressed:
+        return raw
+    job.say("the echoes still have the pulse's spectrum: compressing them first")
+    return sarcl.compress(raw)
+
+
+def _focus(make: Callable[[str | None], Image | None], outputs: list[str], floor_db: float, job: Job) -> None:
+    """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
+    file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
+    image = make(file)
+    if image is None:
+        job.say(f"this piece is finished; its tiles wait in {file}.parts for those of the other pieces")
+        return
+    _say_report("focus", image.report, job)
+    for path in outputs:
+        if path != file:
+            image.save(path, floor_db=floor_db)
+        job.say(f"wrote {path}")
+
+
+def _say_report(what: str, report: Report | None, job: Job) -> None:
+    if report is None:
+        return
+    steps = ", ".join(f"{stage} {s:.1f}" for stage, s in report.seconds.items() if s >= 0.05)
+    job.say(f"{what}: {sum(report.seconds.values()):.1f} s on {report.device}" + (steps and f" ({steps})"))
+    error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted"
+    if report.measured_error is not None:
+        error += f", {report.measured_error:.1e} measured at random places"
+    job.say(f"{'':{len(what)}}  {error}")
+    logging.getLogger("sarcl").info("%s", report)
+
+
+def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:
+    print(f"sarcl: warning: {message}", file=sys.stderr)
+
+
+HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory", "largest buffer")
+
+
+def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:
+    """`sarcl.devices()` as a table, a star at the indices `picked`, the reason under what does not work."""
+    from ..base.text import size_text
+
+    rows = [HEAD]
+    for d in devices:
+        mark = "*" if d.index in picked else ""
+        yes = ["yes" if v else "no" for v in (d.works, d.fp64)]
+        rows.append((mark, str(d.index), d.name, d.platform, d.kind, *yes, str(d.vector_width),
+                     size_text(d.memory), size_text(d.max_alloc)))  # fmt: skip
+    widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
+    lines = ["  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
+    for n, d in reversed(list(enumerate(devices, 1))):
+        if not d.works:
+            lines.insert(n + 1, f"{'':{widths[0] + widths[1] + 4}}does not work: {d.why}")
+    if picked:
+        lines += ["", "* is used unless --device or SARCL_DEVICE names another"]
+    return "\n".join(lines) if devices else "no OpenCL device"

@@ -1,0 +1,95 @@
+"""One run of a command: its lines, its bar, the files it is going to write, and Ctrl-C that is not lost."""
+
+from __future__ import annotations
+
+import os
+import signal
+import sys
+from types import FrameType
+from typing import Any
+
+from ..base.progress import Bar
+from ..io import output_paths
+
+Outputs = dict[str, tuple[int, int] | None]
+
+
+def identity(path: Any) -> tuple[int, int] | None:
+    """What tells a file from the one that takes its place; None where there is none."""
+    try:
+        found = os.stat(path)
+    except OSError:
+        return None
+    return found.st_ino, found.st_mtime_ns
+
+
+def complete(outputs: Outputs) -> list[str]:
+    """The paths that hold a new file: they are put in place whole, so it is complete."""
+    return [path for path, before in outputs.items() if identity(path) not in (None, before)]
+
+
+class Job:
+    """Used as `with Job(outputs) as job`; outputs gets the `identity` each output path has before the work.
+
+    Ctrl-C raises KeyboardInterrupt at once, as ever, except while an output file is begun or put in its
+    place: then the next report of progress or line does. So it does where Python drops it, in a destructor or
+    a C library's callback; an error that follows from that is a KeyboardInterrupt too.
+    """
+
+    def __init__(self, outputs: Outputs) -> None:
+        self.outputs = outputs
+        self.bar = Bar()
+        self.interrupted = False
+        self._before: Any = None
+        self._hook = sys.unraisablehook
+
+    def __enter__(self) -> Job:
+        # not where Ctrl-C is ignored (nohup, background jobs of a shell), nor in a program that handles it
+        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
+            try:
+                self._before = signal.signal(signal.SIGINT, self._interrupt)
+            except ValueError:  # not the main thread, where no signal arrives
+                return self
+            sys.unraisablehook = self._unraisable
+        return self
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        self.bar.wipe()
+        if self._before is not None:
+            signal.signal(signal.SIGINT, self._before)
+            sys.unraisablehook = self._hook
+        if kind is not None:
+            self.check()
+
+    def check(self) -> None:
+        """Raise KeyboardInterrupt where Ctrl-C was pressed."""
+        if self.interrupted:
+            raise KeyboardInterrupt
+
+    def progress(self, stage: str, done: int, total: int) -> None:
+        """What verbs call: the bar, and a place to stop."""
+        self.check()
+        self.bar(stage, done, total)
+
+    def say(self, text: str) -> None:
+        """Print a line, the bar out of its way."""
+        self.check()
+        self.bar.wipe()
+        print(text, flush=True)
+
+    def expect(self, path: Any) -> None:
+        """This path is going to be written; raises what `paths.check_writable` does where it cannot be."""
+        output_paths.check_writable(path)
+        self.outputs[str(path)] = identity(path)
+
+    def _interrupt(self, _: int, frame: FrameType | None) -> None:
+        self.interrupted = True
+        while frame is not None:
+            if frame.f_code.co_filename == output_paths.__file__:
+                return  # a file is being begun or put in its place: not to be cut in two
+            frame = frame.f_back
+        raise KeyboardInterrupt
+
+    def _unraisable(self, unraisable: Any) -> None:
+        if not isinstance(unraisable.exc_value, KeyboardInterrupt):
+            self._hook(unraisable)

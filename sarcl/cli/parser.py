@@ -1,0 +1,280 @@
+"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | papers |
+bench.
+
+Only the parser is here, so that --help answers at once; sarcl/cli/_commands.py does the work.
+"""
+
+from __future__ import annotations
+
+import argparse
+import os
+import re
+import sys
+from typing import Any, NoReturn
+
+EPILOG = """examples:
+  sarcl demo                                            simulate and focus a scene: out/demo.png
+  sarcl simulate scene.toml -o raw.h5 --image image.png
+  sarcl focus raw.h5 -o image.png -o image.h5 --window taylor:35:5
+  sarcl measure image.h5 --near 10 0 0
+
+environment: SARCL_DEVICE (as --device), SARCL_THREADS (of CPU devices).
+exit status: 0 done, 1 something failed, 2 bad input, 3 no OpenCL device that works, 130 interrupted."""
+
+FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED = 1, 2, 3, 130
+
+
+class _Parser(argparse.ArgumentParser):
+    def __init__(self, **options: Any) -> None:
+        super().__init__(**options)
+        self._negative_number_matcher = re.compile(r"-\.?\d")  # -1e3 too is a number, not an option
+
+    def error(self, message: str) -> NoReturn:
+        self.exit(BAD_INPUT, f"sarcl: error: {message} (see {self.prog} --help)\n")
+
+
+def parser() -> argparse.ArgumentParser:
+    """The parser of all commands."""
+    top = _Parser(
+        prog="sarcl",
+        description="Synthetic-aperture-radar echoes and images on any OpenCL device.",
+        epilog=EPILOG,
+        formatter_class=argparse.RawDescriptionHelpFormatter,
+    )
+    top.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
+    common = _Parser(add_help=False)
+    common.add_argument("--debug", action="store_true", help="show the traceback of an error")
+    common.add_argument("-v", "--verbose", action="store_true", help="say more about what is done")
+    device = _Parser(add_help=False)
+    device.add_argument(
+        "--device", metavar="NAME", help="part of a device's name, its number, cpu or gpu (see sarcl devices)"
+    )
+    commands = top.add_subparsers(dest="command", metavar="COMMAND", required=True)
+
+    def command(name: str, text: str, *parents: _Parser) -> argparse.ArgumentParser:
+        return commands.add_parser(
+            name, help=text, description=text[0].upper() + text[1:] + ".", parents=[common, *parents]
+        )
+
+    command("devices", "list the OpenCL devices: what works, what does not and why")
+    _demo(command("demo", "simulate the echoes of a scene, focus them and write the picture", device))
+    _simulate(command("simulate", "make the echoes that a scenario file describes", device))
+    _focus(command("focus", "turn echoes into an image", device))
+    measure = command("measure", "measure a point response: resolution and side lobes")
+    measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
+    measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
+    _fda(command("fda", "measure what aperture mappings of frequency-diverse arrays gain: a page and a JSON", device))
+    _papers(
+        command("papers", "list the papers done again, or do one: published beside measured, a page and a JSON", device)
+    )
+    _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
+    return top
+
+
+def _demo(p: argparse.ArgumentParser) -> None:
+    p.add_argument("--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)")
+    p.add_argument("--quick", action="store_true", help="coarser and smaller, in a few seconds")
+    p.add_argument("--seed", type=int, default=0, help="of the ground's random heights (default 0)")
+
+
+def _simulate(p: argparse.ArgumentParser) -> None:
+    p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/scenarios.md")
+    p.add_argument("-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)")
+    p.add_argument(
+        "--image",
+        action="append",
+        default=[],
+        metavar="IMAGE",
+        help="focus too and write .png or .h5; repeatable (default, where there is a grid: FILE.png)",
+    )
+    p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
+    p.add_argument("--dry-run", action="store_true", help="say what the echoes will take, and write nothing")
+    p.add_argument(
+        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
+    )
+
+
+def _focus(p: argparse.ArgumentParser) -> None:
+    p.add_argument("raw", nargs="+", metavar="RAW", help="sarcl's .h5 or Gotcha .mat; several are joined")
+    p.add_argument(
+        "-o",
+        "--output",
+        action="append",
+        default=[],
+        metavar="IMAGE",
+        help="image to write, .png or .h5; repeatable (default: RAW's name with .png, here)",
+    )
+    where = p.add_argument_group("grid", "default: chosen from the data, and printed")
+    where.add_argument("--grid", metavar="FILE.toml", help="the [grid.*] table of a scenario file")
+    where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m")
+    where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="pixels")
+    where.add_argument("--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="of rows and columns, m")
+    where.add_argument("--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="of the plane (default 0 0 1)")
+    where.add_argument(
+        "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
+    )
+    how = p.add_argument_group("focusing")
+    how.add_argument("--tolerance", type=float, default=1e-3, help="relative error allowed (default 1e-3)")
+    how.add_argument(
+        "--method", choices=["auto", "direct", "factorized"], default="auto", help="default auto: the cheapest"
+    )
+    how.add_argument("--dry-run", action="store_true", help="say what it will take, and do nothing")
+    how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
+    how.add_argument(
+        "--beam", type=float, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
+    )
+    how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
+    how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
+    large = p.add_argument_group(
+        "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
+    )
+    large.add_argument(
+        "--tile", type=piece, metavar="I/N", help="make piece I of N alone; the last to finish puts the image together"
+    )
+    large.add_argument(
+        "--resume",
+        action=argparse.BooleanOptionalAction,
+        help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start anew",
+    )
+    rows = p.add_argument_group("data")
+    rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
+    rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
+    rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
+    p.add_argument(
+        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
+    )
+
+
+def _fda(p: argparse.ArgumentParser) -> None:
+    p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/fda.md)")
+    p.add_argument("-o", "--output", metavar="PATH", help="the page, default FILE.html, with FILE.json beside it")
+
+
+def _papers(p: argparse.ArgumentParser) -> None:
+    p.add_argument("paper", nargs="?", metavar="NAME", help="the paper to do again (docs/papers.md); none: list them")
+    p.add_argument(
+        "-o",
+        "--output",
+        metavar="PATH",
+        help="the page, or a folder for it, default NAME.html, with NAME.json beside it",
+    )
+    p.add_argument(
+        "--quick", action="store_true", help="without arrays of more than 100 elements, in a fifth of the time"
+    )
+
+
+def _bench(p: argparse.ArgumentParser) -> None:
+    p.add_argument("what", nargs="?", choices=["backproject"], default="backproject", help="what to measure")
+    p.add_argument("--json", metavar="FILE", help="write every figure, .json")
+    p.add_argument("--picture", metavar="FILE", help="draw rate against error, .png")
+    what = p.add_argument_group("what is measured")
+    what.add_argument("--scenes", nargs="+", choices=["spotlight", "straight"], help="apertures (default both)")
+    what.add_argument("--data", choices=["noise", "points"], help="default noise for spotlight, points for straight")
+    what.add_argument("--sizes", nargs="+", type=int, metavar="N", help="pulses, samples, image side (default 1024)")
+    what.add_argument("--tolerances", nargs="+", type=float, metavar="T", help="default 1e-1 to 1e-6")
+    what.add_argument(
+        "--methods", nargs="+", choices=["direct", "factorized", "auto"], help="default direct factorized"
+    )
+    what.add_argument("--devices", nargs="+", metavar="NAME", help="as --device elsewhere (default all that work)")
+    what.add_argument("--no-fp64", action="store_true", help="each device once more as if it had no float64")
+    peer = p.add_argument_group("peers")
+    peer.add_argument("--peer-python", metavar="PATH", help="a Python that has fastsar (default this one)")
+    peer.add_argument("--peer-backend", choices=["cpu", "cuda", "jax", "auto"], help="fastsar's (default cpu)")
+    peer.add_argument("--no-peers", action="store_true", help="sarcl alone, without NumPy and fastsar")
+    how = p.add_argument_group("how")
+    how.add_argument("--repeats", type=int, metavar="K", help="runs of each, in turns (default 5)")
+    how.add_argument(
+        "--pixels", type=int, metavar="K", help="checked against the exact sum, at least 256 (default 1024)"
+    )
+    how.add_argument("--limit", type=float, metavar="S", help="leave out what would run longer, s (default 120)")
+    how.add_argument("--patience", type=float, metavar="S", help="wait so long for an idle machine, s (default 0)")
+
+
+class _Version(argparse.Action):
+    def __call__(self, parser: argparse.ArgumentParser, *_: Any) -> NoReturn:
+        from ..base.version import __version__
+
+        print(f"sarcl {__version__}")
+        parser.exit()
+
+
+def window(text: str) -> Any:
+    """ "none", "hamming" or "taylor:35:5" as `backproject` takes it."""
+    from ..numerics.windows import parse
+
+    try:
+        return parse(text)
+    except ValueError as exc:
+        raise argparse.ArgumentTypeError(str(exc)) from None
+
+
+def size(text: str) -> float:
+    """ "2G", "500 MB", "1.5GiB" in bytes."""
+    unit = text.strip().lower().removesuffix("b")
+    base = 1024 if unit.endswith("i") else 1000
+    unit = unit.removesuffix("i")
+    power = "kmgt".find(unit[-1:]) + 1 if unit else 0
+    try:
+        value = float(unit[:-1] if power else unit) * base**power
+    except ValueError:
+        value = 0.0
+    if not 0 < value < float("inf"):
+        raise argparse.ArgumentTypeError(f"{text!r} is no size; give bytes, e.g. 2G, 500M or 1.5GiB")
+    return value
+
+
+def piece(text: str) -> tuple[int, int]:
+    """ "2/8": piece 2 of 8."""
+    match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
+    i, n = (int(match[1]), int(match[2])) if match else (1, 0)
+    if not i <= n:
+        raise argparse.ArgumentTypeError(f"{text!r} is no piece; give I/N with I from 1 to N, such as 2/8")
+    return i, n
+
+
+def main(argv: list[str] | None = None) -> int:
+    """Run a command; returns the exit status."""
+    outputs: Any = {}
+    debug = "--debug" in (sys.argv[1:] if argv is None else argv)
+    try:
+        args = parser().parse_args(argv)
+        from ._commands import run
+
+        return run(args, outputs)
+    except KeyboardInterrupt:
+        if debug:
+            raise
+        print(f"sarcl: interrupted; {_kept(outputs)}", file=sys.stderr)
+        return INTERRUPTED
+    except BrokenPipeError:  # whoever read our output has left: `sarcl devices | head -1`
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        return FAILED
+    except Exception as exc:
+        if debug:
+            raise
+        status = _status(exc)
+        text = " ".join(str(exc).split()) or type(exc).__name__
+        if status == FAILED:
+            text = f"{type(exc).__name__}: {text} (--debug shows where)"
+        print(f"sarcl: error: {text}", file=sys.stderr)
+        return status
+
+
+def _kept(outputs: Any) -> str:
+    if not outputs:
+        return "nothing was written"
+    from ._job import complete
+
+    names = complete(outputs)
+    verb = "is" if len(names) == 1 else "are"
+    tiles = any(os.path.isdir(os.path.realpath(path) + ".parts") for path in outputs)
+    rest = (
+        "only finished tiles are kept" if tiles else "nothing was written" if not names else "nothing else was written"
+    )
+    return f"{' and '.join(names)} {verb} complete, {rest}" if names else rest
+
+
+def _status(exc: Exception) -> int:
+    if any(c.__name__ == "NoDeviceError" for c in type(exc).__mro__):  # its module need not be loaded for this
+        return NO_DEVICE
+    return BAD_INPUT if isinstance(exc, (ValueError, TypeError, OSError, MemoryError)) else FAILED

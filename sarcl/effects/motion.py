@@ -1,0 +1,226 @@
+"""Motion of antennas and targets: errors of the track, positions known or not, and targets that move.
+
+Intra-pulse motion is in stop_and_go.py.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base import constants, validation
+from ..model.phase_history import PhaseHistory
+from ..model.pointing import turned, velocities
+from ..model.trajectory import Trajectory
+from ._random_motion import deviation, frequencies, wander
+
+WRAPPED = 0.01  # share of a row's energy that may lie where moving it wraps round: side lobes hold less
+FRAMES = ("scene", "track")
+
+
+def perturbed(
+    track: Trajectory,
+    *,
+    rms: Any = 0.0,
+    correlation_time: float | None = None,
+    spectrum: tuple[Any, Any] | None = None,
+    attitude_rms: Any = 0.0,
+    frame: str = "scene",
+    seed: int = 0,
+) -> Trajectory:
+    """The track with smooth random errors of its positions, and of its attitude where attitude_rms is not zero.
+
+    rms               m, one or per axis (3,): standard deviation of the errors
+    correlation_time  s: the errors' autocorrelation is rms^2 exp(-(t/correlation_time)^2), or
+    spectrum          (frequencies Hz (k,), densities (k,)): their one-sided power spectrum, of any scale, linear
+                      between frequencies
+    attitude_rms      rad, one or about each body axis (3,)
+    frame             axes are the "scene"'s, or the "track"'s: along, to the left, up
+    seed              errors depend on it and on each pulse's time alone: parts of a track, and tracks of another prf,
+                      see the same motion
+
+    Sums of 256 cosines of random phase, their frequencies drawn from the spectrum (Shinozuka and Deodatis, Appl. Mech.
+    Rev. 44, 1991): the deviation is the ensemble's; errors that are slow against the track are mostly an offset.
+    """
+    validation.instance("track", track, Trajectory)
+    seed = validation.count("seed", seed, 0)
+    drawn = frequencies(correlation_time, spectrum, seed)
+    offset, rate = wander(track.times, deviation("rms", rms), drawn, seed, 0)
+    out = _moved(track, offset, rate, frame)
+    angles = deviation("attitude_rms", attitude_rms)
+    return turned(out, wander(track.times, angles, drawn, seed, 1)[0]) if angles.any() else out
+
+
+def sinusoidal(
+    track: Trajectory, *, amplitude: Any, frequency: float, phase: Any = 0.0, frame: str = "scene"
+) -> Trajectory:
+    """The track moved by amplitude sin(2 pi frequency t + phase): m (3,), Hz, rad, one or per axis.
+
+    A motion of amplitude a along the line of sight makes paired echoes of amplitude J_1(4 pi a/lambda) beside a point.
+    """
+    validation.instance("track", track, Trajectory)
+    size = validation.array("amplitude", amplitude, np.float64, (3,))
+    turns = 2 * np.pi * validation.number("frequency", frequency, above=0)
+    phase = validation.array("phase", np.broadcast_to(phase, (3,)), np.float64, (3,))
+    angle = turns * track.times[:, None] + phase
+    return _moved(track, size * np.sin(angle), size * turns * np.cos(angle), frame)
+
+
+def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory | None = None) -> PhaseHistory:
+    """Echoes as a processor has them that believes in another track: `raw` with the positions of `track`.
+
+    Samples and reference ranges stay: what was recorded does not change. A track of as many pulses as raw has rows, or
+    of as many as it has times (rows of one time, such as polarisations, share a position). receiver: likewise; default
+    the track where raw has one antenna, raw's own receiver where it has two. ValueError where times do not match.
+    """
+    validation.instance("raw", raw, PhaseHistory)
+    changes: dict[str, Any] = {}
+    for side, given in (("tx", track), ("rx", receiver)):
+        if given is None:
+            continue
+        validation.instance("track" if side == "tx" else "receiver", given, Trajectory)
+        row = _pulse_of_row(raw, given)
+        changes[side] = given.positions[row]
+        changes[f"{side}_velocity"] = None if given.velocities is None else given.velocities[row]
+    if receiver is None:
+        changes["rx"] = None if raw.is_monostatic else raw.rx
+        changes["rx_velocity"] = changes["tx_velocity"] if raw.is_monostatic else raw.rx_velocity
+    return replace(raw, **changes)
+
+
+def relative(
+    track: Trajectory,
+    *,
+    velocity: Any = (0.0, 0.0, 0.0),
+    acceleration: Any = (0.0, 0.0, 0.0),
+    rotation: Any = (0.0, 0.0, 0.0),
+    center: Any = (0.0, 0.0, 0.0),
+    epoch: float = 0.0,
+) -> Trajectory:
+    """The track as a rigid body sees it that moves: its echoes from there are those of the moving body.
+
+    A point of the body is at x at `epoch`, s, and at time t at
+        x(t) = c + R(t) (x - c) + v (t - epoch) + a (t - epoch)^2/2,   R(t) a turn by rotation (t - epoch)
+    velocity m/s, acceleration m/s^2, rotation rad/s about `center` c, m: each (3,). Distances, incidence and beams are
+    exact, pulse by pulse; polarisation is exact unless the body turns about another axis than the vertical that H and V
+    are told from. Shadows between the body and the rest of the scene are not. Add echoes with `combined`.
+    """
+    validation.instance("track", track, Trajectory)
+    from scipy.spatial.transform import Rotation
+
+    v, a, w, c = (
+        validation.array(name, value, np.float64, (3,))
+        for name, value in (
+            ("velocity", velocity),
+            ("acceleration", acceleration),
+            ("rotation", rotation),
+            ("center", center),
+        )
+    )
+    t = (track.times - validation.number("epoch", epoch))[:, None]
+    back = np.swapaxes(Rotation.from_rotvec(w * t).as_matrix(), 1, 2)
+    positions = c + np.einsum("nij,nj->ni", back, track.positions - c - v * t - a * t**2 / 2)
+    changes: dict[str, Any] = {"positions": positions}
+    if track.velocities is not None:
+        seen = np.einsum("nij,nj->ni", back, track.velocities - v - a * t)
+        changes["velocities"] = seen - np.cross(w, positions - c)
+    if track.attitude is not None:
+        changes["attitude"] = back @ track.attitude
+    return replace(track, **changes)
+
+
+def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
+    """Echoes of several parts of a scene in one: the sum of their samples, with the geometry of the first.
+
+    Every other part's phase is moved from its reference ranges to the first's. Parts need the same rows, frequencies
+    and polarisations: give `sarcl.echo` the same range_window for all, wide enough for where each part really is.
+    ValueError names what differs, or the row where a part lies outside the first's window.
+    """
+    parts = list(parts)
+    if not parts:
+        raise ValueError("combined was given no echoes; give at least one")
+    for part in parts:
+        validation.instance("each part", part, PhaseHistory)
+    first = parts[0]
+    total = np.zeros(first.samples.shape, np.result_type(*(p.samples.dtype for p in parts)))
+    for i, part in enumerate(parts):
+        _same_rows(first, part, i)
+        shift = (
+            2
+            / np.longdouble(constants.SPEED_OF_LIGHT)
+            * (part.reference_range.astype(np.longdouble) - first.reference_range)
+        )
+        for start in range(0, first.n_rows, 256):
+            rows = slice(start, min(start + 256, first.n_rows))
+            block = part.read(rows.start, rows.stop)
+            if shift.any():
+                _stays(block, np.asarray(shift[rows] * part.frequency_step[rows], np.float64), i, start)
+                f = part.frequency[rows, None] + part.frequency_step[rows, None] * np.arange(part.n_samples)
+                block = block * np.exp(-2j * np.pi * ((f * shift[rows, None]) % 1).astype(np.float64))
+            total[rows] += block
+    return replace(first, samples=validation.sealed(total), report=None)
+
+
+def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
+    if part.samples.shape != first.samples.shape:
+        raise ValueError(
+            f"part {i} has samples {part.samples.shape}, part 0 {first.samples.shape}; make both with the same track "
+            "length, polarisations and range_window"
+        )
+    for name in ("frequency", "frequency_step", "polarization", "tx_channel", "rx_channel", "compressed"):
+        a, b = getattr(first, name), getattr(part, name)
+        if not np.array_equal(a, b):
+            raise ValueError(f"part {i} and part 0 differ in {name}; make both with the same waveform and range_window")
+
+
+def _stays(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
+    """ValueError where a row's echoes, moved by `shift` periods, would come round at the window's other end."""
+    n = block.shape[1]
+    power = np.abs(np.fft.ifft(block, axis=1)) ** 2
+    place = np.fft.fftfreq(n) + shift[:, None]
+    # an echo within half a sample of the edge belongs to either end
+    lost = (power * (np.abs(place) > 0.5 + 1 / n)).sum(axis=1) > WRAPPED * power.sum(axis=1)
+    if lost.any():
+        row = start + int(np.argmax(lost))
+        raise ValueError(
+            f"part {i} lies outside part 0's range window at row {row}; give both echoes a wider range_window, or "
+            "leave out the pulses from which it is not in it"
+        )
+
+
+def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
+    if len(track) == raw.n_rows:
+        return np.arange(raw.n_rows)
+    if raw.time is None:
+        raise ValueError(
+            f"raw has {raw.n_rows} rows and no times, the track {len(track)} pulses; give one position per row"
+        )
+    row = np.clip(np.searchsorted(track.times, raw.time - 1e-9), 0, len(track) - 1)
+    off = np.abs(track.times[row] - raw.time)
+    if (off > 1e-9 * (1 + np.abs(raw.time))).any():
+        bad = int(np.argmax(off))
+        raise ValueError(
+            f"row {bad} was sent at {raw.time[bad]:g} s, when the track has no pulse; give one position per row"
+        )
+    return row
+
+
+def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
+    """The track moved by offsets (n, 3) in the frame's axes."""
+    if validation.choice("frame", frame, FRAMES) == "track":
+        along = velocities(track)
+        left = np.cross((0.0, 0.0, 1.0), along)
+        level = np.linalg.norm(left, axis=1, keepdims=True)
+        if not (level > 1e-6 * np.linalg.norm(along, axis=1, keepdims=True)).all():
+            bad = int(np.argmin(level))
+            raise ValueError(f"the track stands still or goes straight up at pulse {bad}; use frame='scene'")
+        along, left = along / np.linalg.norm(along, axis=1, keepdims=True), left / level
+        axes = np.stack([along, left, np.cross(along, left)], axis=-1)
+        turning = np.gradient(axes, track.times, axis=0) if len(track) > 1 else np.zeros_like(axes)
+        rate = np.einsum("nij,nj->ni", axes, rate) + np.einsum("nij,nj->ni", turning, offset)
+        offset = np.einsum("nij,nj->ni", axes, offset)
+    speed = None if track.velocities is None else track.velocities + rate
+    return replace(track, positions=track.positions + offset, velocities=speed)

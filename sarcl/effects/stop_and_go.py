@@ -1,0 +1,188 @@
+"""What stop and go leaves out: antennas move while a pulse travels, and while it is sent."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import constants, validation
+from ..model.phase_history import PhaseHistory
+from ..model.trajectory import Trajectory
+from ..model.waveform import Waveform
+
+
+@dataclass(frozen=True, eq=False)
+class StopAndGo:
+    """What stop and go errs, for every pulse and point (n_pulses, n_points). Made by `stop_and_go_error`.
+
+    flight      m: half the true path, to where the receiver is when the echo arrives, less the one echo computes
+    chirp       m: how much farther the echo lies than its half path, because the pulse's Doppler shift looks like delay
+    phase       rad: 4 pi fc flight/c + pi doppler^2/rate, the phase (of exp(-j phase)) at the band's middle
+    smear       rad: phase at the band's edges beyond `phase` and `chirp`
+    doppler     Hz, of the echo
+
+    A constant, and what is linear in time, only displace the image; `defocus` is what is left.
+    """
+
+    flight: np.ndarray
+    chirp: np.ndarray
+    phase: np.ndarray
+    smear: np.ndarray
+    doppler: np.ndarray
+    times: np.ndarray
+
+    @property
+    def defocus(self) -> np.ndarray:
+        """Largest |phase less its best straight line over the pulses|, rad (n_points,)."""
+        t = self.times - self.times.mean()
+        line = np.stack([np.ones_like(t), t / max(float(np.abs(t).max()), 1e-300)], axis=-1)
+        return np.asarray(np.abs(self.phase - line @ np.linalg.lstsq(line, self.phase, rcond=None)[0]).max(axis=0))
+
+
+def stop_and_go_error(
+    track: Trajectory,
+    points: Any,
+    waveform: Waveform,
+    *,
+    receiver: Trajectory | None = None,
+    used: Trajectory | None = None,
+) -> StopAndGo:
+    """How much a stop-and-go echo errs at points, m (m, 3), of a transmitter on `track`, a receiver on `receiver`.
+
+    used  the receiver's track that echo is given, default `receiver` itself (or `track`): with
+          `receiver_at_arrival(...)` this tells what is left of the error.
+
+    flight: c tau = |T(t) - x| + |x - R(t + tau)| is solved. chirp: the echo of p(t) is p((t - tau)/(1 + tau')), whose
+    spectrum is P(f (1 + tau')). For a chirp of rate k = bandwidth/duration, P = exp(-j pi (f - fc)^2/k), that is
+    a delay of tau' fc/k more, and little else (docs/radar.md). ValueError for pulses that are no chirps.
+    """
+    if waveform.kind != "chirp":
+        raise ValueError(f"stop and go's error is told for chirps, not for a {waveform.kind!r} waveform")
+    x = validation.array("points", points, np.float64, ("n", 3))
+    moving = track if receiver is None else receiver
+    tau, slope = _delays(track, moving, x)
+    stands = moving if used is None else used
+    if len(stands) != len(track):
+        raise ValueError(f"used has {len(stands)} positions but track has {len(track)}; give one per pulse")
+    path = _distance(track.positions[:, None], x) + _distance(stands.positions[:, None], x)
+    c, fc, rate = constants.SPEED_OF_LIGHT, waveform.center, waveform.bandwidth / waveform.duration
+    flight = (c * tau - path) / 2
+    return StopAndGo(
+        flight=flight,
+        chirp=c * slope * (1 + slope) * fc / (2 * rate),
+        phase=4 * np.pi * fc / c * flight + np.pi * (fc * slope) ** 2 / rate,
+        smear=np.abs(np.pi * slope * waveform.bandwidth * waveform.duration / 2 * (1 + slope / 2)),
+        doppler=-fc * slope,
+        times=track.times,
+    )
+
+
+def receiver_at_arrival(track: Trajectory, point: Any, *, receiver: Trajectory | None = None) -> Trajectory:
+    """Where the receiver is when echoes from `point`, m (3,), arrive: the receiver's track for an exact flight there.
+
+    sarcl.echo(scene, chirp, track, receiver=receiver_at_arrival(track, center)) has the true two-way path of the point
+    `center`, and elsewhere errs by what `stop_and_go_error(..., used=...)` says. The frame must be inertial: on a
+    turning Earth, give positions in a frame that does not turn (the Sagnac effect is of the same size).
+    """
+    x = validation.array("point", point, np.float64, (3,))
+    moving = track if receiver is None else receiver
+    tau, _ = _delays(track, moving, x[None])
+    at = _Path(moving)
+    when = track.times + tau[:, 0]
+    return replace(moving, times=track.times, positions=at(when), velocities=at(when, 1))
+
+
+def pulse_motion(raw: PhaseHistory, point: Any, *, undo: bool = False) -> PhaseHistory:
+    """Echoes with the phase that motion during the pulse gives those of `point`, m (3,); undo takes it out.
+
+    exp(-j pi ((f (1 + tau') - fc)^2 - (f - fc)^2)/k): range-Doppler coupling, exact for the point; others err by the
+    difference of their `StopAndGo.chirp`. Samples change as they are read. ValueError where raw has no velocities, or
+    no chirp.
+    """
+    validation.instance("raw", raw, PhaseHistory)
+    if raw.waveform is None or raw.waveform.kind != "chirp":
+        raise ValueError(
+            "raw names no chirp, so its rate is unknown; set raw.waveform to the Waveform.chirp that was sent"
+        )
+    speeds = raw.tx_velocity, raw.tx_velocity if raw.rx_velocity is None and raw.is_monostatic else raw.rx_velocity
+    if speeds[0] is None or speeds[1] is None:
+        raise ValueError("raw has no velocities of its antennas; give tracks with velocities, or set raw.tx_velocity")
+    x = validation.array("point", point, np.float64, (3,))
+    slope = _slope(raw.tx - x, speeds[0], raw.rx - x, speeds[1])
+    return replace(raw, samples=_Chirped(raw, slope, -1.0 if undo else 1.0))
+
+
+class _Chirped:
+    """Rows times the phase of motion during the pulse, made as a slice asks."""
+
+    def __init__(self, raw: PhaseHistory, slope: np.ndarray, sign: float) -> None:
+        assert raw.waveform is not None
+        self.source, self.slope, self.sign = raw.samples, slope, sign
+        self.first, self.step = raw.frequency, raw.frequency_step
+        self.center, self.rate = raw.waveform.center, raw.waveform.bandwidth / raw.waveform.duration
+        self.shape, self.dtype = raw.samples.shape, np.dtype(raw.samples.dtype)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        f = self.first[rows, None] + self.step[rows, None] * np.arange(self.shape[1])
+        moved = f * self.slope[rows, None]
+        phase = np.pi * moved * (2 * (f - self.center) + moved) / self.rate
+        block = np.asarray(self.source[rows])
+        return (block * np.exp(-1j * self.sign * phase)).astype(self.dtype.newbyteorder("="))
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class _Path:
+    """Positions (derivative 0) and velocities (1) of a track at any time near its own, m (..., 3)."""
+
+    def __init__(self, track: Trajectory) -> None:
+        from scipy.interpolate import CubicHermiteSpline, CubicSpline
+
+        self.track, self.spline = track, None
+        if track.velocities is not None and len(track) > 1:
+            self.spline = CubicHermiteSpline(track.times, track.positions, track.velocities)
+        elif len(track) > 3:
+            self.spline = CubicSpline(track.times, track.positions)
+        elif track.velocities is None:
+            raise ValueError(f"a track of {len(track)} pulses tells no velocity; give Trajectory(..., velocities=...)")
+
+    def __call__(self, times: np.ndarray, derivative: int = 0) -> np.ndarray:
+        if self.spline is not None:
+            return np.asarray(self.spline(times, derivative))
+        assert self.track.velocities is not None  # one pulse
+        if derivative:
+            return np.broadcast_to(self.track.velocities[0], (*times.shape, 3))
+        return np.asarray(self.track.positions[0] + (times - self.track.times[0])[..., None] * self.track.velocities[0])
+
+
+def _delays(track: Trajectory, moving: Trajectory, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """tau of c tau = |T(t) - x| + |x - R(t + tau)|, s, and its rate of change with t: (n_pulses, n_points)."""
+    c, at, from_tx = constants.SPEED_OF_LIGHT, _Path(moving), _Path(track)
+    out = _distance(track.positions[:, None], points)
+    start = np.broadcast_to(track.times[:, None], out.shape)
+    tau = (out + _distance(at(start), points)) / c
+    for _ in range(20):  # every step gains a factor c/speed
+        rx = at(start + tau)
+        last, tau = tau, (out + _distance(rx, points)) / c
+        if np.abs(tau - last).max() <= 4e-16 * tau.max():
+            break
+    speed = from_tx(track.times, 1)[:, None]
+    return tau, _slope(track.positions[:, None] - points, speed, rx - points, at(start + tau, 1))
+
+
+def _slope(to_tx: np.ndarray, tx_velocity: np.ndarray, to_rx: np.ndarray, rx_velocity: np.ndarray) -> np.ndarray:
+    """tau' = (u_t.V_t + u_r.V_r)/(c - u_r.V_r), from vectors from points to antennas (..., 3)."""
+    closing = []
+    for d, v in ((to_tx, tx_velocity), (to_rx, rx_velocity)):
+        length = np.linalg.norm(d, axis=-1)
+        if not length.all():
+            raise ValueError("an antenna stands on the point, where its range has no rate of change; move one of them")
+        closing.append((d * v).sum(axis=-1) / length)
+    return np.asarray((closing[0] + closing[1]) / (constants.SPEED_OF_LIGHT - closing[1]))
+
+
+def _distance(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(np.linalg.norm(a - b, axis=-1))

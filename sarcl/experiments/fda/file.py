@@ -1,0 +1,83 @@
+"""Experiment files of `sarcl fda`: what all cases share, what differs from case to case, and what is swept."""
+
+from __future__ import annotations
+
+import tomllib
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ...base import text, validation
+from ._sweep import KEYS as SWEPT
+from ._sweep import cases
+from .case import Case
+
+KEYS = tuple(n for n in Case.__dataclass_fields__ if n not in ("name", "series", "swept"))
+ANGLES = ("squint", "steer")
+TABLES = ["fda", "case", "sweep"]
+
+
+def load(path: Any) -> tuple[str, list[Case]]:
+    """Title and cases of a TOML file: [fda] holds `title` and what all cases share, every [[case]] the rest.
+
+    Without a [[case]] the shared table is the only one. [sweep] makes each into as many as its lists have combinations
+    (`sarcl.fda.sweep`). squint_deg and steer_deg are degrees. ValueError names file and key of what does not fit.
+    """
+    path = Path(path)
+    try:
+        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
+    except FileNotFoundError:
+        raise FileNotFoundError(f"experiment {str(path)!r} does not exist; check its name and folder") from None
+    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
+        raise ValueError(f"{path}: {exc}; this is not valid TOML") from None
+    for name in tables:
+        if name not in TABLES:
+            raise ValueError(f"{path}: {text.unknown(name, TABLES, 'table')}")
+    for name in ("fda", "sweep"):
+        if not isinstance(tables.get(name, {}), dict):
+            raise ValueError(f"{path}: {name} is {tables[name]!r:.60}; it is a table, written [{name}]")
+    shared = dict(tables.get("fda", {}))
+    title = shared.pop("title", "Frequency-diverse apertures")
+    given = tables.get("case", [{}])
+    if not isinstance(given, list) or not all(isinstance(table, dict) for table in given):
+        raise ValueError(f"{path}: cases are written [[case]], one table each")
+    out: list[Case] = []
+    for i, table in enumerate(given):
+        where = f"{path}: case {i + 1}"
+        fields = {"name": f"case {i + 1}", **_plain({**shared, **table}, (*KEYS, "name"), where)}
+        try:
+            if "sweep" in tables:
+                where = f"{path}: [sweep] of case {i + 1}"
+                out += cases(fields, _plain(tables["sweep"], SWEPT, where))
+            else:
+                out.append(Case(**fields))
+        except (TypeError, ValueError) as exc:
+            raise ValueError(str(exc) if str(exc).startswith(where) else f"{where}: {exc}") from exc
+    return str(title), out
+
+
+def _plain(table: dict[str, Any], known: tuple[str, ...], where: str) -> dict[str, Any]:
+    """Keys and values as Case has them: tuples for lists, radians for degrees."""
+    degrees = {f"{name}_deg": name for name in ANGLES}
+    out: dict[str, Any] = {}
+    for key, value in table.items():
+        if key not in (*known, *degrees):
+            raise ValueError(f"{where}: {text.unknown(key, [*known, *degrees], 'key')}")
+        name = degrees.get(key, key)
+        if name in out:
+            raise ValueError(f"{where}: {name} is given twice, in radians and in degrees; leave one out")
+        out[name] = _tuples(value) if name == key else _radians(key, value, where)
+    return out
+
+
+def _tuples(value: Any) -> Any:
+    return tuple(_tuples(v) for v in value) if isinstance(value, list) else value
+
+
+def _radians(key: str, value: Any, where: str) -> Any:
+    try:
+        found = [float(np.deg2rad(validation.number(key, v))) for v in (value if isinstance(value, list) else [value])]
+    except ValueError as exc:
+        raise ValueError(f"{where}: {exc}") from None
+    return tuple(found) if isinstance(value, list) else found[0]

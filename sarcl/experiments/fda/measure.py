@@ -1,0 +1,245 @@
+"""Experiments on frequency-diverse apertures: what a mapping does to a point, to its neighbours, and to the data.
+
+Every case is collected once, mapped in every way asked for, and set beside a conventional antenna with the same phase
+centres, band and track. What is flown: case.py; what is measured: docs/fda.md.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...arrays.map_aperture import map_aperture
+from ...base.constants import SPEED_OF_LIGHT
+from ...model.phase_history import PhaseHistory
+from ._sweep import sweep
+from .case import RAW, REACH, Case
+
+__all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "run", "sweep", "told_apart"]
+
+CONVENTIONAL = "conventional"
+STEPS = 24  # places in a null width of the conventional aperture
+DRAWN = 2000  # spatial frequencies
+RESOLVED = 3.0  # dB between two points that are told apart
+ALIKE = 0.2  # dB by which dips may differ that say the same
+NEAR = 0.25  # of a null width: how far their peaks may stand from them
+
+
+def run(
+    cases: Sequence[Case], *, device: Any = None, progress: Callable[[str, int, int], None] | None = None
+) -> list[dict[str, Any]]:
+    """What was measured of each case: plain numbers, ready for JSON."""
+    out = []
+    for i, case in enumerate(cases):
+        if progress:
+            progress("fda", i, len(cases))
+        out.append(measure(case, device))
+    if progress:
+        progress("fda", len(cases), len(cases))
+    return out
+
+
+def measure(case: Case, device: Any = None) -> dict[str, Any]:
+    """Responses at every place, dips at every separation and the data's support, of every mapping that applies.
+
+    "not_applicable" holds the others, with the reason. "collected" is the support of the channels themselves.
+    """
+    rows: dict[str, dict[str, Any]] = {}
+    refused: dict[str, str] = {}
+    for y in case.points:
+        for name, raw in _mapped(case, [y], refused, device):
+            at, values = cut(raw, case, y, device)
+            row = rows.setdefault(name, {"points": [], "dips": []})
+            row["points"].append({"place": y, **response(at, values, y)})
+            if len(row["points"]) == 1:
+                row |= _described(raw, case)
+    for separation in case.separations:
+        for name, raw in _mapped(case, [-separation / 2, separation / 2], refused, device):
+            at, values = cut(raw, case, 0.0, device)
+            rows[name]["dips"].append({"separation": separation, **pair(at, values, separation)})
+    for row in rows.values():
+        row["told_apart"] = told_apart(row["dips"], case.null)
+    setting = {name: getattr(case, name) for name in Case.__dataclass_fields__}
+    derived = {"bandwidth": case.bandwidth, "middle": case.middle, "spacing": case.step, "null": case.null}
+    more = {"swept": dict(case.swept), "is_wide": case.is_wide, "not_applicable": refused, "collected": collected(case)}
+    return {**setting, **derived, **more, "mapped": rows}
+
+
+def _mapped(
+    case: Case, places: Sequence[float], refused: dict[str, str], device: Any
+) -> Iterator[tuple[str, PhaseHistory]]:
+    """The conventional data and those of every mapping that applies; `refused` gains the others, with the reason."""
+    yield CONVENTIONAL, case.conventional(places, device)
+    raw = case.collect(places, device)
+    for name in case.mappings:
+        if name in refused:
+            continue
+        try:
+            mapped = _map(case, raw, name)
+        except ValueError as exc:
+            refused[name] = str(exc)
+        else:
+            yield name, mapped
+
+
+def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
+    if raw.tx_channel is not None and name in (RAW, "channels"):
+        if name == RAW:
+            raise ValueError("every row holds its own channel's place and carrier as it is: that is 'channels'")
+        return raw
+    return raw if name == RAW else map_aperture(raw, name, attitude=case.track().attitude)
+
+
+def cut(raw: PhaseHistory, case: Case, y: float, device: Any = None) -> tuple[np.ndarray, np.ndarray]:
+    """Image along cross-range about (0, y, 0): places, m (n,), and amplitudes (n,), 1 for a focused unit point."""
+    from ...imaging.backproject import backproject
+    from ...model.image_grid import ImageGrid
+
+    step = case.null / STEPS
+    at = y + step * np.arange(-int(REACH * STEPS), int(REACH * STEPS) + 1)
+    grid = ImageGrid.points(np.stack([0 * at, at, 0 * at], axis=1))
+    image = backproject(raw, grid, tolerance=1e-3, check=False, device=device)
+    return at, np.abs(np.asarray(image.data)) / image.gain
+
+
+def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:
+    """Of one point: error of the peak's place and its level, null and half-power widths, m, PSLR and ISLR, dB.
+
+    "inside" is False where the highest value is the cut's first or last: what was measured is then no peak.
+    """
+    from scipy.interpolate import CubicSpline
+
+    fine = np.linspace(at[0], at[-1], 8 * len(at))
+    power = np.maximum(CubicSpline(at, values**2)(fine), 1e-12 * values.max() ** 2)
+    peak = left = right = int(power.argmax())
+    while left > 0 and power[left - 1] < power[left]:
+        left -= 1
+    while right < len(power) - 1 and power[right + 1] < power[right]:
+        right += 1
+    half = np.flatnonzero(power[left : right + 1] >= power[peak] / 2) + left
+    sides = np.concatenate([power[:left], power[right + 1 :]])
+    return {
+        "error": _vertex(fine, power, peak) - place,
+        "level_db": float(10 * np.log10(power[peak])),
+        "null": (_vertex(fine, power, right) - _vertex(fine, power, left)) / 2,
+        "irw": _crossing(fine, power, half[-1], 1) - _crossing(fine, power, half[0], -1),
+        "pslr_db": float(10 * np.log10(sides.max(initial=1e-12 * power[peak]) / power[peak])),
+        "islr_db": float(10 * np.log10(max(sides.sum(), 1e-12 * power[peak]) / power[left : right + 1].sum())),
+        "inside": bool(0 < peak < len(power) - 1),
+    }
+
+
+def _vertex(x: np.ndarray, y: np.ndarray, i: int) -> float:
+    """Where the parabola through an extreme sample and its neighbours has its own."""
+    if not 0 < i < len(y) - 1:
+        return float(x[i])
+    bend, slope = y[i - 1] - 2 * y[i] + y[i + 1], (y[i - 1] - y[i + 1]) / 2
+    return float(x[i] + np.clip(slope / bend if bend else 0.0, -0.5, 0.5) * (x[1] - x[0]))
+
+
+def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
+    """Where power falls through half its peak, next to sample i."""
+    if not 0 <= i + side < len(power):
+        return float(x[i])
+    share = (power[i] - power.max() / 2) / max(power[i] - power[i + side], 1e-300)
+    return float(x[i] + np.clip(share, 0, 1) * (x[i + side] - x[i]))
+
+
+def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
+    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is but one peak."""
+    return pair(at, values, separation)["dip_db"]
+
+
+def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, float]:
+    """Of two points about 0: the `dip`, dB; shift, how far the worse of their peaks stands from its point, m; false_db,
+    the highest other peak over the lower of the two, dB. Zeros where there is but one peak."""
+    found = []
+    for side in (-1, 1):
+        near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
+        peak = int(near[values[near].argmax()])
+        if peak in (near[0], near[-1]):  # it only rises towards the middle, or goes on rising outwards
+            return {"dip_db": 0.0, "shift": 0.0, "false_db": 0.0}
+        found.append(peak)
+    lower, between = float(values[found].min()), float(values[found[0] : found[1] + 1].min())
+    peaks = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])) + 1
+    others = values[np.setdiff1d(peaks, found)].max(initial=1e-6 * lower)
+    return {
+        "dip_db": float(20 * np.log10(lower / max(between, 1e-6 * lower))),
+        "shift": max(abs(_vertex(at, values, i) - s * separation / 2) for i, s in zip(found, (-1, 1), strict=True)),
+        "false_db": float(20 * np.log10(others / lower)),
+    }
+
+
+def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = RESOLVED) -> float | None:
+    """The smallest separation, m, from which on two points are told apart; None: not even at the largest.
+
+    That is a dip of `least` dB, peaks within a quarter of the null width, m, of the points, no other within 3 dB.
+    """
+    out = None
+    for row in sorted(dips, key=lambda d: -d["separation"]):
+        if row["dip_db"] < least or row["shift"] > NEAR * null or row["false_db"] > -RESOLVED:
+            break
+        out = row["separation"]
+    return out
+
+
+def nearer(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> int | None:
+    """1 where `row` tells two points apart nearer together than `plain` does, -1 only farther apart or not at all, 0 at
+    the same separation (dips that differ by less than 0.2 dB are one), None where neither does."""
+    mine, other = (_no_less(row["told_apart"]), _no_less(plain["told_apart"]))
+    if mine == other:
+        return None if mine == np.inf else 0
+    late, early = (row, plain) if mine > other else (plain, row)
+    if _no_less(told_apart(late["dips"], null, RESOLVED - ALIKE)) <= _no_less(early["told_apart"]):
+        return 0
+    return 1 if mine < other else -1
+
+
+def _no_less(separation: float | None) -> float:
+    return np.inf if separation is None else separation
+
+
+def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:
+    """Lengths of the phase centres backprojected from, and the spatial frequencies that they claim, turns/m."""
+    centers = (raw.tx + raw.rx) / 2
+    if case.path == "line":
+        along = centers @ case.ahead
+    else:
+        along = case.ground * np.arctan2(centers[:, 1], -centers[:, 0])
+    return {
+        "length": float(np.ptp(along)),
+        "gap": float(np.diff(np.unique(np.round(along, 6))).max(initial=0.0)),
+        **_support(spatial_frequencies(raw)),
+    }
+
+
+def _support(found: np.ndarray) -> dict[str, Any]:
+    some = np.random.default_rng(0).permutation(found)[:DRAWN]
+    return {"claimed": float(np.ptp(found[:, 1])), "support": some.round(4).tolist()}
+
+
+def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
+    """K = f/c (u_T + u_R) at the origin, of up to `most` samples of every row, turns/m (n, 2): along x and y."""
+    some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
+    f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
+    look = _unit(raw.tx) + _unit(raw.rx)
+    return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
+
+
+def collected(case: Case, most: int = 101) -> dict[str, Any]:
+    """Spread across, turns/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
+    pulses."""
+    array, track = case.channels(), case.track()
+    pulses = np.unique(np.linspace(0, case.n_pulses - 1, most).astype(int))
+    turn = np.eye(3)[None] if track.attitude is None else track.attitude[pulses]
+    tx = track.positions[pulses, None] + np.einsum("pij,nj->pni", turn, array.positions)
+    f = case.center + np.stack([array.offsets_at(int(p)) for p in pulses])
+    ends = {"reference": track.positions[pulses, None, None], "own": tx[:, :, None], "all": tx[:, None]}
+    look = _unit(tx)[:, :, None] + _unit(ends[case.receive])
+    return _support((f[:, :, None, None] / SPEED_OF_LIGHT * look[..., :2]).reshape(-1, 2))
+
+
+def _unit(v: np.ndarray) -> np.ndarray:
+    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

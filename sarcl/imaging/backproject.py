@@ -1,0 +1,279 @@
+"""backproject: echoes to an image, to a stated tolerance."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from contextlib import ExitStack, closing
+from typing import Any, overload
+
+import numpy as np
+
+from ..arrays.map_aperture import map_aperture
+from ..base.errors import ToleranceMissed
+from ..base.report import Report
+from ..base.stage_timer import Clock
+from ..base.validation import choice, count, instance
+from ..base.validation import tolerance as allowed_error
+from ..model.image import Image
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..opencl.device import budget, open_devices
+from .choose_method import METHODS, Choice, choose
+from .focusing_task import Task, by_reason, make_task
+from .run.checkpoint import Keeper
+from .run.image_output import Strip, Target, is_path
+from .run.tile_files import gaps, share
+from .run.workers import BLOCKS_EACH, Crew, Local
+from .tiling import Run, extent
+from .tiling import count as pixels_in
+
+log = logging.getLogger(__name__)
+
+MOST_FILES = 64  # blocks an image whose finished tiles are kept
+EDGE = 1e-5  # of a window or beam: pixels nearer may fall to either side, and no error is measured there
+Progress = Callable[[str, int, int], None]
+
+
+@overload
+def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: None = None, **options: Any) -> Image: ...
+
+
+@overload
+def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: Any, **options: Any) -> Image | None: ...
+
+
+def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result apart, not the options
+    raw: PhaseHistory,
+    grid: ImageGrid,
+    *,
+    tolerance: float = 1e-3,
+    method: str = "auto",
+    window: Any = None,
+    weights: Any = None,
+    beam: Any = None,
+    mapping: Any = None,
+    wrap: bool = False,
+    skip: Any = True,
+    max_bytes: float | None = None,
+    out: Any = None,
+    resume: bool | None = None,
+    tile: Any = None,
+    check: bool | None = None,
+    device: Any = None,
+    cluster: Any = None,
+    progress: Progress | None = None,
+) -> Image | None:
+    """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
+
+    raw        PhaseHistory, compressed
+    grid       ImageGrid, a plane or any points
+    tolerance  L2 error allowed, relative to the larger of |I| and the norm of randomly phased contributions
+    method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
+    window     None, "hamming" or ("taylor", sidelobe_db, nbar): over samples and over rows
+    weights    one a row (n_rows,), on top of window and raw.weight
+    beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
+               grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
+    mapping    of a frequency-diverse array's echoes: what `sarcl.map_aperture` takes, "corrected", "apparent" or
+               "channels", or a dict of its arguments, such as {"mapping": "apparent", "center": (0, 0, 5)}
+    wrap       False: a row reaches only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats beyond
+    skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data") to leave pairs out
+               unseen instead of finding that they add nothing; the image is the same
+    max_bytes  memory for blocks on each device, default 1 GiB on CPUs, half the memory of a GPU
+    out        None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"
+    resume     finished tiles of an image at a path wait in "PATH.parts", where the same call finds them after a
+               kill. None: from the first second on; True: whatever ends the run; False: none, and those there
+               are thrown away
+    tile       (i, n): make piece i of n alone, 1 <= i <= n, and keep its tiles in "PATH.parts"; the piece that
+               completes the image puts it together and returns it, the others return None
+    check      recompute 256 random pixels exactly; None: where that costs less than 2 %
+    device     see `sarcl.devices`; a list of such, or "all", for several at once
+    cluster    a dask.distributed.Client whose workers make the tiles, each on a device of its own
+    progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
+
+    Returns an Image. ValueError: a tolerance that cannot be met (with the best that can), data not compressed,
+    arguments that do not fit, tiles of another job in "PATH.parts"; ToleranceMissed, a ValueError that holds the
+    finished image: the check measured more than the tolerance; MemoryError: max_bytes too small for a single row.
+    Source: Farooq 2009, section 2.2.2; docs/accuracy.md and docs/large.md.
+    """
+    clock = Clock()
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
+    if mapping is not None:
+        raw = map_aperture(raw, **(mapping if isinstance(mapping, dict) else {"mapping": mapping}))
+    choice("method", method, METHODS)
+    tolerance = allowed_error(tolerance)
+    piece = _piece(tile, resume, out)
+    task = make_task(raw, grid, window, weights, wrap, skip, beam)
+    crew, chosen = _crew(task, method, tolerance, device, cluster, max_bytes)
+    clock.lap("plan")
+
+    with ExitStack() as stack:
+        keeper = None
+        if is_path(out):
+            keeper = Keeper(out, task, chosen, tolerance, True if piece else resume)
+            stack.push(keeper)
+        if piece and keeper:
+            finished = keeper.finished()
+            if finished is not None:
+                return finished
+            _fill(crew, task, chosen, None, keeper, share(chosen.tiling.n_bands, *piece, chosen.unit), clock, progress)
+            if not keeper.complete():
+                return None
+        try:
+            target = Target(grid, out, stack, chosen.dtype)
+        except FileExistsError:
+            if piece:  # the others' tiles and these are being put together by another run
+                return None
+            raise
+        bands = 0, chosen.tiling.n_bands
+        skipped, kept = _fill(crew, task, chosen, target, keeper, bands, clock, progress)
+        if grid.empty is not None and not target.grid.is_plane:
+            target.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
+        target.finish()
+        outside, unlit = by_reason(skipped)
+        no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
+        done = task.pairs - outside - unlit - no_data
+        if done == 0:
+            where, remedy = ("range window", "") if unlit == 0 else ("range window and beam", " and the beam")
+            text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
+            log.warning(text, where, remedy)
+        measured = None
+        exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
+        if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
+            measured = _measure_error(task, grid, target.data)
+            clock.lap("check")
+        plan = chosen.plan.describe(chosen.method)
+        if kept:
+            plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
+        report = Report(
+            plan=plan,
+            tolerance=tolerance,
+            predicted_error=chosen.predicted_error,
+            measured_error=measured,
+            contributions_done=done,
+            contributions_skipped={
+                "range window": outside,
+                "beam": unlit,
+                "zero weight": (raw.n_rows - task.raw.n_rows) * grid.size,
+                "no data": no_data,
+            },
+            seconds=clock.seconds,
+            device=" + ".join(crew.names),
+        )
+        middle = task.raw.n_rows // 2
+        image = target.image(
+            job=keeper.mark if keeper and keeper.pieces else None,
+            gain=float(task.row_weight.sum() * task.sample_weight.sum()),
+            frequency=float(np.median(task.antennas.frequency)),
+            tx=task.raw.tx[middle],
+            rx=task.raw.rx[middle],
+            report=report,
+        )
+        if keeper:
+            keeper.done()
+        if measured is not None and measured > tolerance:
+            raise ToleranceMissed(tolerance, measured, image)
+        return image
+
+
+def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
+    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for what does not go together."""
+    if resume is not None:
+        instance("resume", resume, bool)
+    if (tile is not None or resume) and not is_path(out):
+        name = "tile" if tile is not None else "resume"
+        raise ValueError(f'{name} is {tile or resume!r} but out is no path; give out="image.h5": tiles wait beside it')
+    if tile is None:
+        return None
+    if resume is False:
+        raise ValueError("tile and resume=False do not go together: a piece would throw away the other pieces' tiles")
+    if np.shape(tile) != (2,):
+        raise ValueError(f"tile is {tile!r}; wanted (i, n): piece i of n")
+    i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
+    if i > n:
+        raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
+    return i, n
+
+
+def _crew(
+    task: Task, method: str, tolerance: float, device: Any, cluster: Any, max_bytes: float | None
+) -> tuple[Crew, Choice]:
+    """Who makes the image, and how: one plan for all of them."""
+    if cluster is not None:
+        from .run.dask_workers import Cluster, have_lanes
+
+        chosen = choose(task, method, tolerance, have_lanes(cluster, device))
+        return Cluster(cluster, task, chosen, device, max_bytes), chosen
+    devices = open_devices(device)
+    budgets = [min(budget(d, max_bytes), d.info.memory) for d in devices]
+    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
+    chosen = choose(task, method, tolerance, lanes, float64)
+    engines = [chosen.on(d, task) for d in devices]
+    return Local(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
+
+
+def _fill(
+    crew: Crew,
+    task: Task,
+    chosen: Choice,
+    target: Target | None,
+    keeper: Keeper | None,
+    bands: Run,
+    clock: Clock,
+    progress: Progress | None,
+) -> tuple[int, int]:
+    """Some bands, into `target` or only into files: (pairs skipped, bands that were in files)."""
+    tiling, n_rows = chosen.tiling, task.raw.n_rows
+    there, skipped = [], 0
+    for run, values, missed in keeper.found(*bands) if keeper else ():
+        if target is not None:
+            target.flat[extent(tiling, *run)] = values
+        there.append(run)
+        skipped += missed
+    todo = gaps(there, *bands)
+    total = n_rows * sum(pixels_in(tiling, *run) for run in todo)
+    said = -1
+
+    def tick(done: int) -> None:
+        nonlocal said
+        if progress and done != said:
+            progress("backproject", done, total)
+            said = done
+
+    def flat_for(first: int, last: int) -> Any:
+        return Strip(tiling, first, last, chosen.dtype) if target is None else target.flat
+
+    pixels = total / max(n_rows, 1)
+    most = pixels / (BLOCKS_EACH * crew.size) if crew.size > 1 else pixels
+    if keeper and keeper.resume is not False:
+        most = min(most, max(pixels / MOST_FILES, crew.least_pixels))
+    clock.lap("files")
+    made = []
+    with closing(crew.work(crew.blocks(todo, most, chosen.unit), flat_for, clock, tick)) as work:
+        for first, last, flat, missed in work:
+            made.append((first, last))
+            skipped += missed
+            if keeper:
+                keeper.keep(first, last, flat, missed)
+                clock.lap("files")
+    if gaps(there + made, *bands):
+        raise RuntimeError(f"bands {gaps(there + made, *bands)} were left out; please report this")
+    return skipped, sum(b - a for a, b in there)
+
+
+def _measure_error(task: Task, grid: ImageGrid, data: Any) -> float:
+    """Relative error at up to 256 random pixels against the exact float64 sum, as the contract defines it."""
+    from ..reference.backproject import backproject as exact
+
+    index, positions = grid.sample(256, seed=0)
+    beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
+    wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE)
+    got = (
+        np.asarray(data)[index]
+        if isinstance(data, np.ndarray)
+        else np.array([data[i] for i in zip(*index, strict=True)])
+    )
+    clear = np.isfinite(wanted)
+    wrong, scale = float(np.linalg.norm((got - wanted)[clear])), max(float(np.linalg.norm(wanted[clear])), spread)
+    return wrong / scale if wrong else 0.0

@@ -1,0 +1,137 @@
+"""A grid for data that come without one: where they were aimed, as fine and as wide as they tell."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.image_grid import ImageGrid
+
+if TYPE_CHECKING:
+    from ..model.phase_history import PhaseHistory
+
+MOST = 1024  # pixels along a side
+ROWS = 4096  # rows looked at; more say nothing new about the geometry
+WELL_POSED = 0.02  # smallest over largest singular value that fixes all three coordinates, and
+FIXED = 0.001  # that fixes a direction on the ground; others stay as they are
+
+
+@dataclass(frozen=True, eq=False)
+class DefaultGrid:
+    """A plane, and in words why it is this one."""
+
+    grid: ImageGrid
+    why: str
+
+
+def default_grid(
+    raw: PhaseHistory,
+    *,
+    center: Any = None,
+    shape: Any = None,
+    spacing: Any = None,
+    normal: Any = None,
+    x_axis: Any = None,
+) -> DefaultGrid:
+    """A plane (level by default) for phase history, from the data where its owner leaves it open.
+
+    center   the point whose range equals reference_range in every row: the origin where it does to within a
+             resolution cell; else by least squares, on z = 0 unless the antennas' directions fix z too;
+             else the origin
+    spacing  half the resolution along rows and columns, from the frequencies and directions the data hold
+    shape    what the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
+    normal, x_axis   as in `ImageGrid.plane`
+    """
+    part = raw if raw.n_rows <= ROWS else raw[np.linspace(0, raw.n_rows - 1, ROWS).astype(int)]
+    why = []
+    if center is None:
+        center, words = _center(part)
+        why.append(words)
+    axes: dict[str, Any] = {
+        "center": center,
+        "x_axis": x_axis,
+        "normal": (0, 0, 1) if normal is None else normal,
+    }
+    cell, swath = _resolution(part, ImageGrid.plane(shape=1, spacing=1, **axes), raw.n_rows)
+    if spacing is None:
+        spacing = tuple(float(f"{d:.4g}") for d in cell / 2)
+        why.append(f"pixels half the resolution of {cell[0]:.3g} x {cell[1]:.3g} m")
+    if shape is None:
+        wanted = [max(1, 2 * round(swath / (2 * d))) for d in np.broadcast_to(spacing, 2)]
+        shape = [min(n, MOST) for n in wanted]
+        limit = "" if shape == wanted else f"{MOST} pixels at most of "
+        why.append(f"{limit}the {swath:.4g} m that are unambiguous")
+    return DefaultGrid(ImageGrid.plane(shape=shape, spacing=spacing, **axes), "; ".join(why))
+
+
+def _excess(raw: PhaseHistory, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Range of x less the reference, m (n_rows,), and its gradient (n_rows, 3)."""
+    to_tx, to_rx = x - raw.tx, x - raw.rx
+    r_tx, r_rx = (np.maximum(np.linalg.norm(d, axis=1), 1e-9) for d in (to_tx, to_rx))
+    return (r_tx + r_rx) / 2 - raw.reference_range, (to_tx / r_tx[:, None] + to_rx / r_rx[:, None]) / 2
+
+
+def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
+    origin = np.zeros(3)
+    near = SPEED_OF_LIGHT / (2 * float(raw.bandwidth.max()))
+
+    def spread(x: np.ndarray) -> float:
+        return float(np.sqrt(np.mean(_excess(raw, x)[0] ** 2)))
+
+    if spread(origin) <= near:
+        return origin, "centre: the origin, where all reference ranges meet"
+    for free, words in ((3, "where the reference ranges meet"), (2, "where the reference ranges meet z = 0")):
+        x = _meet(raw, free)
+        if x is not None and spread(x) <= float(raw.swath.min()) / 4:
+            return np.round(x, 3), f"centre: {words}, to {spread(x):.2g} m"
+    return (
+        origin,
+        "centre: the origin, because the reference ranges meet in no point (--center names another)",
+    )
+
+
+def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:
+    """Least-squares point of equal ranges, its first `free` coordinates free, the rest 0.
+
+    None where antennas too much alike leave one of three coordinates open, or the search does not settle.
+    """
+    x = np.zeros(3)
+    for _ in range(50):
+        excess, gradient = _excess(raw, x)
+        u, s, vt = np.linalg.svd(gradient[:, :free], full_matrices=False)
+        if free == 3 and (len(s) < 3 or s[-1] < WELL_POSED * s[0]):
+            return None
+        fixed = s > FIXED * s[0]
+        step = -vt.T[:, fixed] @ ((u.T @ excess)[fixed] / s[fixed])
+        # no further at once than the antennas are away: farther, the gradients have nothing to say
+        reach = float(raw.reference_range.max()) / 2
+        length = float(np.linalg.norm(step))
+        x[:free] += step * min(1.0, reach / max(length, 1e-300))
+        if length < 1e-6 * max(1.0, reach * 1e-6):
+            return x
+    return None
+
+
+def _resolution(raw: PhaseHistory, plane: ImageGrid, n_rows: int) -> tuple[np.ndarray, float]:
+    """Resolution along rows and columns (y_axis, x_axis), m, and the extent, m, over which nothing repeats.
+
+    The data hold the spatial frequencies k = 2 f/c times the gradient of range; their extent along an axis
+    is 0.886 over the resolution.
+    """
+    assert plane.center is not None and plane.x_axis is not None and plane.y_axis is not None
+    direction = -_excess(raw, plane.center)[1] @ np.stack([plane.y_axis, plane.x_axis], axis=1)
+    low, high = raw.frequency, raw.frequency + raw.bandwidth
+    k = np.concatenate([direction * (2 / SPEED_OF_LIGHT * f)[:, None] for f in (low, high)])
+    extent = np.ptp(k, axis=0)
+    level = max(float(np.median(np.linalg.norm(direction, axis=1))), 0.1)  # cosine of the grazing angle
+    swath = float(raw.swath.min()) / level
+    turn = np.ptp(np.unwrap(np.arctan2(direction[:, 0], direction[:, 1])))
+    if raw.n_rows > 1 and turn > 0:
+        middle = 2 / SPEED_OF_LIGHT * float(np.median((low + high) / 2))
+        swath = min(swath, (n_rows - 1) / (turn * level * middle))
+    # an axis the data do not resolve gets pixels that are not too far from square
+    extent = np.maximum(extent, extent.max() / 8)
+    return 0.886 / np.maximum(extent, 0.886 / swath), swath

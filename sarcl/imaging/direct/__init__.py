@@ -1,0 +1,1 @@
+"""sarcl/imaging/direct"""

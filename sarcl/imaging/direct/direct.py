@@ -1,0 +1,181 @@
+"""Direct backprojection: every (row, pixel) pair that is not skipped."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...base import text
+from ...base.stage_timer import Clock
+from ...numerics import range_profiles
+from ...numerics.plan import Plan, cheapest
+from ...numerics.tiles import Tiles
+from ...opencl.device import Device
+from ..focusing_task import Task, tally
+from ..tiling import GridTiling, place_tiles
+from . import line_plan
+from .line_plan import LinePlan
+from .tile_kernels import CHUNK, pass_of
+
+
+def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, GridTiling]:
+    """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
+
+    lanes  the devices work on vectors of pixels, so that lines of pixels pay; ValueError names the best there is
+    """
+    raw, grid = task.raw, task.grid
+    highest, bandwidth = task.highest, float(raw.bandwidth.max())
+    lined = None
+    if lanes and grid.is_plane:
+        lined = line_plan.choose(
+            tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
+        )
+    if lined is not None and lined.cost < 0.9:  # no other plan costs less
+        return lined, line_plan.LineTiling(grid, lined.side)
+    tilings = {side**2: GridTiling(grid, side) for side in (32, 16, 8)}
+    plan = cheapest(
+        tolerance,
+        [(n, tiling.radius) for n, tiling in tilings.items()],
+        distance=task.antennas.distance(grid.bounds),
+        frequency=highest,
+        bandwidth=bandwidth,
+        n_samples=raw.n_samples,
+        points_per_row=grid.size,
+        chunk=CHUNK,
+        least_tolerance=0.0,
+    )
+    if lined is not None and lined.cost < plan.cost:
+        return lined, line_plan.LineTiling(grid, lined.side)
+    return plan, tilings[plan.per_tile]
+
+
+class Direct:
+    """The loops over row blocks and tiles on one device; see task.Engine."""
+
+    dtype = np.complex64
+
+    def __init__(self, device: Device, task: Task, plan: Plan | LinePlan, tiling: GridTiling) -> None:
+        self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
+        self.lanes = device.info.vector_width
+        bistatic = task.antennas.rx is not None
+        beam = task.antennas.beam is not None
+        self.kernels = pass_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
+        self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
+        # making a row's profile anew for every block costs as much as this many pixels, ten times over
+        self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
+        self.skip = int("range window" in task.skips) + 2 * int("beam" in task.skips)
+        self.sample_weight = task.sample_weight * range_profiles.correction(
+            plan.interpolator, task.raw.n_samples, plan.length
+        )
+
+    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
+        """Runs of bands whose accumulators fit in their share of nbytes; a band that is alone may be larger."""
+        most, tiling = self._tiles_at_once(nbytes) * self.tiling.per_tile, self.tiling
+        if tiling.grid.is_plane:  # all bands are alike
+            step = max(1, most // tiling.pixels(0, 1))
+            return [(a, min(a + step, tiling.n_bands)) for a in range(0, tiling.n_bands, step)]
+        blocks, first = [], 0
+        for band in range(tiling.n_bands):
+            if band > first and tiling.pixels(first, band + 1) > most:
+                blocks.append((first, band))
+                first = band
+        return [*blocks, (first, tiling.n_bands)]
+
+    def _shares(self, nbytes: float) -> tuple[float, float, float]:
+        """Bytes for rows' profiles, pixels and tiles' constants: one, two and one parts of four.
+
+        Rows get more where they need it: half of it at most.
+        """
+        least, chunk = (8.0 * self.stride * n for n in (self.kernels.least_rows, self.kernels.chunk))
+        if least > nbytes / 2:
+            raise MemoryError(
+                f"max_bytes is {text.size_text(nbytes)} but the range profiles of {self.kernels.least_rows} rows, the "
+                f"least that are added up at a time, need {text.size_text(least)}, half of it at most; give "
+                f"max_bytes={2 * least:.2g} or more"
+            )
+        rows = max(nbytes / 4, min(chunk, nbytes / 2))
+        alloc = float(self.device.info.max_alloc)
+        return min(rows, alloc), min((nbytes - rows) * 2 / 3, alloc), min((nbytes - rows) / 3, alloc)
+
+    def _tiles_at_once(self, nbytes: float) -> int:
+        """Tiles whose accumulators, and offsets where each tile has its own, fit in the pixels' share of nbytes."""
+        planes = 16 if self.tiling.grid.is_plane else 16 + 24
+        return max(1, int(self._shares(nbytes)[1] / (planes * self.tiling.per_tile)))
+
+    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        tiling = self.tiling
+        tiles, orders = tiling.bands(first, last)
+        most = self._tiles_at_once(budget)
+        skipped, values = 0, np.empty(0, np.complex64)
+        whole = last - first > 1 or tiles.n_tiles <= most
+        if not tiling.grid.is_plane:
+            values = np.empty(tiling.pixels(first, last), np.complex64)
+        for start in range(0, tiles.n_tiles, most):
+            stop = min(start + most, tiles.n_tiles)
+
+            def rows_done(rows: float, start: int = start, stop: int = stop) -> None:
+                tick((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
+
+            image, missed = self.add_up(_some(tiles, start, stop), budget, clock, rows_done)
+            if whole and tiling.grid.is_plane:
+                rows = tiling.download(self.device, image, first, last, None)
+                flat[first * tiling.high : first * tiling.high + len(rows)] = rows
+            elif len(values):
+                values[start * tiles.per_tile : stop * tiles.per_tile] = self._values(image, stop - start)
+            else:
+                place_tiles(tiling, self._values(image, stop - start), first, start, stop, flat)
+            skipped += tally(missed, tiling.tile_sizes(first, last)[start:stop])
+        if len(values):
+            tiling.place(values, first, last, orders, flat)
+        clock.lap("write")
+        return skipped
+
+    def _values(self, image: Any, n_tiles: int) -> np.ndarray:
+        """Pixels of compensated sums on the device, tile by tile."""
+        sums = self.device.download(image, np.empty((4, n_tiles * self.tiling.per_tile), np.float32))
+        return ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).astype(np.complex64)
+
+    def add_up(
+        self, tiles: Tiles, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> tuple[Any, np.ndarray]:
+        """All rows into these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
+        device, raw, kernels = self.device, self.task.raw, self.kernels
+        for_rows, _, for_constants = self._shares(budget)
+        # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
+        most = min(128 if device.is_cpu else 4096, int(for_rows / (8 * self.stride)))
+        rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
+        image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
+        on = kernels.ready(tiles, self.skip)
+        clock.lap("prepare")
+        for start in range(0, raw.n_rows, rows):
+            stop = min(start + rows, raw.n_rows)
+            weights = self.task.row_weight[start:stop, None] * self.sample_weight
+            made = range_profiles.from_samples(
+                device, raw.read(start, stop), weights, self.plan.interpolator, self.plan.length
+            )
+            block = device.upload(made)
+            packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
+            pulses = device.upload(packed), packed.shape[2], stop - start
+            clock.lap("profiles")
+            at_once = int(for_constants / (4 * kernels.components * packed.shape[2]))
+            step = max(1, min(tiles.n_tiles, at_once))
+            for tile in range(0, tiles.n_tiles, step):
+                end = min(tile + step, tiles.n_tiles)
+                kernels.add(on, tile, end, pulses, block, self.stride, self.stride // 2, 0, image)
+                if end < tiles.n_tiles:  # what one step keeps for its tiles is gone before the next begins
+                    device.finish()
+            device.finish()
+            clock.lap("backproject")
+            tick(stop)
+        return image, on.skipped()
+
+
+def _some(tiles: Tiles, start: int, stop: int) -> Tiles:
+    """Tiles start ... stop - 1."""
+    if (start, stop) == (0, tiles.n_tiles):
+        return tiles
+    offsets = tiles.offsets if tiles.shared else tiles.offsets[:, start * tiles.per_tile : stop * tiles.per_tile]
+    return Tiles(tiles.per_tile, tiles.references[start:stop], tiles.radius[start:stop], offsets, tiles.shared)

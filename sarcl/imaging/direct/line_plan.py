@@ -1,0 +1,238 @@
+"""Direct backprojection onto planes, a line of pixels at a time: the engine of backproject_lines.cl and its plan."""
+
+from __future__ import annotations
+
+import itertools
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...model.image_grid import ImageGrid
+from ...numerics import error_bounds, interpolation
+from ...numerics.interpolation import Interpolator
+from ...numerics.pulse_geometry import Antennas
+from ...numerics.tiles import Tiles
+from ..tiling import GridTiling
+
+LOCAL_BYTES = 60_000  # of local memory a group of pulses may take
+SIDES = (64, 32, 16)
+FINES = (1, 2, 4, 8)
+GROUP_SIZES = (16, 8, 4)
+
+# Relative cost of a contribution, in contributions of the gathering kernel with the hat, measured on PoCL: of a tap of
+# a line; of a sample of a line's profile; of a line's weights; of a (tile, pulse); of a pixel of a group
+TAP, SAMPLE, LINE, PULSE, GROUPS = 0.045, 1.2, 1.0, 30.0, 0.4
+
+
+def components(beam: bool) -> int:
+    """Floats of a (tile, pulse) record: N_LINE of kernels/backproject_lines.cl."""
+    return 32 if beam else 28
+
+
+@dataclass(frozen=True, eq=False)
+class LinePlan:
+    """How lines are computed: tile side, samples a pixel, both interpolators, pulses a group and what they may differ.
+
+    slope       the curvature moves pixels' places too
+    limit_turn  turns, and limit_place samples: a pulse whose curvature differs by more is added pixel by pixel,
+    limit_step  samples a pixel along a line: as is one that sees more
+    cost        of a contribution, relative to one by the hat and float32 ranges
+    """
+
+    side: int
+    fine: int
+    group: int
+    line: Interpolator
+    interpolator: Interpolator
+    length: int
+    order: int
+    slope: bool
+    limit_turn: float
+    limit_place: float
+    limit_step: float
+    predicted_error: float
+    cost: float
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": method,
+            "taps": self.interpolator.taps,
+            "profile samples": self.length,
+            "points a tile": self.side**2,
+            "ranges": f"lines, {self.line.taps} taps, {self.fine} samples a pixel",
+            "series": f"order {self.order}" if self.order else "exact",
+        }
+
+    def macros(self, bistatic: bool, wrap: bool, local: bool = False) -> dict[str, int]:
+        """Build-time macros of kernels/backproject_lines.cl."""
+        return {
+            "BISTATIC": int(bistatic),
+            "WRAP": self.length if wrap else 0,
+            "TAPS": self.interpolator.taps,
+            "TERMS": self.interpolator.table.shape[-1],
+            "ORDER": self.order,
+            "SIDE": self.side,
+            "FINE": self.fine,
+            "FINE_BITS": self.fine.bit_length() - 1,
+            "LINE_TAPS": self.line.taps,
+            "LINE_TERMS": self.line.table.shape[-1],
+            "GROUP": self.group,
+            "SLOPE": int(self.slope),
+            "LOCAL": int(local),
+        }
+
+
+class LineTiling(GridTiling):
+    """Square tiles of a plane about one of their pixels, (side/2, side/2), so that offsets are whole pixels."""
+
+    def __init__(self, grid: ImageGrid, side: int) -> None:
+        super().__init__(grid, side)
+        self.high = self.wide = side
+        rows, columns = grid.shape
+        self.n_bands, self.across = -(-rows // side), -(-columns // side)
+        assert grid.spacing is not None
+        self._radius = side / 2 * float(np.hypot(*grid.spacing))
+
+    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
+        half = self.side // 2
+        columns = np.arange(self.across) * self.side + half
+        references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
+        radius = np.full(self.across, self._radius)
+        return Tiles(self.per_tile, references, radius, np.zeros((6, 0), np.float32), shared=True), None
+
+
+def steps(grid: ImageGrid) -> np.ndarray:
+    """A column's and a row's step, m (2, 3)."""
+    assert grid.spacing is not None and grid.x_axis is not None and grid.y_axis is not None
+    return np.stack([grid.spacing[1] * grid.x_axis, grid.spacing[0] * grid.y_axis])
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """How sampled pulses see sampled tiles: directions along a pixel's steps, m (tiles, n, 2 antennas, 2), and 1/m."""
+
+    along: np.ndarray
+    inverse: np.ndarray
+
+    @classmethod
+    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray | None, axes: np.ndarray) -> Look:
+        ends = np.stack([tx, tx if rx is None else rx], axis=1)
+        d = ends - points[:, None, None, :]
+        inverse = 1 / np.maximum(np.linalg.norm(d, axis=-1), 1e-3)
+        return cls(np.einsum("tnac,kc->tnak", d * inverse[..., None], axes), inverse)
+
+    def largest_step(self) -> float:
+        """Largest half path a pixel adds along either axis, m."""
+        return float(np.abs(self.along.mean(axis=2)).max(initial=0.0))
+
+    def rest(self, side: int, spacing: tuple[float, float]) -> np.ndarray:
+        """rest_ij of kernels/backproject_lines.cl, m (tiles, n, 5 points of a tile's edge, where it is largest)."""
+        mean = self.along.mean(axis=2)
+        turned = np.abs(mean[..., 1]) > np.abs(mean[..., 0])
+        u = np.where(turned[..., None, None], self.along[..., ::-1], self.along)
+        step = np.where(turned, spacing[0], spacing[1])[..., None, None]
+        i, j = side / 2 * np.array([-1, 0, 1, 1, -1]), side / 2 * np.array([1, 1, 1, -1, -1])
+        along, across = u[..., :1] * j, u[..., 1:] * i
+        # |p|^2 - (u.p)^2 at (i, j), less that at (i, 0)
+        bend = (step * j) ** 2 - (along + across) ** 2 + across**2
+        return (bend * (self.inverse / 2)[..., None]).mean(axis=2)
+
+
+def moved(rest: np.ndarray) -> float:
+    """Largest part of `rest`, m (..., 5), that is not in a line's place, which is moved by half its ends' mean."""
+    ends = np.stack([rest[..., [0, 1, 2]], rest[..., [4, 1, 3]]])
+    middle = ends.mean(axis=0) / 2
+    return float(max(np.abs(ends - middle).max(), np.abs(middle).max()))
+
+
+def sampled_groups(n_rows: int, group: int, most: int = 24) -> np.ndarray:
+    """First rows of up to `most` groups spread over all rows."""
+    starts = np.arange(0, max(n_rows - group, 0) + 1, group)
+    return starts[np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).astype(int))]
+
+
+def outline(grid: ImageGrid) -> np.ndarray:
+    """Centre, corners and middles of the edges of a plane, m (9, 3)."""
+    rows, columns = grid.shape
+    i, j = np.meshgrid([0, rows // 2, rows - 1], [0, columns // 2, columns - 1], indexing="ij")
+    return grid.at(i.ravel(), j.ravel())
+
+
+def choose(
+    tolerance: float,
+    grid: ImageGrid,
+    antennas: Antennas,
+    *,
+    n_samples: int,
+    bandwidth: float,
+    highest: float,
+    source: tuple[Interpolator, int] | None = None,
+    sides: tuple[int, ...] = SIDES,
+) -> LinePlan | None:
+    """The cheapest way by lines whose predicted error is at most `tolerance`, or None.
+
+    highest  frequency, Hz; sides: of tiles, to choose from
+    source   interpolator and profile length where profiles are already made
+    """
+    assert grid.spacing is not None
+    distance = antennas.distance(grid.bounds)
+    spacing, n_rows = grid.spacing, len(antennas.tx)
+    best: LinePlan | None = None
+    for side, group in ((s, g) for s in sides for g in GROUP_SIZES if s * g <= 512):
+        radius = side / 2 * float(np.hypot(*spacing))
+        if 4 * radius > distance or (side > sides[-1] and min(grid.shape) <= side / 2):
+            continue
+        starts = sampled_groups(n_rows, group)
+        rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
+        rx = None if antennas.rx is None else antennas.rx[rows]
+        points = outline(grid)
+        look = Look.at(points, antennas.tx[rows], rx, steps(grid))
+        rest = look.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
+        kappa = 2 * highest / SPEED_OF_LIGHT
+        turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
+        off = 1.1 * moved(rest)
+        order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
+        fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.place_rounding(
+            radius, bandwidth, False
+        )
+        fixed += error_bounds.series_error(radius, distance, highest, order)
+        fixed += error_bounds.curvature_rounding(radius, distance, highest)
+        if fixed > 0.7 * tolerance:
+            continue
+        fixed += 2 * np.pi * turn + error_bounds.sum_rounding(group, n_samples)
+        misplaced = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
+        cells = look.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells a pixel
+        for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
+            size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
+            if cells * 1.2 >= fine or size > LOCAL_BYTES:
+                continue
+            line = interpolation.line_interpolator(taps, fine / cells)
+            # the slope's own weights err too, by a few times what the weights do
+            error = fixed + line.error + (misplaced**2 / 2 + 8 * misplaced * line.error if slope else misplaced)
+            if error > 0.9 * tolerance:
+                continue
+            vectors = fine * (1.3 * side + 8)
+            per_pair = (
+                taps * TAP * (1.8 if slope else 1) + (SAMPLE * vectors + LINE * side + PULSE) / side**2 + GROUPS / group
+            )
+            if source is None:
+                reads = grid.size * SAMPLE * vectors / side**2
+                try:
+                    made, length, cost = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
+                except ValueError:
+                    continue
+                per_pair += (cost - interpolation.TAP_COST[2]) * reads / grid.size
+            else:
+                made, length = source
+                if made.error > tolerance - error:
+                    continue
+            if best is None or per_pair < best.cost:
+                sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
+                best = LinePlan(
+                    side, fine, group, line, made, length, order, slope, turn, max(off * sigma, 1e-6),
+                    cells * length / n_samples * (1 + 1e-5), error + made.error, per_pair,
+                )  # fmt: skip
+    return best

@@ -1,0 +1,137 @@
+"""What a block of pulses adds to tiles of pixels: the two kernels of backprojection, and what each keeps on the device.
+
+Both serve the direct method, where pulses bring their own range profiles, and the factorised one (`local`), where every
+tile has profiles of its own, about its reference point.
+"""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...base import float_pairs
+from ...numerics.plan import Plan
+from ...numerics.tiles import Tiles
+from ...opencl.device import Device
+from ..tiling import GridTiling
+from . import line_plan
+from .line_plan import LinePlan, LineTiling, steps
+
+CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
+VECTORS = 4  # vectors of pixels a work-item of the gathering kernel
+
+# pulses on the device: the packed array, its padded length, and how many are real
+Pulses = tuple[Any, int, int]
+
+
+class GatherPass:
+    """Any tiles, each pixel by interpolation of its own: kernels/backproject.cl."""
+
+    chunk, least_rows = CHUNK, 1
+
+    def __init__(
+        self, device: Device, plan: Plan, tiling: GridTiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool
+    ) -> None:
+        self.device, self.beam = device, beam
+        self.lanes = device.info.vector_width
+        macros = {**plan.macros(bistatic, wrap), "LOCAL": int(local), "VECTORS": VECTORS, "CHUNK": CHUNK}
+        macros["BEAM"] = int(beam)
+        self.components = plan.components(bistatic, beam)
+        self.constants = device.kernel("backproject.cl", "tile_constants", **macros)
+        self.kernel = device.kernel("backproject.cl", "backproject", **macros)
+        self.group = device.max_group(self.kernel)
+        self.table = device.upload(plan.interpolator.table)
+
+    def ready(self, tiles: Tiles, skip: int) -> Placed:
+        """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
+        device = self.device
+        parts = [float_pairs.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
+        return Placed(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
+
+    def add(
+        self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
+        image: Any,
+    ) -> None:  # fmt: skip
+        """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
+        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
+        centers, radius, offsets = on.buffers
+        constants = device.empty(4 * self.components * n * (high - low))
+        device.run(
+            self.constants, (n // self.lanes, high - low), None,
+            pulse, centers, radius, n, tiles.n_tiles, low, on.skip, constants,
+        )  # fmt: skip
+        items = tiles.per_tile // self.lanes // VECTORS
+        device.run(
+            self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
+            source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
+            tiles.offsets.shape[1], 0 if tiles.shared else tiles.per_tile // self.lanes, image,
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
+        )  # fmt: skip
+
+
+class LinePass:
+    """Square tiles of a plane, a line at a time: kernels/backproject_lines.cl."""
+
+    def __init__(
+        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
+        beam: bool,
+    ) -> None:  # fmt: skip
+        self.device, self.tiling, self.beam = device, tiling, beam
+        self.components = line_plan.components(beam)
+        # a group's pulses share their curvature: blocks of rows are whole groups, whatever the memory
+        self.chunk = self.least_rows = plan.group
+        self.lanes = device.info.vector_width
+        macros = {**plan.macros(bistatic, wrap, local), "BEAM": int(beam)}
+        self.constants = device.kernel("backproject_lines.cl", "line_constants", **macros)
+        self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **macros)
+        self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
+        self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
+        self.limits = [np.float32(v) for v in (plan.limit_turn, plan.limit_place, plan.limit_step)]
+
+    def ready(self, tiles: Tiles, skip: int) -> Placed:
+        """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
+        return Placed(self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam)
+
+    def add(
+        self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
+        image: Any,
+    ) -> None:  # fmt: skip
+        """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
+        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
+        assert self.tiling.grid.spacing is not None
+        dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
+        constants = device.empty(4 * self.components * n * (high - low))
+        device.run(
+            self.constants, (n // self.lanes, high - low), None,
+            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip, self.axes, constants,
+        )  # fmt: skip
+        device.run(
+            self.kernel, (high - low,), (1,),
+            source, stride, origin, self.table, self.weights, n, used, constants, dx, dy, low,
+            tiles.n_tiles, *self.limits, image, np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
+        )  # fmt: skip
+
+
+class Placed:
+    """Tiles on the device: buffers of a pass, and counts a tile: of pulses that miss it, and of those that do not
+    light it where there is a beam.
+    """
+
+    def __init__(self, device: Device, tiles: Tiles, skip: int, buffers: list[Any], beam: bool) -> None:
+        self.device, self.tiles, self.skip, self.buffers, self.beam = device, tiles, int(skip), buffers, beam
+        self.counts = 1 + beam
+        self.missed = device.zeros(4 * self.counts * tiles.n_tiles)
+
+    def skipped(self) -> np.ndarray:
+        """Pulses left out of every tile, (2, n_tiles) int64: outside their range window, and outside their beam."""
+        counts = self.device.download(self.missed, np.empty((self.counts, self.tiles.n_tiles), np.int32))
+        return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
+
+
+def pass_of(device: Device, plan: Plan | LinePlan, tiling: GridTiling, **how: bool) -> GatherPass | LinePass:
+    """The pass that a plan means; how: bistatic, wrap, local, beam."""
+    if isinstance(plan, LinePlan):
+        assert isinstance(tiling, LineTiling)
+        return LinePass(device, plan, tiling, **how)
+    return GatherPass(device, plan, tiling, **how)

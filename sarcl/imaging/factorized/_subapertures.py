@@ -1,0 +1,213 @@
+"""Sub-apertures: smooth runs of pulses, thinned out level by level to nodes. Geometry and errors, no device."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...model.phase_history import PhaseHistory
+from ...numerics import interpolation
+
+GAP = 5.0  # a step of the track so many times longer than the median begins a new run
+
+
+@dataclass(frozen=True, eq=False)
+class Track:
+    """Antenna positions that change smoothly within each run, and the carriers of their rows.
+
+    tx, rx     m (n, 3); rx is None where it equals tx
+    frequency  Hz (n,), of zero phase slope; frequency_step Hz (n,)
+    runs       (first, last) of each run of consecutive rows
+    """
+
+    tx: np.ndarray
+    rx: np.ndarray | None
+    frequency: np.ndarray
+    frequency_step: np.ndarray
+    runs: tuple[tuple[int, int], ...]
+
+    def __len__(self) -> int:
+        return len(self.tx)
+
+    @property
+    def ends(self) -> list[np.ndarray]:
+        """Transmitters, and receivers where they differ."""
+        return [self.tx] if self.rx is None else [self.tx, self.rx]
+
+
+def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
+    """An order of the rows, (n,), in which each smooth run of alike rows is consecutive; and the runs."""
+    keys = [raw.frequency, raw.frequency_step]
+    keys += [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
+    group = np.zeros(raw.n_rows, np.int64)
+    for key in keys:
+        unique, index = np.unique(key, return_inverse=True)
+        group = group * len(unique) + index
+    time = np.arange(raw.n_rows) if raw.time is None else raw.time
+    order = np.lexsort((np.arange(raw.n_rows), time, group))
+    step = np.abs(np.diff(raw.tx[order], axis=0)).sum(axis=1) + np.abs(np.diff(raw.rx[order], axis=0)).sum(axis=1)
+    usual = float(np.median(step)) if len(step) else 0.0
+    cut = np.flatnonzero((np.diff(group[order]) != 0) | (step > GAP * usual)) + 1
+    edges = [0, *cut.tolist(), raw.n_rows]
+    return order, list(itertools.pairwise(edges))
+
+
+@dataclass(frozen=True, eq=False)
+class Thinning:
+    """From a track to every `thin`-th of its positions: the nodes, and how pulses are spread over them.
+
+    nodes   the thinned Track
+    blocks  (n_blocks, 4) int32: first pulse, pulses, first node, first row of the filter
+    filter  (thin, taps) float32: weight of each of the nodes around a pulse at this fraction of the way
+    error   of the filter, relative, at the oversampling it was made for
+    """
+
+    nodes: Track
+    thin: int
+    blocks: np.ndarray
+    filter: np.ndarray
+    error: float
+
+
+def thinned(track: Track, thin: int, taps: int, oversample: float) -> Thinning:
+    """Every `thin`-th position of each run, and beyond its ends as many as the filter of `taps` needs."""
+    runs, parts, first = [], [], 0
+    blocks: list[np.ndarray] = []
+    rx_parts, rows = [], []
+    for begin, end in track.runs:
+        n = end - begin
+        n_blocks = -(-n // thin)
+        at = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
+        b = np.arange(n_blocks)
+        blocks.append(np.stack([begin + b * thin, np.minimum(thin, n - b * thin), first + b, 0 * b], axis=1))
+        places = at * thin
+        parts.append(_positions(track.tx[begin:end], places))
+        if track.rx is not None:
+            rx_parts.append(_positions(track.rx[begin:end], places))
+        rows += [begin] * len(at)
+        runs.append((first, first + len(at)))
+        first += len(at)
+    z = np.arange(thin) / thin - 0.5
+    weights = interpolation.least_squares_weights(taps, oversample, z)
+    nodes = Track(
+        np.concatenate(parts),
+        np.concatenate(rx_parts) if rx_parts else None,
+        track.frequency[rows],
+        track.frequency_step[rows],
+        tuple(runs),
+    )
+    error = interpolation.line_interpolator(taps, oversample).error
+    return Thinning(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
+
+
+def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
+    """Positions m (n, 3) of a run at whole indices, which beyond its ends follow the parabola through its last."""
+    n = len(run)
+    inside = np.clip(at, 0, n - 1)
+    out = run[inside]
+    step = max(1, min((n - 1) // 2, int(at[1] - at[0]) if len(at) > 1 else 1))
+    for outside, end, sign in ((at < 0, 0, 1), (at > n - 1, n - 1, -1)):
+        if not outside.any() or n < 3:
+            continue
+        a, b, c = run[end], run[end + sign * step], run[end + 2 * sign * step]
+        t = ((at[outside] - end) * sign / step)[:, None]
+        out[outside] = a + t * (b - a) + t * (t - 1) / 2 * (c - 2 * b + a)
+    return out
+
+
+def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
+    """Largest change, from one row to the next, of the range's gradient at points, m (n, 3): per row, no unit.
+
+    axes  unit vectors (2, 3) of the plane that the points around lie in, or None for points anywhere
+    """
+    worst = 0.0
+    for begin, end in track.runs:
+        if end - begin < 2:
+            continue
+        rows = begin + np.unique(np.linspace(0, end - begin - 2, min(512, end - begin - 1)).astype(int))
+        change = np.zeros((len(points), len(rows), 3))
+        for antenna in track.ends:
+            directions = []
+            for r in (rows, rows + 1):
+                d = antenna[r] - points[:, None, :]
+                directions.append(d / np.maximum(np.linalg.norm(d, axis=-1, keepdims=True), 1e-9))
+            change += (directions[1] - directions[0]) / len(track.ends)
+        seen = change if axes is None else change @ axes.T
+        worst = max(worst, float(np.linalg.norm(seen, axis=-1).max()))
+    return worst
+
+
+def filter_error(
+    track: Track, made: Thinning, centers: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
+) -> float:
+    """Largest error of what the nodes make of a pulse, at points `radius` from each of `centers`, m (m, 3).
+
+    This is the thinning itself, computed for the track as it is, not as a smooth one would be: for pulses of 32 blocks
+    spread over it, and for the 1024 pulses where it is roughest.
+    """
+    directions = np.concatenate([np.eye(3), -np.eye(3)])
+    if axes is not None:
+        angle = 2 * np.pi * np.arange(8) / 8
+        directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
+    blocks = made.blocks
+    spread = np.unique(np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int))
+    within = np.unique(np.linspace(0, made.thin - 1, min(64, made.thin)).astype(int))
+    usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
+    pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
+    block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
+    nodes = block[:, 2:3] + np.arange(made.filter.shape[1])
+    filters, worst = made.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
+    for center in centers:
+        points = center + radius * directions
+        exact = _phases(track, pulses, points, center, frequency)
+        known = _phases(made.nodes, nodes, points, center, frequency)
+        worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, known) - exact).max()))
+    return worst
+
+
+def _roughest(track: Track, made: Thinning, center: np.ndarray, most: int = 1024) -> np.ndarray:
+    """Pulses to which directions from `center` leave the line between the nodes about them the most."""
+    first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
+    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.thin)[:, None]
+    node, off = np.repeat(node, count), np.zeros(len(track))
+    for antenna, ends in zip(track.ends, made.nodes.ends, strict=True):
+        pulses, nodes = _directions(antenna, center), _directions(ends, center)
+        apart = pulses - (1 - way) * nodes[node] - way * nodes[node + 1]
+        off = np.maximum(off, np.einsum("ij,ij->i", apart, apart))
+    return np.argpartition(off, max(len(off) - most, 0))[-most:]
+
+
+def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:
+    d = ends - center
+    return d / np.maximum(np.sqrt(np.einsum("ij,ij->i", d, d)), 1e-9)[:, None]
+
+
+def _phases(track: Track, rows: np.ndarray, points: np.ndarray, center: np.ndarray, frequency: float) -> np.ndarray:
+    """exp(j 2 pi f (tau(x) - tau(center))) of rows (...) at points (m, 3): (..., m)."""
+    path = np.zeros((*rows.shape, len(points)))
+    x = points - center
+    for antenna in track.ends:
+        to_center = antenna[rows] - center
+        near = np.sqrt((to_center**2).sum(axis=-1))[..., None]
+        along = to_center @ x.T
+        grown = (x**2).sum(axis=1) - 2 * along
+        path += grown / (near + np.sqrt(near**2 + grown)) / len(track.ends)
+    return np.exp(4j * np.pi * frequency / SPEED_OF_LIGHT * path)
+
+
+def chains(leaf: int, largest: int) -> Iterator[tuple[int, ...]]:
+    """Sides of tiles from the first level to the leaf: ratios of 2 to 16, at most four levels."""
+    yield (leaf,)
+    for ratio in (2, 4, 8, 16):
+        if leaf * ratio >= 2 * largest:
+            return
+        yield (leaf * ratio, leaf)
+        for second in (4, 8, 16):
+            if leaf * ratio * second < 2 * largest:
+                yield (leaf * ratio * second, leaf * ratio, leaf)
+                if leaf * ratio * second * 8 < 2 * largest:
+                    yield (leaf * ratio * second * 8, leaf * ratio * second, leaf * ratio, leaf)

@@ -1,0 +1,394 @@
+"""Factorised backprojection: pulses are thinned out on smaller and smaller tiles, then focused on the smallest.
+
+About the centre of a small tile, what its pixels see changes slowly from pulse to pulse, so fewer pulses carry it
+(kernels/merge_subapertures.cl). Cost grows as N^2 log N for N pulses of N samples and N x N pixels.
+Source: McCorkle and Rofheart
+1996 (quadtree); docs/accuracy.md.
+"""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...base import float_pairs
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.stage_timer import Clock
+from ...numerics import range_profiles
+from ...numerics.tiles import Tiles
+from ...opencl.device import Device
+from ..direct.direct import Direct
+from ..direct.tile_kernels import Placed, pass_of
+from ..focusing_task import Task, tally
+from ..tiling import GridTiling
+from ._memory import Room
+from ._tile_coverage import Sight, alike, look, without
+from ._tile_tree import Tree, tree_of
+from .plan import GUARD, FactorPlan, Level, leaf_antennas
+
+SPAN = 32  # vectors of a profile a work-item
+
+
+@dataclass(frozen=True, eq=False)
+class _Descent:
+    """A tree of tiles on the device: sums of pixels, and per level the tiles' centres and which tile they lie in."""
+
+    tree: Tree
+    image: Any
+    centers: list[Any]
+    parents: list[Any]
+    ready: Placed
+
+
+class Factorized:
+    """The loops over levels on one device; see task.Engine."""
+
+    dtype = np.complex64
+
+    def __init__(self, device: Device, task: Task, plan: FactorPlan, tiling: GridTiling) -> None:
+        self.device, self.plan, self.tiling = device, plan, tiling
+        self.whole = self.task = task
+        if (plan.order != np.arange(len(plan.order))).any():
+            raw, antennas, order = task.raw[plan.order], task.antennas, plan.order
+            self.task = replace(task, raw=raw, row_weight=task.row_weight[order], antennas=antennas.picked(order))
+        # which tiles a beam lights is found out here: the kernels never see one
+        self.antennas = self.task.antennas
+        self.task = replace(self.task, antennas=replace(self.antennas, beam=None))
+        self.lanes = device.info.vector_width
+        bistatic = task.antennas.rx is not None
+        self.merges = []
+        for i, level in enumerate(plan.levels):
+            made = plan.between if i else plan.first
+            macros = {
+                "BISTATIC": int(bistatic),
+                "SPAN": SPAN,
+                "WRAP": plan.length if task.wrap and not i else 0,
+                "TAPS": made.taps,
+                "TERMS": made.table.shape[-1],
+                "FROM_CENTRE": int(i == 0),
+                "NODES": level.thinning.filter.shape[1],
+            }
+            self.merges.append(
+                (
+                    device.kernel("merge_subapertures.cl", "shifts", **macros),
+                    device.kernel("merge_subapertures.cl", "merge", **macros),
+                )
+            )
+        self.leaves = pass_of(device, plan.leaf, tiling, bistatic=bistatic, wrap=False, local=True, beam=False)
+        self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
+        self.filters = [device.upload(v.thinning.filter) for v in plan.levels]
+        self.blocks_of = [device.upload(v.thinning.blocks) for v in plan.levels]
+        self.sample_weight = task.sample_weight * range_profiles.correction(plan.first, task.raw.n_samples, plan.length)
+        # nodes of each level as the kernels want them, about the scene's centre
+        self.nodes = []
+        for v in plan.levels:
+            antennas = leaf_antennas(v.thinning.nodes)
+            packed = antennas.packed(tiling.center, plan.length, 0, len(antennas.tx), self.lanes)
+            self.nodes.append((device.upload(packed), packed.shape[2], len(antennas.tx)))
+        self.strides = [self._stride(v) for v in plan.levels]
+        # a tile that lies in the window may reach beyond it with what its profiles have to spare
+        top = plan.levels[0]
+        sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
+        self.pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
+        self.source_stride = plan.length + 2 * self.pad
+        self.room = Room(
+            plan, tiling, task.raw.n_rows, self.strides, self.source_stride, self.nodes[-1][1], self.leaves.components,
+            device.info.max_alloc, device.is_cpu,
+        )  # fmt: skip
+
+    def _stride(self, level: Level) -> int:
+        """Complex samples of a profile of this level: whole vectors."""
+        whole = max(self.lanes // 2, 1)
+        return -(-(2 * level.reach + 1) // whole) * whole
+
+    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
+        """Runs of bands to be made with nbytes on the device; see `Room.blocks`."""
+        return self.room.blocks(nbytes)
+
+    def working(self, nbytes: float) -> float:
+        """Bytes that `fill` takes for the first block, about, when it is given nbytes."""
+        return self.room.working(nbytes)
+
+    @property
+    def least_pixels(self) -> int:
+        """Making a row's profile anew for every block costs as much as this many pixels, ten times over."""
+        return 1000 * self.plan.length
+
+    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        tiling, n_rows = self.tiling, self.task.raw.n_rows
+        skipped, done, of = 0, 0, tiling.pixels(first, last)
+
+        def part_of(pixels: int) -> Callable[[float], None]:
+            return lambda rows: tick((done * n_rows + rows * pixels) / of)
+
+        if not tiling.grid.is_plane:
+            tree = tree_of(tiling, first, last, self.plan.factors)
+            n = len(tree.centers[0])
+            sight, sizes = self._look(_top_of(tree.centers[0]), first, last), tiling.tile_sizes(first, last)
+            values, most = (
+                np.empty((tree.leaves.n_tiles, tiling.per_tile), np.complex64),
+                max(1, self.room.most(budget)),
+            )
+            for low in range(0, n, most):
+                tops = np.arange(low, min(low + most, n))
+                at = slice(*(tree.leaves_of(t)[i] for i, t in enumerate(tops[[0, -1]])))
+                pixels = (at.stop - at.start) * tiling.per_tile
+                some = _some_of(tree, low, tops[-1] + 1)
+                image, missed = self._sums(some, _seen(sight, tops), budget, clock, part_of(pixels))
+                sums = self.device.download(image, np.empty((4, pixels), np.float32))
+                values[at] = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(-1, tiling.per_tile)
+                skipped += tally(missed, sizes[at])
+                done += pixels
+            tiling.place(values.ravel(), first, last, tiling.bands(first, last)[1], flat)
+            clock.lap("write")
+            return skipped
+        factor, lines = self.plan.factors[0], (0, 0)
+        wide = -(-tiling.across // factor)
+        for a, b, left, right in self.room.parts(first, last, budget):
+            before, lines = lines, (a // factor, -(-b // factor))
+            if lines != before:
+                sight = self._look(_top_of(self._centers(*lines)), a, b)
+            part = _columns(tiling, left, right)
+            tree, pixels = tree_of(part, a, b, self.plan.factors), part.pixels(a, b)
+            down, over = np.arange(lines[1] - lines[0]), np.arange(left // factor, -(-right // factor))
+            seen = _seen(sight, (down[:, None] * wide + over).ravel())
+            image, missed = self._sums(tree, seen, budget, clock, part_of(pixels))
+            made = part.download(self.device, image, a, b, tree.slot)
+            at = slice(left * tiling.wide, left * tiling.wide + made.shape[1])
+            flat[a * tiling.high : a * tiling.high + len(made), at] = made
+            skipped += tally(missed, part.tile_sizes(a, b)[tree.slot])
+            done += pixels
+            clock.lap("write")
+        return skipped
+
+    def _sums(
+        self, tree: Tree, sight: Sight, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> tuple[Any, np.ndarray]:
+        """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
+        device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
+        image = device.zeros(16 * leaves.n_tiles * self.tiling.per_tile)
+        down = _Descent(tree, image, [device.upload(float_pairs.wide(c.T)) for c in tree.centers],
+                        [None, *(device.upload(p) for p in tree.parents)], self.leaves.ready(leaves, 0))  # fmt: skip
+        count = np.array([[reason in self.whole.skips] for reason in ("range window", "beam")])
+        n_tops = len(tree.centers[0])
+        each = [b - a for a, b in map(tree.leaves_of, range(n_tops))]
+        missed = np.repeat(sight.missed, each, axis=1) * count
+        clock.lap("prepare")
+        # directly first: the sums are put in place, and what is merged is added to them
+        for tops, rows in sight.directly:
+            picked, skipped = self._add_directly(down, tops, rows, budget / 2, clock)
+            missed[:, picked] += skipped
+        step, within, below = self.room.at_once(tree, budget)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], sight.merged, [False]])))
+        for low, high in edges.reshape(-1, 2).tolist():
+            gathered = device.zeros(8 * (high - low) * self.nodes[0][2] * self.strides[0])
+
+            def rows_done(rows: float, low: int = low, high: int = high) -> None:
+                tick((low * n_rows + (high - low) * rows / 2) / n_tops)
+
+            self._gather(down, low, high, sight.left_out, gathered, budget, clock, rows_done)
+            queued = 0.0
+            for top in range(low, high, step):
+                self._descend(down, 0, top, min(top + step, high), gathered, low, within)
+                queued += step * below
+                if queued > budget / 8:  # what is queued holds its profiles
+                    device.finish()
+                    queued = 0.0
+            device.finish()
+            clock.lap("backproject")
+        tick(n_rows)
+        return image, missed
+
+    def _centers(self, low: int, high: int) -> np.ndarray:
+        """Centres of lines low ... high - 1 of a plane's tiles of the first level, m (n, 3), those of its trees."""
+        tiling, factor = self.tiling, self.plan.factors[0]
+        if factor == 1:
+            return tiling.bands(low, high)[0].references
+        rows = (np.arange(low, high) + 0.5) * factor * tiling.high
+        columns = (np.arange(-(-tiling.across // factor)) + 0.5) * factor * tiling.wide
+        return np.asarray(tiling.grid.at(rows[:, None], columns).reshape(-1, 3) - tiling.center)
+
+    def _look(self, tree: Tree, first: int, last: int) -> Sight:
+        """How rows see tiles of the first level of bands first ... last - 1, whole lines of them in a plane."""
+        plan, factor = self.plan, self.plan.factors[0]
+        if self.tiling.grid.is_plane:
+            line_of = np.repeat(range(first // factor, -(-last // factor)), -(-self.tiling.across // factor))
+        else:
+            line_of = np.repeat(range(first, last), [self.room.tops(b, b + 1) for b in range(first, last)])
+        # merging costs the same for any number of rows
+        least = self.task.raw.n_rows * plan.cost / plan.edge.cost
+        return look(self.antennas, tree, self.tiling, plan.levels[0].radius, line_of, least)
+
+    def _add_directly(
+        self, down: _Descent, tops: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Leaves of these largest tiles get what rows (indices; None: all) add to them, directly, and nothing else.
+
+        Returns the leaves, and rows skipped in each (2, n).
+        """
+        tree, task = down.tree, self.whole
+        if rows is not None:
+            raw, antennas, weight = self.task.raw[rows], self.antennas.picked(rows), self.task.row_weight[rows]
+            task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
+        picked = np.concatenate([np.arange(*tree.leaves_of(top)) for top in tops])
+        engine = Direct(self.device, task, self.plan.edge, self.tiling)
+        some = _picked(tree.leaves, picked)
+        image, missed = engine.add_up(some, budget, clock, lambda rows: None)
+        copy = self.device.kernel("assemble_image.cl", "move")
+        where = self.device.upload(picked.astype(np.int32))
+        per_tile = self.tiling.per_tile
+        self.device.run(
+            copy, (per_tile, len(picked)), None,
+            image, np.uint64(len(picked) * per_tile), where, down.image, np.uint64(tree.leaves.n_tiles * per_tile),
+        )  # fmt: skip
+        self.device.finish()
+        return picked, missed
+
+    def _gather(
+        self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
+        clock: Clock, tick: Callable[[float], None],
+    ) -> None:  # fmt: skip
+        """First level: profiles of all pulses become those of nodes about the largest tiles low ... high - 1.
+
+        left_out  by tile: rows that have no part in it (n_rows,) bool, or None
+        """
+        device, plan, task = self.device, self.plan, self.task
+        level, raw = plan.levels[0], task.raw
+        stride = self.source_stride
+        shifts, merge = self.merges[0]
+        tops, centers = len(down.tree.centers[0]), down.centers[0]
+        nowhere = device.upload(np.zeros(tops, np.int32))
+        blocks, n_shift = level.thinning.blocks, 2 + 2 * plan.first.taps
+        rows = self.room.rows(budget)
+        for start in range(0, raw.n_rows, rows):
+            stop = min(start + rows, raw.n_rows)
+            weights = task.row_weight[start:stop, None] * self.sample_weight
+            source = device.upload(
+                range_profiles.from_samples(device, raw.read(start, stop), weights, plan.first, plan.length, self.pad)
+            )
+            packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
+            pulse, n, used = device.upload(packed), packed.shape[2], stop - start
+            clock.lap("profiles")
+            # blocks of pulses that share their nodes, cut where this block of rows begins and ends
+            begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
+            cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
+            step = max(1, int(min(budget / 8, device.info.max_alloc) / (4 * n_shift * used)))
+            records = device.empty(4 * n_shift * used * min(step, high - low))
+            kept = []  # a buffer on a CPU is the host's memory: it must last until it has been used
+            for tile, count, without_rows in alike(left_out, low, high, step):
+                seen = cut if without_rows is None else without(cut, without_rows[start:stop])
+                if len(seen) == 0:
+                    continue
+                cut_buffer = device.upload(seen.astype(np.int32))
+                kept.append(cut_buffer)
+                device.run(
+                    shifts, (n // self.lanes, count), None,
+                    pulse, centers, tops, centers, nowhere, self.tables[0], n, used, tops, tile, level.reach,
+                    self.strides[0], stride, stride // 2, records,
+                )  # fmt: skip
+                device.run(
+                    merge, (self._spans(0), count), None,
+                    source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
+                    level.reach, tile, low, self.nodes[0][2], self.strides[0], out,
+                )  # fmt: skip
+            device.finish()
+            clock.lap("backproject")
+            tick(stop)
+
+    def _spans(self, level: int) -> int:
+        return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))
+
+    def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
+        """Tiles low ... high - 1 of a level, whose profiles begin with tile `first` in `source`, and all below them.
+
+        within  bytes that every level below may take at a time
+        """
+        device, plan, tree = self.device, self.plan, down.tree
+        pulse, n, used = self.nodes[level]
+        if level == len(plan.levels) - 1:
+            stride = self.strides[level]
+            for begin, end in _runs(low, high, within / self.room.constants):
+                self.leaves.add(
+                    down.ready, begin, end, self.nodes[level], source, stride, plan.levels[level].reach,
+                    (begin - first) * used * stride, down.image,
+                )  # fmt: skip
+                if end < high:
+                    device.finish()
+            return
+        shifts, merge = self.merges[level + 1]
+        below, parents = plan.levels[level + 1], down.parents[level + 1]
+        nodes, stride = self.nodes[level + 1][2], self.strides[level + 1]
+        children = tree.children[level]
+        whole = int(children[low]), int(children[high])
+        for begin, end in _runs(*whole, within / self.room.tile_bytes(level + 1)):
+            made = device.zeros(8 * (end - begin) * nodes * stride)
+            records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
+            device.run(
+                shifts, (n // self.lanes, end - begin), None,
+                pulse, down.centers[level], len(tree.centers[level]), down.centers[level + 1], parents, self.tables[1],
+                n, used, len(tree.centers[level + 1]), begin, below.reach, stride, self.strides[level],
+                plan.levels[level].reach, records,
+            )  # fmt: skip
+            device.run(
+                merge, (self._spans(level + 1), end - begin), None,
+                source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
+                self.blocks_of[level + 1], len(below.thinning.blocks), self.filters[level + 1], below.reach, begin,
+                begin, nodes, stride, made,
+            )  # fmt: skip
+            self._descend(down, level + 1, begin, end, made, begin, within)
+            if (begin, end) != whole:
+                device.finish()
+
+
+def _runs(low: int, high: int, most: float) -> Iterator[tuple[int, int]]:
+    """low ... high - 1 in runs of `most`, one at least."""
+    step = max(1, int(min(most, high - low)))
+    for begin in range(low, high, step):
+        yield begin, min(begin + step, high)
+
+
+def _columns(tiling: GridTiling, left: int, right: int) -> GridTiling:
+    """Leaves left ... right - 1 across a plane; left is a multiple of the first level's factor."""
+    if (left, right) == (0, tiling.across):
+        return tiling
+    part = copy.copy(tiling)
+    part.across = right - left
+    part.grid = tiling.grid.columns(left * tiling.wide, min(right * tiling.wide, tiling.grid.shape[1]))
+    return part
+
+
+def _top_of(centers: np.ndarray) -> Tree:
+    """Tiles of the first level about `centers`, m (n, 3), and nothing below them."""
+    n = len(centers)
+    return Tree((centers,), (), Tiles(1, centers, np.zeros(n), np.zeros((6, 0), np.float32), True), np.arange(n))
+
+
+def _some_of(tree: Tree, low: int, high: int) -> Tree:
+    """Tiles low ... high - 1 of the first level, and all below them."""
+    centers, children = [tree.centers[0][low:high]], []
+    for below, begins in zip(tree.centers[1:], tree.children, strict=True):
+        children.append(begins[low : high + 1] - begins[low])
+        low, high = int(begins[low]), int(begins[high])
+        centers.append(below[low:high])
+    return Tree(tuple(centers), tuple(children), _picked(tree.leaves, np.arange(low, high)), tree.slot[low:high])
+
+
+def _picked(tiles: Tiles, which: np.ndarray) -> Tiles:
+    """These tiles."""
+    return Tiles(tiles.per_tile, tiles.references[which], tiles.radius[which], tiles.tile_offsets(which), tiles.shared)
+
+
+def _seen(sight: Sight, tops: np.ndarray) -> Sight:
+    """What `sight` says of these tops: the same rows are added directly, whichever neighbours are made with them."""
+    place = np.full(len(sight.merged), -1)
+    place[tops] = np.arange(len(tops))
+    directly = [(mine[mine >= 0], rows) for mine, rows in ((place[t], rows) for t, rows in sight.directly)]
+    return Sight(
+        sight.merged[tops], [sight.left_out[i] for i in tops], [d for d in directly if len(d[0])],
+        sight.missed[:, tops],
+    )  # fmt: skip

@@ -1,0 +1,274 @@
+"""Plans of factorised backprojection: how pulses are thinned out, level by level, within a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...numerics import error_bounds, interpolation
+from ...numerics.interpolation import Interpolator
+from ...numerics.plan import ORDER_COST, RANGE_COST, Plan, cheapest
+from ...numerics.pulse_geometry import Antennas
+from ...opencl import fft
+from ..direct import line_plan
+from ..direct.line_plan import LinePlan, LineTiling
+from ..direct.tile_kernels import CHUNK
+from ..focusing_task import Task
+from ..tiling import GridTiling
+from ._subapertures import Thinning, Track, chains, filter_error, rate, runs_of, thinned
+from ._tile_tree import spread_of, tree_of
+
+# Relative costs as in line_plan.py, measured on PoCL: of a tap and of a node for a sample moved to a new tile, and of a
+# (tile, pulse) that is moved; and of a sample of a profile
+MOVE_TAP, MOVE_NODE, SHIFT, PROFILE = 0.052, 0.017, 10.0, 6.0
+LEAF_COST = {64: 0.35, 32: 0.45, 16: 0.8}  # of a contribution to a leaf of that side, about
+SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
+TAPS = (4, 6, 8)
+TRIES = 8  # candidates worked out in full
+THINNEST = 4096  # pulses a node at most: more would save nothing
+GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may touch
+
+
+@dataclass(frozen=True, eq=False)
+class Level:
+    """One level: tiles `side` pixels (or so many leaves' points) wide, `radius` m, whose pulses are thinned out."""
+
+    side: int
+    radius: float
+    reach: int  # samples of a profile on each side of the tile's centre
+    thinning: Thinning
+
+    def n_bytes(self, stride: int) -> int:
+        """Bytes of a tile's profiles of `stride` samples."""
+        return 8 * stride * len(self.thinning.nodes)
+
+
+@dataclass(frozen=True, eq=False)
+class FactorPlan:
+    """Levels from large tiles to leaves, the interpolators between them, and how leaves become pixels.
+
+    factors  leaves a side in a tile of each level; length: samples of a profile of the rows' whole window
+    leaf     from profiles about leaves to pixels; edge: the direct plan of tiles that cross a range window's edge
+    order    of the rows, (n_rows,), in which smooth runs are consecutive; cost of a contribution, relative
+    """
+
+    levels: tuple[Level, ...]
+    factors: tuple[int, ...]
+    first: Interpolator
+    between: Interpolator
+    length: int
+    leaf: LinePlan | Plan
+    edge: LinePlan | Plan
+    predicted_error: float
+    cost: float
+    order: np.ndarray
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": method,
+            "tiles": " > ".join(str(level.side) for level in self.levels),
+            "pulses a tile": " > ".join(
+                str(n) for n in [len(self.order), *(len(v.thinning.nodes) for v in self.levels)]
+            ),
+            "taps": self.between.taps,
+            "profile samples": self.length,
+            "leaves": self.leaf.describe(method)["ranges"],
+        }
+
+
+def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, GridTiling]:
+    """The cheapest plan whose predicted error is at most `tolerance`; ValueError where sub-apertures cannot meet it.
+
+    lanes  the devices work on vectors of pixels, so that lines of pixels pay
+    """
+    order, runs = runs_of(task.raw)
+    a = task.antennas
+    rx = None if a.rx is None else a.rx[order]
+    track = Track(a.tx[order], rx, a.frequency[order], a.frequency_step[order], tuple(runs))
+    reason = "neighbouring pulses differ too much"
+    for lines in (True, False) if lanes and task.grid.is_plane else (False,):  # near an antenna lines bend too much
+        case = _Case(task, track, order, tolerance, lines)
+        for _, choice in sorted(case.candidates(), key=lambda c: c[0])[:TRIES]:
+            try:
+                return case.build(*choice)
+            except ValueError as exc:
+                reason = str(exc)
+    raise ValueError(f"tolerance {tolerance:.1e} cannot be met with sub-apertures here: {reason}")
+
+
+def _spacing(taps: int, error: float) -> float | None:
+    """The widest spacing at which so many taps err by at most `error`."""
+    return next((s for s in SPACINGS if interpolation.line_interpolator(taps, s).error <= error), None)
+
+
+class _Case:
+    """One task at one tolerance: what candidates share."""
+
+    def __init__(self, task: Task, track: Track, order: np.ndarray, tolerance: float, lines: bool) -> None:
+        grid = task.grid
+        self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
+        self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
+        self.distance = task.antennas.distance(grid.bounds)
+        self.axes: np.ndarray | None = None
+        if grid.is_plane:
+            assert grid.x_axis is not None and grid.y_axis is not None
+            self.axes = np.stack([grid.x_axis, grid.y_axis])
+            self.points = line_plan.outline(grid)
+            assert grid.spacing is not None
+            pixel, self.largest = float(np.hypot(*grid.spacing)), max(grid.shape)
+            self.leaves = {side: side / 2 * pixel for side in (LEAF_COST if lines else (32, 16))}
+        else:
+            low, high = grid.bounds
+            signs = np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+            self.points = (low + high) / 2 + signs * (high - low) / 2
+            side = 16
+            self.leaves = {side: GridTiling(grid, side).radius}
+            self.largest = int(np.sqrt(grid.size))
+        self.turning = (
+            rate(track, self.points, self.axes) * 2 * self.highest / SPEED_OF_LIGHT
+        )  # cycles per row and metre
+
+    def candidates(self) -> Iterator[tuple[float, tuple[Any, ...]]]:
+        """(about its cost, arguments of `build`) of every way worth trying."""
+        for leaf in self.leaves:
+            for chain in chains(leaf, self.largest):
+                share = 0.75 * self.tolerance / (2 * len(chain) + 1)
+                for taps, nodes in ((t, n) for t in TAPS for n in TAPS):
+                    spacing, fine = _spacing(taps, share), _spacing(nodes, share)
+                    if spacing is None or fine is None:
+                        continue
+                    made = self._cost(chain, taps, spacing, nodes, fine)
+                    if made:
+                        yield made[0], (chain, taps, spacing, nodes, fine, made[1], share)
+
+    def _cost(
+        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float
+    ) -> tuple[float, list[int]] | None:
+        """Contributions' worth of work, and how far each level thins out; None where it does not."""
+        n_rows, size = self.task.raw.n_rows, self.task.grid.size
+        sigma = 2 * self.bandwidth / SPEED_OF_LIGHT * spacing
+        sources, total, spaced, thins = float(n_rows), 0.0, 1.0, []
+        for side in chain:
+            radius = self.leaves[chain[-1]] * side / chain[-1]
+            thin = int(min(1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced), max(1, sources // 2), THINNEST))
+            if thin < 2:
+                return None
+            thins.append(thin)
+            total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, nodes)
+            sources, spaced = sources / thin + nodes, spaced * thin
+        leaf = LEAF_COST[chain[-1]] if self.lines else interpolation.TAP_COST[taps] + 0.1
+        return total + size * sources * leaf + n_rows * PROFILE * spacing * self.task.raw.n_samples, thins
+
+    def build(
+        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, thins: list[int], share: float
+    ) -> tuple[FactorPlan, GridTiling]:  # fmt: skip
+        """The plan of a candidate, its errors computed for the track as it is; ValueError where they are too large."""
+        raw, grid = self.task.raw, self.task.grid
+        between = interpolation.line_interpolator(taps, spacing)
+        length = 2 * fft.good_length(int(np.ceil(spacing * raw.n_samples / 2)))
+        sigma = 2 * float(raw.frequency_step.max()) * length / SPEED_OF_LIGHT
+        made = (interpolation.interpolator(t, length / raw.n_samples) for t in interpolation.TERMS)
+        first = next((i for i in made if i.error <= share), None)
+        if first is None:
+            raise ValueError(f"no interpolator errs by less than {share:.1e}")
+        tiling = LineTiling(grid, chain[-1]) if self.lines else GridTiling(grid, chain[-1])
+        factors = tuple(side // chain[-1] for side in chain)
+        radii = self._radii(tiling, factors)
+        thinnings: list[Thinning] = []
+        error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
+        for radius, thin in zip(radii, thins, strict=True):
+            while True:
+                thinned_out = thinned(source, thin, nodes, fine)
+                worst = filter_error(source, thinned_out, self.points, radius, self.highest, self.axes)
+                if worst <= 1.3 * share or thin <= 2:
+                    break
+                thin = max(2, int(thin * 0.75))
+            error += worst + (between.error if thinnings else 0.0)
+            thinnings.append(thinned_out)
+            source = thinned_out.nodes
+        leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
+        if leaf is None:
+            raise ValueError(f"thinning errs by {error:.1e} already")
+        edge = self._edge(tiling)
+        # from the leaves up: a tile's profiles hold those of its children, and what their interpolation touches
+        reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
+        for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
+            apart = radius if not grid.is_plane else radius - below * (1 - 2 / chain[-1])
+            reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
+        if self.task.wrap and reach[-1] + 4 * GUARD > length:
+            raise ValueError("its largest tiles are wider than the period in which ranges repeat")
+        levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], thinnings, strict=True))
+        sources = [raw.n_rows, *(len(v.thinning.nodes) for v in levels)]
+        cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * PROFILE * spacing * raw.n_samples
+        for v, n in zip(levels, sources, strict=False):
+            cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, nodes)
+        return FactorPlan(
+            levels, factors, first, between, length, leaf, edge,
+            max(error + leaf.predicted_error, edge.predicted_error),  # a row is merged into a tile or added directly
+            cost / (raw.n_rows * grid.size), self.order,
+        ), tiling  # fmt: skip
+
+    def _radii(self, tiling: GridTiling, factors: tuple[int, ...]) -> list[float]:
+        """Largest distance of a point from its tile's centre, m, level by level."""
+        if tiling.grid.is_plane:
+            return [tiling.radius * factor for factor in factors]
+        tree = tree_of(tiling, 0, tiling.n_bands, factors)
+        return spread_of(tree, tree.leaves.radius)
+
+    def _leaf(
+        self, tolerance: float, nodes: Track, source: tuple[Interpolator, int], tiling: GridTiling
+    ) -> LinePlan | Plan | None:
+        """How leaves become pixels within a tolerance."""
+        raw, n_samples = self.task.raw, self.task.raw.n_samples
+        if tolerance <= 0:
+            return None
+        if self.lines:
+            return line_plan.choose(
+                tolerance, self.task.grid, leaf_antennas(nodes), n_samples=n_samples, bandwidth=self.bandwidth,
+                highest=self.highest, source=source, sides=(tiling.side,),
+            )  # fmt: skip
+        best = None
+        for mode in (0, 1):
+            for order in (2, 3, 0):
+                error = error_bounds.range_error(
+                    tiling.radius, self.distance, self.highest, self.bandwidth, mode, order
+                )
+                error += error_bounds.sum_rounding(CHUNK, raw.n_samples) + source[0].error
+                cost = interpolation.TAP_COST[source[0].taps] + RANGE_COST[mode] + ORDER_COST[order] - 2
+                if error <= tolerance and (best is None or cost < best.cost):
+                    best = Plan(*source, tiling.per_tile, mode, order, error, cost)
+        return best
+
+    def _edge(self, tiling: GridTiling) -> LinePlan | Plan:
+        """For tiles that some pulse sees only in part: directly, on the same leaves."""
+        raw = self.task.raw
+        if self.lines:
+            plan = line_plan.choose(
+                self.tolerance, self.task.grid, self.task.antennas, n_samples=raw.n_samples, bandwidth=self.bandwidth,
+                highest=self.highest, sides=(tiling.side,),
+            )  # fmt: skip
+            if plan is None:
+                raise ValueError("edges of the range window cannot be focused by lines")
+            return plan
+        return cheapest(
+            self.tolerance, [(tiling.per_tile, tiling.radius)], distance=self.distance, frequency=self.highest,
+            bandwidth=self.bandwidth, n_samples=raw.n_samples, points_per_row=self.task.grid.size, chunk=CHUNK,
+            least_tolerance=0.0,
+        )  # fmt: skip
+
+
+def moving_cost(samples: float, taps: int, nodes: int) -> float:
+    """Cost of a pulse moved to a new tile and spread over nodes."""
+    return samples * (taps * MOVE_TAP + nodes * MOVE_NODE) + SHIFT
+
+
+def leaf_antennas(nodes: Track) -> Antennas:
+    """Nodes as antennas about whose tiles profiles already stand: no reference range, no window."""
+    far = np.full(len(nodes), 1e30)
+    reference = sum(np.linalg.norm(e, axis=1) for e in nodes.ends) / len(nodes.ends)
+    return Antennas(nodes.tx, nodes.rx, reference, nodes.frequency, nodes.frequency_step, -far, far)

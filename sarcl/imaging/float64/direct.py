@@ -1,0 +1,205 @@
+"""Direct backprojection in float64, for tolerances that complex64 cannot hold."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...base import text
+from ...base.stage_timer import Clock
+from ...numerics.interpolation_float64 import Kernel
+from ...opencl import fft
+from ...opencl.device import Device, devices
+from ..focusing_task import Task, tally
+from ..tiling import GridTiling
+from ._pulse_records import packed
+from .plan import CHUNK, Plan
+
+N_CONST = 16  # of kernels/backproject_float64.cl
+PIXEL_BYTES = 56  # positions, totals and their errors
+LARGEST = 1e290  # of a profile: sums of any number of such rows still fit in complex128
+
+
+class Precise:
+    """The loops over row blocks and tiles on one device; see task.Engine. ValueError where it has no float64."""
+
+    dtype = np.complex128
+
+    def __init__(self, device: Device, task: Task, plan: Plan, tiling: GridTiling) -> None:
+        if not device.info.fp64:
+            raise ValueError(_no_float64(device))
+        self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
+        self.lanes = device.info.vector_width
+        self.skip = int("range window" in task.skips) + 2 * int("beam" in task.skips)
+        macros = plan.macros(task.antennas.rx is not None, task.wrap, task.antennas.beam is not None)
+        self.constants = device.kernel("backproject_float64.cl", "tile_constants", **macros)
+        self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
+        self.group = device.max_group(self.kernel)
+        self.table = device.upload(plan.kernel.table)
+        self.sample_weight = task.sample_weight * correction(plan.kernel, task.raw.n_samples, plan.length)
+
+    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
+        """Runs of bands whose positions and totals fit in half of nbytes; a band that is alone may be larger.
+
+        MemoryError where not even one row's profile fits in the rest.
+        """
+        least = 2 * self._row_bytes
+        if nbytes < least:
+            raise MemoryError(
+                f"max_bytes is {text.size_text(nbytes)} but the range profile of one row needs half of "
+                f"{text.size_text(least)}; give max_bytes={least:.2g} or more"
+            )
+        most = self._tiles_at_once(nbytes) * self.tiling.per_tile
+        blocks, first = [], 0
+        for band in range(self.tiling.n_bands):
+            if band > first and self.tiling.pixels(first, band + 1) > most:
+                blocks.append((first, band))
+                first = band
+        return [*blocks, (first, self.tiling.n_bands)]
+
+    @property
+    def _row_bytes(self) -> float:
+        return 16.0 * (self.plan.length + 2 * padding(self.plan.kernel))
+
+    def _tiles_at_once(self, nbytes: float) -> int:
+        return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
+
+    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
+        positions, orders = tile_positions(tiling, first, last)
+        positions, lanes = by_range(positions, raw.tx[middle], raw.rx[middle])
+        values, missed = np.empty(positions.shape[:2], np.complex128), np.empty((2, len(positions)), np.int64)
+        # as few runs of tiles as fit; every one reads all rows anew
+        runs = -(-len(positions) // self._tiles_at_once(budget))
+        for i in range(runs):
+            run = slice(i * len(positions) // runs, (i + 1) * len(positions) // runs)
+
+            def part(rows_done: float, i: int = i) -> None:
+                tick((i * raw.n_rows + rows_done) / runs)
+
+            made, missed[:, run] = self._tiles(positions[run], budget, clock, part)
+            np.put_along_axis(values[run], lanes[run], made, axis=1)
+        tiling.place(values.ravel(), first, last, orders, flat)
+        clock.lap("write")
+        return tally(missed, tiling.tile_sizes(first, last))
+
+    def _tiles(
+        self, positions: np.ndarray, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Pixels (n_tiles, per_tile) at positions, m (n_tiles, per_tile, 3), and rows left out of each (2, n_tiles)."""
+        device, raw, plan, n_tiles = self.device, self.task.raw, self.plan, len(positions)
+        # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
+        most = (2 if device.is_cpu else 64) * CHUNK
+        fit = int(budget / 4 / self._row_bytes)
+        rows = min(most, fit // CHUNK * CHUNK or max(1, fit))
+        references = (positions.min(axis=1) + positions.max(axis=1)) / 2
+        radius = np.linalg.norm(positions - references[:, None], axis=-1).max(axis=-1)
+        pixels = positions.shape[0] * positions.shape[1]
+        image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
+        where = device.upload(positions.reshape(-1, 3).T)
+        tile, reach = device.upload(references.T), device.upload(radius)
+        stride = plan.length + 2 * padding(plan.kernel)
+        clock.lap("prepare")
+        for start in range(0, raw.n_rows, rows):
+            stop = min(start + rows, raw.n_rows)
+            weights = self.task.row_weight[start:stop, None] * self.sample_weight
+            block = device.upload(profiles(device, raw.read(start, stop), weights, plan.kernel, plan.length))
+            pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
+            pulse, n = device.upload(pulse_host), pulse_host.shape[1]
+            clock.lap("profiles")
+            step = max(1, min(n_tiles, int(min(budget / 4, device.info.max_alloc) / (8 * N_CONST * n))))
+            constants = device.empty(8 * N_CONST * n * step)
+            for at in range(0, n_tiles, step):
+                count = min(step, n_tiles - at)
+                device.run(
+                    self.constants, (n // self.lanes, count), None,
+                    pulse, tile, reach, n, n_tiles, at, self.skip, constants,
+                )  # fmt: skip
+                items = positions.shape[1] // self.lanes
+                device.run(
+                    self.kernel, (items, count), (items, 1) if items <= self.group else None,
+                    block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
+                    where, image, np.uint64(pixels), missed,
+                )  # fmt: skip
+            device.finish()
+            clock.lap("backproject")
+            tick(stop)
+        sums = device.download(image, np.empty((4, pixels)))
+        made = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(positions.shape[:2])
+        return made, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
+
+
+def _no_float64(device: Device) -> str:
+    able = [f"{i.index}: {i.name}" for i in devices() if i.works and i.fp64]
+    remedy = f"choose device= one of {'; '.join(able)}" if able else "no device here has it"
+    return f"tolerances below 1e-6 need float64, which {device.info.name!r} lacks; its best is 1e-6: {remedy}"
+
+
+def tile_positions(tiling: GridTiling, first: int, last: int) -> tuple[np.ndarray, list[np.ndarray | None]]:
+    """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1, and for listed points their order.
+
+    They are grid.positions to the bit: near the Earth's surface, a rounding of 1 nm is 4e-7 rad at X band. Tiles
+    that reach beyond the grid repeat its last row and column.
+    """
+    grid, n = tiling.grid, tiling.per_tile
+    if grid.listed is not None:
+        _, orders = tiling.bands(first, last)
+        points, band = grid.listed.reshape(-1, 3), tiling.LISTED_BAND
+        parts = [points[b * band + o] for b, o in zip(range(first, last), orders, strict=True) if o is not None]
+        return np.concatenate(parts).reshape(-1, n, 3), orders
+    rows, columns = grid.shape
+    high, wide, across = tiling.high, tiling.wide, tiling.across
+    i = np.minimum(np.arange(first * high, last * high), rows - 1)
+    j = np.minimum(np.arange(across * wide), columns - 1)
+    made = grid.at(i[:, None], j).reshape(last - first, high, across, wide, 3)
+    return made.transpose(0, 2, 1, 3, 4).reshape(-1, n, 3), [None] * (last - first)
+
+
+def by_range(positions: np.ndarray, tx: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Points (n_tiles, per_tile, 3) of each tile in order of their path from tx to rx, and that order.
+
+    Lanes of a vector, and work-items of a group, then read nearly the same samples for all rows that look alike.
+    """
+    path = sum(np.sqrt(((positions - end) ** 2).sum(axis=-1)) for end in (tx, rx))
+    order = np.argsort(path, axis=1, kind="stable")
+    return np.take_along_axis(positions, order[..., None], axis=1), order
+
+
+def padding(kernel: Kernel) -> int:
+    """Samples kept on each side of a profile, so that neither taps nor windows of FAR samples more leave their row."""
+    return kernel.taps + 4
+
+
+def correction(kernel: Kernel, n_samples: int, length: int) -> np.ndarray:
+    """What spectra (n_samples,) are multiplied by: 1/transform, and the sign that puts delay 0 at length/2."""
+    k = np.arange(n_samples) - n_samples // 2
+    return np.where(k % 2, -1.0, 1.0) / kernel.transform(k / length)
+
+
+def profiles(device: Device, samples: np.ndarray, weights: np.ndarray, kernel: Kernel, length: int) -> np.ndarray:
+    """Profiles (n, length + 2 padding) complex128 of samples (n, n_samples), each times weights (n, n_samples).
+
+    Delay 0 stands at padding + length/2; the padding repeats the profile's other end.
+    """
+    n, n_samples = samples.shape
+    shaped = samples * weights
+    largest = float(np.abs(shaped).max(initial=0.0)) * n_samples
+    if not largest <= LARGEST:
+        raise ValueError(
+            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in complex128 hold up "
+            f"to {LARGEST:.0e}: scale the samples down"
+        )
+    spectrum = np.zeros((n, length), np.complex128)
+    low = n_samples // 2
+    spectrum[:, : n_samples - low] = shaped[:, low:]
+    if low:
+        spectrum[:, -low:] = shaped[:, :low]
+    pad = padding(kernel)
+    made = np.empty((n, length + 2 * pad), np.complex128)
+    made[:, pad:-pad] = fft.rows(device, spectrum, inverse=True)
+    made[:, :pad] = made[:, length : length + pad]
+    made[:, -pad:] = made[:, pad : 2 * pad]
+    return made

@@ -1,0 +1,149 @@
+"""Plans of float64 backprojection: the cheapest that meets a tolerance, and what it is predicted to err."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...numerics import error_bounds_float64, interpolation_float64
+from ...numerics.interpolation_float64 import Kernel
+from ...opencl import fft
+from .. import profile_energy
+from ..focusing_task import Task
+from ..profile_energy import Energy
+from ..tiling import GridTiling
+
+CHUNK = 64  # rows added plainly before the compensated total; blocks of rows are multiples of it
+SIDES = (16, 8)  # of tiles, pixels
+MOST_TURNS = 2.0**44  # of a path; places among samples, up to 32 a turn, still count below 2^51
+WIDE = -1  # the order of plans that compute every path in pairs of float64
+
+# Cost in ns of a contribution with no taps, of a tap, by order of the series; of what a tile's points share; of a
+# profile's sample. Measured on PoCL, two cores; only their ratios matter.
+PAIR_COST, TAP_COST, TILE_COST, SAMPLE_COST = 1.15, 0.23, 38.0, 10.0
+ORDER_COST = {2: -0.05, 3: 0.0, 4: 0.1, 0: 0.5, WIDE: 4.0}
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """How an image is computed: kernel and profile length, points a tile, order of the range series.
+
+    order         2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
+    cost          relative, of a row
+    next_cheaper  the most accurate of the plans that cost less, or None
+    """
+
+    kernel: Kernel
+    length: int
+    per_tile: int
+    order: int
+    predicted_error: float
+    cost: float
+    next_cheaper: Plan | None = None
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        words = {
+            "method": method,
+            "taps": self.kernel.taps,
+            "profile samples": self.length,
+            "points a tile": self.per_tile,
+            "ranges": "pairs of float64" if self.order == WIDE else "float64",
+            "series": f"order {self.order}" if self.order > 0 else "exact",
+        }
+        if self.next_cheaper:
+            other = self.next_cheaper
+            words["next cheaper"] = (
+                f"{other.kernel.taps} taps of {other.length} samples: error {other.predicted_error:.1e}"
+            )
+        return words
+
+    def macros(self, bistatic: bool, wrap: bool, beam: bool) -> dict[str, int]:
+        """Build-time macros of kernels/backproject_float64.cl."""
+        return {
+            "BISTATIC": int(bistatic),
+            "BEAM": int(beam),
+            "WRAP": self.length if wrap else 0,
+            "TAPS": self.kernel.taps,
+            "TERMS": self.kernel.terms,
+            "ORDER": self.order,
+            "CHUNK": CHUNK,
+        }
+
+
+def make_plan(task: Task, tolerance: float) -> tuple[Plan, GridTiling]:
+    """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
+
+    ValueError names the best tolerance there is.
+    """
+    tilings = {side**2: GridTiling(task.grid, side) for side in SIDES}
+    seen = profile_energy.seen(task)
+    plans = sorted(_plans(task, tilings, seen), key=lambda p: p.cost)
+    good = next((p for p in plans if p.predicted_error <= tolerance), None)
+    if good is None:
+        least = min(p.predicted_error for p in plans)
+        digits = 10.0 ** (np.floor(np.log10(least)) - 1)
+        reach = np.ceil(1.001 * least / digits) * digits  # rounded up: what is printed can be asked for
+        dark = f": these pixels are {20 * np.log10(seen.near):.0f} dB darker than what lies beside them in their rows"
+        raise ValueError(
+            f"tolerance {tolerance:.1e} cannot be met in complex128{dark if seen.near > 10 else ''}; "
+            f"the best here is {reach:.1e}"
+        )
+    cheaper = [p for p in plans if p.cost < good.cost]
+    other = min(cheaper, key=lambda p: p.predicted_error, default=None)
+    named = Plan(good.kernel, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other)
+    return named, tilings[named.per_tile]
+
+
+def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator[Plan]:
+    """Every plan there is. Memory plays no part: neither plan nor image depends on it."""
+    raw, grid = task.raw, task.grid
+    _check_paths(task)
+    frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())
+    distance = task.antennas.distance(grid.bounds)
+    extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
+    cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
+    # errors scale with the rows' energy, a tolerance with what pixels see of it: in these data, and at rare nulls
+    dark = max(seen.near, error_bounds_float64.darkness(float(cells)))
+    ranges = [
+        (
+            error_bounds_float64.range_error(tiling.radius, distance, frequency, order),
+            cost + TILE_COST / per_tile,
+            per_tile,
+            order,
+        )
+        for per_tile, tiling in tilings.items()
+        for order, cost in ORDER_COST.items()
+    ]
+    for taps in interpolation_float64.TAPS:
+        for oversample in interpolation_float64.OVERSAMPLE:
+            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
+            # and an even length puts delay 0 on a sample
+            length = 2 * fft.good_length(max(int(np.ceil(oversample * raw.n_samples / 2)), 2 * taps))
+            if length > max(interpolation_float64.LONGEST, 2 * raw.n_samples):
+                continue
+            kernel = interpolation_float64.cheapest_kernel(taps, float(oversample))
+            fixed = dark * kernel.error
+            fixed += max(seen.whole, dark) * error_bounds_float64.sum_rounding(CHUNK, length, kernel.edge_gain)
+            profile = SAMPLE_COST * length * (1 + length / 65536)
+            for error, extra, per_tile, order in ranges:
+                if np.isfinite(error):
+                    pairs = grid.size * (PAIR_COST + TAP_COST * taps + extra)
+                    yield Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
+
+
+def _check_paths(task: Task) -> None:
+    """ValueError for paths whose turns pairs of float64 cannot split into whole ones and the rest."""
+    raw, grid = task.raw, task.grid
+    ends = (raw.tx, raw.rx, grid.bounds)
+    longest = 2 * sum(float(np.abs(x).max()) for x in ends) + float(np.abs(raw.reference_range).max())
+    turns = 2 * float(raw.frequency.max()) / SPEED_OF_LIGHT * longest
+    if turns > MOST_TURNS:
+        raise ValueError(
+            f"paths of up to {longest:.1e} m are {turns:.1e} turns of phase, float64 counts {MOST_TURNS:.1e}; give "
+            "positions about a nearer origin"
+        )

@@ -1,0 +1,203 @@
+"""What is to be focused, worked out once: the rows that count, their weights, their geometry."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..base.stage_timer import Clock
+from ..base.validation import array, converted, finite, number
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..numerics.plan import skips as known_skips
+from ..numerics.pulse_geometry import Antennas
+from .tiling import GridTiling
+
+SKIPS = ("range window", "beam", "zero weight", "no data")
+
+
+@dataclass(frozen=True, eq=False)
+class Task:
+    """One image to be made, whatever the method and the device.
+
+    raw            its rows; those of weight 0 are gone where they are skipped
+    grid           ImageGrid; where empty cells are not skipped, they have positions and no longer count as empty
+    antennas       geometry of the rows, their range windows and beams
+    sample_weight  (n_samples,) and row_weight (n_rows,), float64: window, raw.weight and `weights` together
+    wrap           profiles repeat beyond the range window
+    skips          reasons to leave out pairs
+    """
+
+    raw: PhaseHistory
+    grid: ImageGrid
+    antennas: Antennas
+    sample_weight: np.ndarray
+    row_weight: np.ndarray
+    wrap: bool
+    skips: frozenset[str]
+
+    @property
+    def highest(self) -> float:
+        """No frequency is above it, Hz."""
+        return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
+
+    @property
+    def pairs(self) -> int:
+        """(row, pixel) pairs of the rows that count."""
+        return self.raw.n_rows * self.grid.size
+
+
+class Engine(Protocol):
+    """One way to focus a task on one device. Every module of a method has one.
+
+    A class made as (device, task, plan, tiling). It may have an attribute least_pixels: how many pixels a block
+    should have so that what every block costs anew does not show; without, blocks are as large as memory
+    allows, and so is what a killed run loses.
+
+    plan    with describe(method) -> dict and predicted_error; never a matter of device or memory
+    tiling  GridTiling whose bands are the units of work; fixed by grid, geometry and tolerance
+    dtype   of the pixels: complex64 or complex128
+    """
+
+    plan: Any
+    tiling: GridTiling
+    dtype: Any
+
+    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
+        """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
+
+        MemoryError where nbytes is too little for anything.
+        """
+        ...
+
+    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+        """Write the pixels of bands first ... last - 1 to their places in `flat` (Target.flat).
+
+        budget  bytes on the device, all in all
+        tick    called as tick(rows_done): how many of the task's rows these bands have had so far
+        Returns how many (row, pixel) pairs were skipped, as `tally` puts it.
+        """
+        ...
+
+
+_BEAM = 2**64  # pairs outside a beam are counted in multiples of it, so that one whole number carries both reasons
+
+
+def tally(missed: np.ndarray, sizes: np.ndarray) -> int:
+    """Pairs left out, for `by_reason`, from rows left out of every tile (2, n_tiles) and pixels of each (n_tiles,).
+
+    It is a plain int, so that workers and files hand it on and add it up as such: the pairs outside the range window,
+    where there is no beam.
+    """
+    window, beam = (int((rows * sizes).sum()) for rows in missed)
+    return window + _BEAM * beam
+
+
+def by_reason(skipped: int) -> tuple[int, int]:
+    """Pairs outside the range window, and outside the beam, from the sum of what `tally` returned."""
+    return skipped % _BEAM, skipped // _BEAM
+
+
+def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarray | None, float]:
+    """Unit directions (n_rows, 3), or None where every point is seen, and full angle, rad, of `beam`.
+
+    beam    None, an angle about the line from the transmitter to `center`, m (3,), or (angle, direction)
+    ValueError: an angle that is not in (0, 2 pi], a direction of another shape, zero or not finite.
+    """
+    if beam is None:
+        return None, 2 * np.pi
+    pointed = isinstance(beam, (tuple, list))
+    if pointed and len(beam) != 2:
+        raise ValueError(f"beam has {len(beam)} parts; give an angle in rad, or (angle, direction)")
+    name = "beam[0]" if pointed else "beam"
+    angle = number(name, beam[0] if pointed else beam, above=0)
+    if angle > 2 * np.pi:
+        raise ValueError(f"{name} is {angle:g} rad; a full angle is at most 2 pi: give radians")
+    if pointed:
+        given = converted("beam[1]", beam[1], np.float64)
+        if given.shape not in ((3,), (raw.n_rows, 3)):
+            raise ValueError(f"beam[1] has shape {given.shape}, wanted a direction (3,) or one a row ({raw.n_rows}, 3)")
+        finite("beam[1]", given)
+        toward = np.broadcast_to(given, (raw.n_rows, 3))
+    else:
+        toward = center - raw.tx
+    largest = np.abs(toward).max(axis=1, keepdims=True)  # first, so that squares neither overflow nor vanish
+    if not largest.all():
+        row = int(np.argmin(largest))
+        if not pointed:
+            raise ValueError(f"tx[{row}] is at the grid's centre, so its beam points nowhere; give (angle, direction)")
+        which = f"[{row}]" if np.ndim(beam[1]) == 2 else ""
+        raise ValueError(f"beam[1]{which} is (0, 0, 0); a direction needs a length")
+    if angle == 2 * np.pi:
+        return None, angle
+    toward = toward / largest
+    return toward / np.linalg.norm(toward, axis=1, keepdims=True), angle
+
+
+def make_task(
+    raw: PhaseHistory, grid: ImageGrid, window: Any, weights: Any, wrap: bool, skip: Any, beam: Any = None
+) -> Task:
+    """What the options of `backproject` make of the data; ValueError for those that do not fit."""
+    if not raw.compressed:
+        raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
+    skips = known_skips(skip, SKIPS)
+    sample_weight, row_weight = weigh(raw, window, weights)
+    toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0))
+    if "zero weight" in skips and not row_weight.all():
+        used = np.flatnonzero(row_weight)
+        raw, row_weight = raw[used], row_weight[used]
+        toward = None if toward is None else toward[used]
+    if "no data" not in skips:
+        grid = grid.filled()
+    return Task(raw, grid, antennas_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips))
+
+
+def weigh(raw: PhaseHistory, window: Any, weights: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Weights of samples (n_samples,) and rows (n_rows,): window, raw.weight and `weights` together.
+
+    The rows of each channel and polarisation, in time, share one window over the aperture.
+    """
+    from ..numerics.windows import weights as window_weights
+
+    rows = np.ones(raw.n_rows)
+    if window is not None:
+        keys = [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
+        when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
+        group = np.zeros(raw.n_rows, np.int64)
+        for key in keys:
+            group = group * (len(np.unique(key)) + 1) + np.unique(key, return_inverse=True)[1]
+        for g in np.unique(group):
+            members = np.flatnonzero(group == g)
+            rows[members[np.argsort(when[members])]] = window_weights(window, len(members))
+    if raw.weight is not None:
+        rows = rows * raw.weight
+    if weights is not None:
+        rows = rows * array("weights", weights, np.float64, (raw.n_rows,))
+    if (rows < 0).any():
+        raise ValueError(f"weights[{int(np.argmin(rows))}] is negative; a weight cannot be")
+    if not rows.any():
+        raise ValueError("every row has weight 0; nothing would be focused")
+    return window_weights(window, raw.n_samples), rows
+
+
+def antennas_of(
+    raw: PhaseHistory, wrap: bool, beam: np.ndarray | None = None, beam_angle: float = 2 * np.pi
+) -> Antennas:
+    """The geometry of every row; the carrier is the frequency of sample n_samples//2; beam as of `beam_of`."""
+    half = np.full(raw.n_rows, 1e30) if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
+    return Antennas(
+        tx=raw.tx,
+        rx=None if raw.is_monostatic else raw.rx,
+        reference_range=raw.reference_range,
+        frequency=raw.frequency + raw.n_samples // 2 * raw.frequency_step,
+        frequency_step=raw.frequency_step,
+        near=-half,
+        far=half,
+        wrap=wrap,
+        beam=beam,
+        beam_angle=beam_angle,
+    )

@@ -1,0 +1,166 @@
+"""What an image will take before any work is done: method, time, memory, error."""
+
+from __future__ import annotations
+
+import copy
+import functools
+import time
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.stage_timer import Clock
+from ..base.text import duration, size_text
+from ..base.validation import choice, instance
+from ..base.validation import tolerance as allowed_error
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..opencl import device as opencl
+from ..opencl.device import Device, open_devices
+from . import profile_energy
+from .choose_method import METHODS, Choice, choose
+from .factorized.plan import FactorPlan
+from .factorized.plan import moving_cost as moving_cost
+from .focusing_task import Task, make_task
+
+PROBE = 0.03  # s a probe of a device takes at least
+MOST_BANDS = 2**16  # of which blocks are listed: what the first takes shows in these
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast:
+    """What `backproject` would do with the same options.
+
+    method           "direct" or "factorized"; plan: the details, as in a report
+    seconds          about, on these devices as fast as they are now
+    bytes            of memory, about: pixels in memory and blocks on every device
+    predicted_error  bound of the relative error
+    cheaper          (predicted error, seconds) of the next cheaper plan, or None where there is none
+    """
+
+    method: str
+    plan: dict[str, Any]
+    seconds: float
+    bytes: float
+    predicted_error: float
+    cheaper: tuple[float, float] | None
+
+    def __str__(self) -> str:
+        text = f"{self.method}: about {duration(self.seconds)}, {size_text(self.bytes)}"
+        text += f", error below {self.predicted_error:.1e}"
+        if self.cheaper:
+            text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
+        return text
+
+
+def plan(
+    raw: PhaseHistory,
+    grid: ImageGrid,
+    *,
+    tolerance: float = 1e-3,
+    method: str = "auto",
+    window: Any = None,
+    weights: Any = None,
+    beam: Any = None,
+    wrap: bool = False,
+    skip: Any = True,
+    max_bytes: float | None = None,
+    device: Any = None,
+) -> Forecast:
+    """How `backproject(raw, grid, ...)` would make the image with these options: a Forecast, before any work.
+
+    Samples are read once, up to 2^28 of them, to see how much of their energy lies on the grid. Time is scaled
+    from a short run of the kernel on each device. ValueError and MemoryError where `backproject` would raise one.
+    """
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
+    choice("method", method, METHODS)
+    tolerance = allowed_error(tolerance)
+    task = make_task(raw, grid, window, weights, wrap, skip, beam)
+    devices = open_devices(device)
+    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
+    chosen = choose(task, method, tolerance, lanes, float64)
+    working = sum(_bytes(task, chosen, d, min(opencl.budget(d, max_bytes), d.info.memory)) for d in devices)
+    # of a pixel in all rows that see it, at cost 1
+    seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
+    return Forecast(
+        chosen.method,
+        chosen.plan.describe(chosen.method),
+        seconds * _work(task, chosen),
+        float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
+        chosen.predicted_error,
+        _cheaper(task, method, tolerance, lanes, float64, chosen, seconds),
+    )
+
+
+def _work(task: Task, chosen: Choice) -> float:
+    """What a row costs: pixels to be made, of tiles that reach beyond the grid too, times the cost of each."""
+    tiling, plan, rows = chosen.tiling, chosen.plan, task.raw.n_rows
+    pixels = float(tiling.pixels(0, tiling.n_bands))
+    if not isinstance(plan, FactorPlan):
+        return pixels * chosen.cost
+    # the plan counts tiles as if they filled the grid
+    sources = [rows, *(len(level.thinning.nodes) for level in plan.levels)]
+    extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
+    for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
+        if tiling.grid.is_plane:
+            tiles = float(-(-tiling.n_bands // factor) * -(-tiling.across // factor))
+        else:
+            tiles = pixels / tiling.per_tile / factor**2
+        moved = moving_cost(2 * level.reach, plan.between.taps, level.thinning.filter.shape[1])
+        extra += max(tiles - task.grid.size / level.side**2, 0.0) * n * moved
+    return task.grid.size * chosen.cost + extra / rows
+
+
+def _rate(devices: list[Device]) -> float:
+    """Contributions a second of all devices together; drivers of the same CPU share its cores."""
+    return sum(_speed(d) for d in devices if not d.is_cpu) + max((_speed(d) for d in devices if d.is_cpu), default=0.0)
+
+
+def _cheaper(
+    task: Task, method: str, tolerance: float, lanes: bool, float64: bool, chosen: Choice, seconds: float
+) -> tuple[float, float] | None:
+    """The plan of the smallest error that costs noticeably less."""
+    for factor in (2, 3, 10, 30):
+        if tolerance * factor < 1:
+            other = choose(task, method, tolerance * factor, lanes, float64)
+            if _work(task, other) < 0.95 * _work(task, chosen):
+                return other.predicted_error, seconds * _work(task, other)
+    return None
+
+
+def _bytes(task: Task, chosen: Choice, device: Device, budget: float) -> float:
+    """What a device holds at a time; its budget is kept."""
+    tiling = copy.copy(chosen.tiling)
+    tiling.n_bands = min(tiling.n_bands, MOST_BANDS)
+    engine: Any = chosen.engine(device, task, chosen.plan, tiling)
+    if hasattr(engine, "working"):
+        return min(float(engine.working(budget)), budget)
+    first, last = engine.blocks(budget)[0]
+    return min(24.0 * tiling.pixels(first, last) + 8.0 * chosen.plan.length * 256, budget)
+
+
+@functools.lru_cache(maxsize=16)
+def _speed(device: Device) -> float:
+    """Contributions a second of the gathering kernel with the hat and ranges in float32: the unit of plans' costs."""
+    from .direct import direct
+
+    n = 256
+    track = np.stack([np.full(n, -7e3), np.linspace(-50, 50, n), np.full(n, 7e3)], axis=1)
+    samples = np.ones((n, 256), np.complex64)
+    raw = PhaseHistory(
+        samples, frequency=9.5e9, frequency_step=1e6, tx=track, reference_range=np.linalg.norm(track, axis=1)
+    )
+    side = 128
+    while True:
+        task = make_task(raw, ImageGrid.plane(shape=(side, side), spacing=0.3), None, None, False, True)
+        made, tiling = direct.make_plan(task, 0.1, lanes=False)
+        engine, out = direct.Direct(device, task, made, tiling), np.empty((side, side), np.complex64)
+        clock = Clock()
+        engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)  # builds, warms up
+        clock, start = Clock(), time.perf_counter()
+        engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)
+        if time.perf_counter() - start > PROBE or side >= 4096:
+            return task.pairs * made.cost / clock.seconds["backproject"]
+        side *= 2

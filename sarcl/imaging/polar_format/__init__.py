@@ -1,0 +1,1 @@
+"""sarcl/imaging/polar_format"""

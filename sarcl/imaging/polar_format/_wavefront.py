@@ -1,0 +1,127 @@
+"""Plane waves over a scene: wavenumbers of rows on a plane, and what the wavefronts' curvature is beside them."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...model.image_grid import ImageGrid
+from ...model.phase_history import PhaseHistory
+
+MOST_ROWS = 65  # of those that the curvature is looked at
+DIRECTIONS = 16  # from the centre, along which focus is looked for
+FOCUSED = np.pi / 4  # rad
+
+
+@dataclass(frozen=True, eq=False)
+class Waves:
+    """Plane waves of monostatic rows about a point of a grid.
+
+    center    m (3,): where they are exact
+    toward    unit vectors from it to the antennas (n_rows, 3)
+    distance  |tx - center|, m (n_rows,)
+    shift     distance less reference_range, m (n_rows,): the phase 4 pi f shift/c is put back
+    """
+
+    center: np.ndarray
+    toward: np.ndarray
+    distance: np.ndarray
+    shift: np.ndarray
+
+    def places(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[np.ndarray, np.ndarray]:
+        """Turns from one pixel to the next (n_rows, 2), rows and columns: of sample n_samples//2, and a sample more.
+
+        K = -(2 f/c) u on the plane, so that I(x) = sum s exp(+j 2 pi K.(x - center)).
+        """
+        assert grid.spacing is not None and grid.y_axis is not None and grid.x_axis is not None
+        along = self.toward @ np.stack([grid.y_axis * grid.spacing[0], grid.x_axis * grid.spacing[1]], axis=1)
+        middle = raw.frequency + raw.n_samples // 2 * raw.frequency_step
+        scale = -2 / SPEED_OF_LIGHT
+        return scale * middle[:, None] * along, scale * raw.frequency_step[:, None] * along
+
+
+def waves_about(raw: PhaseHistory, center: np.ndarray) -> Waves:
+    """Plane waves of every row about `center`, m (3,). ValueError where an antenna is there."""
+    away = raw.tx - center
+    distance = np.linalg.norm(away, axis=1)
+    if not distance.all():
+        raise ValueError(f"tx[{int(np.argmin(distance))}] is at the grid's centre, where waves have no direction")
+    # differences of float64 are 4e-9 m off at 36 000 km: 1e-5 rad at 60 GHz
+    wide, known = raw.tx.astype(np.longdouble) - center, raw.reference_range.astype(np.longdouble)
+    length = np.sqrt((wide**2).sum(axis=1))
+    shift = ((wide**2).sum(axis=1) - known**2) / np.where(length + known > 0, length + known, 1)
+    return Waves(center, away / distance[:, None], distance, shift.astype(np.float64))
+
+
+@dataclass(frozen=True)
+class Curvature:
+    """What plane waves err on a grid.
+
+    phase       largest |4 pi f/c (|T - x| - |T - c| + u.(x - c))| of any pixel, row and frequency, rad
+    defocus     what is left of it, rad, once a constant phase and a shift are taken out pixel by pixel
+    distortion  the largest such shift, m
+    radius      m from the centre within which defocus stays below pi/4; inf where it does as far as the antennas
+    """
+
+    phase: float
+    defocus: float
+    distortion: float
+    radius: float
+
+
+def curvature(raw: PhaseHistory, waves: Waves, grid: ImageGrid) -> Curvature:
+    """What plane waves err on a plane: at its border, from some rows, lowest, middle and highest frequency."""
+    rows = np.unique(np.linspace(0, raw.n_rows - 1, MOST_ROWS).astype(int))
+    looked = _Looked(raw, waves, grid, rows)
+    last = np.array(grid.shape) - 1
+    i, j = (np.array(at) / 2 for at in ([0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]))
+    phase, rest, shift = looked(grid.at(i * last[0], j * last[1]) - waves.center)
+    angle = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
+    assert grid.y_axis is not None and grid.x_axis is not None
+    compass = np.cos(angle)[:, None] * grid.x_axis + np.sin(angle)[:, None] * grid.y_axis
+
+    def blurred(radius: float) -> bool:
+        return bool(looked(radius * compass)[1].max() >= FOCUSED)
+
+    low, high = 0.0, float(waves.distance[rows].min()) / 2
+    radius = np.inf
+    if blurred(high):
+        for _ in range(40):
+            middle = (low + high) / 2
+            low, high = (low, middle) if blurred(middle) else (middle, high)
+        radius = low
+    return Curvature(float(phase.max()), float(rest.max()), float(shift.max()), radius)
+
+
+class _Looked:
+    """The phase that plane waves lack, of some rows at three frequencies, and what of it is no shift."""
+
+    def __init__(self, raw: PhaseHistory, waves: Waves, grid: ImageGrid, rows: np.ndarray) -> None:
+        self.toward, self.distance = waves.toward[rows], waves.distance[rows]
+        n = np.array([0, (raw.n_samples - 1) / 2, raw.n_samples - 1])
+        frequency = raw.frequency[rows, None] + raw.frequency_step[rows, None] * n
+        self.wavenumber = 4 * np.pi / SPEED_OF_LIGHT * frequency  # (rows, 3), rad/m of range
+        assert grid.y_axis is not None and grid.x_axis is not None
+        on_plane = self.toward @ np.stack([grid.y_axis, grid.x_axis], axis=1)
+        waves_here = (self.wavenumber[:, :, None] * on_plane[:, None]).reshape(-1, 2)
+        middle = waves_here.mean(axis=0)
+        # a phase and a shift: the columns are scaled alike, so that what no shift can be told from a phase is dropped
+        self.scale = float(np.abs(waves_here - middle).max()) or 1.0
+        self.basis = np.column_stack([np.ones(len(waves_here)), (waves_here - middle) / self.scale])
+
+    def __call__(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+        """Largest phase, rad, largest rest, rad, and shift, m, at places d, m (n, 3), from the centre: each (n,)."""
+        along = self.toward @ d.T
+        near = self.distance[:, None] - along
+        path = np.sqrt(np.maximum((d * d).sum(axis=1) - along**2, 0) + near**2)
+        # |T - x| - (|T| - u.d) without cancellation
+        lacking = ((d * d).sum(axis=1) - along**2) / np.maximum(path + near, 1e-300)
+        phase = (self.wavenumber[:, :, None] * lacking[:, None]).reshape(-1, len(d))
+        fit = np.linalg.lstsq(self.basis, phase, rcond=1e-9)[0]
+        return (
+            np.abs(phase).max(axis=0),
+            np.abs(phase - self.basis @ fit).max(axis=0),
+            np.linalg.norm(fit[1:], axis=0) / self.scale,
+        )

@@ -1,0 +1,193 @@
+"""polar_format: monostatic echoes to an image as if wavefronts were planes, by one two-dimensional FFT."""
+
+from __future__ import annotations
+
+import warnings
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import SarclWarning, ToleranceMissed
+from ...base.report import Report
+from ...base.stage_timer import Clock
+from ...base.validation import instance
+from ...base.validation import tolerance as allowed_error
+from ...model.image import Image
+from ...model.image_grid import ImageGrid
+from ...model.phase_history import PhaseHistory
+from ...numerics.nufft2d import Gridder, make_plan, tile_of
+from ...numerics.range_profiles import LARGEST
+from ...opencl import device as opencl
+from ...opencl.device import open_device
+from ..focusing_task import Task, make_task
+from ._wavefront import Curvature, Waves, curvature, waves_about
+
+DEFOCUS = np.pi / 2  # rad at the grid's border that is warned of
+Progress = Callable[[str, int, int], None]
+
+
+def polar_format(
+    raw: PhaseHistory,
+    grid: ImageGrid,
+    *,
+    tolerance: float = 1e-2,
+    window: Any = None,
+    weights: Any = None,
+    max_bytes: float | None = None,
+    device: Any = None,
+    check: bool | None = None,
+    progress: Progress | None = None,
+) -> Image:
+    """Focus echoes on a plane, wavefronts taken for planes: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
+
+    raw        PhaseHistory, compressed, monostatic, of at least 2 rows; any track
+    grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, u from c to the antenna; phases
+               are referred to c whatever reference_range is
+    tolerance  L2 error allowed against that sum, relative to the larger of |I| and the norm if samples added with
+               random phases, sqrt(pixels sum |w s|^2)
+    window, weights, max_bytes   as `backproject` takes them
+    check      compute 256 random pixels of that sum exactly; None: where that costs less than 2 %
+    device     see `sarcl.devices`
+    progress   called as progress(stage, done, total), in thousandths
+
+    The report's plan says what plane waves err against `backproject`, which the tolerance does not count: the
+    largest phase, what of it blurs, by how much pixels are displaced, and the radius in which images are sharp.
+    sarcl.SarclWarning where they are not to the grid's border, and where that lies beyond the range window, in
+    which echoes repeat. ValueError: bistatic or uncompressed data, listed points, one row, a tolerance that cannot
+    be met; ToleranceMissed: the check measured more than the tolerance; MemoryError: max_bytes too small.
+    Source: Farooq 2009, equations 2.59 to 2.64; docs/polar_format.md.
+    """
+    clock = Clock()
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
+    if not grid.is_plane:
+        raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
+    tolerance = allowed_error(tolerance)
+    task = make_task(raw, grid, window, weights, wrap=True, skip=True)
+    if not raw.is_monostatic:
+        row = int(np.argmax((raw.rx != raw.tx).any(axis=1)))
+        raise ValueError(
+            f"raw is bistatic: rx[{row}] is not tx[{row}], and polar_format knows one direction a row; use backproject"
+        )
+    if task.raw.n_rows < 2:
+        raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
+    opened = open_device(device)
+    budget = min(opencl.budget(opened, max_bytes), opened.info.memory)
+    waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
+    bent = curvature(task.raw, waves, grid)
+    _warn(task, waves, bent)
+    turns, step = waves.places(task.raw, grid)
+    plan = make_plan(tolerance, grid.shape, turns, step, raw.n_samples, tile_of(opened))
+    engine = Gridder(opened, plan, turns, step, raw.n_samples)
+    engine.blocks(budget)
+    clock.lap("plan")
+
+    energy = np.zeros(task.raw.n_rows)
+
+    def read(start: int, stop: int) -> np.ndarray:
+        made = _weighted(task, waves, start, stop, tolerance)
+        energy[start:stop] = (made.real.astype(np.float64) ** 2 + made.imag.astype(np.float64) ** 2).sum(axis=1)
+        return made
+
+    def tell(share: float) -> None:
+        if progress:
+            progress("polar format", round(1000 * share), 1000)
+
+    data = engine.image(read, grid.shape, budget, clock, tell)
+    norm, random = float(np.linalg.norm(data)), float(np.sqrt(energy.sum() * grid.size))
+    details = plan.describe()
+    if norm < random:
+        details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
+    details |= _describe(bent)
+    measured = None
+    exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
+    if check or (check is None and exact_seconds < 0.02 * clock.seconds["gridding"]):
+        measured = _measure_error(task, grid, waves, data)
+        clock.lap("check")
+    middle = task.raw.n_rows // 2
+    image = Image(
+        data,
+        grid,
+        gain=float(task.row_weight.sum() * task.sample_weight.sum()),
+        frequency=float(np.median(task.antennas.frequency)),
+        tx=task.raw.tx[middle],
+        rx=task.raw.rx[middle],
+        report=Report(
+            plan=details,
+            tolerance=tolerance,
+            predicted_error=plan.predicted_error,
+            measured_error=measured,
+            contributions_done=task.pairs,
+            contributions_skipped={"zero weight": (raw.n_rows - task.raw.n_rows) * grid.size},
+            seconds=clock.seconds,
+            device=opened.info.name,
+        ),
+    )
+    if measured is not None and measured > tolerance:
+        raise ToleranceMissed(tolerance, measured, image)
+    return image
+
+
+def _weighted(task: Task, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
+    """Samples of some rows, times weights, their phase about the grid's centre: complex64."""
+    raw, rows = task.raw, slice(start, stop)
+    made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
+    shift = waves.shift[rows, None]
+    # a reference at the centre differs from it by roundings alone
+    if float(np.abs(shift).max()) * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * tolerance:
+        n = np.arange(raw.n_samples)
+        first = 2 / SPEED_OF_LIGHT * shift * raw.frequency[rows, None] % 1
+        turns = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
+        made = made * np.exp(2j * np.pi * turns)
+    largest = float(np.abs(made).max(initial=0.0))
+    if largest > LARGEST / raw.samples.size:
+        raise ValueError(
+            f"samples times weights reach {largest:.1e}; sums of {raw.samples.size} in complex64 hold up to "
+            f"{LARGEST:.0e}: scale the samples down"
+        )
+    return made.astype(np.complex64)
+
+
+def _warn(task: Task, waves: Waves, bent: Curvature) -> None:
+    """What of the grid is blurred, or repeats what lies elsewhere."""
+    if bent.defocus > DEFOCUS:
+        text = (
+            f"wavefronts are curved: at the grid's border {bent.defocus:.2g} rad are left that blur; polar_format "
+            f"focuses within {bent.radius:.3g} m of its centre. Take a smaller grid, or backproject"
+        )
+        warnings.warn(text, SarclWarning, stacklevel=3)
+    reach = np.abs(waves.toward @ (_corners(task.grid) - waves.center).T) + np.abs(waves.shift)[:, None]
+    if (reach > task.raw.swath[:, None] / 2 * (1 + 1e-9)).any():
+        text = (
+            f"the grid reaches {reach.max():.4g} m in range, but the range window ends at "
+            f"{task.raw.swath.min() / 2:.4g} m: beyond it polar_format repeats echoes. "
+            "Take a smaller grid, or backproject"
+        )
+        warnings.warn(text, SarclWarning, stacklevel=3)
+
+
+def _corners(grid: ImageGrid) -> np.ndarray:
+    last = np.array(grid.shape) - 1
+    return grid.at(np.array([0, 0, 1, 1]) * last[0], np.array([0, 1, 0, 1]) * last[1])
+
+
+def _describe(bent: Curvature) -> dict[str, str]:
+    """What plane waves err, for a report."""
+    return {
+        "plane waves err": f"{bent.phase:.2g} rad",
+        "that blurs": f"{bent.defocus:.2g} rad",
+        "displaced by": f"{bent.distortion:.2g} m",
+        "sharp within": f"{bent.radius:.3g} m",
+    }
+
+
+def _measure_error(task: Task, grid: ImageGrid, waves: Waves, data: np.ndarray) -> float:
+    """Relative error at up to 256 random pixels against the exact float64 sum."""
+    from ...reference.polar_format import polar_format as exact
+
+    index, positions = grid.sample(256, seed=0)
+    wanted, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
+    wrong = float(np.linalg.norm(data[index] - wanted))
+    return wrong / max(float(np.linalg.norm(wanted)), random) if wrong else 0.0

@@ -1,0 +1,125 @@
+"""How much of the rows' energy the pixels see: errors scale with the first, a tolerance with the second."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from weakref import WeakKeyDictionary
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..numerics.interpolation_float64 import kernel
+from ..opencl import fft
+from .focusing_task import Task
+
+ROWS, PIXELS, MOST = 16, 256, 2**18
+ALL = 2**28  # samples up to which every row is looked at
+TAPS, FINER, TERMS = 12, 4.0, 6  # of a kernel that errs by 1e-11
+
+
+_norms: WeakKeyDictionary[Task, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
+
+
+@dataclass(frozen=True)
+class Energy:
+    """Root mean square of range profiles, relative to that at the pixels themselves.
+
+    near    around the pixels' places: interpolation errs in proportion to it
+    whole   over whole profiles: rounding of transforms errs in proportion to it
+    """
+
+    near: float
+    whole: float
+
+
+def seen(task: Task) -> Energy:
+    """Estimate from 256 pixels in 16 rows spread over the data and in the 16 brightest, exact to 1e-11 of an amplitude.
+
+    Energy(1, 1) where no pixel sees anything.
+    """
+    raw, grid = task.raw, task.grid
+    bright = row_norms(task)
+    count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
+    usual = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
+    best = np.setdiff1d(np.argsort(bright)[-count:], usual)
+    _, x = grid.sample(PIXELS, seed=1)
+    # the brightest stand for themselves, the others for all that were not looked at
+    stands_for = {int(r): (raw.n_rows - len(best)) / len(usual) for r in usual} | {int(r): 1.0 for r in best}
+    read = {r: raw.read(r, r + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in stands_for}
+    scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read.values()))  # squares must not overflow
+    n = raw.n_samples
+    k = np.arange(n) - n // 2
+    length = fft.good_length(max(4 * n, 48))
+    shaped = 1 / kernel(TAPS, FINER, TERMS).transform(k / length)
+    at = near = lit = 0.0
+    for row, samples in read.items():
+        turns, inside = _delays(task, x, row)
+        values, close = _read(samples / scale, shaped, length, turns[inside])
+        at, near = at + stands_for[row] * values, near + stands_for[row] * close
+        lit += stands_for[row] * int(inside.sum()) / raw.n_rows
+    whole = lit * float(((bright / scale) ** 2).sum())
+    if whole == 0 or near == 0:
+        return Energy(1.0, 1.0)
+    floor = 1e-20 * whole  # every pixel of every row at an exact null: no more can be told
+    return Energy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
+
+
+def row_norms(task: Task) -> np.ndarray:
+    """Norm of the samples of each row as they are weighed, (n_rows,) float64.
+
+    Of more than 2^28 samples (2 GiB), every n-th row alone is read, and stands for those up to the next.
+    """
+    if task in _norms:
+        return _norms[task]
+    raw = task.raw
+    every = -(-raw.n_rows * raw.n_samples // ALL)
+    weight, out = np.repeat(task.sample_weight**2, 2), np.empty(raw.n_rows)
+    step = max(1, min(64, 2**20 // raw.n_samples)) if every == 1 else 1
+    for start in range(0, raw.n_rows, step * every):
+        samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
+        parts = samples.view(samples.real.dtype).astype(np.float64)
+        largest = float(np.abs(parts).max()) or 1.0  # squares of huge samples overflow
+        parts /= largest
+        norm = largest * np.sqrt(np.square(parts, out=parts) @ weight)
+        out[start : start + step * every] = norm if every == 1 else norm[0]
+    _norms[task] = out * task.row_weight
+    return _norms[task]
+
+
+def share(task: Task) -> float:
+    """Share of (row, pixel) pairs in the row's range window and beam, estimated from 64 rows and 256 pixels."""
+    _, x = task.grid.sample(PIXELS, seed=1)
+    rows = np.unique(np.linspace(0, task.raw.n_rows - 1, 64).astype(int))
+    return float(np.mean([_delays(task, x, int(row))[1].mean() for row in rows]))
+
+
+def _delays(task: Task, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
+    """Delays of points, m (m, 3), in turns of a row's window, and whether the row sees them."""
+    raw = task.raw
+    half = sum(np.linalg.norm(x - end[row], axis=1) for end in (raw.tx, raw.rx)) / 2
+    turns = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
+    lit = np.full(len(x), True) if task.wrap else np.abs(turns) <= 0.5
+    if task.antennas.beam is not None:
+        lit &= task.antennas.beam_depth(x, row) >= 0
+    return turns, lit
+
+
+def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarray) -> tuple[float, float]:
+    """Power of a profile at delays (m,), in turns of the window, added up; and around them.
+
+    shaped  (n_samples,): what makes up for the kernel's transform
+    """
+    made, n = kernel(TAPS, FINER, TERMS), len(samples)
+    k = np.arange(n) - n // 2
+    spectrum = np.zeros(length, np.complex128)
+    spectrum[k] = samples * shaped
+    profile = np.fft.ifft(spectrum) * length
+    spectrum[k] = samples
+    power = np.abs(np.fft.ifft(spectrum) * length) ** 2
+    place = turns * length - (made.taps - 1) / 2
+    first = np.rint(place).astype(np.int64)
+    taps = (first[:, None] + np.arange(made.taps)) % length
+    values = (made.weights(place - first) * profile[taps]).sum(axis=1)
+    # what a kernel reads, and a sample more on each side
+    around = (first[:, None] + np.arange(-1, made.taps + 1)) % length
+    return float((np.abs(values) ** 2).sum()), float(power[around].mean(axis=1).sum())

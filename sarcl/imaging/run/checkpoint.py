@@ -1,0 +1,128 @@
+"""When finished tiles go to files, and what becomes of the files when a run ends."""
+
+from __future__ import annotations
+
+import logging
+import math
+import time
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...io import output_paths
+from ...io.hdf5 import BLOCK_BYTES
+from ...model import store
+from ...model.image import Image
+from ..choose_method import Choice
+from ..focusing_task import Task
+from ..tiling import Run, extent
+from . import _fingerprint
+from .tile_files import Pieces, discard, folder_of, gaps
+
+log = logging.getLogger(__name__)
+
+PERIOD = 1.0  # s; a run that is over sooner leaves no files
+WORTH = 60.0  # s of work that are kept when a run fails or is interrupted, unless resume=True
+
+
+def _parts(flat: Any, at: slice) -> Iterator[np.ndarray]:
+    """Rows `at` of Target.flat, or all of a Strip, some at a time: they may lie in a file."""
+    if hasattr(flat, "values"):
+        yield flat.values
+        return
+    step = max(1, int(BLOCK_BYTES // (np.dtype(flat.dtype).itemsize * max(1, math.prod(flat.shape[1:])))))
+    for start in range(at.start, at.stop, step):
+        yield flat[start : min(start + step, at.stop)]
+
+
+class Keeper:
+    """Keeps the finished tiles of image `path`, by the rule of `resume`.
+
+    True   always, whatever ends the run
+    None   from PERIOD on, so that a killed run loses no finished tile; a run that ends in an exception before
+           WORTH removes the files it began
+    False  not at all; what earlier runs left is thrown away
+
+    Making one reads all samples where there are tiles, or are bound to be; ValueError: they are another job's.
+    Used as a context manager, an exception ends the run.
+    """
+
+    def __init__(self, path: Any, task: Task, chosen: Choice, tolerance: float, resume: bool | None) -> None:
+        self.path, self.task, self.chosen, self.tolerance = path, task, chosen, tolerance
+        self.folder, self.resume = folder_of(path), resume
+        self.pieces: Pieces | None = None
+        self.begun = time.monotonic()
+        self.fresh = True
+        self._waiting: list[tuple[int, int, int]] = []
+        if resume is False:
+            discard(self.folder)
+        elif resume or self.folder.exists():
+            output_paths.check_writable(path)
+            self._open()
+
+    @property
+    def mark(self) -> str | None:
+        """The job's fingerprint, where it was needed."""
+        return self.pieces.mark if self.pieces else None
+
+    def finished(self) -> Image | None:
+        """The image, where this very job has made it already."""
+        if self.mark is None or store.job_of(self.path) != self.mark:
+            return None
+        self.done()
+        image = store.load(self.path)
+        return image if isinstance(image, Image) else None
+
+    def complete(self) -> bool:
+        """Every band has a file."""
+        return self.pieces is not None and not gaps(self.pieces.runs(), 0, self.chosen.tiling.n_bands)
+
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, int]]:
+        """Tiles of earlier runs; see Pieces.found."""
+        if self.pieces is not None:
+            yield from self.pieces.found(first, last)
+
+    def keep(self, first: int, last: int, flat: Any, skipped: int) -> None:
+        """Bands first ... last - 1 are finished in `flat` (Target.flat, or a Strip of just them)."""
+        if self.resume is False:
+            return
+        self._waiting.append((first, last, skipped))
+        if self.pieces is None and time.monotonic() - self.begun < PERIOD:
+            return
+        try:
+            pieces = self.pieces or self._open()
+            for a, b, n in self._waiting:
+                pieces.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b)), n)
+        except (OSError, TypeError) as exc:
+            if self.resume:
+                raise
+            log.warning("finished tiles cannot be kept in %s: %s; a killed run would start anew", self.folder, exc)
+            self.resume = False
+        self._waiting.clear()
+
+    def done(self) -> None:
+        """The image is complete."""
+        if self.pieces is not None:
+            self.pieces.clear()
+
+    def __enter__(self) -> Keeper:
+        return self
+
+    def __exit__(self, kind: Any, *_: Any) -> None:
+        if kind is None or self.pieces is None:
+            return
+        if self.resume or not self.fresh or time.monotonic() - self.begun >= WORTH:
+            log.warning("finished tiles are kept in %s; the same call again goes on from there", self.folder)
+        else:
+            self.pieces.clear()
+
+    def _open(self) -> Pieces:
+        self.fresh = not self.folder.exists()
+        chosen = self.chosen
+        job = _fingerprint.job(self.task, chosen.method, self.tolerance, chosen.plan, chosen.tiling, chosen.dtype)
+        try:
+            self.pieces = Pieces(self.folder, job, chosen.tiling, chosen.dtype)
+        except FileNotFoundError:  # another run has just completed the image and taken the folder away
+            self.pieces = Pieces(self.folder, job, chosen.tiling, chosen.dtype)
+        return self.pieces

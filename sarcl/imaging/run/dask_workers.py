@@ -1,0 +1,180 @@
+"""Tiles made by the workers of a dask.distributed cluster, each on a device of its own. Needs sarcl[dask].
+
+The scheduler is dask's. A worker gets the task once, opens its device in its own process with the first block,
+and sends back the pixels of every block; samples that lie in a file are read from there by each worker, so the
+file has to be where they all find it under one name.
+"""
+
+from __future__ import annotations
+
+import os
+import secrets
+import threading
+from collections.abc import Callable, Generator
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...base.stage_timer import Clock
+from ...model.lazy_rows import Picked, Stacked
+from ...opencl import device as opencl
+from ...opencl.device import Device, listed, open_device
+from ..choose_method import Choice
+from ..focusing_task import Engine, Task
+from ..tiling import Run, count, extent
+from .image_output import Strip
+from .workers import Done, FlatFor, cut
+
+
+@dataclass(frozen=True, eq=False)
+class Order:
+    """What every worker is told once: the task, the plan, which device to take, how much of its memory."""
+
+    task: Task
+    chosen: Choice
+    device: Any
+    max_bytes: float | None
+    name: str
+
+
+class Cluster:
+    """The workers of a distributed.Client: see crew.Crew."""
+
+    least_pixels = 0.0
+
+    def __init__(self, client: Any, task: Task, chosen: Choice, device: Any, max_bytes: float | None) -> None:
+        self.client, self.tiling, self.n_rows = client, chosen.tiling, task.raw.n_rows
+        self.places = _places(client)
+        self.size = len(self.places)
+        self.names: list[str] = []
+        raw = replace(task.raw, samples=portable(task.raw.samples))
+        self.order = Order(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
+
+    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
+        """See Crew."""
+        return cut(self.tiling, todo, most, set(), unit)
+
+    def work(
+        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
+    ) -> Generator[Done, None, None]:
+        """See Crew; progress is reported block by block."""
+        from distributed import as_completed
+
+        tick(0)
+        if not blocks:
+            return
+        order = self.client.scatter(self.order, broadcast=True, hash=False)
+        futures = self.client.map(_make, blocks, order=order, places=self.places, pure=False)
+        run_of = dict(zip((f.key for f in futures), blocks, strict=True))
+        pairs = 0
+        try:
+            for future in as_completed(futures):
+                first, last = run_of[future.key]
+                values, skipped, name = future.result()
+                future.release()
+                self.names = sorted({*self.names, name})
+                flat = flat_for(first, last)
+                flat[extent(self.tiling, first, last)] = values
+                clock.lap("backproject")
+                pairs += self.n_rows * count(self.tiling, first, last)
+                tick(pairs)
+                yield first, last, flat, skipped
+        finally:
+            self.client.cancel(futures)
+
+
+def have_lanes(client: Any, device: Any) -> bool:
+    """Every worker's device works on vectors of pixels, as CPUs do. Opens the devices.
+
+    ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
+    """
+    try:
+        from distributed import Client
+    except ImportError as exc:
+        raise ImportError(f"cluster= needs dask ({exc}): pip install 'sarcl[dask]'") from None
+    if not isinstance(client, Client):
+        raise TypeError(f"cluster is a {type(client).__name__}; wanted a dask.distributed.Client")
+    places = _places(client)
+    if not places:
+        raise RuntimeError("cluster has no workers; start some, and client.wait_for_workers(1)")
+    widths = [client.submit(_width, device, place, workers=[w], pure=False) for w, place in places.items()]
+    return all(width > 1 for width in client.gather(widths))
+
+
+def _places(client: Any) -> dict[str, int]:
+    """Workers, each with its number on its machine: they take turns at its devices."""
+    workers = sorted(client.nthreads())
+    hosts = [address.rpartition(":")[0] for address in workers]
+    return {address: hosts[:i].count(hosts[i]) for i, address in enumerate(workers)}
+
+
+class InFile:
+    """Rows of an HDF5 dataset, opened where they are read."""
+
+    def __init__(self, file: str, name: str, shape: tuple[int, ...], dtype: Any) -> None:
+        self.file, self.name, self.shape, self.dtype = file, name, shape, dtype
+        self._open: Any = None
+
+    def __getstate__(self) -> dict[str, Any]:
+        return {**self.__dict__, "_open": None}
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        if self._open is None:
+            import h5py
+
+            try:
+                found = h5py.File(self.file, "r", locking="best-effort")[self.name]
+            except (OSError, KeyError) as exc:
+                raise OSError(
+                    f"{self.file!r} cannot be read here ({exc}); every worker needs it under this name"
+                ) from None
+            if found.shape != self.shape or found.dtype != self.dtype:
+                raise ValueError(f"{self.file!r} is another file here: its {self.name} are {found.shape} {found.dtype}")
+            self._open = found
+        return np.asarray(self._open[rows])
+
+
+def portable(samples: Any) -> Any:
+    """Samples that another process can read: arrays as they are, datasets by the name of their file."""
+    if isinstance(samples, Picked):
+        return Picked(portable(samples.source), samples.index)
+    if isinstance(samples, Stacked):
+        return Stacked([portable(s) for s in samples.sources])
+    if hasattr(samples, "file") and hasattr(samples, "name"):  # an h5py.Dataset
+        return InFile(os.path.abspath(samples.file.filename), samples.name, samples.shape, samples.dtype)
+    return samples
+
+
+_lock = threading.Lock()  # a worker with several threads still has one device
+_engine: tuple[str, Engine, Device] | None = None
+
+
+def _open(choice: Any, place: int) -> Device:
+    """In a worker: the device of number `place` of its machine."""
+    choices = listed(choice)
+    return open_device(choices[place % len(choices)])
+
+
+def _width(choice: Any, place: int) -> int:
+    """In a worker: how many pixels its device works on at once."""
+    with _lock:
+        return _open(choice, place).info.vector_width
+
+
+def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray, int, str]:
+    """In a worker: pixels of a run of bands, pairs skipped, and the device's name."""
+    global _engine
+    from distributed import get_worker
+
+    with _lock:
+        if _engine is None or _engine[0] != order.name:
+            device = _open(order.device, places.get(get_worker().address, 0))
+            _engine = order.name, order.chosen.on(device, order.task), device
+        _, engine, device = _engine
+        budget = min(opencl.budget(device, order.max_bytes), device.info.memory)
+        strip, skipped = Strip(order.chosen.tiling, *run, order.chosen.dtype), 0
+        ends = {last for _, last in engine.blocks(budget)}
+        for first, last in cut(order.chosen.tiling, [run], float("inf"), ends):
+            skipped += engine.fill(first, last, strip, budget, Clock(), lambda _: None)
+        return strip.values, skipped, device.info.name

@@ -1,0 +1,94 @@
+"""Where an image's pixels go."""
+
+from __future__ import annotations
+
+import os
+from contextlib import ExitStack
+from typing import Any
+
+import numpy as np
+
+from ...base.text import size_text
+from ...model.image import Image
+from ...model.image_grid import ImageGrid
+from ..tiling import GridTiling, extent, row_shape
+
+
+class Target:
+    """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
+
+    def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
+        self.grid, self.writer = grid, None
+        self.data: Any
+        if out is None:
+            nbytes = float(grid.size * np.dtype(dtype).itemsize)
+            try:
+                self.data = np.empty(grid.shape, dtype)
+            except (MemoryError, ValueError):  # the latter where sizes overflow
+                raise MemoryError(
+                    f"an image of {' x '.join(map(str, grid.shape))} needs {size_text(nbytes)} of memory; "
+                    'take a smaller shape, or out="image.h5" to make it in a file'
+                ) from None
+        elif is_path(out):
+            from ...model import store
+
+            self.writer = store.image_writer(out, grid, dtype, claim=True)
+            stack.callback(self.writer.abandon)  # does nothing once finished
+            self.data = self.writer.data
+        else:
+            _check_array(out)
+            if tuple(out.shape) != tuple(grid.shape) or np.dtype(out.dtype).kind != "c":
+                raise ValueError(f"out has shape {out.shape} and type {out.dtype}, wanted complex of {grid.shape}")
+            if np.dtype(out.dtype).itemsize < np.dtype(dtype).itemsize:
+                raise ValueError(f"out has type {out.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
+            self.data = out
+        # rows of a plane go straight to their place; listed points arrive along a curve and go there at the end
+        self.flat = self.data if grid.is_plane else np.empty(grid.size, dtype)
+
+    def finish(self) -> None:
+        """Everything has been written to `flat`."""
+        if not self.grid.is_plane:
+            self.data[...] = self.flat.reshape(self.grid.shape)
+
+    def image(self, job: str | None = None, **fields: Any) -> Image:
+        """The finished Image; a file appears under its name, marked with its job, only now."""
+        if self.writer is not None:
+            if job is not None:
+                self.writer.mark(job)
+            return self.writer.finish(**fields)
+        return Image(self.data, self.grid, **fields)
+
+
+class Strip:
+    """The pixels of some bands alone, written as if they were Target.flat: where no whole image is at hand."""
+
+    def __init__(self, tiling: GridTiling, first: int, last: int, dtype: Any) -> None:
+        at = extent(tiling, first, last)
+        self.start = at.start
+        self.values = np.empty((at.stop - at.start, *row_shape(tiling.grid)), dtype)
+
+    def __setitem__(self, at: Any, block: np.ndarray) -> None:
+        rows, *rest = at if isinstance(at, tuple) else (at,)
+        self.values[(slice(rows.start - self.start, rows.stop - self.start), *rest)] = block
+
+
+def is_path(out: Any) -> bool:
+    """True for the name of an image's file; ValueError for one that does not end in .h5 or .hdf5."""
+    if not isinstance(out, str) and not hasattr(out, "__fspath__"):
+        return False
+    name = os.fspath(out)
+    if not isinstance(name, str) or not name.lower().endswith((".h5", ".hdf5")):
+        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in .h5")
+    return True
+
+
+def _check_array(out: Any) -> None:
+    """TypeError unless `out` is an array or a file's dataset, ValueError unless it can be written to."""
+    if not all(hasattr(out, name) for name in ("shape", "dtype", "__setitem__")):
+        what = f"{' '.join(repr(out).split()):.40} ({type(out).__name__})"
+        raise TypeError(f'out is {what}; wanted None, a complex array of the grid\'s shape, or a path like "image.h5"')
+    file = getattr(out, "file", None)
+    if isinstance(out, np.ndarray) and not out.flags.writeable:
+        raise ValueError("out is a read-only array; give one that can be written to (a memmap: mode='r+')")
+    if file is not None and getattr(file, "mode", "r+") == "r":
+        raise ValueError(f"out is a dataset of {file.filename!r}, which is open for reading; open it with mode 'r+'")

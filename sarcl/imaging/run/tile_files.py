@@ -1,0 +1,214 @@
+"""Finished tiles in files beside an image in the making: a killed run goes on, and several runs share one image.
+
+IMAGE.parts/ holds job.json, which says what is being made, and bands-FIRST-LAST.tiles, each the pixels of some
+bands of the image's one tiling. A file takes its name when it is whole; it carries the fingerprint of its job
+and a checksum, and what fits neither is not used.
+"""
+
+from __future__ import annotations
+
+import json
+import logging
+import os
+import re
+import secrets
+import struct
+from collections.abc import Iterable, Iterator
+from itertools import chain
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..tiling import GridTiling, Run, count, extent, row_shape
+from ._fingerprint import as_bytes, checker, difference, mark
+
+log = logging.getLogger(__name__)
+
+MAGIC = b"sarcl tiles 1\n"
+NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
+DIGEST = 32  # bytes
+
+
+def folder_of(path: Any) -> Path:
+    """Where the tiles of image `path` wait."""
+    return Path(os.path.realpath(os.fspath(path)) + ".parts")
+
+
+class Pieces:
+    """The tiles in files of one job. Made, `folder` exists and is this job's own.
+
+    ValueError where it holds another job's tiles; raises OSError where nothing can be made there.
+    """
+
+    def __init__(self, folder: Path, job: dict[str, Any], tiling: GridTiling, dtype: Any) -> None:
+        self.folder, self.tiling, self.dtype = folder, tiling, np.dtype(dtype)
+        self.mark = mark(job)
+        try:
+            folder.mkdir(exist_ok=True)
+        except FileExistsError:
+            raise NotADirectoryError(
+                f"{str(folder)!r} is a file, and finished tiles are kept in a folder of that name; move it away"
+            ) from None
+        self._sign(job)
+
+    def runs(self) -> list[Run]:
+        """Runs of bands that have a file, by their names."""
+        return sorted(found for path in _tiles(self.folder) if (found := self._named(path)))
+
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, int]]:
+        """Whole files of this job with any of bands first ... last - 1, none twice: (run, pixels, pairs skipped).
+
+        A damaged file is removed, another job's left alone; both are warned of.
+        """
+        end = 0
+        for a, b in self.runs():
+            if a < end or b <= first or a >= last:
+                continue
+            path = self._path(a, b)
+            values, skipped, why = self._read(path, a, b)
+            if values is None:
+                log.warning("%s %s: its tiles are made again", path, why)
+                if why != FOREIGN:
+                    path.unlink(missing_ok=True)
+                continue
+            end = b
+            yield (a, b), values, skipped
+
+    def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: int) -> None:
+        """Put the pixels of bands first ... last - 1, given in parts, in a file, whole or not at all."""
+        head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": int(skipped)}
+        text = json.dumps(head).encode()
+        check = checker()
+        temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
+        try:
+            with open(temporary, "wb") as file:
+                start: tuple[Any, ...] = (MAGIC, struct.pack("<Q", len(text)), text)
+                for part in chain(start, (as_bytes(p.astype(self.dtype, copy=False)) for p in parts)):
+                    file.write(part)
+                    check.update(part)
+                file.write(check.digest())
+            os.replace(temporary, self._path(first, last))
+        except BaseException:
+            temporary.unlink(missing_ok=True)
+            raise
+
+    def clear(self) -> None:
+        """Remove this job's files, and the folder unless something else is in it."""
+        for path in _tiles(self.folder):
+            if self._mark_in(path) in (self.mark, None):
+                path.unlink(missing_ok=True)
+        if not _tiles(self.folder):
+            discard(self.folder)
+
+    def _path(self, first: int, last: int) -> Path:
+        return self.folder / f"bands-{first:06d}-{last:06d}.tiles"
+
+    def _named(self, path: Path) -> Run | None:
+        match = NAME.fullmatch(path.name)
+        first, last = (int(match[1]), int(match[2])) if match else (0, 0)
+        return (first, last) if first < last <= self.tiling.n_bands and path == self._path(first, last) else None
+
+    def _sign(self, job: dict[str, Any]) -> None:
+        """Write job.json where there is none; refuse a folder whose job.json names another job."""
+        path = self.folder / "job.json"
+        temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
+        temporary.write_text(json.dumps({"fingerprint": self.mark, **job}, indent=1) + "\n")
+        try:
+            try:
+                os.link(temporary, path)  # the first of several runs wins
+            except FileExistsError:
+                pass
+            except OSError:  # a disk without links
+                if not path.exists():
+                    os.replace(temporary, path)
+            try:
+                there = json.loads(path.read_text())
+                other = there.pop("fingerprint") != self.mark
+            except (ValueError, KeyError, TypeError, AttributeError, OSError):
+                log.warning("%s is damaged and written anew; only tiles that fit this job are used", path)
+                os.replace(temporary, path)
+                return
+        finally:
+            temporary.unlink(missing_ok=True)
+        if other:
+            raise ValueError(
+                f"{str(self.folder)!r} holds finished tiles of another job: {difference(there, job)}. Give what that "
+                "job was given to continue it, or resume=False (--no-resume) to throw its tiles away"
+            )
+
+    def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, int, str]:
+        """Pixels, pairs skipped and "", or None and why not."""
+        try:
+            data = path.read_bytes()
+        except OSError as exc:
+            return None, 0, f"cannot be read ({exc.strerror})"
+        view = memoryview(data)
+        start = len(MAGIC) + 8
+        if len(data) < start + DIGEST or not data.startswith(MAGIC):
+            return None, 0, "is truncated or damaged"
+        if checker(view[:-DIGEST]).digest() != data[-DIGEST:]:
+            return None, 0, "is truncated or damaged (its checksum differs)"
+        start += struct.unpack("<Q", data[len(MAGIC) : start])[0]
+        head = json.loads(data[len(MAGIC) + 8 : start])
+        if head["job"] != self.mark:
+            return None, 0, FOREIGN
+        at = extent(self.tiling, first, last)
+        size = count(self.tiling, first, last) * self.dtype.itemsize
+        fits = len(data) - DIGEST - start == size and head["dtype"] == self.dtype.str
+        if not fits or (head["first"], head["last"]) != (first, last):
+            return None, 0, "does not hold what its name says"
+        values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
+        return values.reshape(at.stop - at.start, *row_shape(self.tiling.grid)), head["skipped"], ""
+
+    def _mark_in(self, path: Path) -> str | None:
+        """The fingerprint in a file's head; None where it has none that can be read."""
+        try:
+            with open(path, "rb") as file:
+                start = file.read(len(MAGIC) + 8)
+                found = json.loads(file.read(min(struct.unpack("<Q", start[len(MAGIC) :])[0], 4096)))["job"]
+        except (OSError, ValueError, KeyError, TypeError, struct.error):
+            return None
+        return str(found)
+
+
+FOREIGN = "belongs to another job"
+
+
+def discard(folder: Path) -> None:
+    """Remove what runs leave in a folder of tiles, whichever job's, and the folder if it is empty then."""
+    for path in [*_tiles(folder), *folder.glob(".*.tmp"), folder / "job.json"]:
+        path.unlink(missing_ok=True)
+    try:
+        folder.rmdir()
+    except FileNotFoundError:
+        pass
+    except OSError:
+        log.warning("%s holds files that are not sarcl's and stays", folder)
+
+
+def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
+    """Bands of piece i of n; i runs from 1 to n, or from 0 to n - 1: 0 and n are the same piece.
+
+    Shares begin at multiples of `unit` bands, unless there are more pieces than units.
+    """
+    i, units = (i - 1) % n, -(-n_bands // unit)
+    if units < n:
+        unit, units = 1, n_bands
+    return i * units // n * unit, min((i + 1) * units // n * unit, n_bands)
+
+
+def gaps(runs: list[Run], first: int, last: int) -> list[Run]:
+    """What is left of bands first ... last - 1 without `runs`."""
+    left = []
+    for a, b in sorted(runs):
+        if a > first:
+            left.append((first, min(a, last)))
+        first = max(first, b)
+        if first >= last:
+            return left
+    return [*left, (first, last)] if first < last else left
+
+
+def _tiles(folder: Path) -> list[Path]:
+    return [path for path in folder.glob("bands-*.tiles") if NAME.fullmatch(path.name)]

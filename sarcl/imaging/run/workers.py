@@ -1,0 +1,164 @@
+"""Who focuses which tiles: one device, or several that take blocks from one queue."""
+
+from __future__ import annotations
+
+import queue
+import threading
+from collections.abc import Callable, Generator
+from typing import Any, Protocol
+
+import numpy as np
+
+from ...base.stage_timer import Clock
+from ..focusing_task import Engine
+from ..tiling import GridTiling, Run, count
+
+Done = tuple[int, int, Any, int]  # a run, where its pixels are, pairs skipped
+FlatFor = Callable[[int, int], Any]  # where the pixels of a run go
+BLOCKS_EACH = 4  # blocks a worker, so that none waits long for the slowest
+
+
+class Crew(Protocol):
+    """Those who focus the tiles of one task.
+
+    size          how many blocks they work on at once
+    names         of the devices
+    least_pixels  smaller blocks cost noticeably more a pixel
+    """
+
+    @property
+    def size(self) -> int: ...
+
+    @property
+    def names(self) -> list[str]: ...
+
+    @property
+    def least_pixels(self) -> float: ...
+
+    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
+        """The bands of `todo` in blocks, of about `most` pixels at most where units of bands allow."""
+        ...
+
+    def work(
+        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
+    ) -> Generator[Done, None, None]:
+        """Focus all blocks, each into flat_for(first, last); yields each as it is done, in any order.
+
+        tick  called from the caller's thread with the (row, pixel) pairs done so far
+        """
+        ...
+
+
+def cut(tiling: GridTiling, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
+    """The bands of `todo` in even blocks of about `most` pixels, none across one of `ends`.
+
+    Blocks begin at multiples of `unit` bands where neither `todo` nor `ends` want otherwise.
+    """
+    blocks = []
+    for start, stop in todo:
+        n = min(stop - start, max(1, int(np.ceil(count(tiling, start, stop) / max(most, 1)))))
+        even = {(start + (stop - start) * i // n) // unit * unit for i in range(1, n)}
+        first = start
+        for last in sorted({e for e in even | ends if start < e < stop} | {stop}):
+            blocks.append((first, last))
+            first = last
+    return blocks
+
+
+class Local:
+    """Engines of this process, each on its own device: see Crew."""
+
+    def __init__(self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int) -> None:
+        self.engines, self.budgets, self.names, self.n_rows = engines, budgets, names, n_rows
+        self.size = len(engines)
+        self.least_pixels = max(float(getattr(engine, "least_pixels", "inf")) for engine in engines)
+
+    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
+        """See Crew; each block is one that every engine can take."""
+        each = zip(self.engines, self.budgets, strict=True)
+        ends = {last for engine, budget in each for _, last in engine.blocks(budget)}
+        return cut(self.engines[0].tiling, todo, most, ends, unit)
+
+    def work(
+        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
+    ) -> Generator[Done, None, None]:
+        """See Crew."""
+        if self.size > 1:
+            yield from self._together(blocks, flat_for, clock, tick)
+            return
+        before = 0
+        tick(0)
+        for first, last in blocks:
+            done, before = self._one(0, first, last, flat_for, clock, before, tick)
+            tick(before)
+            yield done
+
+    def _one(
+        self, k: int, first: int, last: int, flat_for: FlatFor, clock: Clock, before: int, tick: Callable[[int], None]
+    ) -> tuple[Done, int]:
+        """One block by engine k, and the pairs done after it."""
+        flat, pixels = flat_for(first, last), count(self.engines[k].tiling, first, last)
+
+        def rows_done(rows: float) -> None:
+            tick(before + int(min(rows, self.n_rows) * pixels))
+
+        skipped = self.engines[k].fill(first, last, flat, self.budgets[k], clock, rows_done)
+        return (first, last, flat, skipped), before + self.n_rows * pixels
+
+    def _together(
+        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
+    ) -> Generator[Done, None, None]:
+        """One thread a device; the caller's thread reports progress and hands on what is done."""
+        waiting: queue.SimpleQueue[Run] = queue.SimpleQueue()
+        for block in blocks:
+            waiting.put(block)
+        finished: queue.SimpleQueue[Done | BaseException] = queue.SimpleQueue()
+        stop = threading.Event()
+        pairs = [0] * self.size  # each thread writes its own
+
+        def run(k: int) -> None:
+            def own_tick(done: int) -> None:
+                if stop.is_set():
+                    raise _Stop
+                pairs[k] = done
+
+            own_clock = Clock()
+            try:
+                while not stop.is_set():
+                    try:
+                        first, last = waiting.get_nowait()
+                    except queue.Empty:
+                        return
+                    done, pairs[k] = self._one(k, first, last, flat_for, own_clock, pairs[k], own_tick)
+                    finished.put(done)
+            except _Stop:
+                pass
+            except BaseException as exc:
+                finished.put(exc)
+
+        threads = [threading.Thread(target=run, args=(k,), daemon=True) for k in range(self.size)]
+        tick(0)
+        for thread in threads:
+            thread.start()
+        try:
+            left = len(blocks)
+            while left:
+                try:
+                    done = finished.get(timeout=0.1)
+                except queue.Empty:
+                    tick(sum(pairs))
+                    continue
+                if isinstance(done, BaseException):
+                    raise done
+                left -= 1
+                clock.lap("backproject")
+                tick(sum(pairs))
+                yield done
+        finally:
+            stop.set()
+            for thread in threads:
+                thread.join()
+
+
+class _Stop(Exception):
+    """Another thread has failed, or the caller has given up."""

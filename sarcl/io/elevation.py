@@ -1,0 +1,270 @@
+"""Elevation models through rasterio: points on WGS84, heights above the ellipsoid."""
+
+from __future__ import annotations
+
+import logging
+import re
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base import errors, validation, wgs84
+
+log = logging.getLogger(__name__)
+
+MOST_POINTS = 25_000_000  # two facets each: what Scene.split allows too
+LOWEST, HIGHEST = -1000.0, 9000.0  # m; land lies between -430 and 8849
+METRES = {"metre": 1.0, "meter": 1.0, "m": 1.0, "foot": 0.3048, "us survey foot": 1200 / 3937}
+WGS84 = "EPSG:4326"
+
+
+@dataclass(frozen=True, eq=False)
+class Tile:
+    """longitude, latitude, degrees, and height above the ellipsoid, m, NaN without data: each (n_rows, n_columns)."""
+
+    longitude: np.ndarray
+    latitude: np.ndarray
+    height: np.ndarray
+
+
+def load(path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None) -> Tile:
+    """The points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
+    path = Path(path)
+    name = f"DEM {path.name!r}"
+    with _opened(path, name) as file:
+        _check_place(file, name)
+        above = _reference(file, name, heights, geoid)
+        rows, columns = _window(file, name, bounds)
+        height = _heights(file, name, rows, columns, nodata)
+        longitude, latitude = _places(file, rows, columns)
+    if above:
+        height = height + _undulation(geoid, longitude, latitude, name, above)
+    log.info(
+        "%s: %d x %d points, longitude %.5f to %.5f, latitude %.5f to %.5f, %d without data, heights above %s",
+        name, *height.shape, longitude.min(), longitude.max(), latitude.min(), latitude.max(),
+        np.isnan(height).sum(), f"{above} changed to the ellipsoid's" if above else "the ellipsoid",
+    )  # fmt: skip
+    return Tile(longitude, latitude, height)
+
+
+def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Points and the ellipsoid's unit normals there, both (n_rows, n_columns, 3), in a frame of Scene.from_dem."""
+    validation.choice("frame", frame, ("local", "ecef"))
+    if frame == "ecef":
+        if center is not None:
+            raise ValueError("center is the origin of a local frame; leave it out with frame='ecef'")
+        points = wgs84.ecef(tile.longitude, tile.latitude, tile.height)
+        return points, wgs84.up(tile.longitude, tile.latitude)
+    middle = [(a.min() + a.max()) / 2 for a in (tile.longitude, tile.latitude)]
+    if center is None:
+        center = middle
+    center = validation.array("center", center, np.float64, ("n",))
+    if len(center) not in (2, 3):
+        raise ValueError(f"center has {len(center)} numbers; give (longitude, latitude), degrees, or with a height, m")
+    longitude, latitude, height = [*map(float, center), 0.0][:3]
+    origin = wgs84.ecef(longitude, latitude, height)
+    if abs(latitude) > 90 or np.linalg.norm(wgs84.ecef(middle[0], middle[1], 0.0) - origin) > 1e6:
+        raise ValueError(
+            f"center ({longitude:g}, {latitude:g}) is more than 1000 km from the heights, which are about "
+            f"({middle[0]:.4f}, {middle[1]:.4f}); give (longitude, latitude) in degrees"
+        )
+    axes = wgs84.local_axes(longitude, latitude)
+    points = (wgs84.ecef(tile.longitude, tile.latitude, tile.height) - origin) @ axes.T
+    return points, wgs84.up(tile.longitude, tile.latitude) @ axes.T
+
+
+@contextmanager
+def _opened(path: Path, name: str) -> Iterator[Any]:
+    """A raster, open for reading."""
+    try:
+        import rasterio
+        from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
+    except ImportError as exc:
+        raise ImportError("elevation models need the package rasterio: pip install sarcl[dem]") from exc
+    if not path.exists():
+        raise FileNotFoundError(f"DEM file {str(path)!r} does not exist; check the name and the folder")
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)  # it is an error here
+        try:
+            with rasterio.open(path) as file:
+                yield file
+        except RasterioIOError as exc:
+            raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
+
+
+def _check_place(file: Any, name: str) -> None:
+    if file.crs is None or file.transform.is_identity:
+        what = "CRS" if file.crs is None else "georeferencing"
+        raise ValueError(
+            f"{name} has no {what}, so its heights belong to no place; write it into the file (rio edit-info --crs "
+            "EPSG:4326), or read the array yourself and use Scene.from_heights"
+        )
+    if not (file.crs.is_geographic or file.crs.is_projected):
+        raise ValueError(f"{name} has a CRS that is neither geographic nor projected: {file.crs.to_wkt():.80}")
+    if file.count != 1:
+        raise ValueError(f"{name} has {file.count} bands; an elevation model has one: extract it (gdal_translate -b 1)")
+    if file.width < 2 or file.height < 2:
+        raise ValueError(f"{name} has {file.height} x {file.width} points; a cell needs two in either direction")
+
+
+def _reference(file: Any, name: str, heights: Any, geoid: Any) -> str:
+    """The geoid that heights are above, by its name; "" for the ellipsoid."""
+    wkt = file.crs.to_wkt(version="WKT2_2019")
+    vertical = re.search(r'VERTCRS\["([^"]+)"', wkt)
+    said = vertical[1] if vertical else "ellipsoid" if "CS[ellipsoidal,3]" in wkt else ""
+    if heights is not None and not (isinstance(heights, str) and heights):
+        raise ValueError(f"heights is {heights!r}; give 'ellipsoid' or the name of a geoid, such as 'EGM96'")
+    if heights is None and not said:
+        raise ValueError(
+            f"{name} does not say what its heights are above; pass heights='ellipsoid', or the geoid's name "
+            "(heights='EGM96' for SRTM, 'EGM2008' for Copernicus) with geoid=..."
+        )
+    words = [re.sub(r"[\W_]|height|geoid", "", s.lower()) for s in (said, heights or said)]
+    ellipsoid = ["ellipsoid" in w for w in words]
+    if said and ellipsoid[0] != ellipsoid[1]:
+        raise ValueError(f"heights is {heights!r}, but {name} says that its heights are above {said!r}")
+    if ellipsoid[1]:
+        if geoid is not None:
+            raise ValueError(f"{name} has heights above the ellipsoid; geoid=... would count the undulation twice")
+        return ""
+    if words[0] and words[0] != words[1]:
+        log.info("%s says %r; its heights are taken above %r as asked", name, said, heights)
+    above = heights or said
+    if geoid is None:
+        raise ValueError(
+            f"{name} has heights above {above!r}, not above the ellipsoid; give the undulation as geoid=...: a number "
+            "(m), an array, a function of longitude and latitude, or a raster file of it; geoid=0 leaves it out"
+        )
+    return above
+
+
+def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Rows and columns of the points within bounds."""
+    if bounds is None:
+        low, high = np.zeros(2), np.array([file.height, file.width]) - 1
+    else:
+        bounds = validation.array("bounds", bounds, np.float64, (4,))
+        west, south, east, north = bounds
+        if not (west < east and south < north and max(abs(south), abs(north)) <= 90 and max(abs(bounds)) <= 360):
+            raise ValueError(
+                f"bounds is ({west:g}, {south:g}, {east:g}, {north:g}); give (west, south, east, north) in degrees, "
+                "west < east and south < north"
+            )
+        from rasterio.warp import transform_bounds
+
+        left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _warped(file) else bounds
+        t = ~file.transform
+        corners = [(t.d * x + t.e * y + t.f, t.a * x + t.b * y + t.c) for x in (left, right) for y in (bottom, top)]
+        at = np.array(corners) - 0.5  # points are middles of pixels
+        low = np.maximum(np.ceil(at.min(axis=0) - 1e-6), 0)
+        high = np.minimum(np.floor(at.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
+    if (high - low < 1).any():
+        from rasterio.warp import transform_bounds
+
+        there = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
+        raise ValueError(f"bounds hold no cell of {name}, which reaches over ({there}); check west, south, east, north")
+    rows, columns = (np.arange(int(a), int(b) + 1) for a, b in zip(low, high, strict=True))
+    if len(rows) * len(columns) > MOST_POINTS:
+        raise MemoryError(
+            f"{name} has {len(rows)} x {len(columns)} points, more than {MOST_POINTS:,}; give bounds=(west, south, "
+            "east, north) of the part that the radar sees"
+        )
+    return rows, columns
+
+
+def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata: Any) -> np.ndarray:
+    """Heights in metres, NaN where there are none."""
+    from rasterio.windows import Window
+
+    window = Window(columns[0], rows[0], len(columns), len(rows))
+    stored = file.read(1, window=window, masked=True)
+    if stored.dtype.kind not in "iuf":
+        raise ValueError(f"{name} holds {stored.dtype}; heights are real numbers")
+    missing = np.ma.getmaskarray(stored) | ~np.isfinite(stored.data)
+    if nodata is not None:
+        missing |= stored.data == validation.number("nodata", nodata)
+    unit = (file.units[0] or "metre").lower()
+    if unit not in METRES:
+        raise ValueError(f"{name} has heights in {unit!r}; known units are {', '.join(METRES)}")
+    height = (stored.data.astype(np.float64) * file.scales[0] + file.offsets[0]) * METRES[unit]
+    if missing.all():
+        raise ValueError(f"{name} has no data there: every height is nodata; check bounds and nodata")
+    odd = ~missing & ~((height >= LOWEST) & (height <= HIGHEST))
+    if odd.any():
+        i, j = np.unravel_index(int(odd.argmax()), odd.shape)
+        raise ValueError(
+            f"{name} has a height of {height[i, j]:g} m at row {rows[i]}, column {columns[j]} ({odd.sum()} of that "
+            f"kind), which no land has; if {stored.data[i, j]:g} means no data, pass nodata={stored.data[i, j]:g}"
+        )
+    return np.where(missing, np.nan, height)
+
+
+def _places(file: Any, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Longitude and latitude of points, degrees on WGS84 (n_rows, n_columns) each."""
+    column, row = np.meshgrid(columns + 0.5, rows + 0.5)
+    t = file.transform
+    x, y = t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
+    if not _warped(file):
+        return x, y
+    from rasterio.warp import transform
+
+    longitude, latitude = transform(file.crs, WGS84, x.ravel(), y.ravel())
+    return np.asarray(longitude).reshape(x.shape), np.asarray(latitude).reshape(x.shape)
+
+
+def _warped(file: Any) -> bool:
+    """True where coordinates are not degrees on WGS84 already."""
+    wkt = file.crs.to_wkt()
+    degrees = re.search(r'GEOGCS\[.*?UNIT\["degree"', wkt) is not None
+    return not (file.crs.is_geographic and 'DATUM["WGS_1984"' in wkt and degrees)
+
+
+def _undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str) -> np.ndarray:
+    """Height of the geoid above the ellipsoid, m, at points."""
+    if isinstance(geoid, (str, Path)):
+        return _raster(Path(geoid), longitude, latitude)
+    if callable(geoid):
+        geoid = geoid(longitude, latitude)
+    if np.ndim(geoid) == 0:
+        value = validation.number("geoid", geoid)
+        if value == 0:
+            errors.warn(
+                f"{name} has heights above {above!r}, taken as heights above the ellipsoid (geoid=0): the scene lies "
+                "wrong by the undulation, -107 to +86 m over the Earth"
+            )
+        return np.full(longitude.shape, value)
+    return validation.array("geoid", geoid, np.float64, longitude.shape)
+
+
+def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+    """A raster of undulations, in degrees, read bilinearly at points."""
+    name = f"geoid {path.name!r}"
+    with _opened(path, name) as file:
+        _check_place(file, name)
+        if _warped(file):
+            raise ValueError(f"{name} is not in degrees on WGS84; convert it (gdalwarp -t_srs EPSG:4326)")
+        t = ~file.transform
+        around = abs(file.width * file.transform.a - 360) < 1e-6  # columns go round the Earth
+        west = file.bounds.left
+        lon = west + (longitude - west) % 360 if around or (longitude < west).any() else longitude
+        column, row = t.a * lon + t.b * latitude + t.c - 0.5, t.d * lon + t.e * latitude + t.f - 0.5
+        i, j = np.floor(row).astype(int), np.floor(column).astype(int)
+        i = np.clip(i, 0, file.height - 2)  # within half a pixel of the poles
+        if not around:
+            j = np.where(column == file.width - 1, j - 1, j)
+        inside = (row >= -0.5) & (row <= file.height - 0.5) & (around | ((j >= 0) & (j < file.width - 1)))
+        if not inside.all():
+            raise ValueError(f"{name} covers {tuple(file.bounds)} degrees, not all of the heights")
+        band = file.read(1, window=((i.min(), i.max() + 2), (0, file.width)), masked=True).astype(np.float64)
+        values = band.filled(np.nan) * file.scales[0] + file.offsets[0]
+        i0, j1, width = i - i.min(), (j + 1) % file.width, file.width
+        u, v = row - i, column - j
+        out = (1 - u) * ((1 - v) * values[i0, j % width] + v * values[i0, j1])
+        out += u * ((1 - v) * values[i0 + 1, j % width] + v * values[i0 + 1, j1])
+    validation.finite(name, out)
+    return out

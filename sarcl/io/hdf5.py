@@ -1,0 +1,93 @@
+"""Plain values in HDF5 and back: numbers, words, arrays, a report; blocks of rows."""
+
+from __future__ import annotations
+
+import json
+from collections.abc import Iterator, Mapping
+from typing import Any
+
+import numpy as np
+
+FORMAT = 1
+BLOCK_BYTES = 2**24
+
+
+def sign(file: Any, kind: str) -> None:
+    """Mark a file as sarcl's."""
+    file.attrs["sarcl_file"] = kind
+    file.attrs["format"] = FORMAT
+
+
+def blocks(dataset: Any) -> Iterator[tuple[int, int]]:
+    """Row ranges (start, stop) of about BLOCK_BYTES each."""
+    n = dataset.shape[0]
+    row = max(1, int(np.prod(dataset.shape[1:], dtype=np.int64))) * dataset.dtype.itemsize
+    step = max(1, BLOCK_BYTES // row)
+    for a in range(0, n, step):
+        yield a, min(a + step, n)
+
+
+def put(group: Any, name: str, value: Any) -> None:
+    """A number or word as an attribute, an array as a dataset, None not at all."""
+    import h5py
+
+    if value is None:
+        return
+    if isinstance(value, np.generic):
+        value = value.item()
+    if isinstance(value, (str, int, float)):
+        group.attrs[name] = value
+        return
+    value = np.asarray(value)
+    if value.dtype.kind == "U":
+        group.create_dataset(name, data=value.astype(object), dtype=h5py.string_dtype())
+    else:
+        group.create_dataset(name, data=value)
+
+
+def get(group: Any, name: str) -> Any:
+    """What `put` stored: a str, an int or float, an array, or None."""
+    import h5py
+
+    if name in group.attrs:
+        value = group.attrs[name]
+        return value.item() if isinstance(value, np.generic) else value
+    if name not in group:
+        return None
+    if h5py.check_string_dtype(group[name].dtype) is not None:
+        return group[name].asstr()[...].astype(str)
+    return group[name][...]
+
+
+def put_report(file: Any, report: Any) -> None:
+    if report is not None:  # a dataset: attributes end at 64 KB
+        file["report"] = json.dumps(_plain(report.to_dict()))
+
+
+def get_report(file: Any) -> Any:
+    from ..base.report import Report
+
+    return Report(**_revive(json.loads(file["report"].asstr()[()]))) if "report" in file else None
+
+
+def _plain(value: Any) -> Any:
+    """A report's value in JSON's types; a tuple stays one, what JSON cannot say becomes its text."""
+    if isinstance(value, Mapping):
+        return {str(k): _plain(v) for k, v in value.items()}
+    if isinstance(value, tuple):
+        return {"__tuple__": [_plain(v) for v in value]}
+    if isinstance(value, list):
+        return [_plain(v) for v in value]
+    if isinstance(value, (np.generic, np.ndarray)):
+        return _plain(value.tolist())
+    return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
+
+
+def _revive(value: Any) -> Any:
+    if isinstance(value, list):
+        return [_revive(v) for v in value]
+    if isinstance(value, dict):
+        if set(value) == {"__tuple__"}:
+            return tuple(_revive(v) for v in value["__tuple__"])
+        return {k: _revive(v) for k, v in value.items()}
+    return value

@@ -1,0 +1,142 @@
+"""An HDF5 file in the making: beside its path until it is whole, never left half-written in its place."""
+
+from __future__ import annotations
+
+import errno
+import logging
+import os
+import re
+import shutil
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import hdf5, output_paths
+
+log = logging.getLogger(__name__)
+
+
+class Unfinished:
+    """A file of sarcl's that is being filled; `file` is its h5py.File, until `commit` or `abandon`.
+
+    kind     what it will hold, for hdf5.sign and in messages;  n_bytes  it needs, about
+    claim    one run at a time makes this file, and takes over what a killed one left
+    A write that fails, on a full disk, raises OSError with what would do. Raises what `paths.check_writable` does.
+    """
+
+    def __init__(self, path: Any, kind: str, n_bytes: int, claim: bool = False) -> None:
+        import h5py
+
+        self.path, self.kind, self.n_bytes = Path(path), kind, n_bytes
+        self._part: Path | None
+        self._lock: int | None
+        self._part, self._lock = (
+            output_paths.claim(path, n_bytes) if claim else (output_paths.begin(path, n_bytes), None)
+        )
+        try:
+            with self.writing():
+                # our own lock is held already, and HDF5's would collide with it
+                self.file = h5py.File(self._part, "w", locking=False if claim else None)
+                hdf5.sign(self.file, kind)
+        except BaseException:
+            self.abandon()
+            raise
+
+    @property
+    def is_open(self) -> bool:
+        """Neither committed nor abandoned."""
+        return self._part is not None
+
+    @contextmanager
+    def writing(self) -> Iterator[None]:
+        """Turn what HDF5 says of a failed write into what to do about it."""
+        try:
+            yield
+        except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
+            found = re.search(r"errno = (\d+)", str(exc))
+            number = int(found[1]) if found else getattr(exc, "errno", None)
+            why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
+            free, wanted = shutil.disk_usage(self.path.parent or ".").free, self.n_bytes
+            room = "raise the limit on files' sizes (ulimit -f)" if number == errno.EFBIG else "make room there"
+            remedy = f"{room} for {wanted / 1e9:.2f} GB and give the same call again"
+            if self._lock is not None:
+                remedy += "; it goes on from its tiles where some were kept"
+            text = f"cannot write {str(self.path)!r}: {why}; the {self.kind.replace('_', ' ')} needs "
+            text += f"{wanted / 1e9:.2f} GB, its disk has {free / 1e9:.2f} GB free: {remedy}"
+            raise OSError(text) from exc
+
+    def dataset(self, name: str, shape: tuple[int, ...], dtype: Any) -> Filled:
+        """A dataset, zero until written."""
+        with self.writing():
+            return Filled(self, self.file.create_dataset(name, shape, dtype))
+
+    def reserve(self, n_bytes: int) -> None:
+        """Take room for so many more bytes: HDF5 loses what it cannot write as it closes a dataset, or crashes."""
+        if not hasattr(os, "posix_fallocate"):
+            return
+        with self.writing():
+            self.file.flush()
+            descriptor = self.file.id.get_vfd_handle()
+            try:
+                os.posix_fallocate(descriptor, os.fstat(descriptor).st_size, n_bytes)
+            except OSError as exc:
+                if exc.errno not in (errno.EOPNOTSUPP, errno.EINVAL):
+                    raise
+
+    def commit(self) -> None:
+        """Close the file and move it to its path."""
+        assert self._part is not None
+        with self.writing():
+            self.file.flush()
+            size = self.file.id.get_filesize()
+            self.file.close()
+            os.truncate(self._part, size)  # what was reserved and not used
+        output_paths.commit(self._part, self.path)
+        self._part = None
+        self._unlock()
+
+    def abandon(self) -> None:
+        """Remove the file; `path` is as it was. Nothing happens after `commit`."""
+        if self._part is not None:
+            part, self._part = self._part, None
+            try:
+                if hasattr(self, "file") and self.file:
+                    self._forget()
+                    self.file.close()
+            except (OSError, RuntimeError) as exc:  # HDF5 cannot write what it still holds: nobody wants it
+                log.debug("%s could not be closed in order: %s", part, exc)
+            finally:
+                part.unlink(missing_ok=True)
+                self._unlock()
+
+    def _forget(self) -> None:
+        """Send what is still to be written nowhere: where a disk is full, HDF5 crashes as it closes its file."""
+        try:
+            nowhere = os.open(os.devnull, os.O_RDWR)
+            os.dup2(nowhere, self.file.id.get_vfd_handle())
+            os.close(nowhere)
+        except (OSError, RuntimeError, TypeError, NotImplementedError) as exc:
+            log.debug("%s is closed as it is: %s", self.path, exc)
+
+    def _unlock(self) -> None:
+        if self._lock is not None:
+            os.close(self._lock)
+            self._lock = None
+
+
+class Filled:
+    """A dataset of an unfinished file, read and written in slices like an h5py.Dataset."""
+
+    def __init__(self, owner: Unfinished, dataset: Any) -> None:
+        self.owner, self.dataset = owner, dataset
+        self.shape, self.dtype = dataset.shape, np.dtype(dataset.dtype)
+
+    def __getitem__(self, at: Any) -> Any:
+        return self.dataset[at]
+
+    def __setitem__(self, at: Any, values: Any) -> None:
+        with self.owner.writing():
+            self.dataset[at] = values

@@ -1,0 +1,256 @@
+"""Antenna: a pattern in its own axes, how it is mounted, and what a device needs to look it up."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import constants, validation
+from .antenna_pattern import factor_reach, table_limits, table_slope, uniform_spline
+from .pointing import rotations
+from .trajectory import Trajectory
+
+KINDS = ("isotropic", "aperture", "gaussian", "table")
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mounted along the body's axes
+HEADER = 16  # floats before a table's coefficients, as kernels/pattern.clh reads them
+ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
+COSINE = 1e-5  # beyond which a float32 direction cosine exceeds a limit for certain
+FLOAT_ERROR = 2e-6  # of the peak: float32 sines, exponentials and spline sums
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Antenna:
+    """An amplitude pattern over directions. Make one with `isotropic`, `rectangular`, `gaussian` or `table`.
+
+    Antenna axes: x boresight, y azimuth, z elevation, right-handed. A direction (x, y, z) lies at azimuth
+    atan2(y, x) and elevation atan2(z, hypot(x, y)).
+
+    kind        "isotropic", "aperture", "gaussian" or "table"
+    gain_db     gain at the peak, dBi; 0 leaves a unit peak
+    two_way     the pattern, and gain_db, are those of sending and receiving together
+    size        m (azimuth, elevation), of an aperture;  taper  its illumination at the edges, 0 ... 1 of that amid
+    width       rad (azimuth, elevation), between half-power directions, of a Gaussian
+    azimuth, elevation, values   of a table: rad (n,) and (m,), evenly spaced; complex amplitude (n, m), peak modulus 1
+    frequency   Hz at which width or table hold: angles shrink as frequency rises; None: the same at every frequency
+    mount       rotation from antenna to body axes (3, 3): attitude @ mount turns antenna axes into the scene's
+
+    ValueError names what does not fit. An aperture does not see behind itself, a table not beyond its angles.
+    """
+
+    kind: str
+    gain_db: float = 0.0
+    two_way: bool = False
+    size: Any = None
+    taper: Any = (1.0, 1.0)
+    width: Any = None
+    azimuth: Any = None
+    elevation: Any = None
+    values: Any = None
+    frequency: float | None = None
+    mount: Any = LEVEL
+
+    def __post_init__(self) -> None:
+        validation.choice("antenna kind", self.kind, KINDS)
+        self._set("gain_db", validation.number("antenna gain_db", self.gain_db))
+        if not isinstance(self.two_way, (bool, np.bool_)):
+            raise ValueError(f"antenna two_way is {self.two_way!r}; give True or False")
+        self._set("mount", rotations("antenna mount", self.mount, ()))
+        if self.frequency is not None:
+            self._set("frequency", validation.number("antenna frequency", self.frequency, above=0))
+        if self.kind == "aperture":
+            if self.frequency is not None:
+                raise ValueError("an aperture's size in metres holds at every frequency; leave its frequency out")
+            self._set("size", _pair("antenna size", self.size))
+            taper = validation.array("antenna taper", self.taper, np.float64, (2,))
+            if not ((taper >= 0) & (taper <= 1)).all():
+                raise ValueError(
+                    f"antenna taper is {taper.tolist()}; the illumination at the edges is 0 to 1 of the middle's"
+                )
+            self._set("taper", taper)
+        elif self.kind == "gaussian":
+            width = _pair("antenna width", self.width)
+            if (width > np.pi).any():
+                raise ValueError(
+                    f"antenna width is {width.tolist()} rad; half-power widths are at most pi: were they in deg?"
+                )
+            self._set("width", width)
+        elif self.kind == "table":
+            self._check_table()
+
+    def _check_table(self) -> None:
+        for name, most in (("azimuth", np.pi), ("elevation", np.pi / 2)):
+            axis = validation.array(f"antenna {name}", getattr(self, name), np.float64, ("n",))
+            step = np.diff(axis)
+            if len(axis) < 4 or not (step > 0).all():
+                raise ValueError(
+                    f"antenna {name} must be at least 4 rising angles, got {len(axis)}: {axis[:5].tolist()} ..."
+                )
+            if np.ptp(step) > 1e-6 * step.mean():
+                at = int(np.argmax(np.abs(step - step.mean())))
+                raise ValueError(
+                    f"antenna {name}[{at + 1}] is {step[at]:g} rad after its neighbour, {step.mean():g} in the mean; "
+                    "a table needs even steps: interpolate it first"
+                )
+            if np.abs(axis).max() > most * (1 + 1e-6):
+                worst = np.abs(axis).max()
+                raise ValueError(f"antenna {name} reaches {worst:g} rad, beyond {most:g}: were the angles in degrees?")
+            self._set(name, axis)
+        shape = (len(self.azimuth), len(self.elevation))
+        values = validation.array("antenna values", self.values, np.complex128, shape)
+        if not values.any():
+            raise ValueError("antenna values are zero everywhere; an antenna must see something")
+        self._set("values", validation.sealed(values / np.abs(values).max()))
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    @classmethod
+    def isotropic(cls, *, gain_db: float = 0.0) -> Antenna:
+        """The same in every direction."""
+        return cls(kind="isotropic", gain_db=gain_db)
+
+    @classmethod
+    def rectangular(
+        cls, *, size: Any, taper: Any = 1.0, gain_db: float = 0.0, two_way: bool = False, mount: Any = LEVEL
+    ) -> Antenna:
+        """A rectangular aperture, m (azimuth, elevation): sinc(size_y y/lambda) sinc(size_z z/lambda) if lit evenly.
+
+        taper  illumination at the edges, one or per axis: 1 even, 0.08 Hamming's, 0 Hann's, a raised cosine on a
+               pedestal
+        """
+        taper = np.broadcast_to(np.asarray(taper), (2,))
+        return cls(kind="aperture", size=size, taper=taper, gain_db=gain_db, two_way=two_way, mount=mount)
+
+    @classmethod
+    def gaussian(
+        cls, *, width: Any, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
+        mount: Any = LEVEL,
+    ) -> Antenna:  # fmt: skip
+        """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle off boresight times the
+        unit vector of (y, z): azimuth and elevation on the axes."""
+        return cls(kind="gaussian", width=width, gain_db=gain_db, two_way=two_way, frequency=frequency, mount=mount)
+
+    @classmethod
+    def table(
+        cls, azimuth: Any, elevation: Any, values: Any = None, *, values_db: Any = None, gain_db: float = 0.0,
+        two_way: bool = False, frequency: float | None = None, mount: Any = LEVEL,
+    ) -> Antenna:  # fmt: skip
+        """A measured pattern: bicubic spline through complex amplitudes, or values_db = 20 log10 of their modulus.
+
+        azimuth (n,), elevation (m,) rad, evenly spaced; values (n, m), of any scale: their peak gets `gain_db`.
+        """
+        if (values is None) == (values_db is None):
+            raise ValueError("an antenna table takes either values or values_db; give one of them")
+        if values is None:
+            values = 10 ** (validation.converted("antenna values_db", values_db, np.float64) / 20)
+        return cls(
+            kind="table", azimuth=azimuth, elevation=elevation, values=values, gain_db=gain_db, two_way=two_way,
+            frequency=frequency, mount=mount,
+        )  # fmt: skip
+
+    @property
+    def amplitude(self) -> float:
+        """Amplitude gain at the peak, 10^(gain_db/20)."""
+        return float(10 ** (self.gain_db / 20))
+
+    def axes(self, track: Trajectory) -> np.ndarray:
+        """Antenna axes in the scene at every pulse, as columns, (n, 3, 3): track.attitude @ mount.
+
+        ValueError where the track has no attitude, unless the antenna is isotropic, or it is no rotation.
+        """
+        if track.attitude is None:
+            if self.kind == "isotropic":
+                return np.tile(self.mount, (len(track), 1, 1))
+            raise ValueError(
+                f"the track has no attitude, so nothing aims this {self.kind} antenna; use sarcl.pointing, such as "
+                "pointing.spotlight(track, point) or pointing.stripmap(track, look=0.6)"
+            )
+        attitude = rotations("trajectory attitude", track.attitude, (len(track),))
+        return np.asarray(attitude @ self.mount)
+
+    def gain(self, directions: Any, frequency: float) -> np.ndarray:
+        """Complex amplitude gain (...) at directions in antenna axes (..., 3), of any length, at `frequency` Hz."""
+        from .antenna_pattern import pattern_gain
+
+        return pattern_gain(self, np.asarray(directions, np.float64), frequency)
+
+    def ratio(self, frequency: Any) -> Any:
+        """What angles are multiplied by before the pattern is looked up."""
+        return 1.0 if self.frequency is None else frequency / self.frequency
+
+    def slope(self, frequency: float) -> float:
+        """Largest |change of gain| per radian, over the peak, within 90 deg of boresight."""
+        if self.kind == "isotropic":
+            return 0.0
+        if self.kind == "aperture":  # |g'| <= 2 pi/lambda times the illumination's mean distance from its centre
+            return float(np.pi / 2 * np.hypot(*self.size) * frequency / constants.SPEED_OF_LIGHT)
+        scale = float(self.ratio(frequency))
+        if self.kind == "gaussian":  # pi/2: what a circle about boresight is stretched by at most
+            return float(np.pi / 2 * np.exp(-0.5) * 2 * np.sqrt(np.log(2)) / self.width.min()) * scale
+        return table_slope(self) * scale
+
+    def error(self, frequency: float) -> float:
+        """Bound of what a device's float32 gain errs, over the peak, at directions right to float32."""
+        return FLOAT_ERROR + ANGLE_ERROR * self.slope(frequency)
+
+    def limits(self, level: float, frequency: float) -> np.ndarray:
+        """(y, z, behind): |gain| is below `level` of the peak where a direction cosine along azimuth exceeds y, along
+        elevation exceeds z, and behind the antenna where `behind` is -1 (0: not for certain).
+        """
+        level = validation.number("level", level, above=0)
+        if self.kind == "isotropic":
+            return np.array([2.0, 2.0, 0.0])
+        if self.kind == "aperture":
+            y, z = (factor_reach(self, axis, level, frequency) for axis in (0, 1))
+            return np.array([y + COSINE, z + COSINE, -1.0])
+        if self.kind == "gaussian":  # an angle is no less than its sine
+            off = np.sqrt(max(np.log(1 / level), 0.0) / (2 * np.log(2))) / self.ratio(frequency)
+            return np.array([*(self.width * off + COSINE), -float(self.width.max() * off < np.pi / 2)])
+        y, z, behind = table_limits(self, level, float(self.ratio(frequency)))
+        return np.array([y + COSINE, z + COSINE, behind])
+
+    def packed(self, frequency: float) -> np.ndarray:
+        """Numbers of kernels/pattern.clh, float32: a header, then a table's spline coefficients.
+
+        frequency  Hz at which the kernel's `ratio` is 1.
+        """
+        out = np.zeros(HEADER, np.float32)
+        out[0] = np.array(KINDS.index(self.kind), np.int32).view(np.float32)
+        shrinks = self.kind == "aperture" or self.frequency is not None
+        out[1:4] = self.amplitude, self.ratio(frequency), shrinks
+        if self.kind == "aperture":
+            out[4:6] = self.size * frequency / constants.SPEED_OF_LIGHT
+            out[6:8] = (1 - self.taper) / (1 + self.taper) / 2
+        elif self.kind == "gaussian":
+            out[4:6] = np.sqrt(2 * np.log(2)) / self.width
+        elif self.kind == "table":
+            for i, axis in enumerate((self.azimuth, self.elevation)):
+                out[4 + 2 * i : 6 + 2 * i] = axis[0], (len(axis) - 1) / (axis[-1] - axis[0])
+            out[8:10] = np.array(self.values.shape, np.int32).view(np.float32)
+            weights = uniform_spline(uniform_spline(self.values).T).T
+            return np.concatenate([out, np.ascontiguousarray(weights, np.complex64).view(np.float32).ravel()])
+        return out
+
+
+def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
+    """(transmitting, receiving) antennas from one Antenna or a pair; None where a two-way pattern serves for both."""
+    given = antenna if isinstance(antenna, (tuple, list)) else (antenna, antenna)
+    if len(given) != 2:
+        raise ValueError(f"antenna has {len(given)} entries; give an Antenna, or (transmitting, receiving)")
+    for one in given:
+        validation.instance("antenna", one, Antenna)
+    tx, rx = given
+    if not (tx.two_way or rx.two_way):
+        return tx, rx
+    if tx is not rx or bistatic:
+        raise ValueError("a two-way pattern is that of one antenna at one place; give two one-way patterns")
+    return tx, None
+
+
+def _pair(name: str, value: Any) -> np.ndarray:
+    out = validation.array(name, np.broadcast_to(value, (2,)) if np.ndim(value) == 0 else value, np.float64, (2,))
+    if not (out > 0).all():
+        raise ValueError(f"{name} is {out.tolist()}; both must be greater than 0")
+    return out

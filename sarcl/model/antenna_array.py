@@ -1,0 +1,238 @@
+"""AntennaArray: where elements stand and what carrier each of them sends; one carrier, or diverse ones."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import constants, validation
+from .costas import nearest_sizes, permutation
+
+MOST = 10_000  # elements
+Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True, repr=False)
+class AntennaArray:
+    """Isotropic elements, each sending its own carrier. Make one with `single`, `linear`, `planar` or `costas`.
+
+    positions  from the reference point, m (n, 3), along the scene's axes
+    offsets    carriers less the base frequency f0, Hz (n_plans, n)
+    weights    complex (n,), one an element, default 1
+    plan       row of `offsets` that each pulse uses, (n_pulses,); None: row 0 at every pulse
+
+    Elements may coincide. A field is sum_n w_n exp(+j 2 pi f_n (t - r_n/c)), f_n = f0 + offset (`sarcl.beam`).
+    Farooq's array (2009, equation 3.1) lies along (0, -1, 0) and (0, 0, -1), which flips the sign of angles.
+    ValueError for other shapes, more than 10 000 elements, weights that are all zero, NaN or Inf.
+    """
+
+    positions: Any
+    offsets: Any
+    weights: Any = None
+    plan: Any = None
+
+    def __post_init__(self) -> None:
+        self._set("positions", validation.array("array positions", self.positions, np.float64, ("n", 3)))
+        if self.n > MOST:
+            raise ValueError(f"array has {self.n} elements; at most {MOST} are taken: model groups as one element")
+        self._set("offsets", validation.array("array offsets", self.offsets, np.float64, ("n_plans", self.n)))
+        given = np.ones(self.n) if self.weights is None else self.weights
+        self._set("weights", validation.array("array weights", given, np.complex128, (self.n,)))
+        if not self.weights.any():
+            raise ValueError("array weights are zero everywhere; some element must send")
+        if self.plan is not None:
+            plan = validation.array("array plan", self.plan, np.int64, ("n_pulses",))
+            bad = (plan < 0) | (plan >= len(self.offsets))
+            if bad.any():
+                at = int(np.argmax(bad))
+                raise ValueError(f"array plan[{at}] is {plan[at]}; offsets has rows 0 to {len(self.offsets) - 1}")
+            self._set("plan", plan)
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def __repr__(self) -> str:
+        wide = np.linalg.norm(np.ptp(self.positions, axis=0))
+        plans = f", {len(self.offsets)} plans" if len(self.offsets) > 1 else ""
+        return (
+            f"AntennaArray({self.n} elements over {wide:.4g} m, offsets {self.offsets.min():.4g} to "
+            f"{self.offsets.max():.4g} Hz{plans})"
+        )
+
+    @classmethod
+    def single(cls) -> AntennaArray:
+        """One element at the reference point, sending f0."""
+        return cls(positions=np.zeros((1, 3)), offsets=np.zeros((1, 1)))
+
+    @classmethod
+    def linear(
+        cls, n: int, *, spacing: float, frequency_step: float = 0.0, axis: Any = Y, weights: Any = None
+    ) -> AntennaArray:
+        """Element i at i spacing axis, m, sending f0 + i frequency_step, Hz; element 0 is the reference point.
+
+        A negative spacing is the axis turned round.
+        """
+        i = np.arange(_size("n", n))
+        step = validation.number("frequency_step", frequency_step)
+        place = i[:, None] * (validation.number("spacing", spacing) * validation.direction("axis", axis))
+        return cls(positions=place, offsets=[i * step], weights=weights)
+
+    @classmethod
+    def planar(
+        cls, shape: Any, *, spacing: Any, frequency_step: Any = (0.0, 0.0), axes: Any = (Y, Z), weights: Any = None
+    ) -> AntennaArray:
+        """N by P elements: number n P + p at n dy axes[0] + p dz axes[1], sending f0 + n dfy + p dfz.
+
+        shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz.
+        """
+        if np.shape(shape) != (2,) or np.shape(axes) != (2, 3):
+            raise ValueError(f"shape is {shape!r:.40} and axes {axes!r:.60}; give (N, P), and two directions (2, 3)")
+        rows, columns = (_size(f"shape[{i}]", shape[i]) for i in range(2))
+        _size("shape[0] shape[1]", rows * columns)
+        dy, dz = validation.array("spacing", spacing, np.float64, (2,))
+        steps = validation.array("frequency_step", frequency_step, np.float64, (2,))
+        n, p = (i.ravel() for i in np.indices((rows, columns)))
+        y, z = (validation.direction(f"axes[{i}]", axes[i]) for i in range(2))
+        place = n[:, None] * (dy * y) + p[:, None] * (dz * z)
+        return cls(positions=place, offsets=[n * steps[0] + p * steps[1]], weights=weights)
+
+    @classmethod
+    def costas(
+        cls, n: int, *, spacing: float, frequency_step: float, axis: Any = Y, weights: Any = None
+    ) -> AntennaArray:
+        """Like `linear`, but element i sends f0 + g(i) frequency_step, g a Costas permutation of 0 ... n - 1.
+
+        ValueError where Welch's and Golomb's constructions modulo a prime give none of this size.
+        """
+        order = permutation(_size("n", n))
+        if order is None:
+            below, above = nearest_sizes(n)
+            raise ValueError(
+                f"no Costas array of {n} elements is known here; the nearest sizes are {below} and {above}"
+            )
+        step = validation.number("frequency_step", frequency_step)
+        return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(order * step)
+
+    def with_offsets(self, offsets: Any, *, plan: Any = None) -> AntennaArray:
+        """The same elements sending other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
+        rows = validation.converted("array offsets", offsets, np.float64)
+        return replace(self, offsets=rows[None] if rows.ndim == 1 else rows, plan=plan)
+
+    def subarrays(self, count: int, *, steer: Any = None, frequency: float | None = None) -> AntennaArray:
+        """`count` equal groups of consecutive elements, each sending the carrier of its first element.
+
+        steer      a direction (3,), or (azimuth, elevation) rad from x towards y and z: weights gain the phases that
+                   turn each group there, about its first element, at the carrier it sends in plan 0
+        frequency  f0, Hz, that those phases hold for; needed with `steer`
+        """
+        count = validation.count("count", count)
+        if self.n % count:
+            raise ValueError(f"{self.n} elements do not make {count} equal groups; give a divisor of {self.n}")
+        if (steer is None) != (frequency is None):
+            raise ValueError("steer and frequency go together: phases that steer hold for one frequency; give both")
+        first = np.arange(self.n) // (self.n // count) * (self.n // count)
+        grouped = replace(self, offsets=self.offsets[:, first])
+        if steer is None:
+            return grouped
+        f = validation.number("frequency", frequency, above=0) + grouped.offsets[0]
+        if f.min() <= 0:
+            raise ValueError(
+                f"frequency {frequency:g} Hz leaves a carrier of {f.min():g} Hz; every one must be above 0"
+            )
+        along = (self.positions - self.positions[first]) @ _towards(steer)
+        return replace(grouped, weights=self.weights * np.exp(-2j * np.pi * f * along / constants.SPEED_OF_LIGHT))
+
+    def switched(self, other: AntennaArray, at: int, n_pulses: int) -> AntennaArray:
+        """This array for the pulses before `at`, the carriers of `other` from `at` on; n_pulses in all.
+
+        ValueError where the two differ in more than their carriers.
+        """
+        validation.instance("other", other, AntennaArray)
+        n_pulses = validation.count("n_pulses", n_pulses)
+        if (at := validation.count("at", at, least=0)) > n_pulses:
+            raise ValueError(f"at is {at}; it must lie within the {n_pulses} pulses")
+        for name in ("positions", "weights"):
+            if not np.array_equal(getattr(self, name), getattr(other, name)):
+                raise ValueError(f"other has {name} of its own; only carriers can be switched: use with_offsets")
+        late = other._rows(n_pulses) + len(self.offsets)
+        plan = np.where(np.arange(n_pulses) < at, self._rows(n_pulses), late)
+        return self.with_offsets(np.concatenate([self.offsets, other.offsets]), plan=plan)
+
+    def mirrored(self, at: int, n_pulses: int) -> AntennaArray:
+        """From pulse `at` on the carriers run over the elements in reverse order: progressions change sign, the base
+        frequency moves with them, and the centre frequency stays (Farooq 2009, equations 5.33 to 5.35)."""
+        return self.switched(replace(self, offsets=self.offsets[:, ::-1]), at, n_pulses)
+
+    def _rows(self, n_pulses: int) -> np.ndarray:
+        if self.plan is None:
+            return np.zeros(n_pulses, np.int64)
+        if len(self.plan) != n_pulses:
+            raise ValueError(f"array plan has {len(self.plan)} pulses, wanted {n_pulses}; give as many")
+        return np.asarray(self.plan)
+
+    def offsets_at(self, pulse: int) -> np.ndarray:
+        """Offsets of the elements at this pulse, Hz (n,)."""
+        pulse = validation.count("pulse", pulse, least=0)
+        if self.plan is None:
+            return np.asarray(self.offsets[0])
+        if pulse >= len(self.plan):
+            raise ValueError(f"pulse is {pulse}; the array's plan has pulses 0 to {len(self.plan) - 1}")
+        return np.asarray(self.offsets[self.plan[pulse]])
+
+    @property
+    def n(self) -> int:
+        """Number of elements."""
+        return len(self.positions)
+
+    @property
+    def is_constant(self) -> bool:
+        """Whether all elements send one carrier in every plan: the constant-frequency array."""
+        return bool((np.ptp(self.offsets, axis=1) == 0).all())
+
+    @property
+    def frequency_step(self) -> float | None:
+        """Hz from element to element, where the offsets of every plan are linear in the element's number with one
+        step; else None."""
+        if self.n == 1:
+            return 0.0
+        step = (self.offsets[:, -1] - self.offsets[:, 0]) / (self.n - 1)
+        line = self.offsets[:, :1] + np.arange(self.n) * step[:, None]
+        fits = np.abs(self.offsets - line).max() <= 1e-12 * np.abs(self.offsets).max()
+        return float(step[0]) if fits and np.ptp(step) <= 1e-12 * np.abs(step).max() else None
+
+    @property
+    def centers(self) -> np.ndarray:
+        """Mean of the extreme offsets of each plan, Hz (n_plans,)."""
+        return np.asarray((self.offsets.min(axis=1) + self.offsets.max(axis=1)) / 2)
+
+    @property
+    def center(self) -> float:
+        """Mean of the extreme offsets over all plans, Hz."""
+        return float((self.offsets.min() + self.offsets.max()) / 2)
+
+    @property
+    def span(self) -> float:
+        """Highest less lowest offset over all plans, Hz."""
+        return float(np.ptp(self.offsets))
+
+    @property
+    def center_jump(self) -> float:
+        """Most that the centre frequency differs between two plans, Hz: what pulses of both would not add up by."""
+        return float(np.ptp(self.centers))
+
+
+def _size(name: str, n: Any) -> int:
+    out = validation.count(name, n)
+    if out > MOST:
+        raise ValueError(f"{name} is {out}; an array has at most {MOST} elements")
+    return out
+
+
+def _towards(steer: Any) -> np.ndarray:
+    if np.shape(steer) == (2,):
+        azimuth, elevation = validation.array("steer", steer, np.float64, (2,))
+        level = np.cos(elevation)
+        return np.array([level * np.cos(azimuth), level * np.sin(azimuth), np.sin(elevation)])
+    return validation.direction("steer", steer)

@@ -1,0 +1,134 @@
+"""Image: complex (or multilooked) pixels on a grid."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..base.report import Report
+from .image_grid import ImageGrid, pair
+
+
+@dataclass(frozen=True, eq=False)
+class Image:
+    """An image on a grid.
+
+    data       complex, of grid.shape; real where it is intensity (after `multilook`). May be a file's dataset
+    grid       where the pixels are
+    gain       sum of all weights that went into a pixel: a unit point gives |data| = gain at its place
+    frequency  centre frequency, Hz, and
+    tx, rx     antenna positions at mid-aperture, m (3,): the image's local carrier follows from them
+    report     how it was made
+    """
+
+    data: Any
+    grid: ImageGrid
+    gain: float = 1.0
+    frequency: float | None = None
+    tx: np.ndarray | None = None
+    rx: np.ndarray | None = None
+    report: Report | None = None
+
+    def __post_init__(self) -> None:
+        if isinstance(self.data, (list, tuple)):
+            object.__setattr__(self, "data", np.asarray(self.data))
+        if tuple(np.shape(self.data)) != tuple(self.grid.shape):
+            raise ValueError(
+                f"image data has shape {tuple(np.shape(self.data))} but its grid {tuple(self.grid.shape)}; "
+                "give one value per pixel"
+            )
+        if np.dtype(self.data.dtype).kind not in "fciu":
+            raise ValueError(f"image data has type {self.data.dtype}, wanted complex or real numbers")
+        if self.frequency is not None:
+            object.__setattr__(self, "frequency", validation.number("image frequency", self.frequency, above=0))
+        object.__setattr__(self, "gain", validation.number("image gain", self.gain, above=0))
+        for name in ("tx", "rx"):
+            if getattr(self, name) is not None:
+                object.__setattr__(self, name, validation.array(name, getattr(self, name), np.float64, (3,)))
+
+    def __repr__(self) -> str:
+        shape = " x ".join(map(str, self.grid.shape))
+        return f"Image({shape} {self.data.dtype} pixels, gain {self.gain:.6g})"
+
+    @property
+    def is_complex(self) -> bool:
+        """True until the image is detected (multilooked)."""
+        return np.dtype(self.data.dtype).kind == "c"
+
+    def decibels(self) -> np.ndarray:
+        """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where nothing is."""
+        data = np.asarray(self.data)
+        with np.errstate(divide="ignore"):
+            if self.is_complex:
+                return (20 * np.log10(np.abs(data) / self.gain)).astype(np.float32)
+            if (data < 0).any():
+                at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
+                raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
+            return (10 * np.log10(data / self.gain**2)).astype(np.float32)
+
+    def multilook(self, looks: Any) -> Image:
+        """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; a remainder is cut off.
+
+        ValueError when the grid is no plane or the block is larger than the image.
+        """
+        if not self.grid.is_plane:
+            raise ValueError("multilook is for images on a plane; this grid lists its points")
+        a, b = pair("looks", looks)
+        a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
+        rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
+        if rows == 0 or columns == 0:
+            raise ValueError(f"looks ({a}, {b}) is larger than the image {self.grid.shape}; take fewer")
+        data = np.asarray(self.data)[: rows * a, : columns * b]
+        power = np.abs(data) ** 2 if self.is_complex else data
+        # The mean of a block sits at the mean of its pixels' positions.
+        center = self.grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
+        assert self.grid.spacing is not None
+        grid = replace(
+            self.grid,
+            shape=(rows, columns),
+            center=center,
+            spacing=(self.grid.spacing[0] * a, self.grid.spacing[1] * b),
+        )
+        return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
+
+    def show(self, floor_db: float = -50.0) -> Any:
+        """The picture as a PIL.Image, grey in dB from the brightest pixel down to floor_db."""
+        return self._picture(floor_db)
+
+    def _repr_png_(self) -> bytes:
+        return self._picture(-50.0)._repr_png_()
+
+    def save(self, path: Any, *, floor_db: float = -50.0, title: str | None = None) -> None:
+        """Write "name.png" (grey, dB, with axes) or "name.h5" (lossless; `sarcl.read` opens it)."""
+        suffix = Path(path).suffix.lower()
+        if suffix == ".png":
+            from ..figures.decibels import write_png
+
+            write_png(self._picture(floor_db, title), path)
+        elif suffix in (".h5", ".hdf5"):
+            from . import store
+
+            store.save_image(self, path)
+        else:
+            raise ValueError(f"image path {str(path)!r} ends in {suffix!r}; choose '.png' or '.h5'")
+
+    def _picture(self, floor_db: float, title: str | None = None) -> Any:
+        from ..figures.decibels import picture
+
+        if len(self.grid.shape) != 2:
+            raise ValueError(f"a picture needs two axes; this image has shape {tuple(self.grid.shape)}")
+        origin, names = (0.0, 0.0), ("y", "x")
+        grid = self.grid
+        if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
+            origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
+            # axes along the scene's own carry its coordinates; others the distance along themselves
+            along = np.eye(3)[1], np.eye(3)[0]
+            if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
+                names = ("along y_axis", "along x_axis")
+        return picture(
+            self.decibels(), spacing=grid.spacing, floor_db=floor_db, title=title, origin=origin, names=names
+        )

@@ -1,0 +1,235 @@
+"""Image grids: where the pixels are."""
+
+from __future__ import annotations
+
+import functools
+import math
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+
+FARTHEST = 1e150  # m: squares of coordinates stay finite
+MOST_NUMBERED = 2**63 - 1  # pixels that have a number
+
+
+@dataclass(frozen=True, eq=False)
+class ImageGrid:
+    """Pixel positions: a plane (`ImageGrid.plane`) or any points (`ImageGrid.points`).
+
+    shape    of the image
+    center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
+             center + (i - shape[0]//2) spacing[0] y_axis + (j - shape[1]//2) spacing[1] x_axis
+    listed   positions of any points, m shape + (3,), or None; NaN in all three where a cell is empty
+    """
+
+    shape: tuple[int, ...]
+    center: np.ndarray | None = None
+    spacing: tuple[float, float] | None = None
+    x_axis: np.ndarray | None = None
+    y_axis: np.ndarray | None = None
+    listed: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        if (self.listed is None) == (self.spacing is None):
+            raise ValueError("a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points")
+        for name in ("center", "x_axis", "y_axis", "listed"):
+            value = getattr(self, name)
+            if value is not None and value.flags.writeable:
+                made = (
+                    _cells(np.array(value, np.float64))
+                    if name == "listed"
+                    else validation.array(name, value, np.float64, value.shape)
+                )
+                object.__setattr__(self, name, made)
+
+    @classmethod
+    def plane(
+        cls,
+        *,
+        center: Any = (0.0, 0.0, 0.0),
+        shape: Any,
+        spacing: Any,
+        normal: Any = (0.0, 0.0, 1.0),
+        x_axis: Any = None,
+    ) -> ImageGrid:
+        """A plane of shape (rows, columns) and spacing (row, column) m about `center`, m (3,).
+
+        Columns run along x_axis (projected on the plane; default: the scene's x, or its y where x is the
+        normal), rows along y_axis = normal x x_axis; row 0 is drawn at the bottom.
+        """
+        center = validation.array("center", center, np.float64, (3,))
+        rows, columns = pair("shape", shape)
+        dy, dx = pair("spacing", spacing)
+        n = validation.direction("normal", normal)
+        if x_axis is None:
+            x_axis = (1.0, 0.0, 0.0) if abs(n[0]) < 0.999 else (0.0, 1.0, 0.0)
+        x = validation.direction("x_axis", x_axis)
+        x = x - (x @ n) * n
+        if np.linalg.norm(x) < 1e-6:
+            raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
+        x /= np.linalg.norm(x)
+        made = cls(
+            shape=(validation.count("shape[0]", rows), validation.count("shape[1]", columns)),
+            center=center,
+            spacing=(validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)),
+            x_axis=x,
+            y_axis=np.cross(n, x),
+        )
+        with np.errstate(over="ignore", invalid="ignore"):
+            far = not (np.abs(made.bounds) < FARTHEST).all()
+        if far:
+            raise ValueError(
+                f"pixels of center {_text(center)} and spacing {_text(made.spacing)} reach beyond {FARTHEST:g} m, "
+                "where distances overflow; give both in metres"
+            )
+        return made
+
+    @classmethod
+    def points(cls, positions: Any, *, valid: Any = None) -> ImageGrid:
+        """Any positions, m (..., 3); the image has the shape of all axes but the last.
+
+        valid  bool, of that shape: False where a cell is empty (a height model without data there), whatever its
+               position; NaN in all three coordinates says the same. Its pixel is 0.
+        ValueError: NaN in one or two coordinates, Inf, no cell that is not empty.
+        """
+        listed = validation.converted("positions", positions, np.float64)
+        shape = listed.shape
+        if len(shape) < 2 or shape[-1] != 3 or 0 in shape:
+            raise ValueError(f"positions has shape {shape}, wanted (..., 3) with an axis before the last, none zero")
+        if valid is not None:
+            mask = np.asarray(valid)
+            if mask.dtype != bool or mask.shape != shape[:-1]:
+                raise ValueError(f"valid is {mask.dtype} of shape {mask.shape}, wanted bool of shape {shape[:-1]}")
+            listed[~mask] = np.nan
+        return cls(shape=shape[:-1], listed=_cells(listed))
+
+    @property
+    def is_plane(self) -> bool:
+        """True for a grid made by `plane`."""
+        return self.listed is None
+
+    @property
+    def size(self) -> int:
+        """Number of pixels."""
+        return math.prod(self.shape)
+
+    @functools.cached_property
+    def empty(self) -> np.ndarray | None:
+        """True where a cell is empty, bool of the grid's shape; None where no cell is."""
+        if self.listed is None:
+            return None
+        mask = np.isnan(self.listed[..., 0])
+        return validation.sealed(mask) if mask.any() else None
+
+    @functools.cached_property
+    def _middle(self) -> int:
+        """The column that lies at `center`."""
+        return self.shape[1] // 2
+
+    def columns(self, start: int, stop: int) -> ImageGrid:
+        """Columns start ... stop - 1 of a plane, their positions to the bit those they have there."""
+        self._need_plane("columns")
+        part = replace(self, shape=(self.shape[0], stop - start))
+        part.__dict__["_middle"] = self._middle - start
+        return part
+
+    def filled(self) -> ImageGrid:
+        """The grid with a position that is not empty in every empty cell; itself where there is none."""
+        if self.empty is None or self.listed is None:
+            return self
+        listed = self.listed.copy()
+        listed[self.empty] = listed[~self.empty][0]
+        return ImageGrid(shape=self.shape, listed=validation.sealed(listed))
+
+    def sample(self, most: int, seed: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
+        """Up to `most` random pixels, no empty ones: index into an image, and positions, m (n, 3)."""
+        random = np.random.default_rng(seed)
+        if self.size > MOST_NUMBERED:  # none is likely to be picked twice
+            index = tuple(random.integers(0, n, most) for n in self.shape)
+            return index, self.at(*index)
+        if self.empty is None:
+            picked = np.sort(random.choice(self.size, min(most, self.size), replace=False))
+        else:
+            cells = np.flatnonzero(~self.empty)
+            picked = cells[np.sort(random.choice(len(cells), min(most, len(cells)), replace=False))]
+        index = np.unravel_index(picked, self.shape)
+        return index, self.at(*index) if self.listed is None else self.listed[index]
+
+    @property
+    def normal(self) -> np.ndarray:
+        """Unit normal of a plane (3,)."""
+        self._need_plane("normal")
+        assert self.x_axis is not None and self.y_axis is not None
+        return np.cross(self.x_axis, self.y_axis)
+
+    @property
+    def positions(self) -> np.ndarray:
+        """All pixel positions, m, float64 shape + (3,); NaN where a cell is empty."""
+        if self.listed is not None:
+            return self.listed
+        return self.at(np.arange(self.shape[0])[:, None], np.arange(self.shape[1]))
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lower and upper corner of the box that holds all pixels but empty ones, m (2, 3)."""
+        if self.listed is not None:
+            p = self.listed.reshape(-1, 3) if self.empty is None else self.listed[~self.empty]
+        else:
+            p = self.at(np.array([0, 0, 1, 1]) * (self.shape[0] - 1), np.array([0, 1, 0, 1]) * (self.shape[1] - 1))
+        return np.stack([p.min(axis=0), p.max(axis=0)])
+
+    def at(self, row: Any, column: Any) -> np.ndarray:
+        """Position, m (..., 3), of (fractional) pixel indices of a plane."""
+        self._need_plane("at")
+        assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        i = (np.asarray(row) - self.shape[0] // 2) * self.spacing[0]
+        j = (np.asarray(column) - self._middle) * self.spacing[1]
+        return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
+
+    def index(self, position: Any) -> np.ndarray:
+        """Fractional (row, column) of positions, m (..., 3), projected on a plane: (..., 2)."""
+        self._need_plane("index")
+        assert (
+            self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        )
+        d = np.asarray(position, np.float64) - self.center
+        row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
+        return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
+
+    def _need_plane(self, what: str) -> None:
+        if not self.is_plane:
+            raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
+
+
+def _cells(positions: np.ndarray) -> np.ndarray:
+    """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor an empty cell's three NaN."""
+    empty = np.isnan(positions).all(axis=-1)
+    if empty.all():
+        raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")
+    bad = ~(np.abs(positions) < FARTHEST) & ~empty[..., None]
+    if bad.any():
+        at = np.unravel_index(int(np.argmax(bad)), bad.shape)
+        if np.isfinite(positions[at]):
+            where = ", ".join(str(int(i)) for i in at)
+            raise ValueError(f"positions[{where}] is {positions[at]:g} m, where distances overflow; give metres")
+        raise ValueError(
+            f"positions[{', '.join(str(int(i)) for i in at)}] is {positions[at]}; give finite positions, and NaN in "
+            "all three coordinates of a cell that is empty"
+        )
+    return validation.sealed(positions)
+
+
+def _text(vector: Any) -> str:
+    return "(" + ", ".join(f"{v:g}" for v in vector) + ")"
+
+
+def pair(name: str, value: Any) -> tuple[Any, Any]:
+    """A (row, column) pair; one number serves for both."""
+    if np.ndim(value) == 0:
+        return value, value
+    if np.shape(value) != (2,):
+        raise ValueError(f"{name} is {value!r}; wanted (row, column) or one number for both")
+    return value[0], value[1]

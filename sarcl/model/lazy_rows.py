@@ -1,0 +1,100 @@
+"""Rows of arrays that may lie in files: picked, stacked, scaled and cut without reading them."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base.validation import sealed
+
+
+def in_memory(source: Any) -> bool:
+    """True for a plain array; a memmap is a file, and read like one."""
+    return isinstance(source, np.ndarray) and not isinstance(source, np.memmap)
+
+
+def pick(source: Any, index: np.ndarray) -> Any:
+    """Rows `index` (k,) of a source; lazy where the source is."""
+    if in_memory(source):
+        return sealed(source[index])
+    if isinstance(source, Picked):
+        return Picked(source.source, source.index[index])
+    return Picked(source, index)
+
+
+def stack(sources: list[Any]) -> Any:
+    """Rows of several sources, one after another; lazy where any of them is."""
+    if len(sources) == 1:
+        return sources[0]
+    return sealed(np.concatenate(sources)) if all(map(in_memory, sources)) else Stacked(sources)
+
+
+class Picked:
+    """Chosen rows of a lazy source; reads what a slice asks for, in as few reads as runs of rows allow."""
+
+    def __init__(self, source: Any, index: np.ndarray) -> None:
+        self.source, self.index = source, index
+        self.shape = (len(index), *source.shape[1:])
+        self.dtype = source.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        index = self.index[rows]
+        if len(index) == 0:
+            return np.empty((0, *self.shape[1:]), self.dtype)
+        runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
+        return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Stacked:
+    """Rows of several sources one after another; a slice reads only the sources it touches."""
+
+    def __init__(self, sources: list[Any]) -> None:
+        self.sources = sources
+        self.first = np.cumsum([0, *(s.shape[0] for s in sources)])
+        self.shape = (int(self.first[-1]), *sources[0].shape[1:])
+        self.dtype = np.result_type(*(s.dtype for s in sources))
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        start, stop, _ = rows.indices(self.shape[0])
+        out = np.empty((max(stop - start, 0), *self.shape[1:]), self.dtype)
+        for first, source in zip(self.first.tolist(), self.sources, strict=False):
+            a, b = max(start, first), min(stop, first + source.shape[0])
+            if a < b:
+                out[a - start : b - start] = source[a - first : b - first]
+        return out
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Scaled:
+    """Rows of a source times a factor a row (n,); the source is read, and multiplied, as a slice asks for it."""
+
+    def __init__(self, source: Any, factor: np.ndarray) -> None:
+        self.source, self.factor = source, factor.astype(np.result_type(source.dtype, np.complex64))
+        self.shape, self.dtype = source.shape, self.factor.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factor[rows, None]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Columns:
+    """Columns first ... last - 1 of a source; a slice reads the rows it asks for."""
+
+    def __init__(self, source: Any, first: int, last: int) -> None:
+        self.source, self.columns = source, slice(first, last)
+        self.shape = (source.shape[0], last - first)
+        self.dtype = source.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows])[:, self.columns]
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)

@@ -1,0 +1,277 @@
+"""PhaseHistory: echoes by row and frequency, with the geometry that made them."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, fields, replace
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base import constants, validation
+from .lazy_rows import in_memory, pick, stack
+
+if TYPE_CHECKING:
+    from ..base.report import Report
+    from .antenna_array import AntennaArray
+    from .waveform import Waveform
+
+# Optional arrays with one entry a row: name -> (dtype, trailing shape).
+PER_ROW = {
+    "time": (np.float64, ()),
+    "tx_channel": (np.int64, ()),
+    "rx_channel": (np.int64, ()),
+    "polarization": ("U2", ()),
+    "weight": (np.float64, ()),
+    "tx_velocity": (np.float64, (3,)),
+    "rx_velocity": (np.float64, (3,)),
+}
+
+
+@dataclass(frozen=True, eq=False)
+class PhaseHistory:
+    """Echoes s (n_rows, n_samples); a row is one (pulse, transmit channel, receive channel, polarisation).
+
+    samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
+                     A writeable array is copied; make it read-only to hand it over as it is
+    frequency        of sample 0, Hz, one or per row
+    frequency_step   Hz, one or per row, positive
+    tx, rx           antenna positions, m (n_rows, 3); rx defaults to tx
+    reference_range  m, one or per row: half the two-way path whose phase is already removed
+    time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one a row
+    waveform         the Waveform sent, or None;  array  the AntennaArray that sent it, or None: one antenna
+    compressed       False while the pulse's own spectrum is still in the data (see `compress`)
+
+    A point of amplitude a at x gives a exp(-j 2 pi f (tau - tau_ref)), tau = (|tx - x| + |x - rx|)/c,
+    tau_ref = 2 reference_range/c. ValueError names the field whose shape or value does not fit; samples that
+    are read lazily are checked for NaN and Inf when they are read.
+    """
+
+    samples: Any
+    frequency: Any
+    frequency_step: Any
+    tx: Any
+    reference_range: Any
+    rx: Any = None
+    time: Any = None
+    tx_channel: Any = None
+    rx_channel: Any = None
+    polarization: Any = None
+    weight: Any = None
+    tx_velocity: Any = None
+    rx_velocity: Any = None
+    waveform: Waveform | None = None
+    array: AntennaArray | None = None
+    compressed: bool = True
+    report: Report | None = None
+
+    def __post_init__(self) -> None:
+        samples = self.samples
+        if isinstance(samples, (list, tuple)) or (in_memory(samples) and samples.dtype.kind in "iuf"):
+            samples = validation.sealed(validation.converted("samples", samples, np.complex128))
+        if len(np.shape(samples)) != 2 or 0 in samples.shape:
+            raise ValueError(f"samples has shape {np.shape(samples)}, wanted (n_rows, n_samples), neither zero")
+        if np.dtype(samples.dtype).newbyteorder("=") not in (np.complex64, np.complex128):
+            raise ValueError(f"samples has type {samples.dtype}, wanted complex64 or complex128")
+        if in_memory(samples):
+            validation.finite("samples", samples)
+            if samples.flags.writeable or not samples.dtype.isnative:
+                samples = validation.sealed(np.array(samples, samples.dtype.newbyteorder("="), order="C"))
+        self._set("samples", samples)
+        for name in ("frequency", "frequency_step", "reference_range"):
+            self._set(name, self._rows(name, getattr(self, name), np.float64, (), spread=True))
+        if not (self.frequency_step > 0).all():
+            raise ValueError(
+                f"frequency_step[{int(np.argmin(self.frequency_step))}] is {self.frequency_step.min():g} Hz; "
+                "it must be positive: reverse the samples of a falling sweep"
+            )
+        if not (self.frequency > 0).all():
+            bad = int(np.argmin(self.frequency))
+            raise ValueError(f"frequency[{bad}] is {self.frequency[bad]:g} Hz; it must be positive")
+        self._set("tx", self._rows("tx", self.tx, np.float64, (3,)))
+        self._set("rx", self.tx if self.rx is None else self._rows("rx", self.rx, np.float64, (3,)))
+        for name, (dtype, tail) in PER_ROW.items():
+            if getattr(self, name) is not None:
+                self._set(name, self._rows(name, getattr(self, name), dtype, tail, spread=tail == ()))
+        if self.weight is not None and (self.weight < 0).any():
+            bad = int(np.argmin(self.weight))
+            raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
+        if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
+            raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
+        if self.array is not None and not hasattr(self.array, "offsets_at"):
+            raise TypeError(f"array is a {type(self.array).__name__}; give a sarcl.AntennaArray or None")
+
+    def _set(self, name: str, value: Any) -> None:
+        object.__setattr__(self, name, value)
+
+    def _rows(self, name: str, value: Any, dtype: Any, tail: tuple[int, ...], spread: bool = False) -> np.ndarray:
+        """`value` with one entry a row; a single entry serves all rows where `spread`."""
+        n = self.samples.shape[0]
+        if spread and np.ndim(value) == 0:
+            value = np.full(n, value)
+        out = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
+        if out.ndim != 1 + len(tail) or out.shape[1:] != tail:
+            raise ValueError(f"{name} has shape {out.shape}, wanted {(n, *tail)}")
+        if len(out) != n:
+            raise ValueError(f"samples has {n} rows but {name} has {len(out)}; give one {name} per row")
+        if out.dtype.kind in "fc":
+            validation.finite(name, out)
+        return validation.sealed(out)
+
+    def __repr__(self) -> str:
+        low = self.frequency.min() / 1e9
+        high = (self.frequency + (self.n_samples - 1) * self.frequency_step).max() / 1e9
+        state = "" if self.compressed else ", not compressed"
+        return (
+            f"PhaseHistory({self.n_rows} rows of {self.n_samples} {self.samples.dtype} samples, "
+            f"{low:.6g} to {high:.6g} GHz, swath {self.swath.min():.4g} m{state})"
+        )
+
+    @property
+    def n_rows(self) -> int:
+        """Number of rows."""
+        return int(self.samples.shape[0])
+
+    @property
+    def n_samples(self) -> int:
+        """Number of frequencies in a row."""
+        return int(self.samples.shape[1])
+
+    @property
+    def bandwidth(self) -> np.ndarray:
+        """n_samples frequency_step, Hz (n_rows,)."""
+        return self.n_samples * self.frequency_step
+
+    @property
+    def center_frequency(self) -> np.ndarray:
+        """Middle of the sampled band, Hz (n_rows,)."""
+        return self.frequency + (self.n_samples - 1) / 2 * self.frequency_step
+
+    @property
+    def swath(self) -> np.ndarray:
+        """Unambiguous range about the reference, m (n_rows,): +- half of c / (2 frequency_step)."""
+        return constants.SPEED_OF_LIGHT / (2 * self.frequency_step)
+
+    @property
+    def is_monostatic(self) -> bool:
+        """True where transmitter and receiver share every position."""
+        return self.rx is self.tx or np.array_equal(self.rx, self.tx)
+
+    def read(self, start: int, stop: int) -> np.ndarray:
+        """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
+        if not 0 <= start <= stop <= self.n_rows:
+            raise IndexError(f"rows {start} to {stop} were asked for, but there are {self.n_rows}")
+        block = np.asarray(self.samples[start:stop])
+        if block.shape != (stop - start, self.n_samples):
+            raise ValueError(
+                f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "
+                "its source does not slice as its shape says"
+            )
+        validation.finite("samples", block, first_row=start)
+        return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
+
+    def __getitem__(self, rows: Any) -> PhaseHistory:
+        """The chosen rows (slice, index array or mask); a lazy source stays lazy."""
+        index = np.atleast_1d(np.arange(self.n_rows)[rows])
+        if index.ndim != 1:
+            raise IndexError(f"rows are chosen along one axis, the index has {index.ndim}")
+        if index.size == 0:
+            raise ValueError(f"no row is left of {self.n_rows}; choose at least one")
+        names = ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)
+        picked = {n: getattr(self, n)[index] for n in names if getattr(self, n) is not None}
+        if self.rx is self.tx:
+            picked["rx"] = None
+        return replace(self, samples=pick(self.samples, index), **picked)
+
+    def select(
+        self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
+    ) -> PhaseHistory:
+        """Rows of one polarisation ("HV"), receive channel, sending element. ValueError lists what there is."""
+        keep, where = np.ones(self.n_rows, bool), "these data"
+        for name, field, wanted in (
+            ("polarization", self.polarization, polarization),
+            ("channel", self.rx_channel, channel),
+            ("sender", self.tx_channel, sender),
+        ):
+            if wanted is None:
+                continue
+            if field is None:
+                raise ValueError(f"these data name no {name}; every row is alike")
+            if not (keep & (field == wanted)).any():
+                there = sorted(set(field[keep].tolist()))
+                raise ValueError(f"{name} {wanted!r} is not in {where}; there are {there}")
+            keep &= field == wanted
+            where = f"the rows of {name} {wanted!r}"
+        return self[keep]
+
+    def time_signal(self, oversample: int = 1) -> tuple[np.ndarray, np.ndarray]:
+        """Baseband signals in time: (delay about tau_ref, s (n,) or (n_rows, n); complex (n_rows, n)).
+
+        s~_p(t) = sum_n s_p(f_n) exp(+j 2 pi (f_n - fc) t), not normalised, fc the frequency of sample
+        n_samples//2. One delay axis where every row has the same frequency step.
+        """
+        n = self.n_samples * validation.count("oversample", oversample)
+        lag = np.arange(n) - n // 2
+        step = self.frequency_step if np.ptp(self.frequency_step) else self.frequency_step[:1]
+        delay = lag / (n * step[:, None])
+        spectrum = np.zeros((self.n_rows, n), np.complex128)
+        spectrum[:, np.arange(self.n_samples) - self.n_samples // 2] = self.read(0, self.n_rows)
+        signal = np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1) * n
+        return (delay if len(delay) > 1 else delay[0]), signal
+
+    def save(self, path: Any) -> None:
+        """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows."""
+        from . import store
+
+        store.save_phase_history(self, path)
+
+
+def _words(name: str, value: Any) -> np.ndarray:
+    """Words (n,) from strings or, as files hold them, bytes."""
+    given = np.asarray(value)
+    if given.dtype.kind == "S":
+        given = np.char.decode(given, "ascii")
+    if not all(isinstance(word, str) for word in given.ravel().tolist()):
+        raise ValueError(f"{name} must be strings such as 'HH', got {value!r:.80}")
+    return given.astype(str)
+
+
+def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
+    """Rows of several phase histories in one, in order; all need the same number of samples.
+
+    Optional per-row fields and the waveform are kept where every part has them; lazy samples stay lazy.
+    ValueError names the part that does not fit.
+    """
+    if isinstance(parts, PhaseHistory):
+        raise TypeError("concatenate takes a list of phase histories, got one; give [raw, ...]")
+    parts = list(parts)
+    if not parts:
+        raise ValueError("concatenate was given no phase history; give at least one")
+    for i, part in enumerate(parts):
+        if not isinstance(part, PhaseHistory):
+            raise TypeError(f"part {i} is a {type(part).__name__}; concatenate joins phase histories")
+        if part.n_samples != parts[0].n_samples:
+            raise ValueError(f"part {i} has {part.n_samples} samples a row, part 0 has {parts[0].n_samples}")
+        if part.compressed != parts[0].compressed:
+            raise ValueError(f"part {i} and part 0 differ: one is compressed, one is not; call compress on it first")
+    joined: dict[str, Any] = {}
+    for field in fields(PhaseHistory):
+        values = [getattr(p, field.name) for p in parts]
+        if field.name == "samples":
+            joined["samples"] = stack(values)
+        elif field.name in ("waveform", "array"):
+            joined[field.name] = values[0] if all(_alike(v, values[0]) for v in values) else None
+        elif isinstance(values[0], np.ndarray) and all(v is not None for v in values):
+            joined[field.name] = np.concatenate(values)
+    if not parts[0].compressed and joined["waveform"] is None and any(p.waveform for p in parts):
+        raise ValueError("parts that are not compressed have different waveforms; call compress on each first")
+    if all(p.rx is p.tx for p in parts):
+        joined["rx"] = None
+    return PhaseHistory(**joined, compressed=parts[0].compressed)
+
+
+def _alike(a: Any, b: Any) -> bool:
+    """True where two waveforms (or None) have equal fields."""
+    if a is None or b is None or type(a) is not type(b):
+        return a is b
+    return a is b or all(np.array_equal(getattr(a, f.name), getattr(b, f.name)) for f in fields(a))

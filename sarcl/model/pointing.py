@@ -1,0 +1,154 @@
+"""Where antennas look: tracks with an attitude, made from what the beam should do.
+
+Every function returns the track with `attitude` set: columns are body axes in the scene, x ahead of the beam (an
+antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, which points up as far as it can.
+"""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from .trajectory import Trajectory
+
+UP = (0.0, 0.0, 1.0)
+
+
+def fixed(track: Trajectory, direction: Any, *, up: Any = UP) -> Trajectory:
+    """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3)."""
+    look = _units("direction", direction, len(track))
+    return _looking(track, look, _units("up", up, len(track)))
+
+
+def spotlight(track: Trajectory, point: Any, *, up: Any = UP) -> Trajectory:
+    """Boresight at a point, m (3,) or (n, 3) for one that moves. ValueError where an antenna stands on it."""
+    target = _vectors("point", point, len(track))
+    return _looking(
+        track, _units("point - position", target - track.positions, len(track)), _units("up", up, len(track))
+    )
+
+
+def stripmap(track: Trajectory, look: float, *, squint: float = 0.0, side: str = "right", up: Any = UP) -> Trajectory:
+    """Boresight across the track, `look` rad off straight down, turned `squint` rad towards the velocity.
+
+    side  "right" or "left" of the velocity, seen from above. The azimuth axis keeps in the plane of boresight and
+    velocity, so that an aperture's rows lie along the track; its sense follows from z pointing up.
+    """
+    look = validation.number("look", look, least=0)
+    squint = validation.number("squint", squint)
+    if look > np.pi or abs(squint) >= np.pi / 2:
+        raise ValueError(
+            f"look is {look:g} and squint {squint:g} rad; they reach to pi and pi/2: were they in degrees?"
+        )
+    sign = {"right": 1.0, "left": -1.0}[validation.choice("side", side, ("right", "left"))]
+    along = _units("velocity", velocities(track), len(track))
+    vertical = _units("up", up, len(track))
+    right = np.cross(along, vertical)
+    length = np.linalg.norm(right, axis=1, keepdims=True)
+    if length.min() < 1e-6:
+        raise ValueError(
+            f"the track goes straight up at pulse {int(np.argmin(length))}; no side is right of it: give up=..."
+        )
+    right /= length
+    over = np.cross(right, along)
+    across = sign * np.sin(look) * right - np.cos(look) * over
+    boresight = np.cos(squint) * across + np.sin(squint) * along
+    azimuth = sign * (np.cos(squint) * along - np.sin(squint) * across)
+    return replace(track, attitude=np.stack([boresight, azimuth, np.cross(boresight, azimuth)], axis=-1))
+
+
+def steered(track: Trajectory, azimuth: Any, elevation: Any = 0.0) -> Trajectory:
+    """The track's attitude turned to (azimuth, elevation) rad, one or per pulse, of its own axes.
+
+    The pattern turns as a whole, as when the antenna turns: sliding spotlight, scans, platform errors.
+    """
+    axes = _attitude(track)
+    a, e = (
+        np.broadcast_to(validation.converted(n, v, np.float64), (len(track),))
+        for n, v in (("azimuth", azimuth), ("elevation", elevation))
+    )
+    for name, values in (("azimuth", a), ("elevation", e)):
+        validation.finite(name, values)
+    zero = np.zeros(len(track))
+    ahead = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
+    side = [-np.sin(a), np.cos(a), zero]
+    over = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
+    turn = np.stack([np.stack(column, axis=-1) for column in (ahead, side, over)], axis=-1)
+    return replace(track, attitude=axes @ turn)
+
+
+def turned(track: Trajectory, angles: Any) -> Trajectory:
+    """The track's attitude turned by rotation vectors, rad (3,) or (n, 3), about its own axes x, y, z."""
+    from scipy.spatial.transform import Rotation
+
+    turn = Rotation.from_rotvec(_vectors("angles", angles, len(track)).copy()).as_matrix()
+    return replace(track, attitude=_attitude(track) @ turn)
+
+
+def from_quaternions(track: Trajectory, quaternions: Any, *, scalar_first: bool = True) -> Trajectory:
+    """Attitude from unit quaternions (n, 4) that turn body axes into the scene's; w, x, y, z, or x, y, z, w."""
+    from scipy.spatial.transform import Rotation
+
+    q = validation.array("quaternions", quaternions, np.float64, (len(track), 4))
+    length = np.linalg.norm(q, axis=1)
+    if np.abs(length - 1).max() > 1e-3:
+        bad = int(np.argmax(np.abs(length - 1)))
+        raise ValueError(f"quaternions[{bad}] has length {length[bad]:g}; a rotation's is 1")
+    return replace(track, attitude=Rotation.from_quat(np.roll(q, -1 if scalar_first else 0, axis=1)).as_matrix())
+
+
+def velocities(track: Trajectory) -> np.ndarray:
+    """The track's velocities, m/s (n, 3), or else the slope of its positions."""
+    if track.velocities is not None:
+        return track.velocities
+    if len(track) < 2:
+        raise ValueError("a track of one pulse tells no velocity; give Trajectory(..., velocities=...)")
+    return np.asarray(np.gradient(track.positions, track.times, axis=0))
+
+
+def rotations(name: str, value: Any, lead: tuple[int, ...]) -> np.ndarray:
+    """`value` as rotation matrices lead + (3, 3); ValueError where one is none to 1e-6."""
+    out = validation.array(name, value, np.float64, (*lead, 3, 3))
+    off = np.abs(np.swapaxes(out, -1, -2) @ out - np.eye(3)).max(axis=(-1, -2))
+    bad = np.atleast_1d((off > 1e-6) | (np.linalg.det(out) < 0))
+    if bad.any():
+        at = f"[{int(np.argmax(bad))}]" if lead else ""
+        raise ValueError(
+            f"{name}{at} is no rotation; its columns must be three unit vectors at right angles, right-handed"
+        )
+    return out
+
+
+def _attitude(track: Trajectory) -> np.ndarray:
+    if track.attitude is None:
+        raise ValueError("the track has no attitude to turn; aim it first: pointing.fixed, spotlight or stripmap")
+    return rotations("trajectory attitude", track.attitude, (len(track),))
+
+
+def _looking(track: Trajectory, look: np.ndarray, up: np.ndarray) -> Trajectory:
+    """Axes with x along `look` and z up; straight up or down, z is the scene's y (x, where that is up)."""
+    side = np.cross(up, look)
+    length = np.linalg.norm(side, axis=1, keepdims=True)
+    other = np.where(np.abs(look[:, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])
+    instead = np.cross(other, look)
+    side = np.where(
+        length < 1e-6, instead / np.linalg.norm(instead, axis=1, keepdims=True), side / np.maximum(length, 1e-6)
+    )
+    return replace(track, attitude=np.stack([look, side, np.cross(look, side)], axis=-1))
+
+
+def _vectors(name: str, value: Any, n: int) -> np.ndarray:
+    """`value` (3,) or (n, 3) as (n, 3)."""
+    out = validation.array(name, value, np.float64, (3,) if np.ndim(value) == 1 else (n, 3))
+    return np.broadcast_to(out, (n, 3))
+
+
+def _units(name: str, value: Any, n: int) -> np.ndarray:
+    out = _vectors(name, value, n)
+    length = np.linalg.norm(out, axis=1, keepdims=True)
+    if not length.all():
+        raise ValueError(f"{name} is (0, 0, 0) at pulse {int(np.argmin(length))}; a direction needs a length")
+    return out / length

@@ -1,0 +1,91 @@
+"""The radar equation as named factors: what a radar of some power receives from a unit cross section."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import constants, validation
+from .phase_history import PhaseHistory
+from .waveform import Waveform
+
+BOLTZMANN = 1.380649e-23  # J/K, exact
+
+
+@dataclass(frozen=True, kw_only=True)
+class Radar:
+    """What stands between a radar cross section and a received signal, beside the antennas' gains.
+
+    power                W transmitted, at the pulse's peak
+    losses_db            dB, all of them, both ways, 0 or more
+    noise_temperature    K, of the whole system; None: no noise is known
+
+    ValueError names what does not fit. Samples with a Radar are in sqrt(W): |sample|^2 is the power received from the
+    scatterers while the pulse lasts. Without one (the default of `sarcl.echo`) a unit cross section gives samples of
+    modulus 1 at any range.
+    """
+
+    power: float
+    losses_db: float = 0.0
+    noise_temperature: float | None = None
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "power", validation.number("radar power", self.power, above=0))
+        object.__setattr__(self, "losses_db", validation.number("radar losses_db", self.losses_db, least=0))
+        if self.noise_temperature is not None:
+            value = validation.number("radar noise_temperature", self.noise_temperature, above=0)
+            object.__setattr__(self, "noise_temperature", value)
+
+    def factor(self, frequency: Any) -> np.ndarray:
+        """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that depends on no place."""
+        wave = constants.SPEED_OF_LIGHT / np.asarray(frequency, np.float64)
+        loss = 10 ** (self.losses_db / 10)
+        return np.asarray(np.sqrt(self.power / ((4 * np.pi) ** 3 * loss)) * wave)
+
+    def amplitude(self, frequency: Any, tx_range: Any, rx_range: Any, tx_gain: Any = 1.0, rx_gain: Any = 1.0) -> Any:
+        """sqrt(W) received from a cross section of 1 m^2: factor x spreading x amplitude gains.
+
+        Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be
+        complex (`Antenna.gain`). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for two antennas.
+        """
+        return self.factor(frequency) * spreading(tx_range, rx_range) * tx_gain * rx_gain
+
+
+def spreading(tx_range: Any, rx_range: Any) -> np.ndarray:
+    """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
+    out = np.asarray(tx_range, np.float64) * np.asarray(rx_range, np.float64)
+    if not (out > 0).all():
+        raise ValueError("an antenna stands on a scatterer (range 0), where the radar equation has no answer; move it")
+    return 1 / out
+
+
+def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> np.ndarray:
+    """Mean |noise|^2, W, of samples of the echoes `raw` at W = 1, one a row: k T_s/(df E), E = |P|^2 at its peak, s^2.
+
+    A sample is the received spectrum over P's largest value (times the matched filter's, of peak 1, once compressed);
+    noise of k T_s W/Hz over one period 1/df of the row has k T_s/df there. A chirp has E = duration/bandwidth, so a
+    point's focused signal-to-noise ratio is (its power) duration n_pulses/(k T_s): the energy over the noise density.
+    """
+    temperature = validation.number("temperature", temperature, above=0)
+    pulse = raw.waveform if waveform is None else waveform
+    if pulse is None:
+        raise ValueError(
+            "raw names no waveform, so its pulse's energy is unknown; set raw.waveform, or give nesz_db=..."
+        )
+    return np.asarray(BOLTZMANN * temperature / (raw.frequency_step * peak_energy_density(pulse)))
+
+
+def peak_energy_density(waveform: Waveform) -> float:
+    """Largest |integral of p(t) exp(-j 2 pi f t) dt|^2, s^2, of the pulse p of peak modulus 1.
+
+    duration/bandwidth of a chirp (its stationary-phase spectrum), duration^2 of a tone.
+    """
+    if waveform.kind == "chirp":
+        return waveform.duration / waveform.bandwidth
+    if waveform.kind == "tone":
+        return waveform.duration**2
+    assert waveform.signal is not None and waveform.rate is not None
+    unit = waveform.signal / np.abs(waveform.signal).max()
+    return float((np.abs(np.fft.fft(unit, 8 * len(unit))).max() / waveform.rate) ** 2)

@@ -1,0 +1,101 @@
+"""Trajectories: where the antenna is at each pulse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+
+
+@dataclass(frozen=True, eq=False)
+class Trajectory:
+    """Positions of an antenna's phase centre, one a pulse.
+
+    times       s (n,), increasing
+    positions   m (n, 3)
+    velocities  m/s (n, 3) or None
+    attitude    rotation from body to scene axes (n, 3, 3) or None
+
+    ValueError when shapes disagree, a value is not finite, or times do not increase.
+    """
+
+    times: np.ndarray
+    positions: np.ndarray
+    velocities: np.ndarray | None = None
+    attitude: np.ndarray | None = None
+
+    def __post_init__(self) -> None:
+        positions = validation.array("trajectory positions", self.positions, np.float64, ("n_pulses", 3))
+        n = len(positions)
+        times = validation.array("trajectory times", self.times, np.float64, (n,))
+        if n > 1 and not (np.diff(times) > 0).all():
+            at = int(np.argmax(np.diff(times) <= 0)) + 1
+            raise ValueError(
+                f"trajectory times[{at}] is {times[at]:g} after {times[at - 1]:g}; times must increase: "
+                "a step of length zero or less has no place in a track"
+            )
+        object.__setattr__(self, "times", times)
+        object.__setattr__(self, "positions", positions)
+        if self.velocities is not None:
+            v = validation.array("trajectory velocities", self.velocities, np.float64, (n, 3))
+            object.__setattr__(self, "velocities", v)
+        if self.attitude is not None:
+            a = validation.array("trajectory attitude", self.attitude, np.float64, (n, 3, 3))
+            object.__setattr__(self, "attitude", a)
+
+    def __len__(self) -> int:
+        return len(self.times)
+
+    def picked(self, pulses: Any) -> Trajectory:
+        """These pulses, a slice or numbers in order."""
+        whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
+        some: dict[str, Any] = {name: None if value is None else value[pulses] for name, value in whole.items()}
+        return replace(self, **some)
+
+    @classmethod
+    def line(cls, *, start: Any, velocity: Any, prf: float, n_pulses: int) -> Trajectory:
+        """Straight track: pulse i at start + i velocity/prf (m, m/s, Hz)."""
+        start = validation.array("start", start, np.float64, (3,))
+        velocity = validation.array("velocity", velocity, np.float64, (3,))
+        prf = validation.number("prf", prf, above=0)
+        n = validation.count("n_pulses", n_pulses)
+        if n > 1 and not velocity.any():
+            raise ValueError("velocity is (0, 0, 0); a track of several pulses needs steps of some length")
+        times = np.arange(n) / prf
+        return cls(times, start + times[:, None] * velocity, np.tile(velocity, (n, 1)))
+
+    @classmethod
+    def circle(
+        cls,
+        *,
+        radius: float,
+        height: float,
+        start: float = 0.0,
+        arc: float = 2 * np.pi,
+        n_pulses: int,
+        center: Any = (0.0, 0.0, 0.0),
+        prf: float = 1.0,
+    ) -> Trajectory:
+        """Circle about the z axis through `center`, at `height` above it, m.
+
+        Pulse i stands at azimuth start + arc i/(n_pulses - 1), rad from +x towards +y: the first pulse at
+        `start`, the last at start + arc. prf (Hz) sets times and velocities only.
+        """
+        radius = validation.number("radius", radius, above=0)
+        height = validation.number("height", height)
+        start = validation.number("start", start)
+        arc = validation.number("arc", arc)
+        prf = validation.number("prf", prf, above=0)
+        n = validation.count("n_pulses", n_pulses)
+        center = validation.array("center", center, np.float64, (3,))
+        if n > 1 and arc == 0:
+            raise ValueError("arc is 0; a track of several pulses needs steps of some length")
+        angle = start + arc * (np.arange(n) / max(n - 1, 1))
+        rate = arc / max(n - 1, 1) * prf
+        zero = np.zeros(n)
+        ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), zero + height], axis=-1)
+        tangent = np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
+        return cls(np.arange(n) / prf, center + ring, radius * rate * tangent)

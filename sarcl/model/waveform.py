@@ -1,0 +1,112 @@
+"""Waveforms: the spectrum of the transmitted pulse and of its matched filter."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+
+
+@dataclass(frozen=True, eq=False)
+class Waveform:
+    """A transmitted pulse, complex baseband about `center`. Build one with `chirp`, `tone` or `sampled`.
+
+    center     carrier, Hz
+    bandwidth  band that echoes are sampled in, Hz: [center - bandwidth/2, center + bandwidth/2]
+    duration   length of the pulse, s
+    kind       "chirp", "tone" or "sampled"
+    signal     complex baseband samples (n,), kind "sampled" only; rate their sampling rate, Hz
+
+    The pulse is centred on t = 0. ValueError when a value is not finite or positive, or the band reaches
+    0 Hz.
+    """
+
+    center: float
+    bandwidth: float
+    duration: float
+    kind: str
+    signal: np.ndarray | None = None
+    rate: float | None = None
+
+    def __post_init__(self) -> None:
+        for name in ("center", "bandwidth", "duration"):
+            object.__setattr__(self, name, validation.number(f"waveform {name}", getattr(self, name), above=0))
+        validation.choice("waveform kind", self.kind, ("chirp", "tone", "sampled"))
+        if self.bandwidth >= 2 * self.center:
+            raise ValueError(
+                f"waveform bandwidth {self.bandwidth:g} Hz about center {self.center:g} Hz reaches "
+                "0 Hz; the band must stay positive: raise center or lower bandwidth"
+            )
+        if self.kind == "sampled":
+            signal = validation.array("waveform signal", self.signal, np.complex128, ("n",))
+            if not signal.any():
+                raise ValueError("waveform signal is zero everywhere; it must carry energy")
+            object.__setattr__(self, "signal", signal)
+            object.__setattr__(self, "rate", validation.number("waveform rate", self.rate, above=0))
+        elif self.signal is not None or self.rate is not None:
+            raise ValueError(
+                f"waveform signal and rate go with kind 'sampled', not {self.kind!r}; use Waveform.sampled"
+            )
+
+    @classmethod
+    def chirp(cls, *, center: float, bandwidth: float, duration: float) -> Waveform:
+        """Linear frequency modulation, rate bandwidth/duration; its matched spectrum is 1 in the band."""
+        return cls(center, bandwidth, duration, "chirp")
+
+    @classmethod
+    def tone(cls, *, center: float, duration: float, bandwidth: float | None = None) -> Waveform:
+        """A rectangular pulse of one frequency; its matched spectrum is sinc^2((f - center) duration).
+
+        bandwidth is the sampled band, default 4/duration: the main lobe and one side lobe on each side.
+        """
+        duration = validation.number("waveform duration", duration, above=0)
+        return cls(center, 4 / duration if bandwidth is None else bandwidth, duration, "tone")
+
+    @classmethod
+    def sampled(cls, signal: Any, rate: float, center: float) -> Waveform:
+        """Any pulse, from complex baseband samples (n,) taken at `rate` Hz; its band is `rate` wide."""
+        signal = validation.array("waveform signal", signal, np.complex128, ("n",))
+        rate = validation.number("waveform rate", rate, above=0)
+        return cls(center, rate, len(signal) / rate, "sampled", signal, rate)
+
+    def pulse_spectrum(self, frequency: Any) -> np.ndarray:
+        """Spectrum P of the pulse at `frequency` Hz (n,), complex128, largest modulus 1.
+
+        A chirp's is its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
+        band and 0 outside.
+        """
+        f = np.asarray(frequency, dtype=np.float64) - self.center
+        if self.kind == "chirp":
+            inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
+            return np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside
+        if self.kind == "tone":
+            return np.sinc(f * self.duration).astype(np.complex128)
+        return self._sampled_spectrum(f) / self._sampled_peak()
+
+    def matched_spectrum(self, frequency: Any) -> np.ndarray:
+        """Spectrum W = |P|^2 after the matched filter at `frequency` Hz (n,), float64, peak 1."""
+        return np.abs(self.pulse_spectrum(frequency)) ** 2
+
+    def _sampled_spectrum(self, f: np.ndarray) -> np.ndarray:
+        """sum_m signal_m exp(-j 2 pi f t_m), t_m centred on 0; in blocks, so that memory stays small."""
+        assert self.signal is not None and self.rate is not None
+        t = (np.arange(len(self.signal)) - (len(self.signal) - 1) / 2) / self.rate
+        out = np.empty(f.shape, np.complex128)
+        step = max(1, 2**22 // len(t))
+        for i in range(0, f.size, step):
+            out.flat[i : i + step] = np.exp(-2j * np.pi * np.outer(f.ravel()[i : i + step], t)) @ self._unit
+        return out
+
+    @property
+    def _unit(self) -> np.ndarray:
+        """The signal with a largest part of 1, so that sums of huge values do not overflow."""
+        assert self.signal is not None
+        return self.signal / max(np.abs(self.signal.real).max(), np.abs(self.signal.imag).max())
+
+    def _sampled_peak(self) -> float:
+        """Largest modulus of the signal's spectrum, on a grid 8 times finer than its length needs."""
+        unit = self._unit
+        return float(np.abs(np.fft.fft(unit, 8 * len(unit))).max())

@@ -1,0 +1,217 @@
+"""Samples at uneven wavenumbers to an even image: a two-dimensional nonuniform FFT of type 1, to a tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.stage_timer import Clock
+from ..base.text import size_text
+from ..opencl import fft
+from ..opencl.device import Device
+from .error_bounds import U32, sum_rounding
+from .interpolation import TERMS, Interpolator, interpolator
+from .plan import LEAST_TOLERANCE
+
+OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
+MOST_COUNTED = 2**20  # samples whose crowding is looked at
+CELLS = 64, 8  # a side of a tile on CPUs, where it stays in a cache, and on GPUs, where many must be at work
+# Work of a sample, of each of its taps, and of a cell's FFT, measured on PoCL: only their ratios matter.
+SAMPLE_COST, TAP_COST, CELL_COST = 30.0, 0.9, 1.0
+
+
+@dataclass(frozen=True, eq=False)
+class GridPlan:
+    """How samples become an image: kernel, cells of the grid, and what that is predicted to err.
+
+    crowding  sqrt of the most samples in one cell of 1/rows x 1/columns turns a pixel, at least 1: so much more than
+              the image's own energy may stand where the kernel's aliases come from
+    """
+
+    interpolator: Interpolator
+    length: tuple[int, int]
+    crowding: float
+    predicted_error: float
+    cost: float
+
+    def describe(self) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": "polar format",
+            "taps": f"{self.interpolator.taps} x {self.interpolator.taps}",
+            "cells": f"{self.length[0]} x {self.length[1]}",
+        }
+
+
+def make_plan(
+    tolerance: float, shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, n_samples: int, tile: int
+) -> GridPlan:
+    """The cheapest plan whose predicted error is at most `tolerance`; ValueError names the best there is.
+
+    turns, step  (n_rows, 2): turns from one pixel to the next, of a row's middle sample, and more with every sample
+    tile         cells a side of a tile
+    The error is relative to the larger of |I| and sqrt(pixels sum |s|^2), the norm if samples added at random.
+    """
+    most = most_in_a_cell(shape, turns, step, n_samples)
+    crowding = max(1.0, np.sqrt(most))
+    best: GridPlan | None = None
+    least = np.inf
+    for taps in TERMS:
+        for oversample in OVERSAMPLE:
+            kernel = interpolator(taps, oversample)
+            room = max(2 * taps + tile + 4, 4 * taps)
+            length = tuple(2 * fft.good_length(-(-int(max(np.ceil(oversample * n), room)) // 2)) for n in shape)
+            cells = float(length[0]) * length[1]
+            in_cell = most * shape[0] * shape[1] / cells
+            rounding = sum_rounding(max(1, int(in_cell * taps**2)), int(min(cells, 2**60))) + 6 * U32
+            rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
+            error = crowding * (2 * kernel.error + kernel.error**2) + rounding
+            least = min(least, error)
+            cost = len(turns) * n_samples * (SAMPLE_COST + TAP_COST * taps**2) + CELL_COST * cells * np.log2(cells)
+            if error <= tolerance and (best is None or cost < best.cost):
+                best = GridPlan(kernel, (length[0], length[1]), crowding, error, cost)
+    if best is None or tolerance < LEAST_TOLERANCE:
+        least = max(least, LEAST_TOLERANCE)
+        digits = 10.0 ** (np.floor(np.log10(least)) - 1)
+        raise ValueError(
+            f"tolerance {tolerance:.1e} cannot be met by a polar format image; the best here is "
+            f"{np.ceil(least / digits - 1e-9) * digits:.1e}: backproject goes further"
+        )
+    return best
+
+
+def _growth(kernel: Interpolator, shape: tuple[int, ...], length: tuple[int, ...]) -> float:
+    """By how much what is rounded on the grid grows, rms, where the image is divided by the kernel's transform."""
+    z = np.linspace(-0.5, 0.5, 33)
+    energy = float((kernel.weights(z) ** 2).sum(axis=-1).mean())
+    out = 1.0
+    for n, m in zip(shape, length, strict=True):
+        nu = np.linspace(0, n / 2, 33) / m
+        out *= np.sqrt(energy * (1 / kernel.transform(nu) ** 2).mean())
+    return float(out)
+
+
+def most_in_a_cell(shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, n_samples: int) -> float:
+    """Most samples in one cell of 1/rows x 1/columns turns a pixel, which an image of that size cannot tell apart.
+
+    Of more than 2^20 samples every k-th of a row is counted, in cells wide enough for a row to leave none out; those
+    are taken to stand in a line.
+    """
+    every = -(-len(turns) * n_samples // MOST_COUNTED)
+    n = (np.arange(0, n_samples, every) - n_samples // 2).astype(np.float32)
+    size = np.array(shape)
+    wide = max(1.0, float((every * np.abs(step - np.rint(step)) * size).max())) if every > 1 else 1.0
+    bins = np.maximum((size / wide).astype(np.int64), 1)
+    cell = np.zeros((len(turns), len(n)), np.int64)
+    for axis in (0, 1):
+        first = (turns[:, axis] % 1).astype(np.float32)[:, None]
+        place = first + (step[:, axis] - np.rint(step[:, axis])).astype(np.float32)[:, None] * n
+        place -= np.floor(place)
+        place *= bins[axis]
+        cell = cell * bins[axis] + np.minimum(place.astype(np.int32), bins[axis] - 1)
+    if bins.prod() > 16 * cell.size:
+        counts = np.unique(cell, return_counts=True)[1]
+    else:
+        counts = np.bincount(cell.ravel())
+    return float(counts.max() * every / wide)
+
+
+class Gridder:
+    """A plan on a device, for rows whose wavenumbers are known."""
+
+    def __init__(self, device: Device, plan: GridPlan, turns: np.ndarray, step: np.ndarray, n_samples: int) -> None:
+        self.device, self.plan, self.n_samples = device, plan, n_samples
+        self.tile = tile_of(device)
+        length = np.array(plan.length, np.float64)
+        place = (turns % 1) * length
+        cell = np.floor(place)
+        step = (step - np.rint(step)) * length
+        # n high, |n| <= n_samples, must be exact in float32
+        spare = max(0, 23 - int(np.ceil(np.log2(n_samples + 1))))
+        grain = 2.0 ** (np.ceil(np.log2(np.maximum(np.abs(step), 1e-30))) - spare)
+        high = np.rint(step / grain) * grain
+        self.cell = cell.astype(np.int32)
+        self.line = np.stack([place - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
+        macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.table.shape[-1], "TILE": self.tile}
+        self.kernel = device.kernel("nufft2d.cl", "spread", **{**macros, "VW": 1})
+        self.table = device.upload(plan.interpolator.table)
+
+    def blocks(self, budget: float) -> tuple[int, int]:
+        """Tile rows of the grid, and rows of samples, at a time in `budget` bytes. MemoryError where none fits."""
+        across, sample_row = 8 * self.plan.length[1] * self.tile, 8 * self.n_samples + 32
+        budget = min(budget, 2 * self.device.info.max_alloc)
+        if across + sample_row > budget:
+            raise MemoryError(
+                f"max_bytes leaves {size_text(budget)}, but a row of samples and {self.tile} rows of the grid need "
+                f"{size_text(across + sample_row)}; raise max_bytes"
+            )
+        n_rows = len(self.cell)
+        part = max(sample_row, min(budget / 2, n_rows * sample_row, budget - across))
+        return max(1, int((budget - part) // across)), max(1, int(part // sample_row))
+
+    def image(
+        self,
+        read: Callable[[int, int], np.ndarray],
+        shape: tuple[int, ...],
+        budget: float,
+        clock: Clock,
+        tell: Callable[[float], None],
+    ) -> np.ndarray:
+        """The image complex64 of `shape`, its pixel (rows//2, columns//2) where every phase is that of the samples.
+
+        read  weighted samples start ... stop - 1 of all rows, complex64;  tell: called with the share that is done
+        """
+        m0, m1 = self.plan.length
+        band, block = self.blocks(budget)
+        n_rows, n_tiles = len(self.cell), -(-m0 // self.tile)
+        half = np.empty((shape[1], m0), np.complex64)  # columns of the image, rows of the grid
+        samples = None
+        for first in range(0, n_tiles, band):
+            last = min(first + band, n_tiles)
+            rows = min(last * self.tile, m0) - first * self.tile
+            out = self.device.empty(8 * rows * m1)
+            for start in range(0, n_rows, block):
+                stop = min(start + block, n_rows)
+                if samples is None or block < n_rows:
+                    samples = self.device.upload(read(start, stop))
+                    clock.lap("samples")
+                cell, line = self.device.upload(self.cell[start:stop]), self.device.upload(self.line[start:stop])
+                self.device.run(
+                    self.kernel, (-(-m1 // self.tile), last - first), (1, 1) if self.device.is_cpu else None,
+                    samples, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
+                )  # fmt: skip
+                self.device.finish()
+                clock.lap("gridding")
+                tell(0.8 * (first + (last - first) * stop / n_rows) / n_tiles)
+            made = self.device.download(out, np.empty((rows, m1), np.complex64))
+            wave = fft.rows(self.device, made, inverse=True)
+            _turned(wave, half[:, first * self.tile : first * self.tile + rows])
+            clock.lap("fft")
+        image = np.empty(shape, np.complex64)
+        _turned(fft.rows(self.device, half, inverse=True), image)
+        flat = [
+            1 / self.plan.interpolator.transform((np.arange(n) - n // 2) / m)
+            for n, m in zip(shape, self.plan.length, strict=True)
+        ]
+        image *= flat[0].astype(np.float32)[:, None]
+        image *= flat[1].astype(np.float32)
+        clock.lap("fft")
+        tell(1.0)
+        return image
+
+
+def _turned(wave: np.ndarray, out: np.ndarray) -> None:
+    """Transpose columns -n//2 ... of a spectrum (m, ...) into `out` (n, m), a few rows at a time: caches like it."""
+    low = len(out) // 2
+    for start in range(0, len(wave), 32):
+        part = slice(start, start + 32)
+        out[:low, part] = wave[part, wave.shape[1] - low :].T
+        out[low:, part] = wave[part, : len(out) - low].T
+
+
+def tile_of(device: Device) -> int:
+    """Cells a side of a tile."""
+    return CELLS[0] if device.is_cpu else CELLS[1]

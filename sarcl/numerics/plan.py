@@ -1,0 +1,125 @@
+"""Plans: the cheapest way to meet a tolerance, and what it is predicted to err. Shared by echo and backproject."""
+
+from __future__ import annotations
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from . import error_bounds, interpolation
+from .interpolation import Interpolator
+
+LEAST_TOLERANCE = 1e-6  # of complex64 results
+
+# Relative cost of a contribution in the range modes of kernels/range_phase.clh and by order of the series, and of a
+# tile's constants, measured on PoCL (bench/backproject.py).
+RANGE_COST = {0: 1.0, 1: 1.5, 2: 2.2}
+ORDER_COST = {2: 1.0, 3: 1.05, 0: 1.33}
+TILE_COST = 20.0
+
+
+@dataclass(frozen=True, eq=False)
+class Plan:
+    """How a result is computed: interpolator and profile length, points a tile, range mode and series order.
+
+    cost  of a contribution, relative to one with the hat and ranges in float32
+    """
+
+    interpolator: Interpolator
+    length: int
+    per_tile: int
+    range_mode: int
+    order: int
+    predicted_error: float
+    cost: float = 1.0
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": method,
+            "taps": self.interpolator.taps,
+            "profile samples": self.length,
+            "points a tile": self.per_tile,
+            "ranges": ("float32", "wide linear term", "wide")[self.range_mode],
+            "series": f"order {self.order}" if self.order else "exact",
+        }
+
+    def macros(self, bistatic: bool, wrap: bool = False) -> dict[str, int]:
+        """Build-time macros of the kernels' headers."""
+        return {
+            "BISTATIC": int(bistatic),
+            "WRAP": self.length if wrap else 0,
+            "TAPS": self.interpolator.taps,
+            "TERMS": self.interpolator.table.shape[-1],
+            "RANGE": self.range_mode,
+            "ORDER": self.order,
+        }
+
+    def components(self, bistatic: bool, beam: bool = False) -> int:
+        """Floats of a (tile, pulse) record: N_CONST of kernels/geometry.clh."""
+        return (32 if bistatic else 24 if self.range_mode == 1 else 16) + 8 * beam
+
+
+def cheapest(
+    tolerance: float,
+    tiles: Iterable[tuple[int, float]],
+    *,
+    distance: float,
+    frequency: float,
+    bandwidth: float,
+    n_samples: int,
+    points_per_row: int,
+    chunk: int,
+    least_tolerance: float = LEAST_TOLERANCE,
+    carrier: float = 0.0,
+) -> Plan:
+    """The cheapest plan whose predicted error is at most `tolerance`.
+
+    tiles        choices of (points a tile, radius of the largest tile in m)
+    distance     smallest from an antenna to the scene, m; frequency the highest, Hz
+    chunk        rows or points summed in float32; least_tolerance: below it none is offered
+    carrier      Hz, that no image of the kernel may lie on (accuracy.off_carrier); 0: any may
+    ValueError names the best tolerance there is.
+    """
+    best: tuple[float, Plan] | None = None
+    least, steps = np.inf, carrier * n_samples / bandwidth if bandwidth else 0.0
+    for per_tile, radius in tiles:
+        for mode, range_cost in RANGE_COST.items():
+            for order in (2, 3, 0) if mode < 2 else (0,):
+                fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
+                fixed += error_bounds.sum_rounding(chunk, n_samples)
+                least = min(least, fixed)
+                if fixed > 0.8 * tolerance:
+                    continue
+                try:
+                    interpolator, length, cost = interpolation.choose_interpolator(
+                        tolerance - fixed, n_samples, points_per_row, steps
+                    )
+                except ValueError:
+                    continue
+                sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
+                if mode == 0 and radius * sigma > 2**20:
+                    continue  # places in a tile would not fit float32
+                cost += range_cost - 1 + TILE_COST / per_tile
+                cost += ORDER_COST[order] - 1 if mode < 2 else 0.0
+                if best is None or cost < best[0]:
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error, cost)
+    if best is None or tolerance < least_tolerance:
+        reach = max(least_tolerance, 1.3 * least)
+        digits = 10.0 ** (np.floor(np.log10(reach)) - 1)
+        reach = np.ceil(reach / digits - 1e-9) * digits  # rounded up: what is printed can be asked for
+        raise ValueError(f"tolerance {tolerance:.1e} cannot be met in complex64; the best here is {reach:.1e}")
+    return best[1]
+
+
+def skips(skip: Any, known: tuple[str, ...]) -> set[str]:
+    """The reasons to skip that True, False or a set of names stands for; ValueError lists the known."""
+    if isinstance(skip, bool):
+        return set(known) if skip else set()
+    unknown = {skip} - set(known) if isinstance(skip, str) else set(skip) - set(known)
+    if unknown or isinstance(skip, str):
+        raise ValueError(f"skip is {skip!r}; give True, False or a set of {', '.join(map(repr, known))}")
+    return set(skip)

@@ -1,0 +1,55 @@
+"""Points cut into tiles for the kernels: each tile's center and the points' offsets from it."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base import float_pairs
+from ..base.morton import morton_order
+
+
+@dataclass(frozen=True, eq=False)
+class Tiles:
+    """Points in tiles of `per_tile`, each about its own reference, so that float32 carries them.
+
+    references  m about the scene's centre (n_tiles, 3), float64
+    radius      m (n_tiles,): distance of the farthest point of the tile
+    offsets     m, hi then lo parts (6, n_points) float32; one tile's points when `shared`
+    shared      every tile has the same offsets
+    """
+
+    per_tile: int
+    references: np.ndarray
+    radius: np.ndarray
+    offsets: np.ndarray
+    shared: bool
+
+    @property
+    def n_tiles(self) -> int:
+        return len(self.references)
+
+    def tile_offsets(self, tiles: np.ndarray) -> np.ndarray:
+        """Offsets of these tiles only, (6, n_points)."""
+        if self.shared:
+            return self.offsets
+        return self.offsets.reshape(6, -1, self.per_tile)[:, tiles].reshape(6, -1)
+
+
+def tile_points(
+    positions: np.ndarray, center: np.ndarray, per_tile: int, order: np.ndarray | None = None
+) -> tuple[Tiles, np.ndarray]:
+    """Tiles of points, m (n, 3), near one another along a space-filling curve, and the order of the points.
+
+    The order has whole tiles; the last point fills up the last tile. Give `order` where it is known.
+    """
+    order = morton_order(positions) if order is None else order
+    n_tiles = -(-len(order) // per_tile)
+    order = np.concatenate([order, np.repeat(order[-1:], n_tiles * per_tile - len(order))])
+    local = (positions[order] - center).reshape(n_tiles, per_tile, 3)
+    references = (local.min(axis=1) + local.max(axis=1)) / 2
+    offsets = local - references[:, None]
+    radius = np.sqrt((offsets**2).sum(axis=-1).max(axis=1))
+    packed = float_pairs.wide(offsets.reshape(-1, 3).T).reshape(6, -1)
+    return Tiles(per_tile, references, radius, packed, shared=False), order

@@ -1,0 +1,58 @@
+"""One FFT of rows: reikna on GPUs, scipy.fft on CPU devices (measured: reikna is 3 to 20 times slower there)."""
+
+from __future__ import annotations
+
+import atexit
+import functools
+from typing import Any
+
+import numpy as np
+
+from .device import Device, quiet, threads
+
+
+def good_length(n: int) -> int:
+    """Smallest length >= n whose FFT is fast (factors 2, 3, 5 and 7)."""
+    import scipy.fft
+
+    return int(scipy.fft.next_fast_len(n))
+
+
+def rows(device: Device, data: np.ndarray, *, inverse: bool = False, engine: str | None = None) -> np.ndarray:
+    """FFT of every row of complex (n, m) `data`, not normalised in either direction; the type is kept.
+
+    engine  "reikna" or "scipy"; default by the kind of device. complex128 goes to reikna only where rows are a power of
+            two long: its chirps for other lengths err by 1e-16 times the length (measured: 9e-12 at 98 304)
+    """
+    if engine is None:
+        length = data.shape[1]
+        double = data.dtype == np.complex128 and device.info.fp64 and length & (length - 1) == 0
+        engine = "reikna" if not device.is_cpu and (data.dtype == np.complex64 or double) else "scipy"
+    if engine == "reikna":
+        return _reikna(device, data, inverse)
+    import scipy.fft
+
+    # norm="forward" puts the 1/m on the other direction: neither call divides
+    if inverse:
+        return scipy.fft.ifft(data, axis=1, norm="forward", workers=threads())
+    return scipy.fft.fft(data, axis=1, workers=threads())
+
+
+def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
+    thread, compiled = _plan(device, data.shape, data.dtype.char)
+    buffer = thread.to_device(np.ascontiguousarray(data))
+    compiled(buffer, buffer, inverse)
+    out = buffer.get()
+    return out * out.real.dtype.type(data.shape[1]) if inverse else out
+
+
+@functools.lru_cache(maxsize=16)
+def _plan(device: Device, shape: tuple[int, ...], kind: str) -> tuple[Any, Any]:
+    from reikna.core import Type
+    from reikna.fft import FFT
+
+    # plans hold buffers that must go before the interpreter takes down what frees them
+    atexit.register(_plan.cache_clear)
+    thread = device.reikna_thread()
+    with quiet():
+        return thread, FFT(Type(np.dtype(kind), shape), axes=(1,)).compile(thread)

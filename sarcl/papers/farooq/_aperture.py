@@ -1,0 +1,161 @@
+"""Farooq 2009, sections 5.2 and 5.3: apparent apertures, without the switch and with it."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...figures import html
+from ..lab import Lab, system
+from ..paper import Section
+from ._reference import DIAMOND, PRINTED
+
+# N, step, and as printed: length, m, growth, %, the nulls expected, m, figure
+SWITCHED = (
+    (45, 20e6, 445.0, 3, None, "figure 5.6"),
+    (225, 4e6, 502.0, 17, 0.143, "figure 5.7"),
+    (450, 2e6, 574.0, 33, 0.125, "figure 5.8"),
+)
+OTHER_SPACING = 0.015  # m, half a wave of f0
+THIN = 5  # of the places drawn
+
+
+def steady(lab: Lab) -> Section:
+    """Figures 5.3 to 5.5."""
+    out = Section("steady", "Apparent apertures without the switch (table 5.2, figures 5.3 to 5.5)")
+    out.say(
+        "Mapping moves the whole aperture sideways by d f0/df, with the sign of the step. Its length stays, and so do "
+        "the nulls."
+    )
+    curves = []
+    for n, step, figure in ((45, 20e6, "5.3"), (450, 2e6, "5.4"), (450, -2e6, "5.5")):
+        if not lab.small_enough(n):
+            continue
+        case, name = system(n, step, mirrored=False), f"N {n}, {step / 1e6:+g} MHz"
+        actual, mapped = lab.mapped(case, "corrected"), lab.mapped(case, "apparent")
+        y = mapped.tx[:, 1]
+        out.number(f"{name}: length", f"figure {figure}", 430.0, float(np.ptp(y)), 0.5, "m", ".1f")
+        shift = float((y - actual.tx[:, 1]).mean())
+        wanted = "negative" if step > 0 else "positive"
+        if n > 45:
+            out.states(
+                f"{name}: places are moved", f"figure {figure}", f"in the {wanted} direction", f"by {shift:+.1f} m",
+                (shift < 0) == (step > 0), value=shift,
+            )  # fmt: skip
+        nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
+        remark = "" if step > 0 else (
+            f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
+            f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
+        )  # fmt: skip
+        out.number(f"{name}: nulls in cross-range", f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark)
+        out.states(
+            f"{name}: nulls before and after the mapping", f"figure {figure}", "unchanged",
+            f"{nulls[0]:.4f} and {nulls[1]:.4f} m", abs(nulls[0] - nulls[1]) < 0.002, value=nulls,
+        )  # fmt: skip
+        curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
+        if n == 45:
+            curves.insert(0, ("actual", actual.tx[::THIN, 1], actual.tx[::THIN, 1]))
+            out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
+        elif step > 0:
+            out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
+    out.draw(html.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))
+    return out
+
+
+def switched(lab: Lab) -> Section:
+    """Figures 5.6 to 5.8."""
+    out = Section("switched", "Apparent apertures with the sign switched at mid-aperture (figures 5.6 to 5.8)")
+    out.say(
+        "Half the aperture is moved one way and half the other, so that a gap opens amid them: 2 d f0/df of it. The "
+        "printed lengths follow with d half a wave of the CENTRE frequency, f0 = 10 GHz in both halves, and the range "
+        "offset of equation 5.15 as printed, which takes the two-way path c dt for a one-way one. Half of it, which is "
+        "right, makes half the growth."
+    )
+    curves, table = [], []
+    for n, step, length, growth, _, figure in SWITCHED:
+        if not lab.small_enough(n):
+            continue
+        case, name = system(n, step), f"N {n}, +-{step / 1e6:g} MHz"
+        raw = lab.collect(case)
+        found = {o: lab.mapped(case, "apparent", offset=o) for o in ("published", "halved")}
+        other = system(n, step, spacing=OTHER_SPACING)
+        wide = float(np.ptp(lab.mapped(other, "apparent").tx[:, 1]))
+        lengths = {o: float(np.ptp(m.tx[:, 1])) for o, m in found.items()}
+        here = lengths["published"]
+        out.number(f"{name}: apparent length", figure, length, here, 1.0, "m", ".1f")
+        out.number(f"{name}: longer by", figure, growth, 100 * (here / case.aperture - 1), 0.6, "%", ".1f")
+        table.append([name, f"{length:.0f}", f"{here:.1f}", f"{wide:.1f}", f"{lengths['halved']:.1f}"])
+        out.keep(
+            **{name: {"printed": length, "half a wave of fc": here, "d 0.015 m": wide, "halved": lengths["halved"]}}
+        )
+        gap = float(np.diff(found["published"].tx[:, 1]).max())
+        if n == 45:
+            out.states(
+                "switched aperture", figure, "no longer continuous", f"gap of {gap:.1f} m", gap > 2 * _step(raw.tx),
+                value=gap,
+            )  # fmt: skip
+            _outer(out, lab, figure)
+            curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
+        curves.append((name, raw.tx[::THIN, 1], found["published"].tx[::THIN, 1]))
+        out.draw(
+            lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."),
+            lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", 8.0, PRINTED),
+        )
+    head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
+    out.parts.append(html.table(head, table))
+    out.draw(html.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))
+    return out
+
+
+def _outer(out: Section, lab: Lab, figure: str) -> None:
+    """Side lobes of the centre point and of the outermost across."""
+    case = system(45, 20e6)
+    inner, outer = (
+        lab.measure(lab.mapped(case, "apparent", ((0.0, y, 0.0),)), half=0.9, about=y)["pslr_db"] for y in (0.0, 2.0)
+    )
+    out.states(
+        "side lobes of the outer targets", figure, "most noticeable there",
+        f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it", outer > inner + 1,
+        "what points off the centre suffer from: measured again below", [outer, inner],
+    )  # fmt: skip
+
+
+def nulls(lab: Lab) -> Section:
+    """The nulls of the centre point, sections 5.3.1 and figures 5.6 to 5.8."""
+    out = Section("nulls", "Nulls of the mapped centre point (equation 5.36, figures 5.6 to 5.8)")
+    curves = []
+    for n, step, _, _, expected, figure in SWITCHED:
+        if not lab.small_enough(n):
+            continue
+        case, name = system(n, step), f"N {n}, +-{step / 1e6:g} MHz"
+        mapped = lab.mapped(case, "apparent")
+        found = lab.measure(mapped)
+        text = f"{found['null']:.3f} m, PSLR {found['pslr_db']:.1f} dB"
+        value = [found["null"], found["pslr_db"]]
+        if expected is None:
+            out.states(f"{name}: nulls", figure, "no difference visible", text, abs(found["null"] - PRINTED) < 0.017,
+                       "6 % nearer", value)  # fmt: skip
+        else:
+            uniform = SPEED_OF_LIGHT / case.middle * case.distance / (2 * np.ptp(mapped.tx[:, 1]))
+            out.states(
+                f"{name}: nulls", f"{figure}, equation 5.36", f"{expected:.3f} m", text,
+                abs(found["null"] - expected) < 0.003,
+                f"{uniform:.3f} m is a filled aperture's; two halves with a gap amid them are an interferometer, whose "
+                "nulls are nearer and whose side lobes are higher", value,
+            )  # fmt: skip
+        at, values = lab.cut(mapped, half=1.0, n=401)
+        curves.append((name, at, _db(values)))
+    plain = system(45, 20e6, mirrored=False)
+    at, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
+    curves.insert(0, ("not mapped", at, _db(values)))
+    out.say("Cross-range cuts through the centre point. Equation 5.36 takes the mapped aperture for a filled one.")
+    out.draw(html.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8)."))
+    return out
+
+
+def _step(places: np.ndarray) -> float:
+    return float(np.abs(np.diff(places[:, 1])).max())
+
+
+def _db(values: np.ndarray) -> np.ndarray:
+    return np.maximum(20 * np.log10(np.maximum(values, 1e-9)), -40.0)

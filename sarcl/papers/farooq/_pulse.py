@@ -1,0 +1,143 @@
+"""Farooq 2009, chapter 4: the pulse of diverse carriers, its spectrum, its ambiguity beside a chirp's."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...arrays import array_factor as closed
+from ...arrays.ambiguity import Ambiguity, ambiguity
+from ...arrays.beam import beam
+from ...base.constants import SPEED_OF_LIGHT
+from ...figures import html
+from ...model.antenna_array import AntennaArray
+from ..lab import Lab
+from ..paper import Section
+
+F0, N, STEP = 10e9, 9, 1e9  # table 4.1, scenario B
+HALF_WAVE = SPEED_OF_LIGHT / F0 / 2
+FAR = 1e7  # m
+RATE = 64e9  # samples of a pulse, Hz
+BORESIGHT = ((1.0, 0.0, 0.0),)
+
+
+def waveform(lab: Lab) -> Section:
+    """Figures 4.1 to 4.5."""
+    out = Section("waveform", "The pulse of 9 elements in steps of 1 GHz (table 4.1, figures 4.1 to 4.5)")
+    array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
+    t = np.linspace(-0.5e-9, 1.5e-9, 4001)
+    made = beam(array, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
+    level = np.abs(made[:, 0])
+    half = len(t) // 2
+    first, second = t[level[:half].argmax()], t[half + int(level[half:].argmax())]
+    out.number("period", "figure 4.2", 1.0, 1e9 * (second - first), 1e-3, "ns")
+    lobe = level[(t > 0) & (t < 0.5e-9)]
+    null = t[t > 0][int((np.diff(lobe) > 0).argmax())]  # where it first rises again
+    out.number("main lobe, null to null", "figure 4.3, equation 4.14", 2 / (N * STEP) * 1e9, 2e9 * null, 3e-3, "ns")
+    slow = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=1e3)
+    flat = np.abs(
+        beam(slow, F0, times=FAR / SPEED_OF_LIGHT + t, positions=FAR * np.array(BORESIGHT), device=lab.device)
+    )
+    ripple = float(np.ptp(flat) / N)
+    out.states(
+        "1 kHz steps: modulation over 2 ns", "figure 4.1", "none", f"{ripple:.1e} of the peak", ripple < 1e-3,
+        value=ripple,
+    )  # fmt: skip
+    f, channels, whole = spectra()
+    middle = float((f * whole**2).sum() / (whole**2).sum())
+    out.number("centre frequency of the pulse", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
+    # about the middle: what a flat band of N df holds, but for the tails of the outer tones
+    inside = np.abs(f - 14e9) <= N * STEP / 2
+    share = float((whole[inside] ** 2).sum() / (whole**2).sum())
+    out.states(
+        "bandwidth", "figure 4.5, equation 4.18", "9 GHz", f"{100 * share:.1f} % of the energy lies within 9 GHz",
+        share > 0.95, value=share,
+    )  # fmt: skip
+    crossing = 20 * np.log10(float(channels[0][np.isclose(f, F0 + STEP / 2, atol=2e6)].max()))
+    out.states(
+        "neighbouring channels cross", "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing
+    )
+    out.say(
+        "Boresight, exact field. A pulse as long as the period holds one peak; its spectrum is nine tones in a row."
+    )
+    shown = (f >= 7e9) & (f <= 21e9)
+    out.draw(
+        html.plot([("1 GHz", 1e9 * t, made[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2)."),
+        html.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus",
+                  "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."),
+        html.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, _db(c[shown])) for i, c in enumerate(channels)],
+                  "frequency, GHz", "dB", "Spectra of the channels (figure 4.4)."),
+        html.plot([("sum", f[shown] / 1e9, _db(whole[shown] / whole.max()))], "frequency, GHz", "dB",
+                  "Spectrum of the pulse (figure 4.5)."),
+    )  # fmt: skip
+    out.keep(modulus={"ns": 1e9 * t[::20], "modulus": level[::20]})
+    return out
+
+
+def spectra() -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
+    """Frequencies, Hz (n,), spectra of the pulses of all channels, peak 1, and of their sum, (n,) each."""
+    t = (np.arange(-8192, 8192) + 0.5) * 2.5e-12
+    f = np.fft.fftshift(np.fft.fftfreq(len(t), 2.5e-12))
+
+    def spectrum(n: int, f0: float) -> np.ndarray:
+        pulse = closed.waveform(f0, n, spacing=-HALF_WAVE, frequency_step=STEP, azimuth=0.0, retarded=t, pulsed=True)
+        return np.abs(np.fft.fftshift(np.fft.fft(pulse))) * 2.5e-12 * STEP
+
+    return f, [spectrum(1, F0 + i * STEP) for i in range(N)], spectrum(N, F0)
+
+
+def ambiguities(lab: Lab) -> Section:
+    """Figures 4.6 to 4.8."""
+    out = Section("ambiguity", "Ambiguity of a chirp and of the tones (figures 4.6 to 4.8)")
+    length, band = 1 / STEP, N * STEP
+    t = (np.arange(round(length * RATE)) - (round(length * RATE) - 1) / 2) / RATE
+    chirp = ambiguity(np.exp(1j * np.pi * band / length * t**2), RATE, max_doppler=band / 2)
+    tones = ambiguity(closed.geometric(2 * np.pi * STEP * t, N), RATE, max_doppler=band / 2)
+    slope = band / length
+    shifts = np.abs(chirp.dopplers) < band / 3
+    moved, stays = (np.abs(a.delay_of_peak()[shifts]).max() * RATE for a in (chirp, tones))
+    fit = float(np.polyfit(chirp.dopplers[shifts], chirp.delay_of_peak()[shifts], 1)[0] * slope)
+    out.states(
+        "chirp: delay of the peak with Doppler", "figure 4.6", "range-Doppler coupling",
+        f"{fit:.3f} of nu T/B; up to {moved:.0f} samples", abs(fit - 1) < 0.05, value=fit,
+    )  # fmt: skip
+    out.states(
+        "tones: delay of the peak, |nu| < 3 GHz", "figure 4.7", "no coupling", f"{stays:.0f} sample of {len(t)}",
+        stays <= 1.01, value=stays,
+    )  # fmt: skip
+    ridge = _ridge(tones, slope, length)
+    out.states(
+        "tones: largest value on the chirp's ridge", "figure 4.7", "no ridge",
+        f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more", ridge < 0.25,
+        value=ridge,
+    )  # fmt: skip
+    cuts = [(name, a.magnitude[:, int(np.abs(a.dopplers).argmin())]) for name, a in (("FDA", tones), ("LFM", chirp))]
+    nulls = [1e9 * tones.delays[tones.delays > 0][int((np.diff(c[tones.delays > 0]) > 0).argmax())] for _, c in cuts]
+    out.states(
+        "first nulls of both without Doppler", "figure 4.8", "similar range resolution",
+        f"{nulls[0]:.3f} and {nulls[1]:.3f} ns", abs(nulls[0] - nulls[1]) < 0.03, value=nulls,
+    )  # fmt: skip
+    out.say(
+        "Both last 1 ns and are 9 GHz wide. The chirp's ridge turns a Doppler shift into a wrong range; the tones keep "
+        "their peak where it belongs, and pay with a plateau that is spread over the plane: the volume is 1 for both."
+    )
+    for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
+        out.draw(html.picture(
+            20 * np.log10(np.maximum(a.magnitude.T, 1e-4)), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
+            (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9), "delay, ns", "Doppler, GHz",
+            f"{name}: modulus of the ambiguity function (figure {figure}).", floor_db=-30,
+        ))  # fmt: skip
+    out.draw(html.plot(
+        [(name, 1e9 * tones.delays, c) for name, c in cuts], "delay, ns", "modulus", "Without Doppler (figure 4.8)."
+    ))  # fmt: skip
+    return out
+
+
+def _ridge(a: Ambiguity, slope: float, length: float, kind: object = np.max) -> float:
+    """Largest (or least) |chi| along nu = slope tau, from 0.2 to 0.45 pulse lengths off."""
+    delay, nu = a.delays[:, None], a.dopplers
+    on = (np.abs(nu - slope * delay) < STEP / 4) & (np.abs(np.abs(delay) / length - 0.325) < 0.125)
+    return float(kind(a.magnitude[on]))  # type: ignore[operator]
+
+
+def _db(level: np.ndarray) -> np.ndarray:
+    return np.maximum(20 * np.log10(np.maximum(level, 1e-9)), -40)

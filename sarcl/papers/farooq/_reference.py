@@ -1,0 +1,79 @@
+"""Farooq 2009, section 2.2: the reference image that all others are compared with, by a chirp and by a tone."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...experiments.fda.case import Case
+from ...figures import html
+from ...model.waveform import Waveform
+from ..lab import Lab
+from ..paper import Section
+
+F0, BAND, LENGTH, DISTANCE = 10e9, 900e6, 450.0, 5e3  # table 2.1
+PRINTED = 0.167  # m, theoretical resolution both ways, table 2.1
+# the scan of figure 2.11 lost the places of its 13 points: a diamond, 1 m from point to point
+DIAMOND = tuple((float(x), float(y), 0.0) for x in range(-2, 3) for y in range(-2, 3) if abs(x) + abs(y) <= 2)
+
+
+def section(lab: Lab) -> Section:
+    """Figures 2.13 to 2.16."""
+    out = Section("reference", "The reference image: a chirp and a tone (table 2.1, figures 2.11 to 2.16)")
+    case = Case("table 2.1", aperture=LENGTH, n_pulses=451, distance=DISTANCE)
+    chirp = Waveform.chirp(center=F0, bandwidth=BAND, duration=1e-6)
+    # all of the triangle's spectrum that matters: 16 lobes
+    tone = Waveform.tone(center=F0, duration=1 / BAND, bandwidth=16 * BAND)
+    angle = 2 * np.degrees(np.arctan(LENGTH / 2 / DISTANCE))
+    out.number("angle of the aperture", "table 2.1", 5.2, angle, 0.06, "deg", ".2f")
+    curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {"range": {}, "cross-range": {}}
+    figures = []
+    for name, waveform in (("LFM", chirp), ("tone", tone)):
+        point = lab.single(case, waveform)
+        for axis, way in enumerate(curves):
+            curves[way][name] = lab.cut(point, axis, 0.8, 801)
+            null = lab.measure(point, axis)["null"]
+            out.number(f"{name}: first null in {way}", "table 2.1", PRINTED, null, 0.002, "m")
+        caption = f"{name}: 13 points (figure {'2.13' if name == 'LFM' else '2.14'})."
+        figures.append(lab.picture(lab.single(case, waveform, DIAMOND), caption))
+    _shapes(out, curves)
+    out.say(
+        "One antenna, first with a chirp, then with a short pulse of one frequency, both 900 MHz wide. The scan of "
+        "figure 2.11 lost the places of its 13 points: here they are a diamond, 1 m from point to point. (The paper "
+        "calls the centre point Target #6, so that its order was another one.)"
+    )
+    out.draw(*figures)
+    for figure, (way, found) in zip(("2.15", "2.16"), curves.items(), strict=True):
+        out.draw(html.plot(
+            [(name, at, values / values.max()) for name, (at, values) in found.items()], f"{way}, m", "modulus",
+            f"Cut through the centre point along {way} (figure {figure}).",
+        ))  # fmt: skip
+        out.keep(**{f"{way} {name}": {"m": at[::4], "modulus": v[::4]} for name, (at, v) in found.items()})
+    return out
+
+
+def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]) -> None:
+    """Sinc and triangle, by the largest difference from each over the main lobe and the side lobes."""
+    cell = SPEED_OF_LIGHT / (2 * BAND)
+    for name, law, wanted in (("LFM", "sinc", _sinc), ("tone", "triangular", _triangle)):
+        at, values = curves["range"][name]
+        off = float(np.abs(values / values.max() - wanted(at / cell)).max())
+        out.states(
+            f"{name}: shape of the range response", "figure 2.15", law, f"{law} to {off:.3f} of the peak", off < 0.05,
+            value=off,
+        )  # fmt: skip
+    at, chirp = curves["cross-range"]["LFM"]
+    tone = curves["cross-range"]["tone"][1]
+    off = float(np.abs(chirp / chirp.max() - tone / tone.max()).max())
+    out.states(
+        "cross-range responses of both", "figure 2.16", "nearly identical", f"differ by {off:.3f} of the peak",
+        off < 0.05, value=off,
+    )  # fmt: skip
+
+
+def _sinc(x: np.ndarray) -> np.ndarray:
+    return np.abs(np.sinc(x))
+
+
+def _triangle(x: np.ndarray) -> np.ndarray:
+    return np.maximum(1 - np.abs(x), 0)

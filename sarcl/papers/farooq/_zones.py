@@ -1,0 +1,124 @@
+"""Range zones told apart on transmit: what running carriers are good for (sarcl's own experiment, range_zones.py)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ...figures import html
+from ...imaging.backproject import backproject
+from ...model.image_grid import ImageGrid
+from ...model.phase_history import PhaseHistory
+from ...scene.scene import Scene
+from ..lab import Lab
+from ..paper import Section
+from .range_zones import RangeZones, collect, isolation, of_zone
+
+ZONES = 4
+BEYOND = (-45.0, -15.0, 15.0, 45.0)  # m behind its centre that each zone's point stands
+FLOOR = -60.0  # dB drawn
+
+
+def section(lab: Lab) -> Section:
+    """Isolation of four zones, and what becomes of it off 1/P and off the direction."""
+    out = Section("zones", "Range zones told apart by carriers that run on")
+    radar = RangeZones()
+    systems = {"running carriers": radar, "one carrier": replace(radar, step=0.0)}
+    at = np.linspace(-70, 70, 281)
+    for name, system in systems.items():
+        cuts = cuts_of(system, at, lab.device)
+        levels = matrix(system, lab.device)
+        title = f"{name[0].upper()}{name[1:]}"
+        out.say(f"{title}: level of every zone's point, alone, in every zone's image, over that in its own, dB.")
+        out.parts.append(html.table(
+            ["", *(f"image of zone {q}" for q in range(ZONES))],
+            [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
+        ))  # fmt: skip
+        curves = [(f"zone {q}", at, np.maximum(20 * np.log10(np.maximum(c, 1e-9)), FLOOR)) for q, c in enumerate(cuts)]
+        out.draw(html.plot(
+            curves, "behind the zone's centre, m", "dB", f"{title}: images of the four zones, from one record. Hamming."
+        ))  # fmt: skip
+        off = levels[~np.eye(ZONES, dtype=bool)]
+        out.keep(**{name: {"levels_db": levels, "best_other_db": off.min(), "worst_other_db": off.max()}})
+    _sweeps(out, radar, lab)
+    out.parts.insert(0, html.words(
+        f"{radar.n} elements send carriers {radar.step / 1e3:g} kHz apart at a PRF of {radar.prf / 1e3:g} kHz: "
+        f"{radar.step / radar.prf:g} turns from pulse to pulse, a quarter beyond whole ones. Echoes from "
+        f"{radar.depth / 1e3:.0f} km farther come a pulse late, and in step with a wave over the elements that turns "
+        "by a quarter from one to the next: four zones are orthogonal there. A point stands in each; the receiver "
+        "records their sum; every zone is focused from it. Equal carriers leave them one upon another. This is no "
+        "claim of the paper: it is what an array of diverse carriers does that an array of one cannot."
+    ))  # fmt: skip
+    out.say(
+        "The price: as many elements told apart at the receiver as there are zones, or more, and directions that are "
+        "known. An echo from another direction turns over the elements by itself; 30 degrees off, at half a wave from "
+        "element to element, that is a quarter turn and the next zone is back in full."
+    )
+    return out
+
+
+def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.ndarray]:
+    """Amplitudes along range, `at` m behind each zone's centre (n,), of zones with a unit point each: one a zone."""
+    record = collect(radar, [Scene.points([radar.place(q, b)]) for q, b in enumerate(BEYOND)], device)
+    weights = np.hamming(record.n_samples)
+    record = replace(record, samples=(record.samples * (weights / weights.mean())).astype(np.complex64))
+    return [_image(radar, record, q, at, device=device) for q in range(ZONES)]
+
+
+def matrix(radar: RangeZones, device: Any = None) -> np.ndarray:
+    """Levels (point, image), dB: each zone's point alone, the highest within 5 m of where it folds to, over its own."""
+    out = np.empty((ZONES, ZONES))
+    for p, beyond in enumerate(BEYOND):
+        empty: list[Scene | None] = [None] * p
+        record = collect(radar, [*empty, Scene.points([radar.place(p, beyond)])], device)
+        at = beyond + np.linspace(-5, 5, 41)
+        out[p] = [_image(radar, record, q, at, device=device).max() for q in range(ZONES)]
+    return np.asarray(20 * np.log10(np.maximum(out / np.diag(out)[:, None], 1e-9)))
+
+
+def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: Any = None) -> float:
+    """Level in zone 0's image of a point `apart` zones farther and `elevation` rad above, dB over its own image."""
+    scenes: list[Scene | None] = [None] * apart
+    record = collect(radar, [*scenes, Scene.points([radar.place(apart, 0.0, elevation)])], device)
+    levels = [
+        float(_image(radar, record, q, np.zeros(1), up, device)[0]) for q, up in ((0, 0.0), (apart, elevation))
+    ]  # fmt: skip
+    return 20 * float(np.log10(max(levels[0] / levels[1], 1e-9)))
+
+
+def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
+    """Isolation of the next zone against df/PRF and against direction, measured and predicted."""
+    short = replace(radar, n_pulses=2)
+    turns, lines = np.linspace(0.02, 0.48, 12), np.linspace(0.005, 0.495, 197)
+    angles, fine = np.linspace(-35, 35, 15), np.linspace(-35, 35, 281)
+    whole = np.floor(radar.step / radar.prf)
+
+    def stepped(turn: float) -> RangeZones:
+        return replace(short, step=(whole + turn) * short.prf)
+
+    for name, x, measured, xs, predicted, axis in (
+        ("df over PRF", turns, [leak(stepped(t), 1, device=lab.device) for t in turns], lines,
+         [isolation(stepped(t), 1) for t in lines], "df/PRF less whole turns"),
+        ("direction", angles, [leak(short, 1, np.radians(a), lab.device) for a in angles], fine,
+         [isolation(short, 1, np.radians(a)) for a in fine], "elevation of the echo, deg"),
+    ):  # fmt: skip
+        same = [isolation(stepped(v), 1) if name == "df over PRF" else isolation(short, 1, np.radians(v)) for v in x]
+        clear = np.array(same) > FLOOR
+        error = float(np.abs(np.array(measured) - same)[clear].max())
+        out.keep(**{name: {"at": x, "measured_db": measured, "predicted_db": same, "largest_error_db": error}})
+        out.draw(html.plot(
+            [("predicted", xs, np.maximum(predicted, FLOOR)), ("measured", x, np.maximum(measured, FLOOR))], axis, "dB",
+            f"The next zone's point in zone 0's image, against {name}; largest difference {error:.2f} dB.",
+            dots=("measured",),
+        ))  # fmt: skip
+
+
+def _image(
+    radar: RangeZones, record: PhaseHistory, zone: int, at: np.ndarray, elevation: float = 0.0, device: Any = None
+) -> np.ndarray:
+    """Amplitudes of a zone's image, `at` m behind its centre (n,)."""
+    grid = ImageGrid.points(np.stack([radar.place(zone, b, elevation) for b in at]))
+    made = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
+    return np.abs(np.asarray(made.data)) / made.gain

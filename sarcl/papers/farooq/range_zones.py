@@ -1,0 +1,155 @@
+"""Range zones told apart by carriers that run on from pulse to pulse.
+
+An echo from zone q, at r0 + q c/(2 PRF) + r', arrives q pulses late, among those of zone 0. Oscillators that run on
+carry the pulse's absolute delay tau in their phase, so that element n's return from it is, in the interval's own time,
+
+    a P(f - f_n) exp(-j 2 pi f (tau - q/PRF - tau_ref)) exp(-j 2 pi f_n q/PRF)
+
+The last factor steps by 2 pi q df/PRF from element to element. Where df/PRF = 1/P (mod 1) and N is a multiple of P, the
+zones 0 ... P - 1 are orthogonal over the elements: what zone q' leaves in the image of zone q is
+
+    |sin(N x/2)/(N sin(x/2))|,   x = 2 pi (q' - q) df/PRF - 2 pi f0 d (u' - u)/c
+
+d the spacing, u' and u the cosines of the echo and the pixel along the array. Pulses that start their carriers anew
+each time, or equal carriers, leave it whole. Elements must be told apart at the receiver.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ...arrays.array_factor import dirichlet
+from ...base import validation
+from ...base.constants import SPEED_OF_LIGHT
+from ...model.antenna_array import AntennaArray
+from ...model.phase_history import PhaseHistory
+from ...model.trajectory import Trajectory
+from ...model.waveform import Waveform
+from ...scene.scene import Scene
+from ...simulation.echo import echo
+
+WINDOW = 100.0  # m about a zone's centre
+
+
+@dataclass(frozen=True)
+class RangeZones:
+    """A radar on a level track along y, zones one behind the other along x, an upright array.
+
+    n, spacing m, step Hz   elements, along z
+    center, bandwidth Hz, prf Hz, speed m/s, n_pulses
+    distance m              of zone 0's centre from the middle of the track; the others c/(2 prf) farther each
+    """
+
+    n: int = 8
+    step: float = 40.5e3
+    spacing: float = 0.0156
+    center: float = 9.6e9
+    bandwidth: float = 30e6
+    prf: float = 2e3
+    speed: float = 7.5e3
+    n_pulses: int = 32
+    distance: float = 800e3
+
+    def __post_init__(self) -> None:
+        for name in ("n", "n_pulses"):
+            object.__setattr__(self, name, validation.count(name, getattr(self, name)))
+        for name in ("spacing", "center", "bandwidth", "prf", "speed", "distance"):
+            object.__setattr__(self, name, validation.number(name, getattr(self, name), above=0))
+        object.__setattr__(self, "step", validation.number("step", self.step))
+
+    @property
+    def depth(self) -> float:
+        """c/(2 prf), m from zone to zone."""
+        return SPEED_OF_LIGHT / (2 * self.prf)
+
+    @property
+    def array(self) -> AntennaArray:
+        """The elements and their carriers."""
+        return AntennaArray.linear(self.n, spacing=self.spacing, frequency_step=self.step, axis=(0.0, 0.0, 1.0))
+
+    def place(self, zone: int, beyond: float = 0.0, elevation: float = 0.0) -> np.ndarray:
+        """A place in a zone, m (3,): `beyond` m behind its centre, `elevation` rad above it as the radar sees it."""
+        far = self.distance + zone * self.depth + beyond
+        return np.array([far * np.cos(elevation), 0.0, far * np.sin(elevation)])
+
+    def track(self, late: int = 0) -> Trajectory:
+        """Where the radar is at each pulse, or was `late` pulses before."""
+        pulse = np.arange(self.n_pulses)
+        y = (pulse - late - (self.n_pulses - 1) / 2) * (self.speed / self.prf)
+        return Trajectory(pulse / self.prf, np.stack([0 * y, y, 0 * y], axis=1))
+
+
+def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: Any = None) -> PhaseHistory:
+    """What the receiver records: echoes of all zones added up in every interval, a row for each pulse and element.
+
+    scenes  one a zone, from zone 0 on, where `radar.place` says; None: an empty zone
+
+    Distances are exact, from where the radar was when it sent each pulse to where it is when the echo arrives. The
+    result's geometry is that of zone 0; `of_zone` makes another's. ValueError: no scene at all.
+    """
+    total: PhaseHistory | None = None
+    for zone, scene in enumerate(scenes):
+        if scene is None:
+            continue
+        own = _echo(radar, zone, scene, device)
+        turned = own.samples * np.exp(-2j * np.pi * _turns(radar, own, zone))
+        total = replace(own, samples=turned if total is None else total.samples + turned)
+    if total is None:
+        raise ValueError(f"scenes has {len(scenes)} zones and all are empty; give one of them a scene")
+    return _as_of(radar, total, 0)
+
+
+def of_zone(radar: RangeZones, received: PhaseHistory, zone: int) -> PhaseHistory:
+    """The same record as zone `zone` alone would have made it: for `sarcl.backproject`, on a grid in that zone.
+
+    Its delays are counted from the pulse that the zone answers, and exp(+j 2 pi f_n zone/PRF) undoes the phase of the
+    carriers that ran on meanwhile: other zones are left out of step over the elements.
+    """
+    turned = received.samples * np.exp(2j * np.pi * _turns(radar, received, zone))
+    return _as_of(radar, replace(received, samples=turned), zone)
+
+
+def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
+    """How far an echo from `apart` zones farther, `elevation` rad above the pixel, is put down in its image, dB <= 0.
+
+    The Dirichlet ratio of the module's head; -inf where zones are orthogonal.
+    """
+    turns = np.mod(apart * radar.step / radar.prf, 1.0)
+    turns -= radar.center * radar.spacing * np.sin(validation.number("elevation", elevation)) / SPEED_OF_LIGHT
+    ratio = abs(float(dirichlet(2 * np.pi * turns, radar.n))) / radar.n
+    return 20 * float(np.log10(ratio)) if ratio > 1e-12 else -np.inf
+
+
+def _echo(radar: RangeZones, zone: int, scene: Scene, device: Any) -> PhaseHistory:
+    """Echoes of one zone, delays and phases from its own centre, element by element."""
+    chirp = Waveform.chirp(center=radar.center, bandwidth=radar.bandwidth, duration=1e-5)
+    return echo(
+        scene, chirp, radar.track(zone), receiver=radar.track(), array=radar.array, channels="separated",
+        reference=radar.place(zone), range_window=(-WINDOW, WINDOW), tolerance=1e-5, check=False, device=device,
+    )  # fmt: skip
+
+
+def _turns(radar: RangeZones, raw: PhaseHistory, zone: int) -> np.ndarray:
+    """Turns by which a zone's samples lag in the receiver's interval, whose delays count from zone 0's centre."""
+    late = 2 * (_ends(radar, zone)[2] - _ends(radar, 0)[2]) / SPEED_OF_LIGHT - zone / radar.prf
+    carrier = radar.center + np.tile(radar.array.offsets[0], radar.n_pulses)
+    f = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
+    return np.asarray(np.mod(f * late[:, None], 1.0) + np.mod(carrier * (zone / radar.prf), 1.0)[:, None])
+
+
+def _as_of(radar: RangeZones, raw: PhaseHistory, zone: int) -> PhaseHistory:
+    """The same samples with a zone's geometry."""
+    tx, rx, half = _ends(radar, zone)
+    return replace(raw, samples=validation.sealed(raw.samples.astype(np.complex64)), tx=tx, rx=rx, reference_range=half)
+
+
+def _ends(radar: RangeZones, zone: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Where the element stood that sent, and the receiver, m (n_rows, 3); half the path over the zone's centre, m."""
+    tx = (radar.track(zone).positions[:, None] + radar.array.positions).reshape(-1, 3)
+    rx = np.repeat(radar.track().positions, radar.n, axis=0)
+    ways = [np.linalg.norm(end - radar.place(zone), axis=1) for end in (tx, rx)]
+    return tx, rx, (ways[0] + ways[1]) / 2

@@ -1,0 +1,196 @@
+"""Phase of each pulse, from what bright places of an image get from it. Numbers in, numbers out.
+
+v[p, k] is the contribution of pulse p to place k (columns may also be lags and channels of it), complex64 (n, columns);
+pulse p carries the unknown factor exp(j phase[p]). Across p a scatterer beside place k turns evenly: the FFT over
+p is the image on a line through k, one bin a resolution cell of the whole aperture ("Doppler").
+
+`gradient` is phase gradient autofocus with the power method for the principal eigenvector: robust from afar.
+`sharpen` climbs sum |I|^4: exact at the end. That sum is convex in exp(-j phase), so that going to the best phase
+of its linear part never lowers it.
+
+Sources: Wahl, Eichel, Ghiglia, Jakowatz, Phase gradient autofocus, IEEE Trans. AES 30(3), 1994; Jakowatz and Wahl,
+Eigenvector method for maximum-likelihood estimation of phase errors, JOSA A 10(12), 1993; Ash, An autofocus method for
+backprojection imagery, IEEE GRSL 9(1), 2012.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from ._phase_smoothing import cosines, detrended
+
+CHUNK = 2**22  # values transformed at a time
+POWER_STEPS = 10
+NARROWEST = 10.0  # Doppler bins that `gradient` leaves about a point
+
+
+def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
+    """Phase (n,), rad, that brings the columns of v (n, columns) to points: a pass for each width (Doppler bins).
+
+    A pass shifts every column's brightest bin, within +-width/2, to 0, cuts out `width` bins about it, takes
+    the phase from pulse to pulse, common to all columns, and refines it as the principal eigenvector of their
+    covariance. Columns count by the ratio of point to clutter that their fourth moment tells.
+    """
+    n = len(v)
+    phase = np.zeros(n)
+    for width in widths:
+        cut = _windowed(_centered(turned(v, phase), width), width)
+        second, fourth = (abs(cut) ** 2).mean(axis=0), (abs(cut) ** 4).mean(axis=0)
+        second = np.maximum(second, 1e-30)
+        # |a + clutter|: fourth moment over squared second is 2 - (a^2/(a^2 + clutter^2))^2
+        point = np.sqrt(np.clip(2 - fourth / second**2, 1e-4, 0.9999))
+        cut *= np.sqrt(np.minimum(point / (1 - point), 1e3) / second).astype(np.float32)
+        step = np.angle((cut[1:] * cut[:-1].conj()).sum(axis=1))
+        found = np.concatenate([[0.0], np.cumsum(step)])
+        for _ in range(POWER_STEPS):
+            found = np.angle((cut * turned(cut, found).sum(axis=0).conj()).sum(axis=1))
+        phase += detrended(np.unwrap(found))
+    return phase
+
+
+def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, enough: float = 1e-4) -> np.ndarray:
+    """The phase (n,) near `phase` where sum |I|^4 over `width` Doppler bins about 0 has its maximum.
+
+    I is the FFT over pulses of v exp(-j phase); for width 0 only its bin 0, the image at the places themselves.
+    Stops after `steps`, or when a step gains less than `enough`.
+    """
+    before = 0.0
+    for _ in range(steps):
+        total, pull = 0.0, np.zeros(len(v), np.complex128)
+        for columns, image in _images(v, phase, width):
+            total += _fourth(image)
+            pull += (_back(image, len(v)).conj() * v[:, columns]).sum(axis=1)
+        phase = phase + np.where(pull == 0, 0, np.angle(pull * np.exp(-1j * phase)))
+        if total <= before * (1 + enough):
+            break
+        before = total
+    return phase
+
+
+def extended(v: np.ndarray, first: int, last: int) -> np.ndarray:
+    """Phase (n,) of all pulses against the image that pulses first ... last - 1 make at the places; theirs is 0."""
+    image = v[first:last].sum(axis=0, dtype=np.complex64)
+    phase = np.angle(v @ (_cubed(image).conj()))
+    phase[first:last] = 0
+    return phase
+
+
+def sharpness(v: np.ndarray, phase: np.ndarray, width: float) -> float:
+    """Sum |I|^4 over `width` Doppler bins, on an axis so fine that it does not matter where points lie between bins."""
+    return sum(_fourth(image) for _, image in _images(v, phase, width))
+
+
+def range_shift(v: np.ndarray, phase: np.ndarray, width: float, modes: int) -> np.ndarray:
+    """How many lags later than its common image each pulse's echo comes: (n,), smooth, mean 0, within +-1.
+
+    v (n, columns, lags) at lags of half a range cell. The correlation of a pulse with sum |I|^4's linear part
+    has its maximum where they fit; a Newton step towards it, least squares with the curvatures as weights, on
+    `modes` cosines over the aperture.
+    """
+    n, _, lags = v.shape
+    flat = v.reshape(n, -1)
+    fit = np.zeros((3, n))
+    for columns, image in _images(flat, phase, width):
+        back = _back(image, n).reshape(n, -1, lags)[:, :, 1:-1].conj()  # whole places: see _images
+        part = flat[:, columns].reshape(n, -1, lags)
+        for i in range(3):
+            fit[i] += ((back * part[:, :, i : lags - 2 + i]).sum(axis=(1, 2)) * np.exp(-1j * phase)).real
+    slope = (fit[2] - fit[0]) / 2
+    bend = np.maximum(2 * fit[1] - fit[2] - fit[0], 1e-3 * np.abs(fit[1]))
+    basis = cosines(n, modes)
+    normal = (basis * bend[:, None]).T @ basis
+    normal += 1e-9 * max(np.trace(normal), 1e-30) * np.eye(len(normal))
+    shift = basis @ np.linalg.solve(normal, basis.T @ slope)
+    return np.clip(shift - shift.mean(), -1, 1)
+
+
+def turned(v: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """v (n, columns) with the phase (n,) taken off."""
+    return np.asarray(v * np.exp(-1j * phase).astype(np.complex64)[:, None])
+
+
+def _length(n: int) -> int:
+    """Of the Doppler axis: twice n or more, so that |I|^2 is sampled as finely as it varies and nothing wraps."""
+    import scipy.fft
+
+    return int(scipy.fft.next_fast_len(2 * n))
+
+
+def _images(v: np.ndarray, phase: np.ndarray, width: float) -> Iterator[tuple[slice, np.ndarray]]:
+    """(columns, I (length, columns)) of v (n, columns or columns x lags), some whole places at a time.
+
+    I is zero outside of `width` Doppler bins about 0.
+    """
+    import scipy.fft
+
+    if width == 0:
+        yield slice(None), turned(v, phase).sum(axis=0, keepdims=True)
+        return
+    n = len(v)
+    length = _length(n)
+    half = int(np.ceil(width / 2 * length / n))
+    step = max(1, CHUNK // length // 36) * 36  # a multiple of every count of lags in use (1 and 9)
+    for first in range(0, v.shape[1], step):
+        columns = slice(first, first + step)
+        image = scipy.fft.fft(turned(v[:, columns], phase), length, axis=0, overwrite_x=True)
+        image[half : max(length - half, half)] = 0
+        yield columns, image
+
+
+def _fourth(image: np.ndarray) -> float:
+    """Sum |I|^4."""
+    power = image.real**2 + image.imag**2
+    return float((power * power).sum(dtype=np.float64))
+
+
+def _back(image: np.ndarray, n: int) -> np.ndarray:
+    """|I|^2 I back in pulses, (n, columns), or (1, columns) where it is the same for all: sum |I|^4's derivative."""
+    import scipy.fft
+
+    cubed = _cubed(image)
+    return cubed if len(image) == 1 else np.asarray(scipy.fft.ifft(cubed, axis=0, overwrite_x=True)[:n])
+
+
+def _cubed(image: np.ndarray) -> np.ndarray:
+    """|I|^2 I, in place."""
+    image *= image.real**2 + image.imag**2
+    return image
+
+
+def _centered(v: np.ndarray, width: float) -> np.ndarray:
+    """Columns turned so that the brightest Doppler bin within +-width/2 comes to bin 0."""
+    import scipy.fft
+
+    n = len(v)
+    length = 2 * _length(n)
+    half = max(1, min(int(width / 2 * length / n), length // 2))
+    out = np.empty_like(v)
+    step = max(1, CHUNK // length)
+    for first in range(0, v.shape[1], step):
+        part = v[:, first : first + step]
+        level = np.abs(scipy.fft.fft(part, length, axis=0))
+        level[half : length - half] = 0
+        bins = level.argmax(axis=0)
+        turn = np.arange(n)[:, None] * np.where(bins > length // 2, bins - length, bins) / length
+        out[:, first : first + step] = part * np.exp(-2j * np.pi * turn).astype(np.complex64)
+    return out
+
+
+def _windowed(v: np.ndarray, width: float) -> np.ndarray:
+    """Columns with only the `width` Doppler bins about 0 left."""
+    import scipy.fft
+
+    n = len(v)
+    if width >= n:
+        return v
+    length = _length(n)  # zeros behind: nothing leaks from the last pulse to the first
+    bins = np.minimum(np.arange(length), length - np.arange(length)) * n / length
+    out = np.empty_like(v)
+    step = max(1, CHUNK // length)
+    for first in range(0, v.shape[1], step):
+        spectrum = scipy.fft.fft(v[:, first : first + step], length, axis=0)
+        spectrum[bins > width / 2] = 0
+        out[:, first : first + step] = scipy.fft.ifft(spectrum, axis=0, overwrite_x=True)[:n]
+    return out

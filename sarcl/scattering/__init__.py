@@ -1,0 +1,1 @@
+"""sarcl/scattering"""

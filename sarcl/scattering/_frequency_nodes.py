@@ -1,0 +1,89 @@
+"""At how few frequencies facets are computed: how their amplitudes change over the band, from samples of them.
+
+docs/facets.md derives it; tests/scattering/test_facet_engine.py holds it against facets at random phases.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..numerics.pulse_geometry import Antennas
+from ..scene.scene import Scene
+from ..scene.triangles import areas, centroids, edges
+from .antenna_weights import MOST_NODES
+from .facets import Facets
+
+FACETS, PULSES, FREQUENCIES = 96, 4, 24
+SAFETY = 2.0  # these are samples
+BRIGHTEST = 0.1  # of facets, whose power is left out of what errors are compared with: samples seldom tell it
+
+
+def over_band(
+    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: Antennas, polarizations: Sequence[str],
+    vertical: np.ndarray, center: float, bandwidth: float,
+) -> dict[int, list[float]]:  # fmt: skip
+    """Relative errors of interpolating amplitudes over f^power between 1, 2, ... Chebyshev nodes: {power: [n]}, powers
+    1 and 0, [0] unused.
+
+    Facets are cut to edge, m, those that are no mirrors (k,) to finest. Of the worst of four pulses, by L2 over up to
+    96 facets: twice what follows the n-th Chebyshev coefficient.
+    """
+    part = _sample(scene, mirror, edge, finest)
+    for pulses in (PULSES, 16 * PULSES):  # look closer where nothing is seen
+        found = _errors(part, antennas, pulses, polarizations, vertical, center, bandwidth)
+        if found is not None:
+            return found
+    return {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+
+
+def _errors(
+    part: Facets, antennas: Antennas, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray, center: float,
+    bandwidth: float,
+) -> dict[int, list[float]] | None:  # fmt: skip
+    """None where no pulse sees anything."""
+    cosines = np.cos(np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES)
+    band = center + bandwidth / 2 * cosines
+    transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(cosines)))
+    out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+    seen = False
+    for pulse in np.unique(np.linspace(0, len(antennas.tx) - 1, n_pulses).astype(int)):
+        ends = antennas.tx[pulse], (antennas.tx if antennas.rx is None else antennas.rx)[pulse]
+        made = part.amplitudes(*ends, band, polarizations, vertical)
+        for power, errors in out.items():
+            shaped = made / (band / center)[:, None, None] ** power
+            tails = np.cumsum(np.abs(np.tensordot(transform, shaped, 1))[::-1], axis=0)[::-1]
+            level = typical_power((np.abs(shaped) ** 2).mean(axis=0).sum(axis=1))
+            if level:
+                seen = True
+                for n in range(1, MOST_NODES + 1):
+                    wrong = float(((2 * tails[n]) ** 2).sum())
+                    errors[n] = max(errors[n], SAFETY * float(np.sqrt(wrong / level)))
+    return out if seen else None
+
+
+def typical_power(powers: np.ndarray) -> float:
+    """Sum of powers (k,) without the brightest tenth."""
+    return float(np.sort(powers)[: len(powers) - int(BRIGHTEST * len(powers))].sum())
+
+
+def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float) -> Facets:
+    """Facets drawn half by number, half by area, each shrunk to what cutting would leave of it, somewhere on it."""
+    random = np.random.default_rng(0)
+    n, size = len(scene.triangles), areas(scene.triangles)
+    some = np.arange(n)
+    if n > FACETS:
+        chance = 0.5 / n + 0.5 * size / size.sum()
+        some = random.choice(n, FACETS, p=chance / chance.sum())
+    triangles = scene.triangles[some]
+    shrink = np.minimum(1.0, np.where(mirror[some], edge, finest) / np.maximum.reduce(edges(triangles)))
+    middle = centroids(triangles)[:, None]
+    inner = random.dirichlet((1.0, 1.0, 1.0), len(some))
+    moved = np.einsum("ni,nij->nj", inner, triangles)[:, None] - middle
+    # anywhere where it stays inside
+    triangles = middle + (1 - shrink)[:, None, None] * moved + shrink[:, None, None] * (triangles - middle)
+    return Facets(
+        triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
+        np.ones(len(some), np.complex64),
+    )  # fmt: skip

@@ -1,0 +1,135 @@
+"""How finely weights of antennas and distance have to be followed: over facets, over the band, in float32.
+
+From up to 400 facets and 200 points at up to 32 pulses, with what each of them sends back there: errors are relative to
+the echoes' norm, so that a scene in a side lobe asks for more than one amid the beam. docs/radar.md derives each term.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.boxes import box
+from ..model.waveform import Waveform
+from ..scene.scene import Scene
+from ..scene.triangles import areas, centroids
+from .antenna_weights import MOST_NODES, Beam, BeamError
+from .facets import Facets
+
+SAFETY = 2.0  # these are samples (a facet's corner, by which its weight is judged, lies twice as far off as its area)
+PULSES, FACETS, POINTS = 32, 400, 200
+ANGLE = 1e-7  # rad, rms of what float32 directions err, with room: 1e-8 to 3e-8 measured
+PATTERN = 1e-6  # rms of what float32 patterns err of their peak, with room: 1e-7 to 5e-7 measured
+STEP = 1e-4  # rad, of the differences that stand for derivatives
+
+
+def beam_error(
+    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray, tolerance: float
+) -> BeamError:
+    """Errors for a scene. ValueError where it is out of the beam, or so far out that tolerance cannot be met."""
+    if not beam.weighs:
+        return BeamError()
+    for pulses, many in ((PULSES, 1), (16 * PULSES, 4)):  # look closer before saying that nothing is lit
+        found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
+        if found is not None:
+            break
+    else:
+        raise ValueError(_unlit(beam, scene))
+    if found.rounding > 0.3 * tolerance:
+        raise ValueError(
+            f"tolerance {tolerance:.1e} cannot be met with these antennas: gains in float32 err by "
+            f"{found.rounding:.1e} of the echoes, which lie {20 * np.log10(found.dim):.0f} dB below the beam's peak; "
+            f"aim at the scene, or ask for {4 * found.rounding:.1e}"
+        )
+    return found
+
+
+def _sampled(
+    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray, n_pulses: int,
+    many: int,
+) -> BeamError | None:  # fmt: skip
+    """None where all weights are 0."""
+    random = np.random.default_rng(0)
+    where, facets, share = _places(scene, random, many)
+    point_power = np.abs(scene.amplitudes) ** 2 * sum(name[0] == name[1] for name in polarizations)
+    some, point_share = _drawn(point_power, len(point_power), POINTS * many, random)
+    n_facets = len(where)
+    places = np.concatenate([where, scene.positions[some]])
+    total = bent = seen = floor = blurred = 0.0
+    left = np.zeros(MOST_NODES + 1)
+    cosines = np.cos(np.pi * (np.arange(2 * MOST_NODES + 1) + 0.5) / (2 * MOST_NODES + 1))
+    band = waveform.center + waveform.bandwidth / 2 * cosines
+    for pulse in np.unique(np.linspace(0, len(beam.tx) - 1, n_pulses).astype(int)):
+        power = np.empty(len(places))
+        power[n_facets:] = point_power[some] * point_share
+        if n_facets:
+            ends = beam.tx[pulse], beam.rx[pulse]
+            made = facets.amplitudes(*ends, np.array([waveform.center]), polarizations, vertical)[0]
+            power[:n_facets] = share * (np.abs(made) ** 2).sum(axis=1)
+        weight = beam.weights(places, int(pulse), waveform.center)
+        lit = power * np.abs(weight) ** 2
+        total += float(power.sum())
+        seen += float(lit.sum())
+        # an error of one of two equal patterns is multiplied by the other
+        blurred += (
+            float((power * np.abs(weight) * beam.peak).sum()) if beam.alike else float(power.sum()) * beam.peak**2
+        )
+        away = np.linalg.norm(places - beam.tx[pulse], axis=1)
+        slope = np.zeros(len(places))
+        for axis in range(3):
+            step = np.zeros((len(places), 3))
+            step[:, axis] = STEP * away
+            slope += np.abs((beam.weights(places + step, int(pulse), waveform.center) - weight) / STEP) ** 2
+        floor += float((power * slope).sum())
+        bent += float((power * slope / away**2)[:n_facets].sum())
+        if beam.varies:
+            values = np.stack([beam.weights(places, int(pulse), f) for f in band.tolist()])
+            order = np.arange(len(band))
+            angles = np.outer(order, np.arccos(cosines))
+            coefficients = np.abs(2 / len(band) * np.cos(angles) @ values)  # Chebyshev's, of the weights over the band
+            tails = np.cumsum(coefficients[::-1], axis=0)[::-1]
+            left[1:] += [(power * (2 * tails[n]) ** 2).sum() for n in range(1, MOST_NODES + 1)]
+    if not seen:
+        return None
+    dim = max(1.0, beam.peak * float(np.sqrt(total / seen)))
+    rounding = len(beam.ways) * PATTERN * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + 5e-7
+    return BeamError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
+
+
+def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, Facets, np.ndarray]:
+    """Places drawn on facets, m (n, 3), these facets, and how many each stands for (n,)."""
+    some, share = _drawn(areas(scene.triangles), len(scene.triangles), FACETS * many, random)
+    triangles = scene.triangles[some]
+    corner = random.dirichlet((1.0, 1.0, 1.0), len(some))
+    part = Facets(
+        triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
+        np.ones(len(some), np.complex64),
+    )  # fmt: skip
+    return np.einsum("ni,nij->nj", corner, triangles).reshape(-1, 3), part, share
+
+
+def _drawn(size: np.ndarray, n: int, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of up to `most` of n things, half of them by their size, and how many each stands for."""
+    if n <= most:
+        return np.arange(n), np.ones(n)
+    chance = 0.5 / n + (0.5 * size / size.sum() if size.any() else np.full(n, 0.5 / n))
+    some = random.choice(n, most, p=chance / chance.sum())
+    return some, 1 / (most * chance[some])
+
+
+def _unlit(beam: Beam, scene: Scene) -> str:
+    """That the scene is out of the beam, and by how much."""
+    assert beam.axes is not None
+    boresights = beam.axes[0][:, :, 0]
+    middle = box(np.concatenate([scene.positions, centroids(scene.triangles)])).mean(axis=0)
+    off = np.arccos(np.clip((_unit(middle - beam.tx) * boresights).sum(axis=1), -1, 1))
+    best = int(np.argmin(off))
+    return (
+        f"the scene is wholly out of the beam: its centre is never less than {np.degrees(off[best]):.3g} deg off the "
+        f"boresight (pulse {best}); aim it with sarcl.pointing, such as pointing.spotlight(track, scene.center)"
+    )
+
+
+def _unit(vectors: np.ndarray) -> np.ndarray:
+    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

@@ -1,0 +1,153 @@
+"""How facets are computed to a tolerance: how finely they are cut, at how many frequencies, and what that errs.
+
+docs/facets.md derives each term; tests/scattering/test_facet_engine.py measures the sum.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.boxes import box
+from ..base.constants import SPEED_OF_LIGHT
+from ..numerics.polynomials import chebyshev, lagrange
+from ..numerics.pulse_geometry import Antennas
+from ..scene.scene import Scene
+from ..scene.triangles import centroids, edges
+from ._frequency_nodes import over_band
+from .antenna_weights import MOST_NODES, BeamError
+
+GIGAHERTZ = 1e9  # amplitudes are over f in GHz: so they keep away from float32's smallest numbers
+LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
+SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
+MOST_FACETS = 50_000_000
+# Relative cost of a facet and pulse: of direction, place and polarisations; of its integral at a frequency; of a tap
+FACET, NODE, TAP = 1.0, 0.6, 0.12
+TO_CORNER = 2 / 3  # from a centroid to the farthest corner, of the longest edge
+
+
+@dataclass(frozen=True, eq=False)
+class FacetPlan:
+    """Facets no longer than max_edge, m, their amplitudes over f^power interpolated between `nodes`, Hz (n,).
+
+    power            1 where facets reflect as mirrors, 0 where what they send back has no k in it
+    predicted_error  relative, of what this leaves out
+    n_facets         there will be, about
+    """
+
+    max_edge: float
+    nodes: np.ndarray
+    predicted_error: float
+    n_facets: float
+    power: int = 1
+
+    def basis(self, frequencies: np.ndarray) -> np.ndarray:
+        """Lagrange's polynomials of the nodes at frequencies, Hz (m,), times these over 1 GHz to the power: (n, m).
+
+        The factor k(f) of mirrors' amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
+        """
+        return lagrange(self.nodes, frequencies) * (frequencies / GIGAHERTZ) ** self.power
+
+    def scales(self) -> np.ndarray:
+        """k/(2 sqrt(pi)) at the nodes over the same, 1/m (n,)."""
+        wave = self.nodes / SPEED_OF_LIGHT
+        return np.asarray(np.sqrt(np.pi) * wave / (self.nodes / GIGAHERTZ) ** self.power)
+
+    def describe(self) -> dict[str, Any]:
+        """For a report."""
+        return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, "frequencies a facet": len(self.nodes)}
+
+
+def coherent(scene: Scene) -> np.ndarray:
+    """Facets (k,) of which some part reflects as a mirror their size does."""
+    return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
+
+
+def plan_facets(
+    tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, polarizations: Sequence[str],
+    vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True, weights: BeamError | None = None,
+) -> FacetPlan:  # fmt: skip
+    """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
+
+    center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
+    cut                False: facets stay as they are;  weights  what antennas and distance err
+    ValueError where more than 50 million facets would be needed, with what fewer could do.
+    """
+    longest = np.maximum.reduce(edges(scene.triangles))
+    mirror, highest = coherent(scene), center + bandwidth / 2
+    top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
+    bounds = box(scene.triangles.reshape(-1, 3))
+    distance = nearest(scene, antennas, bounds)
+    weights = weights or BeamError()
+    best: tuple[float, FacetPlan] | None = None
+    least, edge = np.inf, min(top, finest)
+    while True:
+        corner = TO_CORNER * edge
+        count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
+        fixed = _rounding(edge, highest) + weights.rounding
+        if mirror.any():
+            fixed += _spherical(corner, distance, highest) + weights.steepness * corner
+        if fixed < SHARE * tolerance and count <= MOST_FACETS:
+            band = over_band(
+                scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
+            )  # fmt: skip
+            for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
+                error = fixed + weights.with_phase(n, band[power])
+                least = min(least, error)
+                if error <= SHARE * tolerance:
+                    cost = count * (FACET + n * (NODE + 4 * TAP * len(polarizations)))
+                    if best is None or cost < best[0]:
+                        best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power)
+        elif count <= MOST_FACETS:
+            least = min(least, fixed)
+        settled = best is not None and count > 4 * best[1].n_facets
+        if settled or not cut or not mirror.any() or count > MOST_FACETS:
+            break
+        edge /= LADDER
+    if best is None and not cut:
+        raise ValueError(
+            f"tolerance {tolerance:.1e} cannot be met with facets of up to {top:.3g} m uncut; the best is "
+            f"{least / SHARE:.1e}: let echo cut them (max_edge='auto')"
+        )
+    if best is None:
+        raise ValueError(
+            f"tolerance {tolerance:.1e} would cut these facets into more than {MOST_FACETS:,}; the best here is "
+            f"{least / SHARE:.1e}, or take a smaller scene"
+        )
+    return best[1]
+
+
+def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:
+    """Least distance of an antenna to a facet, m, or less: by the box of all, or by centroids where that is near."""
+    distance = antennas.distance(bounds)
+    if distance > float(np.linalg.norm(bounds[1] - bounds[0])):
+        return distance
+    from scipy.spatial import cKDTree
+
+    tree = cKDTree(centroids(scene.triangles))
+    ends = [antennas.tx] if antennas.rx is None else [antennas.tx, antennas.rx]
+    away = min(float(tree.query(end)[0].min()) for end in ends)
+    found = away - TO_CORNER * float(np.maximum.reduce(edges(scene.triangles)).max())
+    if max(found, distance) <= 0:
+        raise ValueError(
+            f"an antenna comes within {away:.3g} m of a facet that is as large; move the track away from the scene, "
+            "or cut its facets first: scene.split(max_edge)"
+        )
+    return max(found, distance)
+
+
+def _spherical(corner: float, distance: float, highest: float) -> float:
+    """The wave's curvature over a facet, rad at its corners, and how its direction and polarisation change there."""
+    if corner >= distance:
+        return float("inf")
+    return float(
+        (2 * np.pi * highest / SPEED_OF_LIGHT) * corner**2 / (distance - corner) + corner / (distance - corner)
+    )
+
+
+def _rounding(edge: float, highest: float) -> float:
+    """Float32 directions (4e-7 |q| |edge| rad, a fifth of which counts) and integrals (kernels/facet.clh)."""
+    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + 2e-6

@@ -1,0 +1,144 @@
+"""Facets as they are added up: cut, moved, culled and lit; and what each of them sends back."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..scene.material import DIAGRAMS, Material
+from ..scene.triangles import centroids, normals
+from ..visibility.illumination import Lighting, Part, Span
+
+AT_ONCE = 100_000  # amplitudes in one go
+POLARIZATIONS = ("HH", "HV", "VH", "VV")
+
+
+@dataclass(frozen=True, eq=False)
+class Facets:
+    """What is left of a scene's facets to be added up.
+
+    triangles     m (k, 3, 3);  reflectivity, two_sided, material (k,), materials   as in Scene
+    light, kept   what of each facet both antennas see, by blocks of pulses, and which of its facets these are (k,);
+                  None: all of all
+    random        complex Gaussian numbers of unit power (k,): what rough facets send back besides
+    """
+
+    triangles: np.ndarray
+    reflectivity: np.ndarray
+    two_sided: np.ndarray
+    material: np.ndarray
+    materials: tuple[Material, ...]
+    light: Lighting | Part | None
+    kept: np.ndarray
+    random: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.triangles)
+
+    def roots(self, frequency: float) -> np.ndarray:
+        """1/sqrt(eps) of every material at one frequency, complex128; 0 of a perfect conductor."""
+        eps = np.array([m.permittivity(frequency) for m in self.materials], np.complex128)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            return np.where(np.isinf(eps), 0, 1 / np.sqrt(eps))
+
+    def spans(self, n_pulses: int) -> Iterator[Span]:
+        """The track in parts, in each of which the share of each facet that is seen, uint8 (k,), changes evenly."""
+        if self.light is None:
+            all_of_all = np.full(len(self), 255, np.uint8)
+            yield Span(0, n_pulses, all_of_all, all_of_all)
+            return
+        for span in self.light.spans():
+            share = span.share[self.kept]
+            yield Span(span.first, span.stop, share, share if span.later is span.share else span.later[self.kept])
+
+    def between(self, first: int, stop: int) -> Facets:
+        """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
+        return self if self.light is None else replace(self, light=self.light.between(first, stop))
+
+    def share_at(self, pulse: int) -> np.ndarray:
+        """Share of each facet that a pulse sees, 0 to 1 (k,)."""
+        return np.ones(len(self)) if self.light is None else self.light.fraction_at(pulse)[self.kept]
+
+    @property
+    def is_rough(self) -> bool:
+        """Any material has roughness finer than a facet."""
+        return any(m.height > 0 for m in self.materials)
+
+    @property
+    def is_mirror(self) -> bool:
+        """Any material reflects in part as a mirror of the facet's size does."""
+        return any(np.isfinite(m.height) for m in self.materials)
+
+    def picked(self, some: np.ndarray) -> Facets:
+        """These facets, in this order, without shadows."""
+        return Facets(
+            self.triangles[some], self.reflectivity[some], self.two_sided[some], self.material[some], self.materials,
+            None, self.kept[some], self.random[some] if len(self.random) else self.random,
+        )  # fmt: skip
+
+    def amplitudes(
+        self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, polarizations: Sequence[str],
+        vertical: np.ndarray,
+    ) -> np.ndarray:  # fmt: skip
+        """What every facet sends back from antennas at tx, rx, m (3,), about its centroid, in float64: what
+        kernels/spread_facets.cl computes, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
+        n, k = len(frequencies), len(self)
+        out = np.empty((n, k, len(polarizations)), np.complex128)
+        step = max(1, AT_ONCE // max(k, 1))
+        for first in range(0, n, step):
+            matrix = self._matrices(tx, rx, frequencies[first : first + step], vertical)
+            for i, name in enumerate(polarizations):
+                out[first : first + step, :, i] = matrix[..., "HV".index(name[0]), "HV".index(name[1])]
+        return out * self.reflectivity[:, None]
+
+    def _matrices(self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, vertical: np.ndarray) -> np.ndarray:
+        """k/(2 sqrt(pi)) S I: complex128 (n, k, 2, 2)."""
+        from ._rough_surface import rough_mean
+        from .physical_optics import normals_and_areas, scattering_matrix, triangle_mean
+
+        places = centroids(self.triangles)
+        to_tx, to_rx = (end - places for end in (tx, rx))
+        to_tx, to_rx = (d / np.linalg.norm(d, axis=1, keepdims=True) for d in (to_tx, to_rx))
+        behind = self.two_sided & ((normals(self.triangles) * to_tx).sum(axis=1) < 0)
+        triangles = np.where(behind[:, None, None], self.triangles[:, ::-1], self.triangles)
+        out, areas = normals_and_areas(triangles)
+        wave, both = frequencies[:, None] / SPEED_OF_LIGHT, to_tx + to_rx
+        phases = (triangles[:, 1:] - triangles[:, :1]) @ both[:, :, None]
+        mean = triangle_mean(2 * np.pi * wave * phases[:, 0, 0], 2 * np.pi * wave * phases[:, 1, 0])
+        if self.is_rough:
+            q = 2 * np.pi * wave[..., None] * both
+            for i, material in enumerate(self.materials):
+                of = self.material == i
+                if of.any():
+                    mean[:, of] = rough_mean(
+                        mean[:, of], material, q[:, of], out[of], areas[of], 1 / wave, self.random[of]
+                    )
+        eps = np.array([[m.permittivity(f) for m in self.materials] for f in frequencies.tolist()])
+        if (eps == eps[:1]).all():
+            eps = eps[:1]
+        matrix = scattering_matrix(out, to_tx, to_rx, eps[:, self.material], tuple(vertical.tolist()))
+        return np.asarray((np.sqrt(np.pi) * wave * areas * mean)[..., None, None] * matrix)
+
+    def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
+        """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""
+        first, second = (self.triangles[:, i] - self.triangles[:, 0] for i in (1, 2))
+        factor = np.where(self.two_sided, -self.reflectivity, self.reflectivity)
+        rows = [*first.T, *second.T, factor]
+        if self.is_rough:
+            rows += [*roughness_planes(self.materials)[:, self.material], self.random.real, self.random.imag]
+        if not metal:
+            for f in nodes if dispersive else nodes[:1]:
+                root = self.roots(float(f))[self.material]
+                rows += [root.real, root.imag]
+        out = np.stack(rows)[:, order].astype(np.float32)
+        out[:6, len(self) :] = 0
+        return out
+
+
+def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
+    """Height, m, number of the diagram, 1/width and 1/Omega of materials as spread_facets.cl reads them: (4, n)."""
+    rows = [(min(m.height, 1e3), DIAGRAMS.index(m.diagram), 1 / (m.width or 1.0), 1 / m.solid_angle) for m in materials]
+    return np.array([(h, 0 if d > 4 else d, w, o) for h, d, w, o in rows]).T

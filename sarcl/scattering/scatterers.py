@@ -1,0 +1,167 @@
+"""From a scene to what a kernel adds up: points, and facets moved, culled and lit."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import boxes, counter_rng
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.waveform import Waveform
+from ..numerics.pulse_geometry import Antennas
+from ..scene import triangles as geometry
+from ..scene.scene import Scene
+from ..scene.terrain import check_above, facets_on
+from ..visibility.illumination import lit
+from .facets import Facets
+
+RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of what rough facets send back
+
+
+@dataclass(frozen=True, eq=False)
+class Points:
+    """Points, m (n, 3), with complex amplitudes (n,)."""
+
+    positions: np.ndarray
+    amplitudes: np.ndarray
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def largest(self) -> float:
+        """Largest amplitude."""
+        return float(np.abs(self.amplitudes).max())
+
+    def planes(self, order: np.ndarray) -> np.ndarray:
+        """Rows of numbers as kernels/spread_points.cl reads them, float32, in `order`; repeats at its end are blank."""
+        out = np.stack([self.amplitudes.real, self.amplitudes.imag])[:, order].astype(np.float32)
+        out[:, len(self) :] = 0
+        return out
+
+
+def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | None, dict[str, int]]:
+    """The scene's points, and pairs with pulses left out: reason -> count."""
+    keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
+    left_out = {"zero reflectivity": int((~keep).sum()) * n_pulses}
+    return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
+
+
+def facets_of(
+    scene: Scene, waveform: Waveform, antennas: Antennas, *, shadows: bool | str, seed: int, skips: set[str],
+    max_bytes: float, device: Any, tell: Callable[[int], object],
+) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
+    """Facets that are cut already: moved, culled and lit, and pairs with pulses left out: reason -> count.
+
+    tell is called with 2, 3 when facets are culled and lit.
+    """
+    n_pulses = len(antennas.tx)
+    terrain = _terrain(scene, antennas)
+    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
+    normals = geometry.normals(scene.triangles)
+    triangles = scene.triangles
+    if scene.roughness.any():
+        heights = counter_rng.gaussian(geometry.centroids(triangles), seed) * scene.roughness
+        triangles = triangles + (heights[:, None] * normals)[:, None]
+    centers = geometry.centroids(triangles)
+    keep = np.ones(len(centers), bool)
+    if "zero reflectivity" in skips:
+        keep &= scene.reflectivity != 0
+        left_out["zero reflectivity"] = int((~keep).sum()) * n_pulses
+    if "facing away" in skips:
+        away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
+        left_out["facing away"] = int(away.sum()) * n_pulses
+        keep &= ~away
+    tell(2)
+    light = None
+    if shadows and keep.any():
+        # by the surface without its random heights: facets moved along their normals would hide their neighbours
+        light = lit(
+            scene.triangles, antennas.tx, antennas.rx, **terrain, two_sided=scene.two_sided, wanted=keep,
+            tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
+            engine="embree" if shadows == "embree" else "opencl",
+        )  # fmt: skip
+        dark = keep & light.dark
+        left_out["shadowed"] = int(dark.sum()) * n_pulses
+        keep &= ~dark
+    tell(3)
+    if not keep.any():
+        return None, left_out
+    random = np.zeros(0, np.complex64)
+    if any(m.height > 0 for m in scene.materials):
+        # by the facets' own places: neither order nor neighbours matter
+        places = geometry.centroids(scene.triangles)[keep]
+        parts = [counter_rng.gaussian(places, seed, stream) for stream in RANDOM_STREAMS]
+        random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
+    return Facets(
+        triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials, light,
+        np.flatnonzero(keep), random,
+    ), left_out  # fmt: skip
+
+
+def _terrain(scene: Scene, antennas: Antennas) -> dict[str, Any]:
+    """What `lit` wants to know of a scene's terrain, if it is whole. ValueError for an antenna under it."""
+    on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
+    if scene.heights is None or on is None:
+        return {}
+    for name, ends in (("track", antennas.tx), ("receiver", antennas.rx)):
+        if ends is not None:
+            check_above(name, scene.heights, ends)
+    return {"heights": scene.heights, "on_heights": on}
+
+
+def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> float:
+    """How much a facet's lit share may err: a quarter, or more where facets are small beside a resolution cell.
+
+    The bound on how far a shadow's edge moves (docs/shadows.md) is several times what it moves: the edge is then off by
+    about half a cell at most, or by a quarter of a facet.
+    """
+    typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
+    try:
+        return float(np.clip(4 * resolution_edge(waveform, antennas, scene) / typical, 0.25, 8.0))
+    except ValueError:  # nothing is resolved
+        return 0.25
+
+
+def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
+    """Half the finer of range and cross-range resolution at the scene's centre, m."""
+    look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
+    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+        distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)
+        if not distance.all():
+            raise ValueError(
+                f"an antenna stands at the scene's centre at pulse {int(np.argmin(distance))}, where no resolution can "
+                "be told to cut facets to; pass max_edge=... in metres, or None"
+            )
+        look += (ends - scene.center) / distance / 2
+    along = float(np.linalg.norm(look, axis=1).max())
+    turn = float(np.linalg.norm(look - look[0], axis=1).max())
+    range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf
+    cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
+    edge = min(range_cell, cross_cell) / 2
+    if not np.isfinite(edge):
+        raise ValueError("forward scattering resolves nothing to cut facets to; pass max_edge=... in metres, or None")
+    return edge
+
+
+def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> np.ndarray:
+    """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
+
+    n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene.
+    """
+    corners = boxes.box(centers)
+    middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
+    out = np.zeros(len(centers), bool)
+    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+        look = ends - middle
+        distance = np.linalg.norm(look, axis=1)
+        if distance.min() <= radius:
+            continue  # inside the scene every direction is possible
+        look = look / distance[:, None]
+        mean = look.mean(axis=0)
+        # a shift of the point by `radius` turns the direction by at most asin(radius/distance)
+        spread = np.linalg.norm(look - mean, axis=1).max() + np.pi / 2 * radius / distance.min()
+        out |= normals @ mean + spread < 0
+    return out

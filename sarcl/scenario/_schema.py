@@ -1,0 +1,221 @@
+"""Which tables and keys a scenario may hold: those of the Python calls they stand for.
+
+A section of a scenario ([waveform.chirp], [[scene.points]], [echo]) stands for one call; its keys are the
+call's arguments, read from the signature, so that the file format cannot drift from the library.
+"""
+
+from __future__ import annotations
+
+import inspect
+import re
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field
+from typing import Any
+
+from ..base.text import unknown
+
+Path = tuple[str | int, ...]
+Call = Callable[..., Any]
+
+# A mesh or an elevation model is a file in a scenario.
+RENAMED = {"mesh": "file", "path": "file"}
+# Arguments that are other sections, or belong to the run and not to the scenario.
+NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
+NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
+NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material's is its table's; the others are tables of their own
+ON = "on"  # of a part of the scene: stand it on the parts before
+_TYPES = {
+    "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
+    "int": (
+        "a whole number",
+        lambda v: not isinstance(v, bool) and isinstance(v, (int, float)) and float(v).is_integer(),
+    ),
+    "str": ("a string", lambda v: isinstance(v, str)),
+    "bool": ("true or false", lambda v: isinstance(v, bool)),
+}
+
+
+_ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
+
+
+def calls(section: str) -> dict[str, Call]:
+    """The calls a section can stand for, by the name of its table; "" is the section's own table."""
+    import sarcl
+
+    from ..scene import shapes
+
+    if section in ("trajectory", "receiver"):
+        t = sarcl.Trajectory
+        return {"line": t.line, "circle": t.circle, "": t}
+    if section == "waveform":
+        w = sarcl.Waveform
+        return {"chirp": w.chirp, "tone": w.tone, "sampled": w.sampled}
+    if section == "scene":
+        s = sarcl.Scene
+        return {
+            "points": s.points,
+            "from_mesh": s.from_mesh,
+            "from_heights": s.from_heights,
+            "from_dem": s.from_dem,
+            "facets": s.facets,
+            **{shape.__name__: shape for shape in shapes.SHAPES},
+        }
+    if section in ("antenna", "receiver_antenna"):
+        a = sarcl.Antenna
+        return {"isotropic": a.isotropic, "rectangular": a.rectangular, "gaussian": a.gaussian, "table": a.table}
+    if section == "array":
+        array = sarcl.AntennaArray
+        return {"linear": array.linear, "planar": array.planar, "costas": array.costas, "": array}
+    if section in ("pointing", "receiver_pointing"):
+        from ..model import pointing as p
+
+        return {"spotlight": p.spotlight, "stripmap": p.stripmap, "fixed": p.fixed}
+    if section in ("radar", "noise"):
+        return {"": sarcl.Radar if section == "radar" else sarcl.add_noise}
+    if section == "materials":
+        return {"": sarcl.Material}
+    if section == "grid":
+        return {"plane": sarcl.ImageGrid.plane, "points": sarcl.ImageGrid.points}
+    return {"": getattr(sarcl, section)}
+
+
+SECTIONS = (
+    "waveform", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna", "array",
+    "radar", "materials", "scene", "grid", "echo", "noise", "backproject",
+)  # fmt: skip
+
+
+def parameters(call: Call) -> dict[str, inspect.Parameter]:
+    """Keys of the table that stands for `call`."""
+    found = inspect.signature(call).parameters
+    return {RENAMED.get(n, n): p for n, p in found.items() if n not in NOT_KEYS}
+
+
+@dataclass(frozen=True)
+class Where:
+    """The file a scenario came from, and the line of each of its keys; nothing for one made in Python."""
+
+    name: str = "scenario"
+    lines: Mapping[Path, int] = field(default_factory=dict)
+
+    def text(self, path: Path, key: str | None = None) -> str:
+        """ "FILE.toml:12: [waveform.chirp]", the line that of `key` where it is known."""
+        line = self.lines.get((*path, key)) if key else None
+        at = path
+        while line is None and at:
+            line, at = self.lines.get(at), at[:-1]
+        name = ".".join(str(p) for p in path if isinstance(p, str))
+        many = path and isinstance(path[-1], int)
+        table = f" [[{name}]]" if many else f" [{name}]" if name else ""
+        if many and line is None:
+            table += f" number {path[-1] + 1}"  # type: ignore[operator]
+        return f"{self.name}:{line}:{table}" if line else f"{self.name}:{table}"
+
+    @contextmanager
+    def blame(self, path: Path, keys: Mapping[str, Any], always: bool = True) -> Iterator[None]:
+        """Put the file, the line and the table before the message of what a call refuses.
+
+        The line is that of the first key the message names. Without `always`, only messages that name a
+        key of the table are its fault.
+        """
+        try:
+            yield
+        except (ValueError, TypeError, FileNotFoundError, MemoryError) as exc:
+            words = re.findall(r"\w+", str(exc))
+            # from_mesh speaks of a mesh where the table has a file
+            named = next((RENAMED.get(w, w) for w in words if RENAMED.get(w, w) in keys), None)
+            if named is None and not always:
+                raise
+            kind = ValueError if isinstance(exc, TypeError) else type(exc)
+            raise kind(f"{self.text(path, named)} {exc}") from exc
+
+
+def check_section(section: str, table: Any, where: Where) -> None:
+    """Refuse what no call would take: unknown keys, wrong types, missing keys. ValueError names the line."""
+    known = calls(section)
+    if section == "materials" and isinstance(table, Mapping):
+        for name, part in table.items():
+            if not isinstance(part, Mapping):
+                raise ValueError(f"{where.text((section,), name)} {name} is {_shown(part)}, wanted a table")
+            _check_table((section, name), part, known[""], where)
+        return
+    if not isinstance(table, Mapping):
+        raise ValueError(f"{where.text((), section)} {section} is {_shown(table)}, wanted a table")
+    if set(known) == {""} or ("" in known and not any(_is_table(v) for v in table.values())):
+        _check_table((section,), table, known[""], where, [k for k in known if k])
+        return
+    kinds = [k for k in known if k]
+    for kind in table:
+        if kind not in kinds:
+            raise ValueError(f"{where.text((section,), kind)} {unknown(kind, kinds, 'table')}")
+    if section == "scene":
+        if not table:
+            raise ValueError(f"{where.text((section,))} is empty; add a [[scene.points]] or [[scene.from_mesh]] table")
+    elif len(table) != 1:
+        given = " and ".join(table) or "none"
+        raise ValueError(f"{where.text((section,))} wants exactly one of the tables {', '.join(kinds)}, got {given}")
+    for kind, value in table.items():
+        for path, part in tables_of(section, kind, value):
+            if not isinstance(part, Mapping):
+                raise ValueError(f"{where.text((section,), kind)} {kind} is {_shown(part)}, wanted a table")
+            lying = section == "scene" and kind not in ("from_heights", "from_dem")
+            _check_table(path, part, known[kind], where, extra={ON: _ON} if lying else {})
+
+
+def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
+    """Each table of a kind with its path: scenes may hold many of one kind."""
+    if section == "scene" and isinstance(value, list):
+        return [((section, kind, i), part) for i, part in enumerate(value)]
+    return [((section, kind), value)]
+
+
+def _check_table(
+    path: Path,
+    table: Mapping[str, Any],
+    call: Call,
+    where: Where,
+    kinds: list[str] | None = None,
+    extra: Mapping[str, inspect.Parameter] | None = None,
+) -> None:
+    known = {**parameters(call), **(extra or {})}
+    for key, value in table.items():
+        if kinds and key in kinds:
+            raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted a table")
+        if key not in known:
+            raise ValueError(f"{where.text(path, key)} {unknown(key, [*known, *(kinds or [])], 'key')}")
+        wanted = _wanted(known[key], value, key)
+        if wanted:
+            raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted {wanted}")
+    for key, parameter in known.items():
+        if parameter.default is inspect.Parameter.empty and key not in table:
+            needed = [k for k, p in known.items() if p.default is inspect.Parameter.empty]
+            raise ValueError(f"{where.text(path)} lacks the key {key!r}; it needs {', '.join(needed)}")
+
+
+def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
+    """What the annotation asks for, in words, where `value` is not that; else ""."""
+    if key == RENAMED["mesh"]:
+        names = {"str"}
+    else:
+        names = {n.strip() for n in str(parameter.annotation).split("|")} - {"None"}
+    if names and names <= set(_TYPES):
+        return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
+    if "Mapping" in str(parameter.annotation) and isinstance(value, Mapping):
+        return ""
+    good = isinstance(value, (bool, int, float, str, list)) and not _is_table(value)
+    return "" if good else "a number, a string, true, false or an array"
+
+
+def _is_table(value: Any) -> bool:
+    return isinstance(value, Mapping) or (isinstance(value, list) and any(isinstance(v, Mapping) for v in value))
+
+
+def _shown(value: Any) -> str:
+    if isinstance(value, Mapping):
+        return "a table"
+    if isinstance(value, bool):
+        return "true" if value else "false"
+    text = repr(value) if isinstance(value, (int, float, str, list)) else str(value)
+    kind = " (a string)" if isinstance(value, str) else " (an array)" if isinstance(value, list) else ""
+    return (text if len(text) <= 60 else text[:57] + "...") + kind

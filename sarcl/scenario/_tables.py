@@ -1,0 +1,131 @@
+"""Nouns as the tables of a scenario."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from ..model.antenna import Antenna
+from ..model.antenna_array import AntennaArray
+from ..model.image_grid import ImageGrid
+from ..model.radar import Radar
+from ..model.trajectory import Trajectory
+from ..model.waveform import Waveform
+from ..scene.material import METAL, Material
+from ..scene.scene import Scene
+
+
+def table_of(value: Any) -> Any:
+    """The table of a noun; anything else as it is. A noun's table gives an equal noun, but names no files."""
+    if isinstance(value, Waveform):
+        return {value.kind: _waveform(value)}
+    if isinstance(value, Trajectory):
+        return _without_none(value, ("times", "positions", "velocities", "attitude"))
+    if isinstance(value, Scene):
+        return _scene(value)
+    if isinstance(value, Material):
+        return _material(value)
+    if isinstance(value, Antenna):
+        return _antenna(value)
+    if isinstance(value, AntennaArray):
+        return _without_none(value, ("positions", "offsets", "weights", "plan"))
+    if isinstance(value, Radar):
+        return _without_none(value, ("power", "losses_db", "noise_temperature"))
+    if isinstance(value, ImageGrid):
+        if not value.is_plane:
+            return {"points": {"positions": value.listed}}
+        return {"plane": _without_none(value, ("center", "shape", "spacing", "normal", "x_axis"))}
+    return value
+
+
+def plain(value: Any) -> Any:
+    """Arrays and tuples as lists, complex numbers as [real, imaginary], paths as text, all the way down."""
+    if isinstance(value, Mapping):
+        return {str(k): plain(v) for k, v in value.items()}
+    if isinstance(value, (np.ndarray, np.generic)):
+        value = value.tolist()
+    if isinstance(value, complex):
+        return [value.real, value.imag]
+    if isinstance(value, Path):
+        return str(value)
+    if isinstance(value, (list, tuple)):
+        return [plain(v) for v in value]
+    return sorted(value) if isinstance(value, (set, frozenset)) else value
+
+
+def _waveform(value: Waveform) -> dict[str, Any]:
+    if value.kind == "sampled":
+        return _without_none(value, ("signal", "rate", "center"))
+    return _without_none(value, ("center", "bandwidth", "duration"))
+
+
+def _antenna(value: Antenna) -> dict[str, Any]:
+    kind = {"aperture": "rectangular"}.get(value.kind, value.kind)
+    own = {
+        "isotropic": (), "rectangular": ("size", "taper"), "gaussian": ("width", "frequency"),
+        "table": ("azimuth", "elevation", "values", "frequency"),
+    }[kind]  # fmt: skip
+    common = ("gain_db",) if kind == "isotropic" else ("gain_db", "two_way", "mount")
+    return {kind: _without_none(value, (*own, *common))}
+
+
+def named(scene: Scene) -> dict[str, Material]:
+    """The scene's materials by names that are unique, in their order."""
+    names: dict[str, Material] = {}
+    for m in scene.materials:
+        name, n = ("metal" if m == METAL else m.name or "material"), 1
+        while name in names or (name == "metal" and m != METAL):
+            n += 1
+            name = f"{m.name or 'material'} {n}"
+        names[name] = m
+    return names
+
+
+def look_up(key: str, value: Any, materials: Mapping[str, Material]) -> Any:
+    """A value of a scene's table: where the key is that of materials, those that `materials` names instead of names."""
+    if key not in ("material", "materials"):
+        return value
+    if isinstance(value, str):
+        return materials.get(value, value)
+    if isinstance(value, list):
+        return [look_up(key, v, materials) for v in value]
+    if isinstance(value, Mapping):
+        return {part: look_up(key, v, materials) for part, v in value.items()}
+    return value
+
+
+def _material(value: Material) -> dict[str, Any]:
+    # what a default depends on is always written
+    always = ("eps_r", "conductivity", "height")
+    plain = {f.name: getattr(value, f.name) for f in fields(value) if f.name != "name"}
+    return {n: v for n, v in plain.items() if n in always or v != Material.__dataclass_fields__[n].default}
+
+
+def _scene(value: Scene) -> dict[str, Any]:
+    tables: dict[str, Any] = {}
+    if len(value.positions):
+        tables["points"] = [{"positions": value.positions, "amplitudes": value.amplitudes}]
+    if len(value.triangles):
+        names = list(named(value))
+        # one table a run of facets of one material: their order, and so their random heights, stays
+        change = np.flatnonzero(np.diff(value.material)) + 1
+        tables["facets"] = [
+            {
+                "triangles": value.triangles[a:b],
+                "material": names[value.material[a]],
+                "reflectivity": value.reflectivity[a:b],
+                "roughness": value.roughness[a:b],
+                **({"point_roughness": value.point_roughness[a:b]} if value.point_roughness[a:b].any() else {}),
+                "two_sided": value.two_sided[a:b],
+            }
+            for a, b in zip([0, *change], [*change, len(value.triangles)], strict=True)
+        ]
+    return tables
+
+
+def _without_none(value: Any, names: tuple[str, ...]) -> dict[str, Any]:
+    return {n: getattr(value, n) for n in names if getattr(value, n) is not None}

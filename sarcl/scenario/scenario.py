@@ -1,0 +1,310 @@
+"""Scenario files: a simulation as TOML, its tables and keys the Python names. See docs/scenarios.md."""
+
+from __future__ import annotations
+
+import inspect
+import re
+import tomllib
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from functools import partial
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+from ..base.text import unknown
+from ..io import toml
+from . import _schema
+from ._schema import Where
+
+if TYPE_CHECKING:
+    from ..model.antenna_array import AntennaArray
+    from ..model.image import Image
+    from ..model.image_grid import ImageGrid
+    from ..model.phase_history import PhaseHistory
+    from ..model.radar import Radar
+    from ..model.trajectory import Trajectory
+    from ..model.waveform import Waveform
+    from ..scene.scene import Scene
+    from ..simulation.echo_forecast import EchoForecast
+
+# Arguments that may be complex, which TOML has no word for: a list of [real, imaginary] pairs.
+COMPLEX = {"amplitudes", "signal", "weights"}
+
+
+@dataclass(frozen=True, eq=False)
+class Scenario:
+    """What to simulate and how to focus it, as tables of plain values: `Scenario(...)` or `load(path)`.
+
+    waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
+    trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
+    receiver     the same for a receiver of its own, or None
+    pointing     {"spotlight": {"point": [0, 0, 0]}}, {"stripmap": ...}, {"fixed": ...}: what sets a track's attitude
+    antenna      {"gaussian": {...}}, {"rectangular": ...}, {"table": ...}, {"isotropic": ...}, or an Antenna
+    array        {"linear": {"n": 45, ...}}, {"planar": ...}, {"costas": ...}, or an AntennaArray
+    receiver_pointing, receiver_antenna   the receiver's, where they differ;  radar  {"power": ...}, or a Radar
+    materials    {name: {"eps_r": 4.0, ...}, ...}, or Materials, which the scene's tables name
+    scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
+    grid         {"plane": {...}} or {"points": {...}}, or an ImageGrid
+    echo         arguments of `sarcl.echo`;  noise  of `sarcl.add_noise`;  backproject  of `sarcl.backproject`
+    folder       mesh files are named relative to it
+
+    All are optional until they are used. Nouns become tables; arrays and tuples become lists. ValueError
+    names the file, line and table of an unknown or missing key, a wrong type, or a value that a noun refuses.
+    """
+
+    waveform: Any = None
+    trajectory: Any = None
+    receiver: Any = None
+    scene: Any = None
+    grid: Any = None
+    echo: Any = None
+    backproject: Any = None
+    materials: Any = None
+    pointing: Any = None
+    antenna: Any = None
+    receiver_pointing: Any = None
+    receiver_antenna: Any = None
+    array: Any = None
+    radar: Any = None
+    noise: Any = None
+    folder: Path = Path()
+    where: Where = field(default_factory=Where, repr=False)
+
+    def __post_init__(self) -> None:
+        from ..scene.scene import Scene
+        from ._tables import named, plain, table_of
+
+        object.__setattr__(self, "folder", Path(self.folder))
+        if isinstance(self.scene, Scene):
+            own = {name: m for name, m in named(self.scene).items() if name != "metal"}
+            object.__setattr__(self, "materials", {**(self.materials or {}), **own} or None)
+        for name in _schema.SECTIONS:
+            value = getattr(self, name)
+            if value is not None:
+                if name == "materials" and isinstance(value, Mapping):
+                    value = {k: table_of(v) for k, v in value.items()}
+                value = plain(table_of(value))
+                _schema.check_section(name, value, self.where)
+                object.__setattr__(self, name, value)
+
+    @property
+    def tables(self) -> dict[str, Any]:
+        """The sections that are there, as nested dicts and lists."""
+        return {n: getattr(self, n) for n in _schema.SECTIONS if getattr(self, n) is not None}
+
+    def dumps(self) -> str:
+        """The scenario as TOML; `loads` gives the same tables, floats to the last bit."""
+        return toml.dumps(self.tables)
+
+    def save(self, path: Any) -> None:
+        """Write it to a file. Mesh files must lie as before, relative to the new file."""
+        from ..io import output_paths
+
+        with output_paths.atomic(path) as part:
+            part.write_text(self.dumps(), encoding="utf-8")
+
+    def build_waveform(self) -> Waveform:
+        """The Waveform."""
+        return self._one("waveform")
+
+    def build_track(self) -> Trajectory:
+        """The transmitter's Trajectory, aimed as [pointing] says."""
+        return self._aimed(self._one("trajectory"), "pointing")
+
+    def build_receiver(self) -> Trajectory | None:
+        """The receiver's Trajectory, None where it moves with the transmitter."""
+        if self.receiver is None:
+            return None
+        return self._aimed(self._one("receiver"), "receiver_pointing" if self.receiver_pointing else "pointing")
+
+    def build_antenna(self) -> Any:
+        """The Antenna, a pair (transmitting, receiving), or None."""
+        if self.antenna is None:
+            if self.receiver_antenna is not None:
+                raise ValueError(f"{self.where.text(('receiver_antenna',))} has no [antenna] that sends; add one")
+            return None
+        sends = self._one("antenna")
+        return sends if self.receiver_antenna is None else (sends, self._one("receiver_antenna"))
+
+    def build_radar(self) -> Radar | None:
+        """The Radar, None where amplitudes do not fall with range."""
+        return None if self.radar is None else self._one("radar")
+
+    def build_array(self) -> AntennaArray | None:
+        """The AntennaArray that sends, None where one antenna does."""
+        return None if self.array is None else self._one("array")
+
+    def build_grid(self) -> ImageGrid:
+        """The ImageGrid."""
+        return self._one("grid")
+
+    def build_scene(self) -> Scene:
+        """The Scene: the sum of its tables, in the order they first appear."""
+        from ..scene.material import Material
+        from ._tables import look_up
+
+        materials = {
+            name: self._call(("materials", name), table, partial(Material, name=name))
+            for name, table in (self.materials or {}).items()
+        }
+        scene = None
+        for kind, value in self._section("scene").items():
+            for path, table in _schema.tables_of("scene", kind, value):
+                place = table.get(_schema.ON)
+                table = {k: look_up(k, v, materials) for k, v in table.items() if k != _schema.ON}
+                part = self._call(path, table, _schema.calls("scene")[kind])
+                if place is not None:
+                    with self.where.blame(path, {_schema.ON: place}):
+                        part = _stand(part, scene, place)
+                scene = part if scene is None else scene + part
+        assert scene is not None
+        return scene
+
+    def simulate(self, **options: Any) -> PhaseHistory:
+        """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
+        import sarcl
+
+        raw = self._echo(sarcl.echo, options)
+        if self.noise is None:
+            return raw
+        level = self._options("noise", {})
+        if "nesz" in level or "nesz_db" in level:
+            level.setdefault("grid", None if "cell_area" in level else self.build_grid())
+        with self.where.blame(("noise",), level):
+            return sarcl.add_noise(raw, **level)
+
+    def plan(self, **options: Any) -> EchoForecast:
+        """What `simulate` with these options will take: rows, bytes, time, error."""
+        import sarcl
+
+        return self._echo(sarcl.plan_echo, options)
+
+    def _echo(self, verb: Callable[..., Any], options: dict[str, Any]) -> Any:
+        self._check_focus()
+        pieces = (self.build_scene(), self.build_waveform(), self.build_track())
+        given = self._options("echo", options)
+        with self.where.blame(("echo",), {k: v for k, v in given.items() if k not in options}, always=False):
+            return verb(
+                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), array=self.build_array(),
+                radar=self.build_radar(), **given,
+            )  # fmt: skip
+
+    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Any) -> Image:
+        """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
+        import sarcl
+
+        given = self._options("backproject", options)
+        if grid is None:
+            grid = self.build_grid()
+        with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
+            return sarcl.backproject(raw, grid, **given)
+
+    def _aimed(self, track: Trajectory, section: str) -> Trajectory:
+        table = getattr(self, section)
+        if table is None:
+            return track
+        kind = next(iter(table))
+        return self._call((section, kind), table[kind], partial(_schema.calls(section)[kind], track))
+
+    def _check_focus(self) -> None:
+        """Refuse a window that would be refused only after the echoes are made."""
+        from ..numerics.windows import weights
+
+        given = self._options("backproject", {})
+        with self.where.blame(("backproject",), given, always=False):
+            weights(given.get("window"), 8)
+
+    def _section(self, name: str) -> dict[str, Any]:
+        table = getattr(self, name)
+        if table is None:
+            kinds = [k for k in _schema.calls(name) if k]
+            more = f"{name}.{kinds[0]}"
+            raise ValueError(f"{self.where.name}: there is no {name}; add a [{more}] table")
+        return table
+
+    def _one(self, name: str) -> Any:
+        table = self._section(name)
+        known = _schema.calls(name)
+        kind = next(iter(table))
+        if kind in known:
+            return self._call((name, kind), table[kind], known[kind])
+        return self._call((name,), table, known[""])
+
+    def _call(self, path: _schema.Path, table: Mapping[str, Any], call: _schema.Call) -> Any:
+        renamed = {new: old for old, new in _schema.RENAMED.items() if old in inspect.signature(call).parameters}
+        with self.where.blame(path, table):
+            given = {renamed.get(k, k): _argument(k, v) for k, v in table.items()}
+            for name in ("mesh", "path", "geoid"):
+                if isinstance(given.get(name), str):
+                    given[name] = self.folder / given[name]
+            return call(**given)
+
+    def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+        """Arguments of a verb: a list there is a pair or a choice with parameters, so a tuple."""
+        table = getattr(self, name) or {}
+        return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
+
+
+def load(path: Any) -> Scenario:
+    """Read a scenario file; mesh files are found relative to its folder.
+
+    ValueError names file and line of what is not TOML or not a scenario; FileNotFoundError.
+    """
+    path = Path(path)
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except UnicodeDecodeError as exc:
+        raise ValueError(f"{path}: byte {exc.start} is not UTF-8 text; a scenario is a TOML file") from None
+    except FileNotFoundError:
+        raise FileNotFoundError(f"scenario file {str(path)!r} does not exist; check the name and the folder") from None
+    except IsADirectoryError:
+        raise IsADirectoryError(f"{str(path)!r} is a folder; give the TOML file in it") from None
+    return loads(text, name=str(path), folder=path.parent)
+
+
+def loads(text: str, *, name: str = "scenario", folder: Any = ".") -> Scenario:
+    """A scenario from TOML text; `name` stands for the file in messages. Raises as `load` does."""
+    from ..io.toml import locate
+
+    try:
+        tables = tomllib.loads(text)
+    except tomllib.TOMLDecodeError as exc:
+        raise ValueError(_syntax(name, text, str(exc))) from None
+    where = Where(name, locate(text.replace("\r\n", "\n")))
+    for section, value in tables.items():
+        if section not in _schema.SECTIONS:
+            what = "table" if isinstance(value, (dict, list)) else "key"
+            raise ValueError(f"{where.text((), section)} {unknown(section, list(_schema.SECTIONS), what)}")
+    return Scenario(**tables, folder=folder, where=where)
+
+
+def _syntax(name: str, text: str, message: str) -> str:
+    """tomllib's message with its line where an editor looks for it."""
+    match = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)", message)
+    line = int(match[1]) if match and match[1] else text.rstrip().count("\n") + 1
+    column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
+    said = message[: match.start()] if match else message
+    return f"{name}:{line}: {said}{column}; this is not valid TOML"
+
+
+def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
+    """`part` on what came before it in the scenario, at place = [x, y] or [x, y, depth]."""
+    if ground is None:
+        raise ValueError("on has no ground: put the table of the ground before this one")
+    if not isinstance(place, list) or len(place) not in (2, 3):
+        raise ValueError(f"on is {place!r}; give [x, y], m, or [x, y, depth]")
+    return part.on(ground, place[0], place[1], depth=place[2] if len(place) == 3 else 0.0)
+
+
+def _argument(key: str, value: Any) -> Any:
+    """A value as its call wants it: pairs of a complex key become complex numbers."""
+    if key in COMPLEX and isinstance(value, list) and value and all(isinstance(v, list) for v in value):
+        for i, pair in enumerate(value):
+            if len(pair) != 2 or not all(isinstance(v, (int, float)) for v in pair):
+                raise ValueError(f"{key}[{i}] is {pair}; a complex number is a pair [real, imaginary]")
+        return np.asarray(value, np.float64) @ (1, 1j)
+    if key == "values" and np.ndim(value) == 3:  # of an antenna's table
+        return np.asarray(value, np.float64) @ (1, 1j)
+    return value

@@ -1,0 +1,268 @@
+"""What facets are made of: permittivity, conductivity, and roughness finer than a facet."""
+
+from __future__ import annotations
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+
+VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
+DIAGRAMS = ("smooth", "isotropic", "cos", "cos2", "exp", "sinc")
+COHERENT = ("smooth", "sinc")  # these reflect like a mirror the size of the facet
+
+
+@dataclass(frozen=True)
+class Material:
+    """A homogeneous half space under a surface that may be rough below the size of a facet.
+
+    eps_r         real part of the relative permittivity, at least 1
+    conductivity  S/m; inf is a perfect conductor
+    height        rms height of the roughness finer than a facet, m: the coherent reflection falls by
+                  exp(-(q.n height)^2/2); inf: none is left. Default 0, with a diagram inf
+    diagram       how the incoherent rest re-radiates, d the angle between the normal and the bisector of the two
+                  lines of sight: "isotropic", "cos", "cos2" (cos^2 d), "exp" (exp(-(d/width)^2)); none for "smooth",
+                  alias "sinc", the deterministic lobe of a flat facet
+    width         d at which "exp" has fallen to 1/e, rad
+    reflectivity  factor on the amplitude, 0 to 1
+    name          for messages and scenario files
+
+    `Material()` is a perfect conductor; eps_r alone a lossless dielectric. ValueError says what cannot be.
+    Source: Franceschetti et al. 1992 (SARAS), eq. (11) and appendix.
+    """
+
+    eps_r: float = None  # type: ignore[assignment]
+    conductivity: float = None  # type: ignore[assignment]
+    height: float = None  # type: ignore[assignment]
+    diagram: str = "smooth"
+    width: float = 0.0
+    reflectivity: float = 1.0
+    name: str = ""
+
+    def __post_init__(self) -> None:
+        validation.choice("diagram", self.diagram, DIAGRAMS)
+        conducting = self.eps_r is None
+        default = {
+            "eps_r": 1.0,
+            "conductivity": np.inf if conducting else 0.0,
+            "height": 0.0 if self.diagram in COHERENT else np.inf,
+        }
+        for name in ("eps_r", "conductivity", "height", "width", "reflectivity"):
+            value = getattr(self, name)
+            value = default[name] if value is None else _number(name, value, name in ("conductivity", "height"))
+            object.__setattr__(self, name, value)
+        if not self.eps_r >= 1:
+            raise ValueError(
+                f"eps_r is {self.eps_r:g}; a relative permittivity is at least 1 (vacuum): losses go into conductivity"
+            )
+        for name, unit in (("conductivity", "S/m"), ("height", "m"), ("width", "rad"), ("reflectivity", "")):
+            if not getattr(self, name) >= 0:
+                raise ValueError(f"{name} is {getattr(self, name):g} {unit}".rstrip() + "; it cannot be negative")
+        if self.reflectivity > 1:
+            raise ValueError(
+                f"reflectivity is {self.reflectivity:g}; an amplitude factor lies between 0 and 1: more would be gain"
+            )
+        if self.diagram in COHERENT and self.height == np.inf:
+            raise ValueError(
+                f"height is inf with diagram {self.diagram!r}: nothing would be reflected; take a diagram such as "
+                "'isotropic' for what is reflected incoherently"
+            )
+        if (self.diagram == "exp") != (self.width > 0):
+            raise ValueError(
+                f"width is {self.width:g} rad with diagram {self.diagram!r}; 'exp' needs a width greater than 0, "
+                "others take none"
+            )
+        if not isinstance(self.name, str):
+            raise TypeError(f"name is a {type(self.name).__name__}; give a string")
+
+    @property
+    def conducting(self) -> bool:
+        """True for a perfect conductor."""
+        return self.conductivity == np.inf
+
+    def lobe(self, delta: Any) -> Any:
+        """The diagram D at angles delta between normal and bisector, rad (...); 0 for smooth materials."""
+        cosine = np.maximum(np.cos(delta), 0)
+        if self.diagram == "exp":
+            return np.exp(-((np.asarray(delta) / self.width) ** 2))
+        return {"isotropic": 1 + 0 * cosine, "cos": cosine, "cos2": cosine**2}.get(self.diagram, 0 * cosine)
+
+    @property
+    def solid_angle(self) -> float:
+        """Integral of D cos over the hemisphere, sr: pi for an isotropic diagram; 1 where there is none."""
+        if self.diagram in COHERENT:
+            return 1.0
+        nodes, weights = np.polynomial.legendre.leggauss(200)
+        delta, weights = (nodes + 1) * np.pi / 4, weights * np.pi / 4
+        return float(2 * np.pi * (weights * self.lobe(delta) * np.cos(delta) * np.sin(delta)).sum())
+
+    def permittivity(self, frequency: Any) -> Any:
+        """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
+
+        Its imaginary part is negative: fields go as exp(+j 2 pi f t). inf for a perfect conductor.
+        """
+        frequency = np.asarray(frequency, np.float64)
+        if not (frequency > 0).all():
+            raise ValueError(f"frequency reaches {frequency.min():g} Hz; it must be greater than 0")
+        if self.conducting:
+            out = np.full(frequency.shape, np.inf, np.complex128)
+        else:
+            out = self.eps_r - 1j * self.conductivity / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
+        return np.asarray(out)[()]
+
+
+def _number(name: str, value: Any, inf: bool) -> float:
+    """A float; infinite where that has a meaning. NaN is refused by name."""
+    if inf and isinstance(value, (float, np.floating)) and value == np.inf:
+        return np.inf
+    return validation.number(name, value)
+
+
+def _made(name: str, eps_r: float, conductivity: float) -> tuple[str, Material]:
+    return name, Material(eps_r, conductivity, name=name)
+
+
+METAL = Material(name="metal")
+# Values at 10 GHz; where each comes from stands in docs/scenes.md. Add your own: MATERIALS["snow"] = Material(1.5).
+MATERIALS: dict[str, Material] = dict(
+    [
+        ("metal", METAL),
+        # ITU-R P.2040-3, table 3: eps_r = a f^b, conductivity = c f^d, f in GHz
+        _made("concrete", 5.24, 0.280),
+        _made("brick", 3.91, 0.0344),
+        _made("marble", 7.07, 0.0464),
+        _made("plasterboard", 2.73, 0.0739),
+        _made("wood", 1.99, 0.0554),
+        _made("glass", 6.31, 0.0787),
+        _made("dry soil", 3.0, 0.0497),
+        _made("moist soil", 11.9, 1.49),
+        _made("wet soil", 11.9, 2.99),
+        # Meissner and Wentz 2004, 2012 at 20 degrees Celsius, 0 and 35 g/kg of salt
+        _made("water", 60.7, 18.2),
+        _made("sea water", 55.9, 20.6),
+        # von Hippel 1954: dry sandy soil, loss tangent 0.0036
+        _made("sand", 2.53, 0.0051),
+        # Olkkonen 2016 (7 to 17 GHz); loss from the depth of 13 cm at 8 GHz of Jaselskis et al. 2003
+        _made("asphalt", 5.0, 0.046),
+    ]
+)
+
+
+def resolve(
+    material: Any, materials: Any, shape: tuple[int, ...]
+) -> tuple[np.ndarray, np.ndarray, tuple[Material, ...]]:
+    """What the keywords `material`, `materials` mean for `shape` facets or cells: (index, reflectivity, table).
+
+    material   a name of MATERIALS or `materials`, a Material, an amplitude reflectivity of a perfect conductor
+               (0 to 1), or an array of `shape` of one of these; with `materials`, whole numbers index it
+    materials  materials in the same words
+    The table's materials have reflectivity 1: theirs is in the second array. ValueError names what is not known.
+    """
+    listed = None if materials is None else _listed(materials)
+    names = {m.name: (m, r) for m, r in listed or () if m.name}
+    given = _array(material)
+    if given.ndim and given.shape != shape:
+        raise ValueError(f"material has shape {given.shape}, wanted one for all or {shape}")
+    whole = given.dtype.kind in "iu"
+    if whole and listed is not None:
+        if given.size and not 0 <= given.min() <= given.max() < len(listed):
+            bad = given.min() if given.min() < 0 else given.max()
+            raise ValueError(f"material holds {bad}; whole numbers are places in materials, 0 to {len(listed) - 1}")
+        index, kinds = given, listed
+    elif whole and given.ndim:
+        raise ValueError(
+            "material is an array of whole numbers; give the materials=[...] they are places in, or floats from 0 to 1 "
+            "for reflectivities"
+        )
+    elif given.dtype.kind in "iuf":
+        value = _reflectivity(given)
+        return (
+            np.broadcast_to(np.int32(0), shape),
+            np.broadcast_to(value, shape),
+            (METAL,),
+        )
+    elif given.dtype.kind == "U":
+        words, index = np.unique(given, return_inverse=True)
+        index, kinds = index.reshape(given.shape), [_one(str(word), names) for word in words]
+    else:
+        places: dict[Any, int] = {}
+        index = np.array([places.setdefault(_key(m), len(places)) for m in given.flat], np.int32)
+        index, kinds = index.reshape(given.shape), [_one(m, names) for m in places]
+    table, place = merge([[m for m, _ in kinds]])
+    factor = np.array([r for _, r in kinds])
+    return (
+        np.broadcast_to(place[0][index].astype(np.int32), shape),
+        np.broadcast_to(factor[index], shape),
+        table,
+    )
+
+
+def merge(tables: Sequence[Sequence[Material]]) -> tuple[tuple[Material, ...], list[np.ndarray]]:
+    """Tables as one without repeats, and for each the places of its materials there."""
+    joined: dict[Material, int] = {}
+    places = [np.array([joined.setdefault(m, len(joined)) for m in table], np.int32) for table in tables]
+    return tuple(joined), places
+
+
+def _array(material: Any) -> np.ndarray:
+    """`material` as an array of numbers, of words, or of objects."""
+    if isinstance(material, (Material, Mapping)) or material is None:
+        out = np.empty((), object)
+        out[()] = material
+        return out
+    out = np.asarray(material)
+    # lists of words and numbers would all become words
+    mixed = out.dtype.kind == "U" and not isinstance(material, (str, np.ndarray, np.generic))
+    return np.asarray(material, object) if mixed or out.dtype.kind not in "iufU" else out
+
+
+def _key(material: Any) -> Any:
+    try:
+        hash(material)
+    except TypeError:
+        raise _unknown(material, {}) from None
+    return material
+
+
+def _listed(materials: Any) -> list[tuple[Material, float]]:
+    if isinstance(materials, (str, Mapping)) or not isinstance(materials, Sequence) or not len(materials):
+        raise ValueError(f"materials is {materials!r:.60}; give a list of materials, such as ['metal', 'concrete']")
+    return [_one(m, {}) for m in materials]
+
+
+def _one(material: Any, names: Mapping[str, tuple[Material, float]]) -> tuple[Material, float]:
+    """A material of reflectivity 1, and its reflectivity."""
+    if isinstance(material, Material):
+        return replace(material, reflectivity=1.0), material.reflectivity
+    if isinstance(material, str):
+        if material in names:
+            return names[material]
+        if material not in MATERIALS:
+            raise _unknown(material, names)
+        return _one(MATERIALS[material], names)
+    if isinstance(material, Mapping):
+        raise _unknown(material, names)
+    return METAL, float(_reflectivity(np.asarray(validation.number("material", material))))
+
+
+def _unknown(material: Any, names: Mapping[str, Any]) -> ValueError:
+    known = ", ".join(map(repr, [*names, *(n for n in MATERIALS if n not in names)]))
+    return ValueError(
+        f"material is {material!r:.60}; known are {known}; or give a sarcl.Material, or a reflectivity from 0 to 1"
+    )
+
+
+def _reflectivity(value: np.ndarray) -> np.ndarray:
+    """Amplitude reflectivities, 0 to 1."""
+    validation.finite("material", value)
+    if value.min(initial=0) < 0:
+        raise ValueError(f"material is {value.min():g}; it must be at least 0: a number is an amplitude reflectivity")
+    if value.max(initial=0) > 1:
+        raise ValueError(
+            f"material is {value.max():g}; an amplitude reflectivity lies between 0 and 1: a number stands for a "
+            "perfect conductor that returns so much"
+        )
+    return value.astype(np.float64)

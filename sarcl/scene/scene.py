@@ -1,0 +1,383 @@
+"""Scenes: point scatterers and triangular facets, from arrays, heights, meshes and elevation models."""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Mapping
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..base.boxes import box as box
+from . import terrain
+from . import triangles as geometry
+from .material import METAL, Material, merge, resolve
+from .triangles import areas as areas
+from .triangles import centroids as centroids
+from .triangles import edges as edges
+from .triangles import normals as normals
+
+log = logging.getLogger(__name__)
+
+POINT_HEIGHTS = 1  # stream of random numbers; 0 is that of the facets' heights
+
+
+@dataclass(frozen=True, eq=False)
+class Scene:
+    """Point scatterers and triangular facets in one Cartesian frame, m. Scenes add: ``ground + tank``.
+
+    positions        points, m (n, 3)
+    amplitudes       complex (n,); |amplitude|^2 is the radar cross section, m^2
+    triangles        facet corners, m (k, 3, 3), counter-clockwise seen from outside
+    reflectivity     factor on each facet's amplitude, 0 to 1 (k,); that of its material is part of it
+    roughness        standard deviation of each facet's height, m (k,): `echo` moves every facet along its normal
+                     by a seeded Gaussian height, which makes speckle once it exceeds about a quarter wavelength
+    two_sided        facets that reflect from both sides (k,): open sheets, and meshes that are not watertight
+    material         each facet's place in materials, int32 (k,), default 0
+    materials        tuple of sarcl.Material, default a perfect conductor; their own reflectivity is moved into
+                     `reflectivity`
+    point_roughness  how far one standard deviation moves each corner, m (k, 3, 3); `realized` moves them
+    heights          (x, y, z) of the largest terrain in it, as of from_heights, where it has one: `echo` finds what
+                     that hides by horizons, as long as its facets are all there, cut or not
+    """
+
+    positions: np.ndarray
+    amplitudes: np.ndarray
+    triangles: np.ndarray
+    reflectivity: np.ndarray
+    roughness: np.ndarray
+    two_sided: np.ndarray
+    material: np.ndarray = None  # type: ignore[assignment]
+    materials: tuple[Material, ...] = ()
+    point_roughness: np.ndarray = None  # type: ignore[assignment]
+    heights: terrain.Heights | None = None
+
+    def __post_init__(self) -> None:
+        n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
+        if n + k == 0:
+            raise ValueError("scene is empty; give it at least one point or facet")
+        if self.material is None:
+            object.__setattr__(self, "material", np.broadcast_to(np.int32(0), (k,)))
+        if self.point_roughness is None:
+            object.__setattr__(self, "point_roughness", _none(k))
+        shapes = {"positions": (n, 3), "triangles": (k, 3, 3), "amplitudes": (n,), "point_roughness": (k, 3, 3)}
+        dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
+        for name in _ARRAYS:
+            value, dtype = getattr(self, name), dtypes.get(name, np.float64)
+            # What is read-only already needs no copy.
+            if not isinstance(value, np.ndarray) or value.flags.writeable or value.dtype != dtype:
+                value = validation.sealed(validation.converted(f"scene {name}", value, dtype))
+            wanted = shapes.get(name, (k,))
+            if value.shape != wanted:
+                raise ValueError(f"scene {name} has shape {value.shape}, wanted {wanted}")
+            validation.finite(f"scene {name}", value if any(value.strides) else value[:1])  # one number for all
+            object.__setattr__(self, name, value)
+        if (self.roughness < 0).any():
+            bad = int(np.argmin(self.roughness))
+            raise ValueError(f"roughness[{bad}] is {self.roughness[bad]:g} m; a standard deviation cannot be negative")
+        self._check_materials()
+
+    def _check_materials(self) -> None:
+        """One table of materials of reflectivity 1, which every facet's index falls into."""
+        table = tuple(self.materials) or ((METAL,) if len(self.triangles) else ())
+        for m in table:
+            validation.instance("materials", m, Material)
+        if self.material.size and not 0 <= self.material.min() <= self.material.max() < len(table):
+            bad = self.material.min() if self.material.min() < 0 else self.material.max()
+            raise ValueError(f"scene material holds {bad}; it is a place in materials, 0 to {len(table) - 1}")
+        if any(m.reflectivity != 1 for m in table):
+            factor = np.array([m.reflectivity for m in table])[self.material]
+            object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
+            table = tuple(replace(m, reflectivity=1.0) for m in table)
+        object.__setattr__(self, "materials", table)
+
+    @classmethod
+    def points(cls, positions: Any, amplitudes: Any = 1.0) -> Scene:
+        """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
+        positions = validation.array("positions", positions, np.float64, ("n", 3))
+        if np.ndim(amplitudes) == 0:
+            amplitudes = [amplitudes] * len(positions)
+        amplitudes = validation.array("amplitudes", amplitudes, np.complex128, (len(positions),))
+        return cls(positions, amplitudes, np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool))
+
+    @classmethod
+    def facets(
+        cls,
+        triangles: Any,
+        *,
+        material: Any = "metal",
+        materials: Any = None,
+        reflectivity: Any = 1.0,
+        roughness: Any = 0.0,
+        point_roughness: Any = None,
+        two_sided: Any = True,
+    ) -> Scene:
+        """Facets from their corners, m (k, 3, 3). Facets of no area are left out and counted in the log.
+
+        material      a name of sarcl.scene.material.MATERIALS, a sarcl.Material, a number (a perfect conductor of this
+                      amplitude reflectivity, 0 to 1), or one of these for each facet (k,)
+        materials     a list of materials that `material` names, or that its whole numbers are places in
+        reflectivity  another factor, 0 to 1, one or (k,)
+        roughness, two_sided   as in Scene, one or (k,);  point_roughness  as in Scene (k, 3, 3)
+        ValueError when there are none, a corner is not finite, or every facet has zero area.
+        """
+        triangles = validation.array("triangles", triangles, np.float64, ("n_facets", 3, 3))
+        k = len(triangles)
+        index, factor, table = resolve(material, materials, (k,))
+        factor = factor * terrain.spread("reflectivity", reflectivity, (k,))
+        if not ((factor >= 0) & (factor <= 1)).all():
+            raise ValueError("reflectivity must lie between 0 and 1: it is a factor on the amplitude")
+        parts: dict[str, Any] = {
+            "triangles": triangles,
+            "reflectivity": validation.sealed(factor),
+            "roughness": terrain.spread("roughness", roughness, (k,)),
+            "two_sided": terrain.spread("two_sided", two_sided, (k,), np.bool_),
+            "material": index,
+            "point_roughness": _none(k),
+        }
+        if point_roughness is not None:
+            parts["point_roughness"] = validation.array("point_roughness", point_roughness, np.float64, (k, 3, 3))
+        solid = geometry.solid(triangles)
+        if not solid.any():
+            raise ValueError(f"all {k} facets are degenerate (zero area); nothing would reflect: check the mesh")
+        if not solid.all():
+            log.info("left out %d of %d facets: zero area", k - solid.sum(), k)
+            parts = {n: validation.sealed(a[solid]) for n, a in parts.items()}
+        return cls(positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128), materials=table, **parts)
+
+    @classmethod
+    def from_mesh(
+        cls,
+        mesh: Any,
+        *,
+        material: str | float | Material | Mapping[str, Any] = "metal",
+        scale: float = 1.0,
+        position: Any = (0.0, 0.0, 0.0),
+        rotation: Any = None,
+        max_edge: float | None = None,
+        roughness: float = 0.0,
+        repair: bool = True,
+    ) -> Scene:
+        """A mesh file that trimesh reads, or a trimesh.Trimesh or .Scene: corner -> rotation(scale corner) + position.
+
+        material  one for all, or {part: material}, a part named by its node, geometry or material in the file;
+                  "*" is every part not named
+        scale     m per unit of the file
+        position  m (3,)
+        rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
+        max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
+        repair    drop repeated faces, wind neighbours alike, turn closed bodies outside (said in the log)
+
+        A mesh that is not watertight reflects from both sides of its facets, so that its winding does not
+        matter. FileNotFoundError, ValueError: file missing, unreadable, without faces, corners not finite.
+        """
+        from ..io.mesh import load, part_materials
+
+        scale = validation.number("scale", scale, above=0)
+        position = validation.array("position", position, np.float64, (3,))
+        turn = geometry.rotation(rotation)
+        loaded = load(mesh, repair)
+        scene = cls.facets(
+            loaded.triangles * scale @ turn.T + position,
+            **part_materials(material, loaded),
+            roughness=roughness,
+            two_sided=not loaded.closed,
+        )
+        return scene if max_edge is None else scene.split(max_edge)
+
+    @classmethod
+    def from_heights(
+        cls,
+        x: Any,
+        y: Any,
+        z: Any,
+        *,
+        material: Any = "metal",
+        materials: Any = None,
+        roughness: Any = 0.0,
+        point_roughness: Any = 0.0,
+    ) -> Scene:
+        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a cell, facing up.
+
+        z                or a function z(x, y) of two arrays (n_y, n_x)
+        material         one, or one a cell (n_y - 1, n_x - 1); materials  as in Scene.facets
+        roughness        m, one number or one per cell: moves the cell's facets along their normals
+        point_roughness  m, one number or one per grid point (n_y, n_x): standard deviation of its height; moves
+                         centres and tilts facets, the surface stays closed (`Scene.realized`)
+        """
+        points = terrain.grid(x, y, z)
+        up = np.array([0.0, 0.0, 1.0])
+        made = cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
+        return replace(made, heights=terrain.heights(points))
+
+    @classmethod
+    def from_dem(
+        cls,
+        path: Any,
+        *,
+        bounds: Any = None,
+        center: Any = None,
+        frame: str = "local",
+        heights: str | None = None,
+        geoid: Any = None,
+        nodata: float | None = None,
+        material: Any = "metal",
+        materials: Any = None,
+        roughness: Any = 0.0,
+        point_roughness: Any = 0.0,
+    ) -> Scene:
+        """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[dem].
+
+        bounds   (west, south, east, north), degrees, default the whole file
+        center   (longitude, latitude[, height]), degrees and m: origin of the local frame, default the middle of
+                 what is read at height 0 of the ellipsoid
+        frame    "local": x east, y north, z up at center; "ecef": Earth-centred, Earth-fixed
+        heights  what the heights are above where the file does not say: "ellipsoid", or the geoid's name
+                 ("EGM96", "EGM2008")
+        geoid    height of that geoid above the ellipsoid, m: a number, an array of the points read, a function
+                 of longitude and latitude in degrees, or a raster file of it; 0 takes heights above the geoid for
+                 heights above the ellipsoid, with a warning
+        nodata   a height that means none, where the file does not say
+        material, materials, roughness, point_roughness   as in from_heights, rows as in the file
+
+        Cells without data have no facets (counted in the log). FileNotFoundError, ImportError; ValueError: no CRS,
+        no vertical reference, nothing in bounds, only nodata, heights that are no heights.
+        """
+        from ..io import elevation
+
+        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+        points, up = elevation.place(tile, frame, center)
+        return cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
+
+    def __repr__(self) -> str:
+        size = " x ".join(f"{s:.4g}" for s in self.bounds[1] - self.bounds[0])
+        return f"Scene({len(self.positions)} points, {len(self.triangles)} facets, {size} m)"
+
+    def __add__(self, other: Scene) -> Scene:
+        if not isinstance(other, Scene):
+            return NotImplemented
+        table, places = merge([self.materials, other.materials])
+        moves = self.has_random_points or other.has_random_points
+        names = (n for n in _ARRAYS if n != "point_roughness" or moves)
+        joined = {n: validation.sealed(np.concatenate([getattr(self, n), getattr(other, n)])) for n in names}
+        parts = [p[s.material] for p, s in zip(places, (self, other), strict=True)]
+        joined["material"] = validation.sealed(np.concatenate(parts))
+        largest = max((s.heights for s in (self, other)), key=lambda h: 0 if h is None else h[2].size)
+        return Scene(**joined, materials=table, heights=largest)
+
+    @property
+    def has_random_points(self) -> bool:
+        """True where point_roughness is still to be realized."""
+        return any(self.point_roughness.strides) and bool(self.point_roughness.any())
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Lower and upper corner of the box that holds everything, m (2, 3)."""
+        corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
+        return box(corners)
+
+    @property
+    def center(self) -> np.ndarray:
+        """Centre of that box, m (3,)."""
+        return self.bounds.mean(axis=0)
+
+    def height_at(self, x: float, y: float) -> float:
+        """Height of the highest facet at (x, y), m, in a frame whose z points up. ValueError where there is none."""
+        x, y = validation.number("x", x), validation.number("y", y)
+        z = geometry.highest(self.triangles, x, y)
+        if z is None:
+            low, high = self.bounds
+            raise ValueError(
+                f"no facet lies at x {x:g}, y {y:g} m; the scene reaches from ({low[0]:g}, {low[1]:g}) to "
+                f"({high[0]:g}, {high[1]:g})"
+            )
+        return z
+
+    def on(self, ground: Scene, x: float, y: float, *, depth: float = 0.0) -> Scene:
+        """This scene moved so that its origin is over (x, y) and its lowest point `depth` m under `ground` there.
+
+        Composites are sums: ``ground + tank.on(ground, 10, -5)``. ValueError where there is no ground at (x, y).
+        """
+        validation.instance("ground", ground, Scene)
+        rise = ground.height_at(x, y) - float(self.bounds[0, 2]) - validation.number("depth", depth)
+        return self.moved((x, y, rise))
+
+    def moved(self, by: Any) -> Scene:
+        """This scene moved by a vector, m (3,)."""
+        by = validation.array("by", by, np.float64, (3,))
+        positions, triangles = validation.sealed(self.positions + by), validation.sealed(self.triangles + by)
+        heights = self.heights
+        if heights is not None:
+            x, y, z = (validation.sealed(values + step) for values, step in zip(heights, by, strict=True))
+            heights = x, y, z
+        return replace(self, positions=positions, triangles=triangles, heights=heights)
+
+    def realized(self, seed: int = 0) -> Scene:
+        """One surface of those that point_roughness describes: every corner moved by a seeded Gaussian number.
+
+        The number is a hash of the seed and the corner's own place, so facets that share a corner stay joined,
+        and neither order nor neighbours matter. Scenes without point_roughness are returned as they are.
+        """
+        seed = validation.count("seed", seed, 0)
+        if not self.has_random_points:
+            return self
+        from ..base.counter_rng import gaussian
+
+        random = gaussian(self.triangles.reshape(-1, 3), seed, POINT_HEIGHTS).reshape(-1, 3, 1)
+        moved = validation.sealed(self.triangles + random * self.point_roughness)
+        heights = None if self.heights is None else terrain.raised(self.heights, self.triangles, moved)
+        return replace(self, triangles=moved, point_roughness=_none(len(moved)), heights=heights)
+
+    def part(self, which: np.ndarray) -> Scene:
+        """The scene with some of its facets alone, bool (k,)."""
+        parts: dict[str, Any] = {n: validation.sealed(getattr(self, n)[which]) for n in _FACET_ARRAYS}
+        return replace(self, **parts)
+
+    def split(self, max_edge: float, max_facets: int = 50_000_000) -> Scene:
+        """The same surface with facets bisected at their longest edge until none is longer than max_edge, m.
+
+        MemoryError when more than `max_facets` would be needed; ValueError for point_roughness not yet realized.
+        """
+        max_edge = validation.number("max_edge", max_edge, above=0)
+        if len(self.triangles) == 0:
+            return self
+        if self.has_random_points:
+            raise ValueError(
+                "point_roughness is one random height for each grid point, which cutting facets would add points to; "
+                "call scene.realized(seed) first"
+            )
+        too_many = (
+            f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
+            "take a smaller scene, a larger max_edge or a coarser resolution"
+        )
+        # No facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory.
+        if areas(self.triangles).sum() > max_facets * np.sqrt(3) / 4 * max_edge**2:
+            raise MemoryError(too_many)
+        triangles, row = self.triangles, np.arange(len(self.triangles))
+        done: list[tuple[np.ndarray, np.ndarray]] = []
+        n_done = 0
+        while len(triangles):
+            lengths = edges(triangles)
+            long = np.maximum.reduce(lengths) > max_edge
+            done.append((triangles[~long], row[~long]))
+            n_done += len(done[-1][0])
+            if n_done + 2 * long.sum() > max_facets:
+                raise MemoryError(too_many)
+            triangles = np.concatenate(geometry.bisect(triangles[long], lengths[:, long]))
+            row = np.tile(row[long], 2)
+        triangles, row = (np.concatenate(a) for a in zip(*done, strict=True))
+        belongs: dict[str, Any] = {
+            n: validation.sealed(getattr(self, n)[row]) for n in ("reflectivity", "roughness", "two_sided", "material")
+        }
+        return replace(self, triangles=validation.sealed(triangles), point_roughness=_none(len(row)), **belongs)
+
+
+_ARRAYS = tuple(n for n in Scene.__dataclass_fields__ if n not in ("materials", "heights"))
+_FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes"))
+
+
+def _none(k: int) -> np.ndarray:
+    """No displacement for k facets, in no memory."""
+    return np.broadcast_to(0.0, (k, 3, 3))

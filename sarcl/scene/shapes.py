@@ -1,0 +1,187 @@
+"""Solids of exact dimensions as facets: ``from sarcl import shapes; ground + shapes.cone(3, 5).on(ground, 10, 0)``.
+
+They stand on z = 0 with their axis along z through the origin (a sphere is about the origin), then are turned and
+moved; all but `plate` and `disc` are closed and face outwards. Corners lie on the true surface, so curved solids are
+inscribed: n facets round the axis stay within 1 - cos(pi/n) of the radius.
+
+    edge        no facet has a longer edge, m: curved surfaces then follow it the better
+    sections    facets round the axis, default 72, or more where `edge` asks for it
+    options     material, materials, reflectivity, roughness, two_sided as in Scene.facets, for all facets;
+                position m (3,), rotation as in Scene.from_mesh
+Each returns a Scene. ValueError names a dimension that is not greater than 0. Source: SARAS Figs 9-17 (cone,
+parallelepiped, cylinder), Wan et al. Figs 6-8 (frustum, cuboid, cylinder).
+"""
+
+from __future__ import annotations
+
+import inspect
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from . import triangles as geometry
+from .scene import Scene
+
+SECTIONS = 72
+MOST_FACETS = 50_000_000
+
+
+def plate(size: Any, *, edge: float | None = None, two_sided: Any = True, **options: Any) -> Scene:
+    """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` asks."""
+    x, y = _dimensions("size", size, 2)
+    corners = np.array([[[-x, -y, 0], [x, -y, 0]], [[-x, y, 0], [x, y, 0]]]) / 2
+    return _placed(geometry.of_grid(corners), edge, two_sided=two_sided, **options)
+
+
+def disc(
+    radius: float, *, edge: float | None = None, sections: int | None = None, two_sided: Any = True, **options: Any
+) -> Scene:
+    """A circular disc about the origin in z = 0, facing up."""
+    radius = validation.number("radius", radius, above=0)
+    return _turned([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
+
+
+def box(size: Any, *, edge: float | None = None, **options: Any) -> Scene:
+    """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` asks."""
+    x, y, z = _dimensions("size", size, 3)
+    low, high = np.array([-x / 2, -y / 2, 0]), np.array([x / 2, y / 2, z])
+    sides = []
+    for axis in range(3):
+        # the other two axes in the order that makes axis their cross product
+        a, b = (axis + 1) % 3, (axis + 2) % 3
+        for end, first, second in ((high, a, b), (low, b, a)):
+            face = np.empty((2, 2, 3))
+            face[..., axis] = end[axis]
+            face[..., first] = [[low[first], high[first]]] * 2
+            face[..., second] = [[low[second]] * 2, [high[second]] * 2]
+            sides.append(geometry.of_grid(face))
+    return _placed(np.concatenate(sides), edge, **options)
+
+
+def cylinder(
+    radius: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+) -> Scene:
+    """An upright circular cylinder with its lids."""
+    radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
+    return _turned([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
+
+
+def cone(
+    radius: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+) -> Scene:
+    """An upright circular cone with its base."""
+    radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
+    return _turned([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
+
+
+def frustum(
+    bottom: float, top: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+) -> Scene:
+    """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
+    bottom, top = validation.number("bottom", bottom, above=0), validation.number("top", top, above=0)
+    height = validation.number("height", height, above=0)
+    return _turned([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
+
+
+def sphere(radius: float, *, edge: float | None = None, facets: int | None = None, **options: Any) -> Scene:
+    """A sphere about the origin: an icosahedron whose edges are cut into n, 20 n^2 facets of like size.
+
+    n follows from `edge`, or is the least that gives `facets`, default 2000.
+    """
+    radius = validation.number("radius", radius, above=0)
+    if edge is not None and facets is not None:
+        raise ValueError("sphere takes edge or facets, not both: one follows from the other")
+    if edge is None:
+        return _placed(
+            radius * _geodesic(_cuts(validation.count("facets", 2000 if facets is None else facets))), None, **options
+        )
+    edge = validation.number("edge", edge, above=0)
+    n = max(1, int(np.ceil(1.05 * radius / edge)))  # from the icosahedron's edge; facets amid its faces are larger
+    while (longest := radius * geometry.edges(unit := _geodesic(n)).max()) > edge:
+        n = max(n + 1, int(n * longest / edge))
+    return _placed(radius * unit, None, **options)
+
+
+def _cuts(facets: int) -> int:
+    return int(np.ceil(np.sqrt(facets / 20)))
+
+
+def _geodesic(n: int) -> np.ndarray:
+    """Triangles (20 n^2, 3, 3) of the unit sphere about the origin."""
+    if 20 * n * n > MOST_FACETS:
+        raise MemoryError(f"a sphere of {20 * n * n:,} facets is too fine; take a larger edge or fewer facets")
+    # corners of the icosahedron are p + q g, g the golden section: sums of whole numbers are the same on both sides
+    # of an edge to the last bit, so that facets stay joined
+    p = np.array([(-1, 0, 0), (1, 0, 0), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1, 0), (0, 1, 0),
+                  (0, 0, -1), (0, 0, 1), (0, 0, -1), (0, 0, 1)])  # fmt: skip
+    q = np.array([(0, 1, 0), (0, 1, 0), (0, -1, 0), (0, -1, 0), (0, 0, 1), (0, 0, 1), (0, 0, -1), (0, 0, -1),
+                  (1, 0, 0), (1, 0, 0), (-1, 0, 0), (-1, 0, 0)])  # fmt: skip
+    faces = np.array([(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2),
+                      (10, 7, 6), (7, 1, 8), (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5),
+                      (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)])  # fmt: skip
+    i, j = (a.ravel() for a in np.meshgrid(np.arange(n), np.arange(n), indexing="ij"))
+
+    def steps(rows: np.ndarray, corners: tuple[tuple[int, int], ...]) -> np.ndarray:
+        return np.stack([np.stack([i + a, j + b], axis=-1)[rows] for a, b in corners], axis=1)
+
+    both = [steps(i + j < n, ((0, 0), (1, 0), (0, 1))), steps(i + j < n - 1, ((1, 0), (1, 1), (0, 1)))]
+    s, t = np.moveaxis(np.concatenate(both), -1, 0)[..., None]
+    whole = [((n - s - t) * m[a] + s * m[b] + t * m[c]) for m in (p, q) for a, b, c in faces]
+    out = np.concatenate(whole[:20]) + np.concatenate(whole[20:]) * ((1 + np.sqrt(5)) / 2)
+    return out / np.sqrt(out[..., :1] ** 2 + out[..., 1:2] ** 2 + out[..., 2:] ** 2)
+
+
+def _turned(profile: Any, edge: float | None, sections: int | None, **options: Any) -> Scene:
+    """The surface that a line of (radius, z), from below to above, sweeps round the z axis."""
+    n = SECTIONS if sections is None else validation.count("sections", sections, 3)
+    line = np.array(profile, np.float64)
+    if edge is not None:
+        # rings and sections so close that a cell's diagonal is no longer than `edge`
+        side = validation.number("edge", edge, above=0) / np.sqrt(2)
+        if sections is None:
+            n = max(n, int(np.ceil(2 * np.pi * line[:, 0].max() / side)))
+        steps = np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / side).astype(int)
+        if 2 * n * steps.sum() > MOST_FACETS:
+            raise MemoryError(f"edge {edge:g} m asks for {2 * n * steps.sum():,} facets; take a larger one")
+        between = np.concatenate([[0.0], *(i + np.arange(1, m + 1) / m for i, m in enumerate(steps))])
+        line = np.stack([np.interp(between, np.arange(len(line)), v) for v in line.T], axis=-1)
+    angle = 2 * np.pi * np.arange(n) / n
+    round_ = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[np.arange(n + 1) % n]  # ends where it began, exactly
+    rings = np.concatenate([line[:, None, :1] * round_, np.broadcast_to(line[:, None, 1:], (len(line), n + 1, 1))], -1)
+    triangles = geometry.of_grid(rings)
+    return _placed(triangles[geometry.solid(triangles)], edge, **options)
+
+
+def _placed(
+    triangles: np.ndarray, edge: float | None, *, position: Any = (0.0, 0.0, 0.0), rotation: Any = None, **options: Any
+) -> Scene:
+    """Facets cut, turned and moved."""
+    position = validation.array("position", position, np.float64, (3,))
+    options = {"two_sided": False, **options}
+    scene = Scene.facets(triangles @ geometry.rotation(rotation).T + position, **options)
+    return scene if edge is None else scene.split(validation.number("edge", edge, above=0))
+
+
+def _dimensions(name: str, size: Any, n: int) -> list[float]:
+    size = validation.array(name, size, np.float64, (n,))
+    return [validation.number(f"{name}[{i}]", v, above=0) for i, v in enumerate(size)]
+
+
+SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere)
+
+
+def _spell_out(shape: Any) -> None:
+    """Let help() and scenario files see what `options` may hold."""
+    own = inspect.signature(shape)
+    more = [p for call in (_placed, Scene.facets) for p in inspect.signature(call).parameters.values()]
+    parameters = {p.name: p for p in more if p.kind is p.KEYWORD_ONLY and p.name != "point_roughness"}
+    parameters["two_sided"] = parameters["two_sided"].replace(default=False)
+    parameters.update(own.parameters)
+    del parameters["options"]
+    order = sorted(parameters.values(), key=lambda p: p.kind)
+    shape.__dict__["__signature__"] = own.replace(parameters=order)
+
+
+for _one in SHAPES:
+    _spell_out(_one)

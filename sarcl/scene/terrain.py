@@ -1,0 +1,167 @@
+"""Surfaces over grids of points, as facets."""
+
+from __future__ import annotations
+
+import logging
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from . import triangles as geometry
+from .material import resolve
+
+log = logging.getLogger(__name__)
+
+Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both rising, and z (n_y, n_x), m
+UNEVEN = 2.0
+ON = 1e-9  # of a terrain's size: corners no further off it are on it
+
+
+def grid(x: Any, y: Any, z: Any) -> np.ndarray:
+    """Points, m (n_y, n_x, 3), of heights z (n_y, n_x), or a function z(x, y), over increasing x (n_x,), y (n_y,)."""
+    x = validation.array("x", x, np.float64, ("n_x",))
+    y = validation.array("y", y, np.float64, ("n_y",))
+    over = np.meshgrid(x, y)
+    if callable(z):
+        z = z(*over)
+        z = np.full(over[0].shape, z) if np.ndim(z) == 0 else z
+    z = validation.array("z", z, np.float64, (len(y), len(x)))
+    for name, axis in (("x", x), ("y", y)):
+        if len(axis) < 2 or not (np.diff(axis) > 0).all():
+            raise ValueError(
+                f"{name} must hold at least two increasing values: a cell needs an extent; turn a falling axis "
+                "round together with z"
+            )
+    return np.stack([*over, z], axis=-1)
+
+
+def heights(points: np.ndarray) -> Heights:
+    """What `grid` made these of."""
+    x, y, z = points[0, :, 0], points[:, 0, 1], points[..., 2]
+    return validation.sealed(x.copy()), validation.sealed(y.copy()), validation.sealed(z.copy())
+
+
+def surface(
+    points: np.ndarray, up: np.ndarray, material: Any, materials: Any, roughness: Any, point_roughness: Any
+) -> dict[str, Any]:
+    """Arguments of Scene.facets for a grid of points, m (n, m, 3): two facets a cell, none where a point is NaN.
+
+    They face `up`, unit vectors (3,) or (n, m, 3), along which point_roughness, m, one or (n, m), moves points.
+    material, materials, roughness   one, or one a cell (n - 1, m - 1)
+    """
+    cells = (points.shape[0] - 1, points.shape[1] - 1)
+    index, factor, table = resolve(material, materials, cells)
+    roughness = spread("roughness", roughness, cells)
+    deviation = spread("point_roughness", point_roughness, points.shape[:2])
+    if (deviation < 0).any():
+        raise ValueError(f"point_roughness reaches {deviation.min():g} m; a standard deviation cannot be negative")
+    triangles = geometry.of_grid(points)
+    up = np.broadcast_to(up, points.shape)
+    good = np.isfinite(triangles).all(axis=(1, 2))
+    if not good.any():
+        raise ValueError("no cell has heights at all its corners; nothing would reflect")
+    if not good.all():
+        log.info("left out %d of %d facets: no data", len(good) - good.sum(), len(good))
+    moves = geometry.of_grid(deviation[..., None] * up)[good] if deviation.any() else None
+    triangles = triangles[good]
+    row, column = np.divmod(np.argmax(good) // 2, cells[1])
+    a, b, c = triangles[0]
+    if np.cross(b - a, c - a) @ up[row, column] < 0:  # rows run down the map: turn facets round
+        triangles = triangles[:, ::-1]
+        moves = None if moves is None else moves[:, ::-1]
+    index, factor, roughness = (np.repeat(v.reshape(-1), 2)[good] for v in (index, factor, roughness))
+    return {
+        "triangles": triangles,
+        "material": index,
+        "materials": table,
+        "reflectivity": factor,
+        "roughness": roughness,
+        "point_roughness": moves,
+        "two_sided": False,
+    }
+
+
+def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
+    """`value` for every facet, cell or point: one number for all, or an array of `shape`; read-only."""
+    if np.ndim(value) == 0:
+        return np.broadcast_to(validation.array(name, value, dtype, ()), shape)
+    return validation.array(name, value, dtype, shape)
+
+
+def heights_of(value: Any) -> Heights:
+    """Checked (x, y, z) of a terrain."""
+    try:
+        x, y, z = value
+    except (TypeError, ValueError):
+        raise ValueError("heights must be (x, y, z): grid lines (n_x,) and (n_y,) and heights (n_y, n_x)") from None
+    x = validation.array("heights x", x, np.float64, ("n_x",))
+    y = validation.array("heights y", y, np.float64, ("n_y",))
+    z = validation.array("heights z", z, np.float64, (len(y), len(x)))
+    for name, axis in (("x", x), ("y", y)):
+        if len(axis) < 2 or not (np.diff(axis) > 0).all():
+            raise ValueError(f"heights {name} must hold at least two increasing values, as Scene.from_heights wants")
+    return x, y, z
+
+
+def above(grid: Heights, points: np.ndarray) -> np.ndarray:
+    """Heights of points, m (n, 3), above the terrain, m (n,); inf beside it."""
+    x, y, z = grid
+    px, py, pz = points.T
+    inside = (px >= x[0]) & (px <= x[-1]) & (py >= y[0]) & (py <= y[-1])
+    i = np.clip(np.searchsorted(x, px, side="right") - 1, 0, len(x) - 2)
+    j = np.clip(np.searchsorted(y, py, side="right") - 1, 0, len(y) - 2)
+    u, v = (px - x[i]) / (x[i + 1] - x[i]), (py - y[j]) / (y[j + 1] - y[j])
+    # the cell's two triangles, as Scene.from_heights cuts it
+    a, d = z[j, i], z[j + 1, i + 1]
+    ground = np.where(u >= v, a + u * (z[j, i + 1] - a) + v * (d - z[j, i + 1]), a + v * (z[j + 1, i] - a))
+    ground = np.where(u >= v, ground, ground + u * (d - z[j + 1, i]))
+    return np.where(inside, pz - ground, np.inf)
+
+
+def check_above(name: str, grid: Heights, ends: np.ndarray) -> None:
+    """ValueError for an antenna under the terrain."""
+    high = above(grid, ends)
+    if high.min() < 0:
+        at = int(high.argmin())
+        raise ValueError(
+            f"{name}[{at}] stands {-high[at]:.3g} m under the terrain; raise the track, or check that track and "
+            "heights are told above the same surface"
+        )
+
+
+def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
+    """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it.
+
+    None too for cells twice as long or wide as others: range lines would miss some of their edges (docs/shadows.md).
+    """
+    x, y, z = grid
+    steps = np.concatenate([np.diff(x), np.diff(y)])
+    if steps.max() > UNEVEN * steps.min():
+        return None
+    size = max(x[-1] - x[0], y[-1] - y[0], np.ptp(z))
+    corners = triangles.reshape(-1, 3).copy()
+    # a rounding outside its border is on it
+    for axis, ends in enumerate((x, y)):
+        near = np.clip(corners[:, axis], ends[0], ends[-1])
+        corners[:, axis] = np.where(np.abs(near - corners[:, axis]) <= ON * size, near, corners[:, axis])
+    on = np.asarray((np.abs(above(grid, corners)) <= ON * size).reshape(-1, 3).all(axis=1))
+    whole = geometry.areas(geometry.of_grid(_points(grid))).sum()
+    return on if abs(geometry.areas(triangles[on]).sum() - whole) <= 1e-6 * whole else None
+
+
+def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | None:
+    """The terrain whose corners, m (k, 3, 3) before, have moved up or down; None where they moved sideways too."""
+    x, y, z = grid
+    before, after = before.reshape(-1, 3), after.reshape(-1, 3)
+    column, row = (np.clip(np.searchsorted(a, v), 0, len(a) - 1) for a, v in zip((x, y), before.T[:2], strict=True))
+    mine = (x[column] == before[:, 0]) & (y[row] == before[:, 1]) & (z[row, column] == before[:, 2])
+    if (before[mine, :2] != after[mine, :2]).any():
+        return None
+    out = z.copy()
+    out[row[mine], column[mine]] = after[mine, 2]
+    return x, y, validation.sealed(out)
+
+
+def _points(grid: Heights) -> np.ndarray:
+    return np.stack([*np.meshgrid(*grid[:2]), grid[2]], axis=-1)

@@ -1,0 +1,102 @@
+"""Geometry of triangles, and rotations: plain arrays in, plain arrays out."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+
+
+def edges(triangles: np.ndarray) -> np.ndarray:
+    """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
+    d = (triangles[:, (i + 1) % 3] - triangles[:, i] for i in range(3))
+    return np.stack([np.sqrt(np.einsum("ij,ij->i", e, e)) for e in d])
+
+
+def areas(triangles: np.ndarray) -> np.ndarray:
+    """Area of each triangle (k, 3, 3), m^2 (k,)."""
+    n = _cross(triangles)
+    return np.sqrt(np.einsum("ij,ij->i", n, n)) / 2
+
+
+def centroids(triangles: np.ndarray) -> np.ndarray:
+    """Centroid of each triangle (k, 3, 3), m (k, 3)."""
+    return (triangles[:, 0] + triangles[:, 1] + triangles[:, 2]) / 3
+
+
+def normals(triangles: np.ndarray) -> np.ndarray:
+    """Outward unit normal of each triangle (k, 3, 3): (k, 3)."""
+    n = _cross(triangles)
+    return n / np.sqrt(np.einsum("ij,ij->i", n, n))[:, None]
+
+
+def solid(triangles: np.ndarray) -> np.ndarray:
+    """True (k,) for triangles with an area that float64 corners can carry: no thinner than 1e-12 of their length."""
+    longest = np.maximum.reduce(edges(triangles))
+    return 2 * areas(triangles) > 1e-12 * longest**2
+
+
+def of_grid(points: np.ndarray) -> np.ndarray:
+    """Two triangles for each cell of a grid of points (n, m, ...): (2 (n - 1) (m - 1), 3, ...).
+
+    Counter-clockwise where the second index grows to the right and the first upwards.
+    """
+    sw, se, nw, ne = points[:-1, :-1], points[:-1, 1:], points[1:, :-1], points[1:, 1:]
+    both = np.stack([np.stack([sw, se, ne], axis=2), np.stack([sw, ne, nw], axis=2)], axis=2)
+    return both.reshape(-1, 3, *points.shape[2:])
+
+
+def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Both halves of every triangle, cut at the middle of its longest edge.
+
+    An edge is cut by its ends alone, so triangles that share it stay joined.
+    """
+    start = lengths.argmax(axis=0)
+    row = np.arange(len(start))
+    a, b, c = (triangles[row, (start + i) % 3] for i in range(3))
+    middle = (a + b) / 2
+    return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+
+
+def highest(triangles: np.ndarray, x: float, y: float) -> float | None:
+    """Largest z of what triangles (k, 3, 3) have above or below (x, y); None where there is none."""
+    if len(triangles) == 0:
+        return None
+    px, py = (triangles[:, :, i] - v for i, v in enumerate((x, y)))
+    inside = (px.min(axis=1) <= 0) & (px.max(axis=1) >= 0) & (py.min(axis=1) <= 0) & (py.max(axis=1) >= 0)
+    px, py, pz = px[inside], py[inside], triangles[inside, :, 2]
+    # area of the triangle that (x, y) makes with the edge opposite each corner
+    opposite = np.roll(px, -1, 1) * np.roll(py, -2, 1) - np.roll(px, -2, 1) * np.roll(py, -1, 1)
+    total = opposite.sum(axis=1)
+    reach = 1e-12 * np.abs(opposite).max(axis=1, initial=0)  # on an edge, rounding must not open a gap
+    same = (opposite >= -reach[:, None]).all(axis=1) | (opposite <= reach[:, None]).all(axis=1)
+    good = same & (np.abs(total) > reach)
+    if not good.any():
+        return None
+    return float(((opposite[good] * pz[good]).sum(axis=1) / total[good]).max())
+
+
+def rotation(given: Any) -> np.ndarray:
+    """Matrix (3, 3) of a rotation, given as a matrix, a rotation vector in rad, an angle about z, or None."""
+    if given is None:
+        return np.eye(3)
+    if hasattr(given, "as_matrix"):
+        given = given.as_matrix()
+    if np.ndim(given) == 0:
+        given = (0.0, 0.0, validation.number("rotation", given))
+    if np.ndim(given) == 1:
+        from scipy.spatial.transform import Rotation
+
+        return Rotation.from_rotvec(validation.array("rotation", given, np.float64, (3,)).copy()).as_matrix()
+    matrix = validation.array("rotation", given, np.float64, (3, 3))
+    # float32 matrices are orthonormal to 1e-7 only
+    if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:
+        raise ValueError("rotation is a matrix that does not rotate: its rows must be orthonormal, its determinant +1")
+    left, _, right = np.linalg.svd(matrix)
+    return left @ right
+
+
+def _cross(t: np.ndarray) -> np.ndarray:
+    return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])

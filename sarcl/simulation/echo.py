@@ -1,0 +1,204 @@
+"""Echoes of points and facets, pulse by pulse, to a stated tolerance."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Any
+
+import numpy as np
+
+from ..arrays.channels import is_single
+from ..base import wgs84
+from ..base.report import Report
+from ..base.validation import array as numbers
+from ..base.validation import choice, count, direction, instance
+from ..base.validation import tolerance as allowed_error
+from ..model.antenna_array import AntennaArray
+from ..model.phase_history import PhaseHistory
+from ..model.trajectory import Trajectory
+from ..model.waveform import Waveform
+from ..numerics import plan
+from ..numerics.pulse_geometry import Antennas
+from ..opencl.device import budget, open_device
+from ..scattering import antenna_weights
+from ..scattering.facets import POLARIZATIONS
+from ..scene.scene import Scene
+from . import echo_sampling
+from .channels.array_echo import array_echo
+from .echo_output import Target
+from .scene_echoes import Order, Progress, Work
+
+SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
+
+
+def echo(
+    scene: Scene,
+    waveform: Waveform,
+    track: Trajectory,
+    *,
+    receiver: Trajectory | None = None,
+    polarization: str | Sequence[str] = "HH",
+    vertical: Any = None,
+    range_window: Any = None,
+    reference: Any = None,
+    array: AntennaArray | None = None,
+    channels: str = "simultaneous",
+    receive: str = "reference",
+    antenna: Any = None,
+    radar: Any = None,
+    shadows: bool | str = True,
+    seed: int = 0,
+    skip: Any = True,
+    compressed: bool = True,
+    max_edge: float | str | None = "auto",
+    max_bytes: float | None = None,
+    out: Any = None,
+    tolerance: float = 1e-3,
+    check: bool | None = None,
+    device: Any = None,
+    progress: Progress | None = None,
+) -> PhaseHistory:
+    """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.
+
+    scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
+                  coefficients, the exact phase of the wave over every facet, single scattering (docs/facets.md)
+    track         transmitter; receiver  a track of as many pulses, default the transmitter's
+    polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": a row a pulse for
+                  each, pulse by pulse. Points send back what they are sent: nothing in HV and VH
+    vertical      (3,), which H lies across and V in a plane with; default z, or in Earth-centred coordinates the
+                  ellipsoid's normal at the scene's centre
+    range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
+                  scatterers outside it are gated out, row by row
+    reference     point of zero phase, m (3,), default the centre of the scene's box
+    array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one:
+                  element n sends the waveform moved by its offset; None: one element
+    channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse
+                  and receiver; "separated": a row of its own for every pulse, sending element and receiver
+    receive       "reference": at the array's reference point; "own": every element hears its own channel
+                  ("separated" only); "all": every element hears all
+    antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
+    radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
+    shadows       True: of every facet only the share counts that both antennas see, along the track; "embree": the
+                  same, rays by that library (package embreex), quicker, and not to the bit the same on all devices
+                  (docs/shadows.md; points are always seen)
+    seed          of the facets' random heights (scene.roughness); the same for any device and block size
+    skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
+                  "out of beam", "equal channels" (of one carrier and place), "interpolated channels" (echoes from few
+                  places of an array stand for all its elements)
+    compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
+    max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
+                  resolution cell too; None: left as they are
+    max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU
+    out           a file of sarcl's (.h5): samples are written there pulse after pulse, and read as they are needed
+    tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
+                  scatterers added with random phases
+    check         recompute 256 random samples exactly; None: where that costs less than 2 %
+    progress      called as progress(stage, done, total)
+
+    Stop and go. Returns a PhaseHistory. ValueError, MemoryError, sarcl.NoDeviceError say what does not fit. Source:
+    the echo equation of sarcl/__init__.py.
+    """
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        instance(name, value, kind)
+    seed = count("seed", seed, 0)
+    if not isinstance(shadows, (bool, np.bool_)):
+        choice("shadows", shadows, ("embree",))
+    opened = open_device(device)
+    order = Order(
+        opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
+        _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed, progress,
+    )  # fmt: skip
+    rx = echo_sampling.receiver_positions(track, receiver)
+    tx = track.positions
+    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
+    reference_range = echo_sampling.half_path(tx, rx, point)
+    given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
+    weights = antenna_weights.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    if array is not None:
+        instance("array", array, AntennaArray)
+        if not is_single(array):
+            return array_echo(
+                array, scene, given, waveform, track, receiver, point, range_window, weights, order,
+                channels=channels, receive=receive, compressed=compressed, check=check, out=out,
+            )  # fmt: skip
+    near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
+    frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, compressed)
+    rows = np.ones(len(tx))
+    antennas = Antennas(
+        tx=tx,
+        rx=None if receiver is None else rx,
+        reference_range=reference_range,
+        frequency=(frequency + n_samples // 2 * step) * rows,
+        frequency_step=step * rows,
+        near=near * rows,
+        far=far * rows,
+    )
+    n = len(order.polarizations)
+    with Target((len(tx), n, n_samples), out, order.budget, (near, far)) as target:
+        frequencies = frequency + step * np.arange(n_samples)
+        pulse = waveform.pulse_spectrum(frequencies)
+        if progress:
+            progress("scene", 0, 3)
+        work, worst = Work(order, given, scene, waveform, antennas, weights), 0.0
+        spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
+        for start in range(0, len(tx), target.pulses):
+            at = slice(start, min(start + target.pulses, len(tx)))
+            block = target.block(start, at.stop)
+            some = antennas.picked(np.arange(start, at.stop))
+            beam = work.weights.seen_from(some.tx, some.tx if some.rx is None else some.rx, at)
+            work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start, beam)
+            worst = max(worst, work.predicted_error)
+            block *= spectrum.astype(np.complex64)
+            target.keep(start, block)
+        work.must_show(near, far)
+        order.clock.lap("spectra")
+        measured = work.measured(antennas, frequencies, spectrum, target, check)
+
+        def every(values: Any) -> Any:
+            return values if n == 1 or values is None else np.repeat(values, n, axis=0)
+
+        velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
+        return target.finish(
+            frequency=frequency,
+            frequency_step=step,
+            tx=every(tx),
+            rx=None if receiver is None else every(rx),
+            reference_range=every(reference_range),
+            time=every(track.times),
+            polarization=np.tile(order.polarizations, len(tx)),
+            tx_velocity=every(velocities[0]),
+            rx_velocity=every(velocities[1]),
+            waveform=waveform,
+            array=array,
+            compressed=compressed,
+            report=Report(
+                plan=work.plan(),
+                tolerance=order.tolerance,
+                predicted_error=worst,
+                measured_error=measured,
+                **work.counted(),
+                seconds=order.clock.seconds,
+                device=opened.info.name,
+                seed=seed,
+            ),
+        )
+
+
+def _polarizations(asked: Any) -> tuple[str, ...]:
+    """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
+    if isinstance(asked, str):
+        asked = POLARIZATIONS if asked == "all" else (asked,)
+    names = tuple(asked) if isinstance(asked, Sequence) else ()
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"polarization is {asked!r}; give at least one, and each once")
+    for name in names:
+        choice("polarization", name, POLARIZATIONS)
+    return names
+
+
+def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
+    """Unit vector (3,): as asked, the ellipsoid's normal at an Earth-centred `center`, m (3,), or z."""
+    if asked is not None:
+        return direction("vertical", asked)
+    normal = wgs84.vertical_at(center)
+    return np.array([0.0, 0.0, 1.0]) if normal is None else normal

@@ -1,0 +1,106 @@
+"""What echoes will take before they are made: rows, bytes, time, error."""
+
+from __future__ import annotations
+
+import logging
+import time
+from dataclasses import dataclass, replace
+from typing import Any
+
+import numpy as np
+
+from ..arrays.channels import channels_of, is_single, sampling
+from ..base import validation
+from ..base.text import duration, size_text
+from ..model import store
+from ..model.antenna_array import AntennaArray
+from ..model.trajectory import Trajectory
+from ..model.waveform import Waveform
+from ..scene.scene import Scene
+from . import echo_sampling
+from .echo import echo
+from .echo_output import log as output_log
+
+FEW, MORE = 8, 40  # pulses from the middle of the track that are really made
+
+
+@dataclass(frozen=True, eq=False)
+class EchoForecast:
+    """What `echo` would do with the same arguments.
+
+    n_rows, n_samples  of the phase history;  bytes  of its samples and geometry, in a file or in memory
+    seconds            about, on this device as fast as it is now
+    contributions      pairs of scatterer, pulse and channel that will be added up, about
+    plan               as in the report;  predicted_error  bound of the relative error
+    """
+
+    n_rows: int
+    n_samples: int
+    bytes: float
+    seconds: float
+    contributions: float
+    plan: dict[str, Any]
+    predicted_error: float
+
+    def __str__(self) -> str:
+        text = f"{self.n_rows} rows of {self.n_samples} samples: {size_text(self.bytes)}, "
+        text += f"about {duration(self.seconds)}, error below {self.predicted_error:.1e}"
+        return text
+
+
+def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Any) -> EchoForecast:
+    """How `echo(scene, waveform, track, ...)` would go with these options: an EchoForecast, before any of it is kept.
+
+    Up to 40 pulses from the middle of the track are made, and timed. Raises what `echo` would, `out` is not touched.
+    """
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        validation.instance(name, value, kind)
+    receiver, array = options.get("receiver"), options.get("array")
+    given = {k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")}
+    real, rx = scene.realized(options.get("seed", 0)), echo_sampling.receiver_positions(track, receiver)
+    asked = options.get("reference")
+    point = scene.center if asked is None else validation.array("reference", asked, np.float64, (3,))
+    reference_range = echo_sampling.half_path(track.positions, rx, point)
+    near, far = echo_sampling.window(real, waveform, track.positions, rx, reference_range, options.get("range_window"))
+    given |= {"reference": point, "range_window": (near, far)}  # of the whole track
+    n_samples = None
+    if isinstance(array, AntennaArray) and not is_single(array):
+        carriers = np.array([c.carrier for c in channels_of(array, waveform.center, len(track))])
+        grid = sampling(carriers, waveform, near, far, options.get("compressed", True))
+        n_samples = grid.width if options.get("channels") == "separated" else grid.n
+
+    def made(n: int) -> tuple[float, Any]:
+        """Seconds of n pulses from the middle of the track, else from where there is something to be seen."""
+        said = None
+        for first in ((len(track) - n) // 2, 0, len(track) - n):
+            at, some = slice(first, first + n), array
+            if isinstance(array, AntennaArray) and array.plan is not None:
+                some = replace(array, plan=array.plan[at])
+            start = time.perf_counter()
+            try:
+                raw = echo(
+                    scene, waveform, track.picked(at), receiver=None if receiver is None else receiver.picked(at),
+                    array=some, check=False, **given,
+                )  # fmt: skip
+            except ValueError as exc:
+                said = said or exc
+            else:
+                return time.perf_counter() - start, raw
+        assert said is not None
+        raise said
+
+    level = output_log.level
+    output_log.setLevel(logging.WARNING)  # these few pulses are not what was asked for
+    try:
+        few, more = min(FEW, len(track)), min(MORE, len(track))
+        made(few)  # builds kernels
+        (once, _), (longer, raw) = made(few), made(more)
+    finally:
+        output_log.setLevel(level)
+    slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more
+    rows = raw.n_rows // more * len(track)
+    n_samples = raw.n_samples if n_samples is None else n_samples
+    return EchoForecast(
+        rows, n_samples, rows * (8.0 * n_samples + store.ROW_BYTES), longer + slope * (len(track) - more),
+        raw.report.contributions_done / more * len(track), dict(raw.report.plan), raw.report.predicted_error,
+    )  # fmt: skip

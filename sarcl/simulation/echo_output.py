@@ -1,0 +1,99 @@
+"""Where samples of echoes go, some pulses at a time: into memory, or into a file of sarcl's."""
+
+from __future__ import annotations
+
+import logging
+import os
+from typing import Any
+
+import numpy as np
+
+from ..base.text import size_text
+from ..base.validation import sealed
+from ..model import store
+from ..model.phase_history import PhaseHistory
+
+log = logging.getLogger(__name__)
+COPIES = 3  # of rows' geometry, while a PhaseHistory is made of it: 320 bytes a row were measured
+SHARE = 0.25  # of max_bytes, for samples on their way into a file
+
+
+class Target:
+    """Samples (n_pulses, ..., n_samples), complex64; a row is all but the first axis' last.
+
+    out  the file they are written to, or None: memory. Its size is logged before the work.
+    MemoryError says how many bytes they would take; for a file, raises what `files.paths.check_writable` does.
+    """
+
+    def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
+        if out is not None and not isinstance(out, (str, os.PathLike)):
+            raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
+        self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
+        self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
+        n_rows = shape[0] * self.a_pulse
+        nbytes = 8.0 * n_rows * shape[-1]
+        text = f"{n_rows} rows of {shape[-1]} samples: {size_text(nbytes)}"
+        log.info("echoes of %d pulses, %s", shape[0], text + f", and {size_text(n_rows * store.ROW_BYTES)} of geometry")
+        geometry, room = float(COPIES * n_rows * store.ROW_BYTES), _memory()
+        if geometry > room:
+            raise MemoryError(
+                f"echoes of {shape[0]} pulses are {n_rows} rows, whose geometry alone takes {size_text(geometry)} of "
+                f"the {size_text(room)} of memory here; split the track, or take channels='simultaneous' for arrays: "
+                "carriers are told apart by their frequencies"
+            )
+        if out is not None:
+            self.writer = store.EchoWriter(out, n_rows, shape[-1])
+            self.pulses = max(1, int(SHARE * budget / (nbytes / shape[0])))
+            return
+        self.pulses = shape[0]
+        try:
+            self.whole = np.zeros(shape, np.complex64)
+        except (MemoryError, ValueError):
+            raise MemoryError(
+                f"echoes of {shape[0]} pulses, {text}, are more than there is memory for; write them to a file "
+                f"(out=...), narrow range_window (now {window[0]:g} to {window[1]:g} m), or split the track"
+            ) from None
+
+    def block(self, start: int, stop: int) -> np.ndarray:
+        """Zeros for the samples of some pulses, to be filled and given to `keep`."""
+        if self.writer is not None:
+            return np.zeros((stop - start, *self.shape[1:]), np.complex64)
+        self.whole[start:stop] = 0
+        return self.whole[start:stop]
+
+    def keep(self, start: int, block: np.ndarray) -> None:
+        """Take a block that is filled."""
+        if self.writer is not None:
+            rows = block.reshape(-1, self.shape[-1])
+            self.writer.samples[start * self.a_pulse : start * self.a_pulse + len(rows)] = rows
+
+    def __len__(self) -> int:
+        return self.shape[0]
+
+    def __getitem__(self, pulse: int) -> np.ndarray:
+        """Samples of one pulse."""
+        if self.writer is None:
+            return self.whole[pulse]
+        rows = self.writer.samples[pulse * self.a_pulse : (pulse + 1) * self.a_pulse]
+        return np.asarray(rows).reshape(self.shape[1:])
+
+    def finish(self, **fields: Any) -> PhaseHistory:
+        """The PhaseHistory of these samples and the other fields."""
+        if self.writer is not None:
+            return self.writer.finish(**fields)
+        return PhaseHistory(sealed(self.whole.reshape(-1, self.shape[-1])), **fields)
+
+    def __enter__(self) -> Target:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        if self.writer is not None:
+            self.writer.abandon()
+
+
+def _memory() -> float:
+    """Bytes of memory of this machine, inf where it does not say."""
+    try:
+        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
+    except (AttributeError, OSError, ValueError):
+        return float("inf")

@@ -1,0 +1,108 @@
+"""What a viewpoint sees of a scene's facets: rays through a tree of boxes, from anywhere."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.boxes import box
+from ..base.morton import interleaved
+from ..opencl.device import Device
+from ..scene.triangles import edges, normals
+
+# Rays start above a facet by this share of its longest edge: coplanar and touching neighbours, and sheets modelled
+# twice, do not hide one another.
+LIFT = 1e-3
+# float32 resolves places to 1e-7 of the scene: rays start, and boxes reach, a few such steps further out
+STEP = 1e-6
+FAR = np.float32(4)  # of boxes that are none: points a ray can only meet by chance, with nothing in them
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Where facets are told in float32: (x - center) unit, at most one for all corners; unit is a power of two."""
+
+    center: np.ndarray
+    unit: float
+
+    @classmethod
+    def around(cls, points: np.ndarray) -> Frame:
+        """The frame that just holds points, m (n, 3)."""
+        corners = box(points)
+        half = float((corners[1] - corners[0]).max()) / 2
+        return cls(corners.mean(axis=0), 2.0 ** -np.ceil(np.log2(half)) if half else 1.0)
+
+    def eye(self, viewpoint: np.ndarray) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+        """A viewpoint, m (3,), for the kernels, and the power of two that makes its distance about one."""
+        at = (np.asarray(viewpoint, np.float64) - self.center) * self.unit
+        shrink = 2.0 ** -np.ceil(np.log2(max(float(np.abs(at).max()), 1.0)))
+        x, y, z = at.astype(np.float32)
+        return x, y, z, np.float32(shrink)
+
+
+class Facets:
+    """Facets on a device, m (k, 3, 3), as those who are looked at.
+
+    frame      of all that can hide them too
+    one_sided  (k,) bool: dark from behind
+    """
+
+    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
+        self.device, self.frame, self.size = device, frame, len(triangles)
+        self.length = np.maximum.reduce(edges(triangles))
+        a = triangles[:, 0]
+        lift = np.maximum(LIFT * self.length * frame.unit, STEP)
+        parts = (
+            (a - frame.center) * frame.unit,
+            (triangles[:, 1] - a) * frame.unit,
+            (triangles[:, 2] - a) * frame.unit,
+            normals(triangles) * lift[:, None],
+        )
+        self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
+        self.side = device.upload(one_sided.astype(np.uint8))
+
+
+class Occluders:
+    """Facets on a device, m (k, 3, 3), as those who hide: a tree of boxes, eight children each."""
+
+    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame) -> None:
+        self.device, self.frame = device, frame
+        corners = ((triangles - frame.center) * frame.unit).astype(np.float32)
+        order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
+        # the last facet fills up the last eight
+        corners = corners[np.append(order, np.repeat(order[-1:], -len(order) % 8))]
+        leaf = np.ascontiguousarray(corners.reshape(-1, 8, 3, 3).transpose(0, 2, 3, 1))
+        low = leaf.min(axis=(1, 3)) - np.float32(2 * STEP)
+        high = leaf.max(axis=(1, 3)) + np.float32(2 * STEP)
+        levels = []
+        while True:
+            low, high = (_padded(side).reshape(-1, 8, 3) for side in (low, high))
+            levels.append(np.stack([low, high], axis=1).transpose(0, 1, 3, 2))
+            if len(low) == 1:
+                break
+            # the filling is no part of the boxes above
+            low, high = low.min(axis=1), np.where(high == FAR, -FAR, high).max(axis=1)
+        levels.reverse()
+        self.depth = len(levels)
+        base = np.cumsum([0, *(len(level) for level in levels[:-1])])
+        self.leaf = device.upload(leaf)
+        self.node = device.upload(np.concatenate(levels))
+        self.base = device.upload(base.astype(np.int32))
+
+    def hide(self, facets: Facets, index: Any, n: int, places: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+        """Set the bits of hidden samples: index (n,) int32, places (buffer, samples), hidden (n,) uint64."""
+        kernel = self.device.kernel("ray_casting.cl", "hidden")
+        arguments = (facets.buffer, index, *places, *self.frame.eye(viewpoint))
+        self.device.run(kernel, (n,), None, *arguments, self.leaf, self.node, self.base, self.depth, hidden)
+
+
+def _curve(points: np.ndarray) -> np.ndarray:
+    """Place (n,) of points (n, 3) between -1 and 1 on a curve that fills space (Morton 1966)."""
+    return interleaved(np.clip((points + 1) * 2.0**20, 0, 2**21 - 1).astype(np.uint64))
+
+
+def _padded(rows: np.ndarray) -> np.ndarray:
+    """Rows filled up to a multiple of eight with FAR."""
+    return np.concatenate([rows, np.full((-len(rows) % 8, *rows.shape[1:]), FAR, rows.dtype)])

@@ -1,0 +1,113 @@
+"""What a terrain of heights hides: horizons along range lines, about one look at a cell for each viewpoint."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..opencl.device import Device
+from ._ray_casting import Facets, Frame
+
+FINE = 2  # range lines a cell, where the terrain ends
+
+
+class Terrain:
+    """Heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m, on a device."""
+
+    def __init__(self, device: Device, grid: tuple[np.ndarray, np.ndarray, np.ndarray], frame: Frame) -> None:
+        self.device, self.frame = device, frame
+        x, y, z = ((v - c) * frame.unit for v, c in zip(grid, frame.center, strict=True))
+        self.axes = (x, y)
+        self.per = tuple((len(a) - 1) / (a[-1] - a[0]) for a in self.axes)
+        self.x, self.y = (device.upload(a.astype(np.float32)) for a in self.axes)
+        z = z.astype(np.float32)
+        self.z_rows, self.z_columns = device.upload(z), device.upload(z.T)
+
+    def scan(self, viewpoint: np.ndarray) -> Scan:
+        """Horizons seen from a viewpoint, m (3,)."""
+        eye = (viewpoint - self.frame.center) * self.frame.unit
+        sectors = [_sector(self.axes, self.per, eye, axis, sign) for axis in (0, 1) for sign in (1, -1)]
+        offsets = np.cumsum([0, *(len(s.lines) * s.columns for s in sectors)])
+        table = self.device.empty(4 * max(int(offsets[-1]), 1))
+        kernel = self.device.kernel("terrain_horizon.cl", "sweep")
+        held = []  # until the kernels are done with them
+        for s, offset in zip(sectors, offsets, strict=False):
+            if not s.columns:
+                continue
+            z, along, across = (self.z_columns, self.y, self.x) if s.axis else (self.z_rows, self.x, self.y)
+            sizes = (len(self.axes[s.axis]), len(self.axes[1 - s.axis]))
+            numbers = np.array([self.per[1 - s.axis], eye[s.axis], eye[2], s.end], np.float32)
+            lines = self.device.upload(s.lines.astype(np.float32))
+            held.append(lines)
+            last = (s.first, s.step, s.columns, int(offset))
+            self.device.run(kernel, (len(s.lines),), None, z, along, across, *sizes, *numbers, lines, *last, table)
+        whole = [
+            (s.first, s.step, s.columns, len(s.lines), o, 0, 0, 0) for s, o in zip(sectors, offsets[:4], strict=True)
+        ]
+        number = [(s.end, s.start, s.density, 0, 0, 0, 0, 0) for s in sectors]
+        numbers = self.device.upload(np.array(number, np.float32))
+        return Scan(self, viewpoint, numbers, self.device.upload(np.array(whole, np.int32)), table, held)
+
+
+@dataclass(frozen=True, eq=False)
+class Scan:
+    """The horizons of one viewpoint, on the device."""
+
+    terrain: Terrain
+    viewpoint: np.ndarray
+    number: Any
+    whole: Any
+    table: Any
+    held: list[Any]
+
+    def hide(self, facets: Facets, index: Any, n: int, places: Any, hidden: Any) -> None:
+        """Set the bits of hidden samples: index (n,) int32, places (buffer, samples), hidden (n,) uint64."""
+        t = self.terrain
+        kernel = t.device.kernel("terrain_horizon.cl", "horizon")
+        eye = t.frame.eye(self.viewpoint)[:3]
+        grid = (t.x, t.y, t.z_rows, t.z_columns, len(t.axes[0]), len(t.axes[1]), *np.array(t.per, np.float32))
+        arguments = (facets.buffer, index, *places, *eye, *grid, self.number, self.whole, self.table, hidden)
+        t.device.run(kernel, (n,), None, *arguments)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sector:
+    """Range lines that cross at least as many grid lines along `axis` as across it.
+
+    end      of the terrain, where lines are told by their places `start` + i/density
+    lines    (n, 2): place there, and slope
+    first    grid line next to the viewpoint, of `columns` on the way outwards, `step`
+    """
+
+    axis: int
+    step: int
+    first: int
+    end: float
+    start: float
+    density: float
+    lines: np.ndarray
+    columns: int
+
+
+def _sector(axes: Any, per: Any, eye: np.ndarray, axis: int, sign: int) -> _Sector:
+    along, across = axes[axis], axes[1 - axis]
+    end = along[-1] if sign > 0 else along[0]
+    # columns under the viewpoint itself have no range line
+    out = np.flatnonzero(sign * (along - eye[axis]) * per[axis] > 1e-3)[::sign]
+    none = _Sector(axis, sign, 0, end, 0.0, 1.0, np.zeros((0, 2)), 0)
+    if len(out) == 0:
+        return none
+    reach = along[out] - eye[axis]
+    wide = abs(reach[-1]) * per[axis] / per[1 - axis]
+    side = across[[0, -1]] - eye[1 - axis]
+    ends = np.concatenate([side * (reach[-1] / reach[0]), side])
+    low, high = max(ends.min(), -wide), min(ends.max(), wide)
+    if not low < high:
+        return none
+    n = int(np.ceil((high - low) * per[1 - axis] * FINE)) + 2
+    place = np.linspace(low, high, n)
+    lines = np.stack([place + eye[1 - axis], place / reach[-1]], axis=1)
+    density = (n - 1) / (high - low)
+    return _Sector(axis, sign, int(out[0]), end, lines[0, 0], density, lines, len(out))

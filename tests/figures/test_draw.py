@@ -1,0 +1,198 @@
+"""Pictures: where a pixel lands, how bright it is, what the axes say, and what is refused."""
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.figures import axes, decibels
+
+
+def data_of(picture):
+    """Grey levels inside the frame, top row first."""
+    return np.asarray(picture.convert("L").crop(picture.info["frame"]))
+
+
+def speckle(shape, seed=0):
+    rng = np.random.default_rng(seed)
+    return 20 * np.log10(np.abs(rng.normal(size=shape) + 1j * rng.normal(size=shape)))
+
+
+# Where pixels land and how bright they are -----------------------------------------------------------------
+
+
+def test_row_0_is_drawn_at_the_bottom_and_column_0_at_the_left():
+    db = np.full((4, 5), -np.inf)
+    db[0, 1] = 0
+    drawn = data_of(decibels.picture(db))
+    at = np.argwhere(drawn == 255)
+    rows, columns = drawn.shape
+    assert at.min(axis=0).tolist() == [3 * rows // 4, columns // 5]
+    assert at.max(axis=0).tolist() == [rows - 1, 2 * columns // 5 - 1]
+
+
+def test_grey_is_linear_in_db_from_the_floor_to_the_brightest_pixel():
+    db = np.array([[0.0, -10, -20, -40, -50, -70, -np.inf]]) + 33
+    levels = decibels.grey_levels(np.vstack([db, db]), -50, (2, 7))
+    assert levels[0].tolist() == [255, 204, 153, 51, 0, 0, 0]
+
+
+def test_small_images_grow_by_a_whole_factor_to_500_pixels():
+    for shape in [(64, 64), (1, 1), (7, 499), (333, 200)]:
+        drawn = np.array(decibels.drawn_shape(shape, None))
+        assert 500 <= drawn.max() < 1000
+        if min(shape) > max(shape) * decibels.THINNEST:
+            assert (drawn % shape == 0).all() and len(set(drawn // shape)) == 1
+    assert decibels.drawn_shape((512, 700), None) == (512, 700)
+
+
+def test_an_enlarged_image_repeats_its_pixels():
+    db = speckle((20, 30))
+    drawn = data_of(decibels.picture(db))
+    k = drawn.shape[0] // 20
+    assert (drawn == np.kron(drawn[::k, ::k], np.ones((k, k)))).all()
+
+
+def test_pixels_are_as_wide_to_high_as_their_spacing():
+    for shape, spacing in [((100, 100), (0.3, 0.1)), ((500, 300), (0.13, 0.1)), ((5000, 3000), (0.2, 0.7))]:
+        rows, columns = decibels.drawn_shape(shape, spacing)
+        true = shape[0] * spacing[0] / (shape[1] * spacing[1])
+        assert rows / columns == pytest.approx(true, rel=0.01)  # one pixel in a few hundred
+
+
+def test_a_long_strip_is_stretched_to_be_seen_and_says_so():
+    assert decibels.drawn_shape((3, 6000), None) == (333, 2000)
+    assert decibels.picture(np.zeros((3, 300))).size[1] > 80
+
+
+def test_large_images_are_reduced_by_averaging_power():
+    db = speckle((4900, 1000))
+    levels = decibels.grey_levels(db, -40, decibels.drawn_shape(db.shape, None)).astype(float)
+    assert levels.shape == (1634, 334)
+    shown = -40 * (1 - levels / 255)
+    shown = 10 ** (shown / 10)
+    # Nine-look speckle: power scatters by 1/sqrt(9) of its mean, where dropped pixels would scatter by 1.
+    assert shown.std() / shown.mean() == pytest.approx(1 / 3, rel=0.02)
+
+
+@pytest.mark.parametrize("shape", [(5, 7), (3, 7), (10, 4), (8, 20), (1, 1)])
+def test_resampling_keeps_the_mean_power(shape):
+    db = speckle((8, 10))
+    mean = decibels._average_power(db, 0.0, shape).mean()
+    assert mean == pytest.approx((10 ** (db / 10)).mean(), rel=1e-12)  # float64 sums
+
+
+def test_an_average_of_whole_blocks_is_the_mean_of_the_block():
+    db = speckle((600, 9))
+    blocks = (10 ** (db / 10)).reshape(300, 2, 3, 3).mean(axis=(1, 3))
+    np.testing.assert_allclose(decibels._average_power(db, 0.0, (300, 3)), blocks, rtol=1e-11)
+
+
+@pytest.mark.parametrize(("value", "level"), [(-np.inf, 0), (0.0, 255), (-300.0, 255), (7.5, 255)])
+@pytest.mark.parametrize("shape", [(1, 1), (20, 30), (3000, 40)])
+def test_an_empty_image_is_black_and_a_constant_one_white(value, level, shape):
+    assert (data_of(decibels.picture(np.full(shape, value))) == level).all()
+
+
+# Axes ------------------------------------------------------------------------------------------------------
+
+
+def test_axes_count_metres_from_the_pixel_that_image_grids_count_from():
+    grid = sarcl.ImageGrid.plane(shape=(5, 8), spacing=(0.5, 0.25))
+    for along, n in enumerate(grid.shape):
+        _, low, high, _ = axes.image_axis(n, along, grid.spacing)
+        centres = low + (np.arange(n) + 0.5) * (high - low) / n
+        xyz = grid.at(*(np.arange(n), 0)[:: 1 - 2 * along])
+        np.testing.assert_allclose(centres, xyz[:, 1 - along], atol=1e-12)
+
+
+def test_axes_without_spacing_count_pixels():
+    assert axes.image_axis(10, 0, None)[:3] == ("row", -0.5, 9.5)
+    assert axes.ticks_between(-0.5, 0.5, 5, least=1.0) == (1.0, [0.0])
+
+
+@pytest.mark.parametrize(
+    ("low", "high", "most", "ticks"),
+    [
+        (-50.1, 49.9, 8, ["-40", "-20", "0", "20", "40"]),
+        (-1.6, 1.5, 6, ["-1", "0", "1"]),
+        (-0.32, 0.31, 7, ["-0.3", "-0.2", "-0.1", "0.0", "0.1", "0.2", "0.3"]),
+        (-50, 0, 5, ["-50", "-40", "-30", "-20", "-10", "0"]),
+        (-3e6, 3e6, 3, ["-2e+06", "0", "2e+06"]),
+    ],
+)
+def test_ticks_stand_at_round_values(low, high, most, ticks):
+    step, values = axes.ticks_between(low, high, most)
+    assert [axes.number(v, step) for v in values] == ticks
+
+
+def test_title_and_scale_are_outside_the_data():
+    plain = decibels.picture(speckle((64, 64)), (0.1, 0.1))
+    titled = decibels.picture(speckle((64, 64)), (0.1, 0.1), title="A title – with a dash, " + "long " * 60)
+    assert (data_of(plain) == data_of(titled)).all()
+    assert titled.size[0] == plain.size[0] and titled.size[1] > plain.size[1]
+
+
+# One row or one column -------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize("shape", [(1, 101), (101, 1)])
+@pytest.mark.parametrize("spacing", [None, (0.1, 0.1)])
+def test_a_profile_is_a_line_that_peaks_where_the_data_do(shape, spacing):
+    x = np.arange(101) - 30
+    picture = decibels.picture((-0.02 * x**2 + 12).reshape(shape), spacing, floor_db=-50)
+    left, top, right, bottom = picture.info["frame"]
+    frame = np.asarray(picture.crop((left, top, right, bottom))).astype(int)
+    blue = np.argwhere(frame[..., 2] - frame[..., 0] > 60)
+    highest = blue[blue[:, 0] == blue[:, 0].min()].mean(axis=0)
+    assert highest[1] / (right - left) == pytest.approx(30.5 / 101, abs=0.01)
+    assert highest[0] / (bottom - top) == pytest.approx(0.04 / 1.04, abs=0.01)
+
+
+@pytest.mark.parametrize("n", [2, 3, 50_000])
+@pytest.mark.parametrize("value", [-np.inf, 0.0])
+def test_profiles_of_any_length_and_of_nothing_are_drawn(n, value):
+    assert decibels.picture(np.full((1, n), value), (1, 0.1)).size[0] > 500
+
+
+# Files and refusals ----------------------------------------------------------------------------------------
+
+
+def test_an_image_shows_and_saves_its_picture(tmp_path):
+    from PIL import Image
+
+    grid = sarcl.ImageGrid.plane(shape=(6, 4), spacing=0.1)
+    data = np.arange(24, dtype=np.complex64).reshape(6, 4)
+    image = sarcl.Image(data, grid)
+    image.save(tmp_path / "a.png", title="a")
+    with Image.open(tmp_path / "a.png") as saved:
+        assert saved.format == "PNG" and saved.size == image._picture(-50, "a").size
+    assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
+    assert image.show(floor_db=-30).size[0] > 300
+
+
+def test_a_picture_that_cannot_be_written_leaves_nothing(tmp_path):
+    picture = decibels.picture(np.zeros((2, 2)))
+    with pytest.raises(FileNotFoundError, match="create it"):
+        decibels.write_png(picture, tmp_path / "no" / "a.png")
+    with pytest.raises(IsADirectoryError):
+        decibels.write_png(picture, tmp_path)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("db", "options", "words"),
+    [
+        (np.zeros(3), {}, r"shape \(3,\), wanted \(rows, columns\)"),
+        (np.zeros((0, 3)), {}, "neither zero"),
+        (np.zeros((2, 3), complex), {}, "wanted real decibels"),
+        (np.array([[0, 1], [np.nan, 2]]), {}, r"db\[1, 0\] is nan"),
+        (np.array([[0, np.inf], [1, 2]]), {}, r"db\[0, 1\] is inf"),
+        (np.zeros((2, 2)), {"floor_db": 0}, "floor_db is 0"),
+        (np.zeros((2, 2)), {"floor_db": 20}, "give e.g. -50"),
+        (np.zeros((2, 2)), {"floor_db": np.nan}, "floor_db is nan"),
+        (np.zeros((2, 2)), {"spacing": (0.1, 0)}, r"spacing\[1\] is 0"),
+    ],
+)
+def test_what_cannot_be_drawn_is_refused(db, options, words):
+    with pytest.raises(ValueError, match=words):
+        decibels.picture(db, **options)

@@ -1,0 +1,60 @@
+"""The grid of data that come without one."""
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.imaging.default_grid import default_grid
+
+
+def seen(track, point, n_samples=64, bandwidth=300e6):
+    r = np.linalg.norm(track.positions - point, axis=1)
+    samples = np.ones((len(track), n_samples), np.complex64)
+    return sarcl.PhaseHistory(samples, 9.6e9 - bandwidth / 2, bandwidth / n_samples, track.positions, r)
+
+
+ARC = sarcl.Trajectory.circle(radius=7e3, height=5e3, start=-0.03, arc=0.06, n_pulses=2500)
+ROUND = sarcl.Trajectory.circle(radius=7e3, height=5e3, arc=6.2, n_pulses=1000)
+PASS = sarcl.Trajectory.line(start=(-9e3, -500, 5e3), velocity=(0, 100, 0), prf=50.0, n_pulses=512)
+
+
+@pytest.mark.parametrize(
+    ("track", "point", "center"),
+    [
+        (ARC, (0, 0, 0), (0, 0, 0)),
+        (ARC, (100, 20, 0), (100, 20, 0)),
+        (PASS, (300, 20, 0), (300, 20, 0)),
+        (ROUND, (10, 20, 30), (10, 20, 30)),  # seen from all around, the height is known too
+    ],
+)
+def test_the_default_grid_lies_where_the_reference_ranges_meet(track, point, center):
+    np.testing.assert_allclose(default_grid(seen(track, point)).grid.center, center, atol=2e-3)
+
+
+def test_the_default_pixels_are_half_the_resolution_on_the_ground():
+    grid = default_grid(seen(ARC, (0, 0, 0))).grid
+    grazing = np.arctan2(5, 7)
+    across = 0.886 * sarcl.check.SPEED_OF_LIGHT / 9.6e9 / (2 * 0.06 * np.cos(grazing))
+    along = 0.886 * sarcl.check.SPEED_OF_LIGHT / (2 * 300e6 * np.cos(grazing))
+    assert grid.spacing[0] == pytest.approx(across / 2, rel=0.05)
+    assert grid.spacing[1] == pytest.approx(along / 2, rel=0.05)
+
+
+def test_the_default_size_is_what_is_unambiguous_but_1024_pixels_at_most():
+    few, many = (default_grid(seen(ARC, (0, 0, 0), n_samples=n)).grid for n in (64, 20_000))
+    swath = sarcl.check.SPEED_OF_LIGHT / (2 * 300e6 / 64) / np.cos(np.arctan2(5, 7))
+    assert few.shape[1] * few.spacing[1] == pytest.approx(swath, rel=0.02)
+    assert max(many.shape) == 1024
+
+
+@pytest.mark.parametrize("n_samples", [1, 64])
+def test_one_pulse_or_one_sample_still_gets_a_grid(n_samples):
+    track = sarcl.Trajectory.circle(radius=7e3, height=5e3, arc=1.0, n_pulses=1)
+    grid = default_grid(seen(track, (0, 0, 0), n_samples=n_samples)).grid
+    assert grid.size >= 1 and np.isfinite(grid.bounds).all()
+
+
+def test_what_the_caller_names_is_kept():
+    grid = default_grid(seen(ARC, (0, 0, 0)), center=(1, 2, 3), shape=(5, 6), normal=(0, 1, 0)).grid
+    assert grid.center.tolist() == [1, 2, 3] and grid.shape == (5, 6)
+    np.testing.assert_allclose(grid.normal, (0, 1, 0), atol=1e-12)

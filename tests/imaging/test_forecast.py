@@ -1,0 +1,121 @@
+"""What an image will take, told before any work."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.cases import noise_history
+
+import sarcl
+from sarcl.cli.parser import main
+
+GRID = sarcl.ImageGrid.plane(shape=(200, 200), spacing=0.2)
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3, 1e-5, 1e-8])
+def test_the_plan_is_the_one_that_is_carried_out(tolerance):
+    raw = noise_history(n_rows=120)
+    forecast = sarcl.plan(raw, GRID, tolerance=tolerance)
+    image = sarcl.backproject(raw, GRID, tolerance=tolerance, check=False)
+    assert forecast.method == image.report.plan["method"]
+    assert forecast.plan == dict(image.report.plan)
+    assert forecast.predicted_error == image.report.predicted_error <= tolerance
+    assert forecast.bytes >= image.data.nbytes
+    assert 0 < forecast.seconds < 60
+
+
+def test_the_next_cheaper_plan_errs_more_and_takes_less():
+    forecast = sarcl.plan(noise_history(n_rows=120), GRID, tolerance=1e-5)
+    error, seconds = forecast.cheaper
+    assert error > forecast.predicted_error and seconds < forecast.seconds
+    assert "next cheaper plan" in str(forecast) and f"{forecast.predicted_error:.1e}" in str(forecast)
+
+
+def test_time_grows_with_the_work_and_memory_with_what_is_allowed():
+    raw = noise_history(n_rows=120)
+    small, large = (sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(n, n), spacing=0.2), wrap=True) for n in (100, 2000))
+    assert large.seconds > 50 * small.seconds and large.bytes > 50 * small.bytes
+    tight = sarcl.plan(raw, sarcl.ImageGrid.plane(shape=(2000, 2000), spacing=0.2), max_bytes=2e7)
+    assert tight.bytes < large.bytes
+
+
+def test_what_a_beam_leaves_out_takes_no_time():
+    raw, grid = noise_history(n_rows=120), sarcl.ImageGrid.plane(shape=(400, 400), spacing=0.2)
+    beam = 20 / np.linalg.norm(raw.tx[0])  # a cone of 20 m, the grid has 80
+    whole, lit = (sarcl.plan(raw, grid, method="direct", wrap=True, beam=b) for b in (None, beam))
+    image = sarcl.backproject(raw, grid, method="direct", wrap=True, beam=beam, check=False)
+    assert image.report.contributions_skipped["beam"] > 0.5 * raw.n_rows * grid.size
+    assert lit.seconds < 0.5 * whole.seconds
+
+
+def test_tiles_that_reach_beyond_a_narrow_grid_take_their_time():
+    """Tiles of 16 x 16 pixels and more: of eight rows, half and more of each tile is thrown away."""
+    from helpers.cases import noise_on, straight
+
+    raw = noise_on(straight(400), n_samples=256)
+    narrow, square = (sarcl.ImageGrid.plane(shape=shape, spacing=0.1) for shape in ((8, 8192), (256, 256)))
+    for method in ("direct", "factorized"):
+        options = {"method": method, "tolerance": 1e-2, "wrap": True}
+        long, compact = (sarcl.plan(raw, grid, **options) for grid in (narrow, square))
+        assert long.seconds > 1.7 * compact.seconds
+
+
+def test_the_error_told_is_that_of_rows_added_directly_too():
+    from helpers.cases import noise_on, straight
+
+    from sarcl.imaging.factorized import plan as factorized_plan
+    from sarcl.imaging.focusing_task import make_task
+
+    for tolerance in (1e-1, 1e-2, 1e-3):
+        task = make_task(noise_on(straight(400)), GRID, None, None, False, True)
+        made, _ = factorized_plan.make_plan(task, tolerance)
+        assert made.edge.predicted_error <= made.predicted_error <= tolerance
+
+
+@pytest.mark.parametrize("tolerance", [1, 2.5, 1e9])
+def test_an_error_as_large_as_the_image_is_refused(tolerance):
+    with pytest.raises(ValueError, match=r"tolerance is .*; an error of 1 is no image at all"):
+        sarcl.plan(noise_history(n_rows=4), GRID, tolerance=tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [0, -1e-3, float("nan"), 1e-30])
+def test_what_backproject_refuses_is_refused(tolerance):
+    raw = noise_history(n_rows=4)
+    for verb in (sarcl.plan, sarcl.backproject):
+        with pytest.raises(ValueError, match="tolerance"):
+            verb(raw, GRID, tolerance=tolerance)
+
+
+def test_dry_run_says_it_and_writes_nothing(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raw = noise_history(n_rows=60)
+    raw.save("raw.h5")
+    before = sorted(p.name for p in tmp_path.iterdir())
+    args = ["focus", "raw.h5", "--center", "0", "0", "0", "--shape", "64", "64", "--spacing", "0.2", "0.2", "--dry-run"]
+    assert main(args) == 0
+    out = capsys.readouterr().out
+    assert "error below" in out and ("direct" in out or "factorized" in out)
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+def test_method_is_checked():
+    with pytest.raises(ValueError, match="method is 'fast'"):
+        sarcl.plan(noise_history(n_rows=4), GRID, method="fast")
+    forecast = sarcl.plan(noise_history(n_rows=64), GRID, tolerance=1e-1, method="direct")
+    assert forecast.method == "direct" and np.isfinite(forecast.seconds)
+
+
+def test_a_beam_is_given_in_degrees(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    raw = noise_history(n_rows=60)
+    raw.save("raw.h5")
+    where = ["--center", "0", "0", "0", "--shape", "96", "96", "--spacing", "0.4", "0.4"]
+    assert main(["focus", "raw.h5", "-o", "image.h5", *where, "--beam", "0.02"]) == 0
+    image = sarcl.read("image.h5")
+    grid = sarcl.ImageGrid.plane(shape=(96, 96), spacing=0.4)
+    wanted = sarcl.backproject(raw, grid, beam=np.radians(0.02))
+    assert image.report.contributions_skipped["beam"] == wanted.report.contributions_skipped["beam"] > 0
+    assert (np.asarray(image.data) == wanted.data).all()
+    for bad in ("0", "-1", "nan", "400"):
+        assert main(["focus", "raw.h5", "-o", "bad.h5", *where, "--beam", bad]) == 2
+        assert "beam" in capsys.readouterr().err

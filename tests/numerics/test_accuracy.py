@@ -1,0 +1,95 @@
+"""Error formulas against what they bound."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sarcl.base import constants
+from sarcl.numerics import error_bounds, interpolation, range_profiles
+from sarcl.numerics.interpolation import interpolator
+
+
+@pytest.mark.parametrize("taps", interpolation.TERMS)
+@pytest.mark.parametrize("oversample", [2.0, 4.0, 10.0])
+def test_interpolation_error_is_bounded_at_every_frequency_and_place(taps, oversample):
+    made = interpolator(taps, oversample)
+    random = np.random.default_rng(0)
+    nu = random.uniform(-0.5, 0.5, 300) / oversample
+    t = random.uniform(20, 30, 300)
+    s = t - (taps - 1) / 2
+    j = np.rint(s)
+    weights = made.weights(s - j)
+    waves = np.exp(2j * np.pi * nu[:, None] * (j[:, None] + np.arange(taps))) / made.transform(nu)[:, None]
+    got = (weights * waves).sum(axis=1)
+    error = np.abs(got - np.exp(2j * np.pi * nu * t)).max()
+    assert error <= 1.02 * made.error  # the bound is taken on a grid of 33 frequencies and 65 places
+    assert error >= 0.3 * made.error  # and it is no exaggeration
+
+
+def test_the_hat_errs_by_3_3_nu_squared():
+    # alias images of sinc^2: sum over m of (nu/(nu + m))^2 is (pi^2/3) nu^2 for small nu
+    for oversample in (16.0, 32.0):
+        nu = 0.5 / oversample
+        assert interpolator(2, oversample).error == pytest.approx(interpolation.MARGIN * np.pi**2 / 3 * nu**2, rel=0.03)
+
+
+def test_more_taps_and_finer_profiles_err_less():
+    for oversample in (2.0, 4.0):
+        errors = [interpolator(t, oversample).error for t in interpolation.TERMS]
+        assert errors == sorted(errors, reverse=True)
+    assert interpolator(2, 8.0).error < interpolator(2, 4.0).error
+
+
+@pytest.mark.parametrize("distance", [20.0, 300.0, 1e4])
+@pytest.mark.parametrize("order", [2, 3])
+def test_series_error_bounds_the_exact_difference(distance, order):
+    radius, frequency = 4.0, 10e9
+    random = np.random.default_rng(1)
+    p = random.standard_normal((20000, 3))
+    p *= radius / np.linalg.norm(p, axis=1, keepdims=True)
+    p = p.astype(np.longdouble)
+    u = np.array([0, 0, 1], np.longdouble)
+    exact = np.sqrt(((distance * u - p) ** 2).sum(axis=1)) - distance
+    a = p @ u
+    w = (p**2).sum(axis=1) - a**2
+    series = -a + w / (2 * distance) * (1 if order == 2 else 1 + a / distance)
+    worst = float(4 * np.pi * frequency / constants.SPEED_OF_LIGHT * np.abs(series - exact).max())
+    bound = error_bounds.series_error(radius, distance, frequency, order)
+    assert 0.3 * bound <= worst <= bound
+
+
+def test_a_series_about_a_near_antenna_is_refused():
+    assert error_bounds.series_error(4.0, 7.0, 1e9, 2) == np.inf
+    assert error_bounds.series_error(4.0, 7.0, 1e9, 0) == 0
+
+
+def test_the_cheapest_interpolator_meets_its_share_and_the_impossible_is_named():
+    for error in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
+        made, length, _ = interpolation.choose_interpolator(error, 1000, 1e6)
+        assert made.error <= error
+        assert length >= made.oversample * 1000 and length % 2 == 0
+    with pytest.raises(ValueError, match="the least is"):
+        interpolation.choose_interpolator(1e-12, 1000, 1e6)
+
+
+def test_spreading_is_the_adjoint_of_interpolation_profiles(device):
+    random = np.random.default_rng(2)
+    made, length, _ = interpolation.choose_interpolator(1e-4, 37, 1e3)
+    pad = range_profiles.padding(made)
+    samples = (random.standard_normal((3, 37)) + 1j * random.standard_normal((3, 37))).astype(np.complex64)
+    rows = random.standard_normal((3, length + 2 * pad)) + 1j * random.standard_normal((3, length + 2 * pad))
+    weights = np.broadcast_to(range_profiles.correction(made, 37, length), samples.shape)
+    forward = range_profiles.from_samples(device, samples, weights, made, length)
+    backward = range_profiles.to_samples(device, rows.astype(np.complex64), 37, made)
+    assert np.vdot(rows, forward) == pytest.approx(np.vdot(backward, samples), rel=1e-5)
+
+
+@pytest.mark.parametrize("carrier", [0.0, 1.3, 40.0, 1024.0, 1e4, 3.21e7])
+@pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-5])
+def test_images_keep_off_the_carrier(error, carrier):
+    made, length, _ = interpolation.choose_interpolator(error, 64, 1e6, carrier)
+    assert made.error <= error
+    nearest = np.abs(carrier - length * np.arange(1, carrier / length + 2)).min()
+    assert nearest >= 0.25 * length
+    assert length <= 1.6 * interpolation.choose_interpolator(error, 64, 1e6)[1]

@@ -1,0 +1,143 @@
+"""The helpers of kernels/*.clh, one by one, against float64."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sarcl.base import float_pairs
+from sarcl.numerics import interpolation
+from sarcl.numerics.pulse_geometry import Antennas
+from sarcl.opencl import device as opencl
+from sarcl.reference.geometry import half_path
+from sarcl.reference.interp import interpolate
+
+# name -> (expression in w_ functions, numpy twin, error bound relative to the result without float64)
+WIDE = {
+    "add": ("w_add(a, b)", lambda a, b: a + b, 3 * 2.0**-48),
+    "sub": ("w_sub(a, b)", lambda a, b: a - b, 3 * 2.0**-48),
+    "mul": ("w_mul(a, b)", lambda a, b: a * b, 5 * 2.0**-48),
+    "div": ("w_div(a, b)", lambda a, b: a / b, 12 * 2.0**-48),
+    "sqrt": ("w_sqrt(a)", lambda a, b: np.sqrt(a), 5 * 2.0**-48),
+}
+
+
+def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doubleword.clh"), **macros):
+    """Run `body` on VW lanes of every input at once; returns (n_out, n) float32."""
+    lanes = device.info.vector_width
+    n = -(-inputs.shape[1] // lanes) * lanes
+    padded = np.ones((len(inputs), n), np.float32)
+    padded[:, : inputs.shape[1]] = inputs
+    text = "".join(f'#include "{h}"\n' for h in headers) + (
+        "__kernel void probe(__global const float *x, __global const float *table, int n, __global float *out) {\n"
+        f"    int i = get_global_id(0);\n    {body}\n}}\n"
+    )
+    expanded = opencl.source.__wrapped__
+
+    def source(file):
+        if file != "probe.cl":
+            return expanded(file)
+        return "\n".join(expanded(line.split('"')[1]) if "#include" in line else line for line in text.split("\n"))
+
+    monkeypatch.setattr(opencl, "source", source)
+    table = macros.pop("table", None)
+    built = device._build("probe.cl", {"VW": lanes, "FP64": int(device.info.fp64), **macros})["probe"]
+    buffer = device.upload(padded)
+    weights = device.upload(np.zeros(1, np.float32) if table is None else table)
+    out = device.zeros(4 * n_out * n)
+    device.run(built, (n // lanes,), None, buffer, weights, n, out)
+    return device.download(out, np.empty((n_out, n), np.float32))[:, : inputs.shape[1]]
+
+
+def pairs(random, n):
+    """Numbers over many magnitudes as hi and lo float32 parts, and their exact sum."""
+    wide = float_pairs.wide(random.uniform(1, 2, n) * 10.0 ** random.integers(-3, 8, n))
+    return wide, wide[0].astype(np.float64) + wide[1]
+
+
+@pytest.mark.parametrize("name", WIDE)
+def test_wide_numbers_keep_their_error_bound(device, monkeypatch, name):
+    expression, twin, bound = WIDE[name]
+    random = np.random.default_rng(1)
+    (a, exact_a), (b, exact_b) = pairs(random, 4001), pairs(random, 4001)
+    body = (
+        "wv a = w_make(LOAD(i, x), LOAD(i, x + n)), b = w_make(LOAD(i, x + 2 * n), LOAD(i, x + 3 * n));"
+        f"wv r = {expression}; STORE(w_float(r), i, out); STORE(w_low(r), i, out + n);"
+    )
+    hi, lo = probe(device, monkeypatch, body, np.concatenate([a, b]), 2)
+    wanted = twin(exact_a, exact_b)
+    # a difference may cancel: its error is relative to the terms
+    scale = np.abs(exact_a) + np.abs(exact_b) if name in ("add", "sub") else np.abs(wanted)
+    assert (np.abs(hi.astype(np.float64) + lo - wanted) <= bound * scale).all()
+
+
+def test_wide_split_gives_the_nearest_integer_and_the_rest(device, monkeypatch):
+    random = np.random.default_rng(2)
+    values = random.uniform(-1, 1, 4001) * 10.0 ** random.uniform(-2, 9, 4001)
+    wide = float_pairs.wide(values)
+    exact = wide[0].astype(np.float64) + wide[1]
+    body = (
+        "iv k; fv rest = w_split(w_make(LOAD(i, x), LOAD(i, x + n)), &k);"
+        "STORE(AS_FLOAT(k), i, out); STORE(rest, i, out + n);"
+    )
+    whole, rest = probe(device, monkeypatch, body, wide, 2)
+    whole = whole.view(np.int32)
+    assert (np.abs(rest) <= 0.5 + 1e-6).all()
+    # 48 bits of a number up to 1e9 leave 4e-6 of a turn
+    assert (np.abs(whole + rest.astype(np.float64) - exact) <= 1e-7 + np.abs(exact) * 2.0**-47).all()
+
+
+def test_wide_square_root_of_zero_is_zero(device, monkeypatch):
+    body = "wv r = w_sqrt(w_make(LOAD(i, x), (fv)0)); STORE(w_float(r), i, out); STORE(w_low(r), i, out + n);"
+    hi, lo = probe(device, monkeypatch, body, np.zeros((1, 8), np.float32), 2)
+    assert (hi == 0).all() and (lo == 0).all()
+
+
+def test_sine_and_cosine_of_turns_err_less_than_4e_7(device, monkeypatch):
+    turns = np.linspace(-0.5, 0.5, 20001, dtype=np.float32)[None]
+    body = "fv s, c; sincos_turns(LOAD(i, x), &s, &c); STORE(s, i, out); STORE(c, i, out + n);"
+    sine, cosine = probe(device, monkeypatch, body, turns, 2)
+    angle = 2 * np.pi * turns[0].astype(np.float64)
+    assert np.abs(sine - np.sin(angle)).max() < 4e-7
+    assert np.abs(cosine - np.cos(angle)).max() < 4e-7
+
+
+@pytest.mark.parametrize("distance", [0.0, 3.0, 1e4, 8e5, 3.6e7])
+def test_half_path_keeps_a_tenth_of_a_nanometre_at_any_distance(device, monkeypatch, distance):
+    random = np.random.default_rng(3)
+    points = random.uniform(-500, 500, (801, 3))
+    tx = np.array([0.6, -0.3, 0.74]) * distance
+    rx = tx + np.array([20.0, 5.0, 1.0])
+    one = np.ones(1)
+    reference = one * (np.linalg.norm(tx) + np.linalg.norm(rx)) / 2
+    antennas = Antennas(tx[None], rx[None], reference, one * 9.6e9, one, -one, one)
+    packed = antennas.packed(np.zeros(3), 64, 0, 1, 1)
+    body = (
+        "point p; p.x = w_make(LOAD(i, x), LOAD(i, x + 3 * n)); p.y = w_make(LOAD(i, x + n), LOAD(i, x + 4 * n));"
+        "p.z = w_make(LOAD(i, x + 2 * n), LOAD(i, x + 5 * n)); wv d = half_path(table, 0, 1, p);"
+        "STORE(w_float(d), i, out); STORE(w_low(d), i, out + n);"
+    )
+    macros = {"BISTATIC": 1, "WRAP": 0, "RANGE": 2, "table": packed}
+    headers = ("common.clh", "doubleword.clh", "geometry.clh")
+    hi, lo = probe(device, monkeypatch, body, float_pairs.wide(points.T).reshape(6, -1), 2, headers, **macros)
+    wanted = half_path(tx, rx, points, 0) - half_path(tx, rx, np.zeros((1, 3)), 0)
+    # 48 bits of points up to 870 m from the centre, five operations
+    assert float(np.abs(hi.astype(np.longdouble) + lo - wanted).max()) < 1e-10
+
+
+@pytest.mark.parametrize("taps", interpolation.TERMS)
+def test_look_up_equals_its_twin(device, monkeypatch, taps):
+    random = np.random.default_rng(taps)
+    made = interpolation.interpolator(taps, 2.0)
+    row = (random.standard_normal(200) + 1j * random.standard_normal(200)).astype(np.complex64)
+    places = random.uniform(10, 180, 1001).astype(np.float32)
+    table = np.concatenate([made.table.ravel(), row.view(np.float32)])
+    body = (
+        f"fv re, im; look_up(table + {made.table.size}, 200, 0, (iv)0, LOAD(i, x), table, &re, &im);"
+        "STORE(re, i, out); STORE(im, i, out + n);"
+    )
+    macros = {"TAPS": taps, "TERMS": interpolation.TERMS[taps], "WRAP": 0, "table": table}
+    re, im = probe(device, monkeypatch, body, places[None], 2, ("common.clh", "interp.clh"), **macros)
+    wanted = interpolate(row, places, made)
+    # places near sample 200 are rounded to 2^-17 before this code sees them; the twin sees the same
+    assert np.abs(re + 1j * im - wanted).max() < 3e-6 * np.abs(row).max()

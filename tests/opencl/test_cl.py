@@ -1,0 +1,155 @@
+"""The OpenCL floor: which device, which errors, what is built once."""
+
+from __future__ import annotations
+
+import subprocess
+import sys
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.base import float_pairs
+from sarcl.opencl import device as opencl
+from sarcl.opencl import fft
+
+
+def run_python(code, **environment):
+    import os
+
+    return subprocess.run(
+        [sys.executable, "-c", code], env={**os.environ, **environment}, capture_output=True, text=True, timeout=100
+    )
+
+
+def test_every_working_device_gave_the_right_numbers_in_a_trial():
+    working = [d for d in sarcl.devices() if d.works]
+    assert working
+    for info in working:
+        assert info.why == "" and info.memory > 0 and info.max_alloc > 0 and info.vector_width in (1, 8)
+
+
+def test_device_is_chosen_by_argument_then_environment_then_kind(monkeypatch):
+    info = next(d for d in sarcl.devices() if d.works)
+    assert opencl.open_device(info.index).info == info
+    assert opencl.open_device(str(info.index)).info == info
+    assert opencl.open_device(info.name[:12].upper()).info.name == info.name
+    opened = opencl.open_device(info.kind)
+    assert opencl.open_device(opened) is opened
+    monkeypatch.setenv("SARCL_DEVICE", "no such thing")
+    assert opencl.open_device(info.index).info == info
+    with pytest.raises(sarcl.NoDeviceError, match="SARCL_DEVICE 'no such thing' matches no working"):
+        opencl.open_device()
+    monkeypatch.setenv("SARCL_DEVICE", "")
+    best = opencl.open_device()
+    if any(d.works and d.kind == "gpu" for d in sarcl.devices()):
+        assert best.info.kind == "gpu"
+
+
+def test_a_name_that_matches_nothing_lists_what_there_is():
+    with pytest.raises(sarcl.NoDeviceError) as caught:
+        opencl.open_device("abacus")
+    assert "'abacus'" in str(caught.value)
+    for info in sarcl.devices():
+        assert info.name in str(caught.value)
+
+
+def test_without_any_platform_the_remedy_is_named(tmp_path):
+    code = "import sarcl\nprint(sarcl.devices())\nsarcl.backproject.__module__\nfrom sarcl import cl\ncl.open_device()"
+    run = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
+    if "()" not in run.stdout:
+        pytest.skip("this loader does not heed OCL_ICD_VENDORS")
+    assert "NoDeviceError: no OpenCL device could build a kernel" in run.stderr
+    assert "apt-get install -y pocl-opencl-icd" in run.stderr
+
+
+def test_import_probes_no_device_and_loads_no_pyopencl():
+    run = run_python("import sys, sarcl; print('pyopencl' in sys.modules, 'numpy' in sys.modules)")
+    assert run.stdout.split() == ["False", "False"], run.stderr
+
+
+def test_verbs_stay_verbs_after_their_modules_are_imported():
+    code = "import sarcl.backproject, sarcl.echo, sarcl.read, sarcl; print(callable(sarcl.echo), callable(sarcl.read))"
+    run = run_python(code)
+    assert run.stdout.split() == ["True", "True"], run.stderr
+
+
+def test_only_cl_imports_pyopencl():
+    from pathlib import Path
+
+    package = Path(sarcl.__file__).parent
+    guilty = [p.name for p in package.rglob("*.py") if "import pyopencl" in p.read_text() and p.name != "device.py"]
+    assert guilty == []
+
+
+def test_kernels_are_built_once_for_each_set_of_macros(device):
+    first = device.kernel("ray_casting.cl", "hidden")
+    assert device.kernel("ray_casting.cl", "hidden") is first
+
+
+def test_includes_are_expanded_once_and_lines_point_at_the_files():
+    text = opencl.source("backproject.cl")
+    assert "#include" not in text
+    assert text.count('#line 1 "doubleword.clh"') == 1
+    line = text.split("\n").index(
+        "__kernel void backproject(__global const float *restrict profiles, int stride, int origin,"
+    )
+    directive = max(i for i, t in enumerate(text.split("\n")[:line]) if t.startswith("#line"))
+    number = int(text.split("\n")[directive].split()[1]) + line - directive - 1
+    from importlib.resources import files
+
+    original = files("sarcl.kernels").joinpath("backproject.cl").read_text().split("\n")
+    assert original[number - 1].startswith("__kernel void backproject(")
+
+
+def test_a_kernel_that_does_not_build_names_file_device_and_log(device, monkeypatch):
+    monkeypatch.setattr(opencl, "source", lambda file: "__kernel void broken(int x) { y = 1; }")
+    with pytest.raises(RuntimeError, match=r"kernels/broken.cl does not build on '.*'") as caught:
+        device.kernel("broken.cl", "broken")
+    assert "undeclared" in str(caught.value) or "error" in str(caught.value)
+
+
+def test_a_buffer_larger_than_the_device_allows_says_need_have_and_remedy(device):
+    need = device.info.max_alloc + 1
+    with pytest.raises(MemoryError, match=r"allows .* per buffer; pass a smaller max_bytes"):
+        device.empty(need)
+
+
+def test_threads_follow_the_environment(monkeypatch):
+    monkeypatch.setenv("SARCL_THREADS", "1")
+    assert opencl.threads() == 1
+    monkeypatch.setenv("SARCL_THREADS", "many")
+    with pytest.raises(ValueError, match="SARCL_THREADS is 'many'"):
+        opencl.threads()
+
+
+def test_one_thread_gives_the_same_image_as_all(tmp_path):
+    code = (
+        "import sys; sys.path.insert(0, 'tests')\n"
+        "from cases import noise_history\nimport sarcl, numpy as np\nfrom sarcl import cl\n"
+        "image = sarcl.backproject(noise_history(), sarcl.ImageGrid.plane(shape=40, spacing=.2), device='cpu')\n"
+        "print(cl.open_device('cpu').queue.device.max_compute_units, complex(image.data.sum()))"
+    )
+    if not any(d.works and d.kind == "cpu" for d in sarcl.devices()):
+        pytest.skip("no CPU device")
+    all_threads, one = run_python(code), run_python(code, SARCL_THREADS="1")
+    assert one.stdout.split()[0] == "1", one.stderr
+    assert one.stdout.split()[1] == all_threads.stdout.split()[1]
+
+
+@pytest.mark.parametrize("engine", ["scipy", "reikna"])
+@pytest.mark.parametrize("shape", [(1, 1), (3, 17), (5, 64), (2, 1000)])
+def test_both_fft_engines_are_the_unnormalised_dft_of_rows(device, engine, shape):
+    random = np.random.default_rng(0)
+    data = (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
+    for inverse in (False, True):
+        wanted = np.fft.ifft(data) * shape[1] if inverse else np.fft.fft(data)
+        got = fft.rows(device, data, inverse=inverse, engine=engine)
+        assert got.dtype == np.complex64
+        assert np.linalg.norm(got - wanted) <= 2e-6 * np.linalg.norm(wanted)
+
+
+def test_wide_pairs_keep_48_bits():
+    values = np.random.default_rng(0).uniform(-1, 1, 1000) * 8e5
+    hi, lo = float_pairs.wide(values)
+    assert np.abs(hi.astype(np.float64) + lo - values).max() <= 8e5 * 2.0**-48

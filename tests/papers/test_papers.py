@@ -1,0 +1,387 @@
+"""Papers done again: what is printed beside what comes out, the command, the page, and range zones told apart."""
+
+from __future__ import annotations
+
+import base64
+import io
+import json
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl import papers
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.cli import parser
+from sarcl.figures import html
+from sarcl.papers.farooq import _zones, range_zones
+from sarcl.papers.farooq.range_zones import RangeZones
+from sarcl.papers.paper import Paper, Section, plain
+
+VOID = {"meta", "br", "image", "rect", "path", "polyline"}
+
+
+class Page(HTMLParser):
+    """Sections with their drawings, tables and words; refuses tags that do not close in order."""
+
+    def __init__(self, text):
+        super().__init__()
+        self.open, self.sections, self.svg, self.words = [], {}, 0, []
+        self.heading = None
+        self.feed(text)
+        self.close()
+        assert not self.open, f"never closed: {self.open}"
+
+    def handle_starttag(self, tag, attrs):
+        if tag not in VOID:
+            self.open.append(tag)
+        if tag == "h2":
+            self.heading = ""
+        if tag == "svg" and self.sections:
+            self.sections[next(reversed(self.sections))] += 1
+
+    def handle_startendtag(self, tag, attrs):
+        pass
+
+    def handle_endtag(self, tag):
+        if tag in VOID:
+            return
+        assert self.open and self.open.pop() == tag, f"</{tag}> closes nothing"
+        if tag == "h2":
+            self.sections[self.heading], self.heading = 0, None
+
+    def handle_data(self, data):
+        self.words.append(data)
+        if self.heading is not None:
+            self.heading += data
+
+
+def run(folder, *options):
+    assert parser.main(["papers", "farooq", "-o", str(folder), *options]) == 0
+    return (folder / "farooq.html").read_text(), json.loads((folder / "farooq.json").read_text())
+
+
+@pytest.fixture(scope="module")
+def quick(tmp_path_factory):
+    """The paper without arrays of more than 100 elements."""
+    return run(tmp_path_factory.mktemp("quick"), "--quick")
+
+
+def rows_of(document):
+    return {row["item"]: row for section in document["sections"] for row in section["rows"]}
+
+
+def numbers_of(document, key):
+    return next(s["numbers"] for s in document["sections"] if s["key"] == key)
+
+
+# item: value, tolerance. What is printed, where it holds; else what the same equations and exact sums give.
+KNOWN = {
+    "LFM: first null in range": (0.167, 0.002),
+    "LFM: first null in cross-range": (0.167, 0.002),
+    "tone: first null in range": (0.167, 0.002),
+    "tone: first null in cross-range": (0.167, 0.002),
+    "LFM: shape of the range response": (0, 0.01),
+    "tone: shape of the range response": (0, 0.02),  # the corner of the triangle, of 16 lobes
+    "CFA: beam": ([0, 0], 0),
+    "FDA: beam (elevation, azimuth) at t' = +250 us": ([-30, 60], 0.5),
+    "FDA: beam (elevation, azimuth) at t' = -250 us": ([30, -60], 0.5),
+    "largest error of the power pattern, 30 MHz": (0.182, 1e-3),
+    "largest error of the power pattern, 150 MHz": (-1.15, 0.01),
+    "error inside +-45 deg, 150 MHz": (0.308, 2e-3),
+    "period": (1.0, 1e-3),
+    "main lobe, null to null": (2 / 9, 2e-3),
+    "tones: largest value on the chirp's ridge": (0.19, 0.01),
+    "delay of the peak at +45 deg, closed form": (0.3536, 2e-4),
+    "delay of the peak at -45 deg, closed form": (-0.3536, 2e-4),
+    "the same in the exact field: a peak at +45 deg": (4.873, 0.01),
+    "delay at the aperture's end, N 45, 20 MHz": (1.088, 1e-3),
+    "delay at the aperture's end, N 225, 4 MHz": (1.0896, 1e-3),
+    "delay at the aperture's end, N 450, 2 MHz": (1.0898, 1e-3),
+    "unmodified, N 45, 20 MHz": ([-4.3, 0.16, 0.20], 0.1),
+    "corrected, N 45, 20 MHz: nulls in cross-range": (0.167, 0.002),
+    "N 45, +20 MHz: length": (430, 0.5),
+    "N 45, +20 MHz: nulls in cross-range": (0.167, 0.002),
+    "N 45, +-20 MHz: apparent length": (445, 1),
+    "N 45, +-20 MHz: nulls": ([0.1575, -11.8], [0.002, 0.1]),
+    "PSLR at 100 MHz": (-13.0, 0.1),
+    "half a wave of the centre frequency": (0.01436, 1e-5),
+}
+LARGE = {
+    "corrected, N 225, 4 MHz: nulls in cross-range": (0.166, 0.002),
+    "corrected, N 450, 2 MHz: nulls in cross-range": (0.166, 0.002),
+    "N 450, +2 MHz: length": (430, 0.5),
+    "N 450, -2 MHz: length": (430, 0.5),
+    "N 450, +2 MHz: places are moved": (-71.8, 0.2),
+    "N 450, -2 MHz: places are moved": (78.5, 0.2),
+    "N 450, -2 MHz: nulls in cross-range": (0.1825, 0.002),
+    "N 225, +-4 MHz: apparent length": (502, 1),
+    "N 450, +-2 MHz: apparent length": (574, 1),
+    "N 225, +-4 MHz: nulls": ([0.124, -7.8], [0.002, 0.1]),
+    "N 450, +-2 MHz: nulls": ([0.100, -5.1], [0.002, 0.1]),
+    "collection time reduced": (25, 0.5),
+    "cross-range resolution, by the same system's aperture": ([2.50, 4.44], 0.03),
+    "cross-range resolution, by the same system's nulls": (4.44, 0.05),
+    "N 450, 2 MHz: places of points 2 and 2.25 m off": ([0, 0, -0.088], 0.01),
+}
+ERR = {
+    "FDA: beam (elevation, azimuth) at t' = +250 us",
+    "largest error of the power pattern, 30 MHz",
+    "error inside +-45 deg, 150 MHz",
+    "the same in the exact field: a peak at +45 deg",
+    "delay at the aperture's end, N 45, 20 MHz",
+    "delay at the aperture's end, N 225, 4 MHz",
+    "delay at the aperture's end, N 450, 2 MHz",
+    "N 45, 20 MHz: places of points 2 and 2.25 m off",
+    "N 45, 20 MHz: two points told apart",
+    "N 45, 20 MHz: spatial frequencies across",
+    "half a wave of the centre frequency",
+    "largest array factor, over N P",
+    "places along the track, N 45, 20 MHz",
+}
+
+
+@pytest.mark.parametrize("item", KNOWN)
+def test_figures_are_those_that_are_known(quick, item):
+    value, tolerance = KNOWN[item]
+    assert (np.abs(np.subtract(rows_of(quick[1])[item]["value"], value)) <= tolerance).all()
+
+
+def test_the_known_errors_err_and_nothing_else_does(quick):
+    found = {item for item, row in rows_of(quick[1]).items() if not row["holds"]}
+    assert found == ERR
+    unexplained = [item for item in found if not rows_of(quick[1])[item]["why"]]
+    assert not unexplained
+
+
+def test_apparent_lengths_follow_spacing_and_halved_offset(quick):
+    here = numbers_of(quick[1], "switched")["N 45, +-20 MHz"]
+    assert here["d 0.015 m"] == pytest.approx(445, abs=1)
+    assert here["halved"] - 430 == pytest.approx((here["half a wave of fc"] - 430) / 2, rel=0.02)
+
+
+def test_trends_hold_the_known_figures(quick):
+    found = numbers_of(quick[1], "trends")
+    at = [found["df_mhz"].index(df) for df in (100, 20, 10)]
+    assert [found["null"][i] for i in at] == pytest.approx([0.164, 0.156, 0.148], abs=0.002)
+    assert [found["pslr_db"][i] for i in at] == pytest.approx([-13.0, -11.8, -10.6], abs=0.1)
+
+
+def test_the_page_is_well_formed_and_every_section_has_a_drawing(quick):
+    text, document = quick
+    made = Page(text)
+    said = "".join(made.words)
+    assert [s["title"] for s in document["sections"]] == list(made.sections)[1:]
+    assert next(iter(made.sections)) == "Published and measured"
+    assert all(count > 0 for count in list(made.sections.values())[1:])
+    for item, row in rows_of(document).items():
+        assert item in said and row["measured"] in said and f"{row['published']} ({row['source']})" in said
+    assert "A quick run" in said and document["finished"] and document["quick"]
+    from PIL import Image
+
+    pictures = re.findall(r'href="data:image/png;base64,([^"]+)"', text)
+    assert len(pictures) > 20
+    for data in pictures:
+        assert Image.open(io.BytesIO(base64.b64decode(data))).mode == "L"
+    assert len(text) < 4e6
+
+
+def test_rows_are_judged_by_their_numbers():
+    section = Section("key", "title")
+    section.number("a", "table 1", 0.167, 0.168, 0.002, "m")
+    section.number("b", "table 1", 0.167, 0.17, 0.002, "m", why="too wide")
+    section.states("c", "figure 1", "focused", "not", np.False_, value=np.float32(3))
+    assert [row.holds for row in section.rows] == [True, False, False]
+    assert section.rows[0].published == "0.167 m" and section.rows[0].measured == "0.168 m"
+    text = json.dumps(section.document(), allow_nan=False)
+    assert '"why": "too wide"' in text and '"value": 3' in text
+    assert plain({"x": [np.inf, np.nan, np.int64(2), np.float64(1 / 3)]}) == {"x": [None, None, 2, 0.333333]}
+
+
+def test_what_is_measured_is_kept_when_a_later_section_fails(tmp_path, monkeypatch, capsys):
+    def fails(lab):
+        raise RuntimeError("no more")
+
+    first = Section("one", "First <&>", parts=[html.words("words")])
+    monkeypatch.setattr(papers, "find", lambda name: Paper(name, "Title", "about", (lambda lab: first, fails)))
+    assert parser.main(["papers", "farooq", "-o", str(tmp_path / "half.html")]) == parser.FAILED
+    kept = json.loads((tmp_path / "half.json").read_text())
+    assert [s["key"] for s in kept["sections"]] == ["one"] and not kept["finished"]
+    text = (tmp_path / "half.html").read_text()
+    assert "First &lt;&amp;&gt;" in text and "Not finished: 1 sections" in text
+    Page(text)
+
+
+def test_papers_are_listed_in_words(capsys):
+    assert parser.main(["papers"]) == 0
+    lines = capsys.readouterr().out.splitlines()
+    assert len(lines) == len(papers.PAPERS) and lines[0].startswith("farooq ") and "Farooq" in lines[0]
+    for name in papers.PAPERS:
+        assert papers.find(name).name == name
+
+
+@pytest.mark.parametrize(
+    "arguments, message",
+    [
+        (["farook"], "unknown paper 'farook'; did you mean 'farooq'? known: farooq"),
+        (["farooq", "-o", "missing/page.html"], "there is no folder"),
+        (["farooq", "-o", "missing"], "there is no folder"),
+        (["farooq", "-o", "a file/page.html"], "is a file, not a folder"),
+        (["farooq", "-o", "a folder.html"], "it is a folder"),
+        (["farooq", "-o", "taken.html"], "taken.json': it is a folder"),
+    ],
+)
+def test_what_cannot_be_done_is_said_in_a_line_before_any_work(tmp_path, monkeypatch, capsys, arguments, message):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "a file").touch()
+    for folder in ("a folder.html", "taken.json"):
+        (tmp_path / folder).mkdir()
+    before = sorted(p.name for p in tmp_path.iterdir())
+    monkeypatch.setattr(Paper, "run", lambda *_: pytest.fail("it started to work"))
+    assert parser.main(["papers", *arguments]) == parser.BAD_INPUT
+    said = capsys.readouterr().err
+    assert message in said and said.count("\n") == 1
+    assert sorted(p.name for p in tmp_path.iterdir()) == before
+
+
+# pictures and plots of the page
+
+
+def test_a_picture_shows_its_first_row_at_the_bottom():
+    from PIL import Image
+
+    db = np.array([[0.0, -10.0], [-20.0, -80.0], [-40.0, -40.0]])
+    made = html.picture(db, (0, 2), (0, 3), "x", "y", "two & two", floor_db=-40, box=(1, 1))
+    Page(made)
+    data = re.search(r"base64,([^\"]+)", made)[1]
+    levels = np.asarray(Image.open(io.BytesIO(base64.b64decode(data))))
+    assert (levels == [[0, 0], [128, 0], [255, 191]]).all()
+    assert "two &amp; two" in made and "0 to -40 dB" in made and made.count("<rect") == 2
+
+
+def test_decades_are_ticked_at_one_two_and_five():
+    made = html.plot([("a", [1, 10, 100], [0, 1, 2])], "x", "y", "c", log_x=True)
+    ticks = re.findall(r'text-anchor="middle">([^<]+)</text>', made)[:-2]
+    assert ticks == ["1", "2", "5", "10", "20", "50", "100"]
+    line = np.array([p.split(",") for p in re.search(r'points="([^"]+)"', made)[1].split()], float)
+    assert np.diff(line[:, 0])[0] == pytest.approx(np.diff(line[:, 0])[1], abs=0.2)
+
+
+def test_chosen_curves_are_dots():
+    curves = [("law", [0, 1], [0, 1]), ("found", [0, 1], [0, 1])]
+    made = html.plot(curves, "x", "y", "c", dots=("found",))
+    assert made.count("<polyline") == 1 and 'stroke-width="6"' in made
+    assert html.plot(curves, "x", "y", "c", dots=True).count("<polyline") == 0
+
+
+# range zones
+
+SHORT = RangeZones(n_pulses=2)
+
+
+def test_the_record_is_the_sum_over_absolute_delays():
+    """a P exp(-j 2 pi f (tau - q/PRF - tau_ref)) exp(-j 2 pi f_n q/PRF), in extended precision."""
+    if np.finfo(np.longdouble).eps > 2e-19:
+        pytest.skip("longdouble is float64 here")
+    radar = RangeZones(n=3, n_pulses=3)
+    places = [radar.place(0, -20.0), radar.place(1, 11.0), None, radar.place(3, 40.0, 0.02)]
+    raw = range_zones.collect(radar, [None if p is None else sarcl.Scene.points([p]) for p in places])
+    c, turn = np.longdouble(SPEED_OF_LIGHT), 2 * np.pi * np.longdouble(1)
+    f = raw.frequency[:, None].astype(np.longdouble) + raw.frequency_step[0] * np.arange(raw.n_samples)
+    wanted = np.zeros(raw.samples.shape, complex)
+    for q, place in enumerate(places):
+        if place is None:
+            continue
+        for row in range(9):
+            pulse, element = divmod(row, 3)
+            y = [(p - 1) * np.longdouble(radar.speed) / radar.prf for p in (pulse - q, pulse)]
+            sender = np.array([0, y[0], element * radar.spacing], np.longdouble)
+            receiver = np.array([0, y[1], 0], np.longdouble)
+            late = sum(np.sqrt(((end - place.astype(np.longdouble)) ** 2).sum()) for end in (sender, receiver)) / c
+            zero = np.array([0, (pulse - 1) * np.longdouble(radar.speed) / radar.prf, sender[2]])
+            mark = radar.place(0).astype(np.longdouble)
+            reference = sum(np.sqrt(((end - mark) ** 2).sum()) for end in (zero, receiver)) / c
+            carrier = np.longdouble(radar.center) + element * np.longdouble(radar.step)
+            turns = f[row] * (late - q / np.longdouble(radar.prf) - reference) + carrier * q / radar.prf
+            wanted[row] += np.exp(-1j * (turn * (turns % 1)).astype(float))
+    assert np.linalg.norm(raw.samples - wanted) < 2e-5 * np.linalg.norm(wanted)
+
+
+def test_four_zones_are_told_apart_by_quarter_turns_and_fold_with_one_carrier():
+    # one element's phase errs by 2e-7 or so: what is left of an exact null
+    for apart in (1, 2, 3):
+        assert _zones.leak(SHORT, apart) < -100 and range_zones.isolation(SHORT, apart) == -np.inf
+    for radar in (replace(SHORT, step=0.0), replace(SHORT, step=20 * SHORT.prf)):  # equal carriers, or whole turns
+        assert _zones.leak(radar, 1) == pytest.approx(0, abs=0.02) and range_zones.isolation(radar, 1) == 0
+    assert _zones.leak(SHORT, 4) == pytest.approx(0, abs=0.02) and range_zones.isolation(SHORT, 4) == 0  # P zones on
+
+
+@pytest.mark.parametrize("turn", [0.03, 0.1, 0.21, 0.27, 0.4])
+def test_off_the_quarter_isolation_is_the_dirichlet_ratio(turn):
+    radar = replace(SHORT, step=(20 + turn) * SHORT.prf)
+    wanted = 20 * np.log10(abs(np.sin(8 * np.pi * turn) / (8 * np.sin(np.pi * turn))))
+    assert range_zones.isolation(radar, 1) == pytest.approx(wanted, abs=1e-6)
+    assert _zones.leak(radar, 1) == pytest.approx(wanted, abs=0.02)
+
+
+@pytest.mark.parametrize("degrees", [-20, -5, 7, 20, 30])
+def test_another_direction_turns_over_the_elements_by_itself(degrees):
+    up = np.radians(degrees)
+    assert _zones.leak(SHORT, 1, up) == pytest.approx(range_zones.isolation(SHORT, 1, up), abs=0.05)
+    if degrees == 30:  # half a wave apart: a quarter turn back, and the zones fold
+        assert range_zones.isolation(SHORT, 1, up) == pytest.approx(0, abs=0.02)
+
+
+def test_a_whole_scene_is_told_apart_in_every_zone(quick):
+    found = numbers_of(quick[1], "zones")
+    running, one = (np.array(found[name]["levels_db"]) for name in ("running carriers", "one carrier"))
+    assert np.abs(np.diag(running)).max() < 1e-3
+    assert running[~np.eye(4, dtype=bool)].max() < -35 and np.abs(one).max() < 0.1
+    assert found["df over PRF"]["largest_error_db"] < 0.02 and found["direction"]["largest_error_db"] < 0.05
+
+
+def test_points_of_all_zones_keep_their_level_and_place():
+    at = np.linspace(-70, 70, 141)
+    cuts = _zones.cuts_of(SHORT, at)
+    for cut, beyond in zip(cuts, _zones.BEYOND, strict=True):
+        assert at[cut.argmax()] == beyond and cut.max() == pytest.approx(1, abs=0.01)
+        assert cut[np.abs(at - beyond) > 12].max() < 0.01  # the window's side lobes and three other zones
+
+
+@pytest.mark.parametrize(
+    "make, message",
+    [
+        (lambda: range_zones.collect(SHORT, [None, None]), "2 zones and all are empty"),
+        (lambda: RangeZones(n=0), "n is 0"),
+        (lambda: RangeZones(prf=np.nan), "prf is nan"),
+        (lambda: range_zones.isolation(SHORT, 1, np.inf), "elevation is inf"),
+        (lambda: range_zones.collect(SHORT, [sarcl.Scene.points([SHORT.place(1)])]), "range window"),
+    ],
+)
+def test_bad_zones_are_named(make, message):
+    with pytest.raises(ValueError, match=message):
+        make()
+
+
+@pytest.mark.slow
+def test_all_of_the_paper(tmp_path):
+    text, document = run(tmp_path)
+    rows = rows_of(document)
+    Page(text)
+    for item, (value, tolerance) in (KNOWN | LARGE).items():
+        assert (np.abs(np.subtract(rows[item]["value"], value)) <= tolerance).all(), item
+    apart = numbers_of(document, "switched")
+    lengths = [apart[f"N {n}, +-{df} MHz"]["d 0.015 m"] for n, df in ((45, 20), (225, 4), (450, 2))]
+    assert lengths == pytest.approx([445, 505, 580], abs=1)
+    trend = numbers_of(document, "trends")
+    assert trend["df_mhz"] == [100, 50, 20, 10, 5, 2, 1]
+    assert trend["null"][-1] == pytest.approx(0.072, abs=0.002) and trend["pslr_db"][-1] == pytest.approx(-2.6, abs=0.1)
+    assert (np.diff(trend["null"]) < 0).all() and (np.diff(trend["pslr_db"]) > 0).all()
+    honest = numbers_of(document, "honest")
+    apparent, own = (honest[f"N 450, 2 MHz, {kind}"] for kind in ("apparent", "channels"))
+    assert apparent["points"][2]["pslr_db"] == pytest.approx(-0.13, abs=0.4)
+    assert abs(own["points"][2]["error"]) < 0.005 and apparent["dips"][0]["dip_db"] == 0
+    assert document["finished"] and not document["quick"]

@@ -1,0 +1,117 @@
+"""Amplitudes that pulses share: what lies between knots, within what samples promise, and counted alike."""
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl import pointing
+from sarcl.model.antenna import Antenna
+from sarcl.scattering import pulse_nodes
+from sarcl.scattering.pulse_nodes import Knots, every, spaced
+from sarcl.scene.material import Material
+
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=1e-6)
+ROUGH = Material(eps_r=4.0, conductivity=1e-3, height=np.inf, diagram="cos")
+BOTH = Material(eps_r=6.0, conductivity=0.1, height=0.002, diagram="exp", width=0.5)
+
+
+def hills(n=20, material=ROUGH, edge=0.3, seed=1):
+    axis = edge * (np.arange(n + 1) - n / 2)
+    return sarcl.Scene.from_heights(
+        axis, axis, np.random.default_rng(seed).normal(0, edge / 6, (n + 1, n + 1)), material=material
+    )
+
+
+def track(n=96, length=300.0):
+    return sarcl.Trajectory.line(start=(-7e3, -length / 2, 7e3), velocity=(0, length, 0), prf=float(n), n_pulses=n)
+
+
+@pytest.fixture
+def always(monkeypatch):
+    monkeypatch.setattr(pulse_nodes, "WORTH", 0)
+
+
+@pytest.mark.parametrize(("n", "spacing"), [(17, 4), (18, 4), (65, 16), (100, 8), (257, 64)])
+def test_cubics_go_through_knots_and_are_exact_for_cubics(n, spacing):
+    knots = spaced(n, spacing)
+    assert knots.pulses[0] == 0 and knots.pulses[-1] == n - 1
+    rows = np.arange(n)
+    for start, stop in ((0, n), (n // 3, n // 2), (n - 1, n)):
+        needed, which, shares = knots.of(start, stop)
+        assert len(np.unique(needed)) == len(needed) and shares.shape == (stop - start, 4)
+        curve = (needed / n - 0.3) ** 3 - needed / n
+        made = (shares * curve[which[:, :1] + np.arange(4)]).sum(axis=1)
+        np.testing.assert_allclose(made, ((rows / n - 0.3) ** 3 - rows / n)[start:stop], atol=2e-6)
+        apart = np.abs(needed[which[:, 1]] - rows[start:stop])
+        assert (apart <= np.abs(needed[:, None] - rows[start:stop]).min(axis=0)).all()
+
+
+def test_each_its_own():
+    needed, which, shares = every(9).of(3, 7)
+    assert needed.tolist() == [3, 4, 5, 6] and which.tolist() == [[i, i] for i in range(4)] and (shares == 1).all()
+    assert isinstance(every(9), Knots) and every(9).order == 1
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-3])
+@pytest.mark.parametrize("material", [ROUGH, BOTH, "metal"])
+def test_shared_amplitudes_keep_the_tolerance(device, always, material, tolerance):
+    """Against the exact sum of every pulse's own amplitudes, in HH and HV, gains and shadows among them."""
+    scene = hills(10, material, edge=0.2)
+    tx = pointing.spotlight(track(), (0, 0, 0))
+    options = {"polarization": ["HH", "HV"], "antenna": Antenna.gaussian(width=0.002), "device": device}
+    raw = sarcl.echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
+    assert raw.report.plan["pulses an amplitude"] >= 4
+    assert raw.report.measured_error <= raw.report.predicted_error <= tolerance
+
+
+def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
+    """A receiver of its own, a window that cuts, facets that turn away on the way, blocks that end anywhere."""
+    scene = hills(24, BOTH, edge=0.4) + sarcl.Scene.facets(
+        [[[-2.0, 0, 0], [2, 0, 0], [0, 0.02, 3]], [[0, 2, 0.0], [1, 2, 0], [1, 2.0, 2]]], material=ROUGH
+    )
+    tx = sarcl.Trajectory.line(start=(-300, -6e3, 4e3), velocity=(600, 300, 0), prf=150.0, n_pulses=150)
+    rx = sarcl.Trajectory(tx.times, tx.positions + np.array([200.0, 300, -500]))
+    made = []
+    for worth in (0, 1e12):
+        monkeypatch.setattr(pulse_nodes, "WORTH", worth)
+        options = {"receiver": rx, "range_window": (-3, 20), "tolerance": 1e-3, "max_edge": 0.2, "device": device}
+        made.append(sarcl.echo(scene, CHIRP, tx, polarization="all", **options))
+    shared, own = made
+    assert shared.report.plan["pulses an amplitude"] > 1 == own.report.plan["pulses an amplitude"]
+    assert np.linalg.norm(shared.samples - own.samples) <= 1e-3 * np.linalg.norm(own.samples)
+    assert shared.report.contributions_done == pytest.approx(own.report.contributions_done, rel=2e-3)
+    sums = [r.contributions_done + sum(r.contributions_skipped.values()) for r in (shared.report, own.report)]
+    assert sums[0] == sums[1]
+
+
+def test_a_jumping_track_shares_nothing(device, always):
+    """Neighbours in time that are no neighbours in space: every pulse its own, and still right."""
+    tx = track()
+    order = np.random.default_rng(2).permutation(len(tx))
+    jumping = sarcl.Trajectory(tx.times, tx.positions[order])
+    raw = sarcl.echo(hills(8), CHIRP, jumping, tolerance=1e-2, check=True, device=device)
+    assert raw.report.plan["pulses an amplitude"] == 1
+    assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
+
+
+def test_no_flash_falls_between_knots(device, always):
+    """A plate that mirrors for three pulses of two hundred: knots are denser than its flash, whatever samples say."""
+    plate = sarcl.Scene.facets([[[-1.0, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1.0, -1, 0], [1, 1, 0], [-1, 1, 0]]])
+    tx = sarcl.Trajectory.line(start=(-900, 0, 6e5), velocity=(1800e2, 0, 0), prf=100 * 200.0, n_pulses=200)
+    tx = sarcl.Trajectory(tx.times, tx.positions * (60, 1, 1))
+    raw = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, check=True, device=device)
+    own = raw.report.plan["pulses an amplitude"]
+    assert own == 1 or 2 * np.pi / 0.031 * 2 * own * 9e-4 * raw.report.plan["facet edges, m"] * 2 / 3 <= 1.01
+    pulse_nodes.WORTH = 1e12
+    wanted = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, device=device)
+    assert np.linalg.norm(raw.samples - wanted.samples) <= 1e-2 * np.linalg.norm(wanted.samples)
+
+
+def test_memory_for_amplitudes_keeps_to_the_budget(device):
+    """Tiles in several calls, blocks of few pulses: the same echoes."""
+    scene = hills(60)
+    small, large = (
+        sarcl.echo(scene, CHIRP, track(40), tolerance=1e-2, max_bytes=size, shadows=False, device=device)
+        for size in (1e6, 1e9)
+    )
+    np.testing.assert_allclose(small.samples, large.samples, atol=1e-4 * np.abs(large.samples).max())

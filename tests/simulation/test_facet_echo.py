@@ -1,0 +1,65 @@
+"""The frequency-by-frequency echo of physical_optics.py, which the engine is held to, against closed forms."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from scattering.test_facet import CONDUCTOR, UP, far_amplitude, plate, quarters
+from scipy.special import fresnel as fresnel_integrals
+
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.reference import facet
+from sarcl.reference.geometry import half_path
+
+BAND = np.linspace(9.3e9, 9.9e9, 7)
+
+
+def seen_from(distance, elevation, azimuth):
+    return distance * np.array(
+        [np.sin(elevation) * np.cos(azimuth), np.sin(elevation) * np.sin(azimuth), np.cos(elevation)]
+    )
+
+
+@pytest.mark.parametrize("distance", [1e3, 1e5])
+def test_echo_of_a_tilted_plate_does_not_depend_on_nodes_or_on_how_it_is_cut(distance):
+    target, tx, rx = plate(5.0, np.radians(20)), seen_from(distance, 0.1, 0.4), seen_from(distance, 0.3, -0.2)
+    normal_incidence = 2 * np.sqrt(np.pi) * 25 * BAND.max() / SPEED_OF_LIGHT
+    wanted = facet.facet_echo(target, 6 - 1j, BAND, tx, rx, distance)
+    more = facet.facet_echo(target, 6 - 1j, BAND, tx, rx, distance, extra_nodes=50)
+    cut = facet.facet_echo(quarters(target), 6 - 1j, BAND, tx, rx, distance)
+    assert np.abs(wanted).min() > 1e-8 * normal_incidence
+    assert np.abs(more - wanted).max() < 1e-11 * normal_incidence
+    assert np.abs(cut - wanted).max() < 1e-11 * normal_incidence
+
+
+def test_echo_from_far_away_is_that_of_plane_waves():
+    target, tx, rx = plate(5.0, np.radians(20)), seen_from(1e10, 0.33, 0.01), seen_from(1e10, 0.36, -0.02)
+    rounding = float(half_path(tx, rx, np.zeros((1, 3)), 1e10)[0])  # of 1e10 m: 1e-6 m
+    for permittivity in (CONDUCTOR, 6 - 1j):
+        got = facet.facet_echo(target, permittivity, BAND[:2], tx, rx, 1e10)
+        for a, f in zip(got, BAND[:2], strict=True):
+            wanted = far_amplitude(target, permittivity, f, tx / 1e10, rx / 1e10)
+            wanted = wanted * np.exp(-4j * np.pi * f / SPEED_OF_LIGHT * rounding)
+            # 25 m^2/(2 R) of path at the corners
+            assert a == pytest.approx(wanted, abs=1e-6 * np.abs(wanted).max())
+
+
+def test_echo_of_a_plate_at_normal_incidence_is_a_pair_of_fresnel_integrals():
+    # exp(-2 j k (sqrt(R^2 + x^2 + y^2) - R)) to second order in x/R; the fourth errs by 8e-6 rad in the corners
+    distance, side = 1e3, 5.0
+    got = facet.facet_echo(plate(side), CONDUCTOR, BAND, distance * UP, distance * UP, distance, by_facet=True)
+    k = 2 * np.pi * BAND / SPEED_OF_LIGHT
+    scale = np.sqrt(2 * k / (np.pi * distance))
+    sine, cosine = fresnel_integrals(scale * side / 2)
+    wanted = k / np.sqrt(np.pi) * (2 * (cosine - 1j * sine) / scale) ** 2
+    assert got[:, 0, 0] == pytest.approx(wanted, rel=1e-5)
+    assert got[:, 1, 1] == pytest.approx(wanted, rel=1e-5)
+
+
+def test_permittivity_may_change_with_frequency():
+    eps = np.array([[6 - 1j, 4 - 2j], [5 - 1j, 4 - 2j]])
+    got = facet.facet_echo(plate(0.5), eps, BAND[:2], 1e3 * UP, 1e3 * UP, 1e3)
+    for i in range(2):
+        one = facet.facet_echo(plate(0.5), eps[i], BAND[i : i + 1], 1e3 * UP, 1e3 * UP, 1e3)
+        assert got[i] == pytest.approx(one[0], rel=1e-12)
+    assert abs(got[0, 0, 0] / BAND[0] - got[1, 0, 0] / BAND[1]) > 1e-3 * abs(got[0, 0, 0] / BAND[0])

@@ -1,0 +1,133 @@
+"""Echoes of terrain: scenes remember their heights, and what these hide is found by horizons as by rays."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from scipy.ndimage import gaussian_filter
+
+import sarcl
+from sarcl import shapes
+from sarcl.scattering import scatterers
+from sarcl.scene.terrain import facets_on
+from sarcl.visibility import illumination
+
+WAVE = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
+LAMBERT = sarcl.Material(eps_r=4.0, diagram="cos")
+
+
+def hills(n=60, height=3.0, **options):
+    axis = np.arange(n + 1) - n / 2
+    z = gaussian_filter(np.random.default_rng(1).standard_normal((n + 1, n + 1)), 5)
+    return sarcl.Scene.from_heights(axis, axis, height * z / z.std(), **{"material": LAMBERT, **options})
+
+
+def track(elevation=0.3, n=16, distance=2e4):
+    azimuth = 0.02 * np.arange(n) / n + 0.3
+    flat = distance * np.cos(elevation) * np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1)
+    return sarcl.Trajectory(np.arange(n) / 100.0, np.column_stack([flat, np.full(n, distance * np.sin(elevation))]))
+
+
+@pytest.fixture
+def terrains(monkeypatch):
+    """What `echo` hands to the shadows as heights, call by call."""
+    seen, lit = [], illumination.lit
+
+    def spy(*arguments, **options):
+        seen.append((options.get("heights"), options.get("on_heights")))
+        return lit(*arguments, **options)
+
+    monkeypatch.setattr(scatterers, "lit", spy)
+    return seen
+
+
+def without(scene):
+    """The same facets, whose shadows are ray-traced."""
+    return replace(scene, heights=None)
+
+
+SCENES = {
+    "terrain": hills,
+    "rough terrain": lambda: hills(point_roughness=0.05),
+    "moved": lambda: hills().moved((3.1, -2.7, 10.3)),
+    "a tank and points on it": lambda: (
+        (ground := hills())
+        + shapes.box((4, 3, 3), material=LAMBERT).on(ground, 5, 5, depth=1)
+        + sarcl.Scene.points([[0, 0, 9.0]])
+    ),
+    "metal": lambda: hills(n=16, height=1.5, material="metal"),  # cut into smaller facets
+}
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_horizons_and_rays_give_the_same_echoes(name, terrains):
+    scene = SCENES[name]()
+    options = {"tolerance": 1e-2, "check": False, "max_edge": 0.5 if name != "metal" else "auto"}
+    by_horizons = sarcl.echo(scene, WAVE, track(), **options)
+    by_rays = sarcl.echo(without(scene), WAVE, track(), **options)
+    assert terrains[0][0] is not None and terrains[1][0] is None
+    boxes = 12 * 4 if "tank" in name else 0
+    assert boxes <= (~terrains[0][1]).sum() < (100 * boxes or 1)
+    shadowed = [r.report.contributions_skipped["shadowed"] for r in (by_horizons, by_rays)]
+    assert shadowed[0] == pytest.approx(shadowed[1], rel=0.03) and shadowed[0] > 0
+    # samples at the edges of shadows differ (docs/shadows.md): 1e-3 of the power
+    difference = np.linalg.norm(by_horizons.samples - by_rays.samples) / np.linalg.norm(by_rays.samples)
+    assert difference < 0.05
+    dark = sarcl.echo(without(scene), WAVE, track(), **options, shadows=False)
+    assert np.linalg.norm(dark.samples - by_rays.samples) > 3 * difference * np.linalg.norm(by_rays.samples)
+
+
+def test_scenes_keep_heights_as_long_as_they_are_theirs():
+    scene = hills(n=20)
+    x, _, z = scene.heights
+    assert not any(v.flags.writeable for v in scene.heights)
+    assert facets_on(scene.heights, scene.triangles).all()
+    cut = scene.split(0.4)
+    assert facets_on(cut.heights, cut.triangles).all()
+    moved = scene.moved((1, 2, 3))
+    assert (moved.heights[2] == z + 3).all() and (moved.heights[0] == x + 1).all()
+    tower = shapes.cylinder(1.0, 20.0)
+    for both in (scene + tower, tower + scene):
+        assert both.heights is scene.heights
+        assert facets_on(both.heights, both.triangles).sum() == len(scene.triangles)
+    small = hills(n=8).moved((0, 0, 50))
+    assert (small + scene).heights is scene.heights and (scene + small).heights is scene.heights
+    rough = hills(n=20, point_roughness=0.2)
+    made = rough.realized(5)
+    assert facets_on(made.heights, made.triangles).all() and 0.1 < (made.heights[2] - rough.heights[2]).std() < 0.3
+
+
+def test_what_is_no_longer_all_of_a_terrain_is_traced(terrains):
+    scene = hills(n=20)
+    holed = scene.part(np.arange(len(scene.triangles)) != 7)
+    shifted = replace(scene, triangles=scene.triangles + np.array([0, 0, 0.5]))
+    sheared = hills(n=20, point_roughness=0.1)
+    sheared = replace(sheared, point_roughness=sheared.point_roughness[..., ::-1]).realized(1)  # moves sideways
+    axis = np.concatenate([np.arange(10.0), 10.0 + 3 * np.arange(10)])
+    uneven = sarcl.Scene.from_heights(axis, axis, np.outer(axis, axis) / 100, material=LAMBERT)
+    for other in (holed, shifted, sheared, uneven):
+        sarcl.echo(other, WAVE, track(n=4), tolerance=1e-1, check=False)
+    assert [heights is None for heights, _ in terrains] == [True] * 4
+
+
+def test_an_antenna_under_the_terrain_is_refused():
+    scene = hills()
+    with pytest.raises(ValueError, match=r"track\[0\] stands .* m under the terrain; raise the track"):
+        sarcl.echo(scene, WAVE, sarcl.Trajectory([0.0], [[5.0, 5.0, -400.0]]), max_edge=5.0, tolerance=1e-1)
+
+
+def test_rays_may_be_embrees():
+    pytest.importorskip("embreex")
+    scene = without(hills(n=30) + shapes.box((4, 3, 6), material=LAMBERT).moved((0, 0, 4)))
+    options = {"tolerance": 1e-2, "check": False, "max_edge": 0.5}
+    ours, theirs = (sarcl.echo(scene, WAVE, track(n=4), shadows=s, **options) for s in (True, "embree"))
+    assert np.linalg.norm(theirs.samples - ours.samples) < 0.02 * np.linalg.norm(ours.samples)
+    shadowed = [r.report.contributions_skipped["shadowed"] for r in (ours, theirs)]
+    assert shadowed[0] == pytest.approx(shadowed[1], rel=0.01) and shadowed[0] > 0
+
+
+def test_other_ray_casters_are_refused():
+    with pytest.raises(ValueError, match="choose one of 'embree'"):
+        sarcl.echo(hills(n=4), WAVE, track(n=4), shadows="optix")

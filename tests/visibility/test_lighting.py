@@ -1,0 +1,424 @@
+"""Lit shares: outlines of shadows on the ground, halves of facets, blocks of pulses, and what may not change them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+from scipy.spatial import ConvexHull
+
+import sarcl
+from sarcl.base.boxes import box
+from sarcl.opencl.device import open_device
+from sarcl.reference.shadow import hidden
+from sarcl.scene.triangles import areas, centroids, normals
+from sarcl.visibility import illumination
+from sarcl.visibility._aspect_blocks import enough_looks, lever, pulse_blocks, reach
+from sarcl.visibility._facet_samples import SAMPLES, places
+from sarcl.visibility.illumination import Light, lit
+
+TOLERANCE = {
+    "straight edge": 1 / 16 + 0.004,  # the finest sampling, and 1/255 steps with the lift's displacement
+    "mean share": 2e-3,  # errors of many facets are as often up as down
+}
+
+
+def eye(azimuth_deg, incidence_deg, distance=10e3):
+    a, i = np.deg2rad(azimuth_deg), np.deg2rad(incidence_deg)
+    return distance * np.array([np.sin(i) * np.cos(a), np.sin(i) * np.sin(a), np.cos(i)])
+
+
+def ground(n=40, size=40.0):
+    x = np.linspace(-size / 2, size / 2, n + 1)
+    return sarcl.Scene.from_heights(x, x, np.zeros((n + 1, n + 1))).triangles
+
+
+def frustum(base=5.0, top=2.0, height=6.0):
+    corners = [[x * s, y * s, z] for s, z in ((base, 0), (top, height)) for x in (-1, 1) for y in (-1, 1)]
+    return trimesh.convex.convex_hull(np.array(corners, float))
+
+
+BODIES = {
+    "cuboid": trimesh.creation.box((4.2, 7.7, 5.0)).apply_translation((0.3, 0.1, 2.5)),
+    "frustum": frustum(),
+    "cylinder": trimesh.creation.cylinder(3.1, 7.0, sections=48).apply_translation((0.2, -0.4, 3.5)),
+    "cone": trimesh.creation.cone(4.0, 8.0, sections=48),
+}
+
+
+def shadow_outline(body, viewpoint):
+    """Convex outline of a body's shadow on z = 0, counter-clockwise."""
+    v = np.asarray(body.vertices)
+    fall = v + (v - viewpoint) * (v[:, 2:] / (viewpoint[2] - v[:, 2:]))
+    return fall[ConvexHull(fall[:, :2]).vertices, :2]
+
+
+def area_within(triangle, outline):
+    """Area of a flat triangle (3, 2) inside a convex outline (n, 2): Sutherland and Hodgman 1974."""
+    polygon = list(triangle)
+    for a, b in zip(outline, np.roll(outline, -1, axis=0), strict=True):
+        side = [(b[0] - a[0]) * (p[1] - a[1]) - (b[1] - a[1]) * (p[0] - a[0]) for p in polygon]
+        kept = []
+        for i, p in enumerate(polygon):
+            q, s, t = polygon[i - 1], side[i], side[i - 1]
+            if s * t < 0:
+                kept.append(q + (p - q) * (t / (t - s)))
+            if s >= 0:
+                kept.append(p)
+        polygon = kept
+        if not polygon:
+            return 0.0
+    x, y = np.array(polygon).T
+    return abs(x @ np.roll(y, -1) - y @ np.roll(x, -1)) / 2
+
+
+def shares(triangles, viewpoint, device=None, tolerance=1 / 16, **options):
+    return Light(open_device(device), triangles, tolerance=tolerance, **options).share([np.asarray(viewpoint)]) / 255
+
+
+@pytest.mark.parametrize("name", BODIES)
+@pytest.mark.parametrize("azimuth, incidence", [(0, 45), (37, 60), (190, 30)])
+def test_a_body_on_flat_ground_shadows_its_outline_and_nothing_else(device, name, azimuth, incidence):
+    viewpoint, floor, body = eye(azimuth, incidence), ground(), BODIES[name]
+    share = shares(np.concatenate([floor, body.triangles]), viewpoint, device, two_sided=False)[: len(floor)]
+    outline = shadow_outline(body, viewpoint)
+    dark = np.array([area_within(t[:, :2], outline) for t in floor]) / areas(floor)
+    # the lift moves a shadow's edge by up to 2e-3 facets
+    inner, outer = (outline.mean(axis=0) + s * (outline - outline.mean(axis=0)) for s in (0.998, 1.002))
+    deep, clear = ([area_within(t[:, :2], line) / areas(t[None])[0] for t in floor] for line in (inner, outer))
+    # exactly: no signal at all comes from full shadow
+    assert (share[np.array(deep) > 1 - 1e-9] == 0).all() and (share[np.array(clear) == 0] == 1).all()
+    assert ((dark > 0) & (dark < 1)).sum() > 15 and (np.array(deep) > 1 - 1e-9).sum() > 50
+    # corners of the outline, and edges across which two outlines pass, are no straight edges
+    error = np.abs(share - (1 - dark))
+    assert np.quantile(error[(dark > 0) & (dark < 1)], 0.9) < TOLERANCE["straight edge"]
+    assert np.mean(share) == pytest.approx(1 - dark.mean(), abs=TOLERANCE["mean share"])
+
+
+@pytest.mark.parametrize("look", [20, 45, 63])
+def test_a_cuboids_shadow_on_the_ground_is_height_times_tangent_of_look(look):
+    """SARAS Fig 13: h tan(look) in ground range."""
+    height, floor = 5.0, ground(160, 40)
+    cuboid = trimesh.creation.box((4, 8, height)).triangles + np.array([0, 0, height / 2])
+    share = shares(np.concatenate([floor, cuboid]), eye(0, look, 36e6), two_sided=False)[: len(floor)]
+    middle = np.abs(centroids(floor)[:, 1]) < 3
+    dark = (1 - share[middle]) @ areas(floor[middle]) / 6.0  # m, of a strip 6 m wide
+    assert dark == pytest.approx(4 + height * np.tan(np.deg2rad(look)), abs=0.02)  # 4 m lie under it
+
+
+@pytest.mark.parametrize("tolerance", [error for _, error in SAMPLES])
+def test_a_large_facet_half_in_shadow_returns_its_lit_share(tolerance):
+    random = np.random.default_rng(4)
+    errors = []
+    for _ in range(60):
+        triangle = np.pad(random.uniform(-5, 5, (3, 2)), ((0, 0), (0, 1)))
+        if areas(triangle[None])[0] < 3:
+            continue
+        turn = random.uniform(0, 2 * np.pi)
+        across, along = np.array([np.cos(turn), np.sin(turn)]), np.array([-np.sin(turn), np.cos(turn)])
+        at = random.dirichlet([1, 1, 1]) @ triangle[:, :2]
+        screen = np.array(
+            [at - 99 * along, at + 99 * along, at + 99 * along + 99 * across, at - 99 * along + 99 * across]
+        )
+        raised = np.pad(screen, ((0, 0), (0, 1)), constant_values=2.0)
+        scene = np.stack([triangle, raised[[0, 1, 2]], raised[[0, 2, 3]]])
+        share = shares(scene, [0, 0, 1e7], tolerance=tolerance)[0]
+        # the outline must run counter-clockwise
+        wanted = 1 - area_within(triangle[:, :2], screen[::-1]) / areas(scene[:1])[0]
+        errors.append(abs(share - wanted))
+    assert len(errors) > 25 and max(errors) < tolerance + 1 / 255 + 0.002  # the lift's displacement
+    assert max(errors) > tolerance / 10 or tolerance < 0.1
+
+
+def test_sample_points_fill_triangles_evenly():
+    """Behind any straight edge the share of points is the share of area within the error that SAMPLES states."""
+    for n, stated in SAMPLES:
+        points = places(n).astype(float)
+        assert points.shape == (n, 2) and (points > 0).all() and (points.sum(axis=1) < 1).all()
+        worst = 0.0
+        for angle in np.linspace(0, 2 * np.pi, 1001):
+            way = np.array([np.cos(angle), np.sin(angle)])
+            q = np.sort(points @ way)
+            a, b, c = np.sort([0, *way])
+            with np.errstate(divide="ignore", invalid="ignore"):
+                area = np.where(q < b, (q - a) ** 2 / ((b - a) * (c - a)), 1 - (c - q) ** 2 / ((c - a) * (c - b)))
+            worst = max(worst, np.abs(area - np.arange(n) / n).max(), np.abs(area - np.arange(1, n + 1) / n).max())
+        assert 0.9 * stated < worst <= stated + 1e-6  # places are float32
+
+
+def test_shares_are_those_of_the_reference_in_a_soup(device):
+    random = np.random.default_rng(8)
+    soup = random.uniform(-5, 5, (60, 1, 3)) + 2 * random.standard_normal((60, 3, 3))
+    for viewpoint in (eye(20, 50), np.array([1.0, 0.5, -0.2]), eye(100, 80, 14)):
+        wanted = 1 - hidden(soup, viewpoint, places(16)).mean(axis=1)
+        assert shares(soup, viewpoint, device, tolerance=0.14) == pytest.approx(wanted, abs=0.51 / 255)
+
+
+def test_a_viewpoint_in_a_room_sees_its_walls_but_not_behind_a_partition(device):
+    walls = trimesh.creation.box((10, 10, 10)).subdivide().subdivide().triangles
+    partition = np.array([[[2.0, -4.9, -4.9], [2, 4.9, -4.9], [2, 0, 4.9]]])
+    scene = np.concatenate([walls, partition])
+    share = shares(scene, [-1, 0.3, 0.2], device)
+    near = walls[:, :, 0].max(axis=1) <= 2
+    assert (share[:-1][near] == 1).all() and share[-1] == 1
+    behind = walls[:, :, 0].min(axis=1) >= 2
+    covered = behind & (np.abs(walls[:, :, 1]) < 2.6).all(axis=1) & (np.abs(walls[:, :, 2]) < 2.6).all(axis=1)
+    assert covered.sum() == 8 and (share[:-1][covered] == 0).all()
+    assert (shares(walls, [-1, 0.3, 0.2], device) == 1).all()
+
+
+def test_facets_facing_away_are_dark_from_one_side_only():
+    roof = np.array([[[-1, -1, 0], [1, -1, 0], [0, 1, 0.0]]])
+    above, below = eye(0, 20), -eye(0, 20)
+    assert shares(roof, above, two_sided=False) == 1 and shares(roof, below, two_sided=False) == 0
+    assert shares(roof, above) == 1 and shares(roof, below) == 1
+
+
+def test_shares_do_not_depend_on_order_chunks_or_device(device, monkeypatch):
+    random = np.random.default_rng(2)
+    scene = np.concatenate(
+        [ground(50), BODIES["frustum"].triangles, BODIES["cylinder"].triangles + np.array([9, 3, 0])]
+    )
+    viewpoint, order = eye(33, 62), random.permutation(len(scene))
+    wanted = shares(scene, viewpoint)
+    assert (shares(scene, viewpoint, device) == wanted).all() and 0.05 < (wanted < 1).mean() < 0.5
+    assert (shares(scene[order], viewpoint, device) == wanted[order]).all()
+    monkeypatch.setattr(illumination, "CHUNK", 333)
+    assert (shares(scene, viewpoint, device) == wanted).all()
+
+
+def test_fine_facets_get_the_shares_that_all_samples_give(monkeypatch):
+    """Corners and centre find every facet on the edge of a shadow that is wider than facets are."""
+    scene = np.concatenate([ground(60), BODIES["frustum"].triangles])
+    assert len(scene) > illumination.FEW
+    some = shares(scene, eye(12, 55), two_sided=False)
+    monkeypatch.setattr(illumination, "FEW", 10**9)
+    full = shares(scene, eye(12, 55), two_sided=False)
+    assert np.abs(some - full).max() <= 1 / 16 and ((full > 0) & (full < 1)).sum() > 20
+
+
+def test_a_large_facet_among_fine_ones_holds_a_whole_shadow():
+    """Neither its corners nor its centre are in the shadow: all its samples are looked at."""
+    plate = np.array([[[-10.0, -10, 0], [10, -10, 0], [-10, 10, 0]]])
+    lid = ground(60, 6.0) + np.array([-6.0, 0.0, 3.0])
+    share = shares(np.concatenate([plate, lid]), [-6.0, 0, 1e7])
+    assert (
+        len(lid) > illumination.FEW and share[0] == pytest.approx(1 - 36 / 200, abs=1 / 16) and (share[1:] == 1).all()
+    )
+
+
+def circle(n, radius=7e3, height=7e3, arc=2 * np.pi):
+    a = np.linspace(0, arc, n, endpoint=False)
+    return np.stack([radius * np.cos(a), radius * np.sin(a), np.full(n, height)], axis=1)
+
+
+def straight(n, length=100.0):
+    return np.stack([np.linspace(-length / 2, length / 2, n), np.full(n, -7e3), np.full(n, 7e3)], axis=1)
+
+
+def pole(height=6.0):
+    return trimesh.creation.box((0.8, 0.8, height)).triangles + np.array([0, 0, height / 2])
+
+
+def test_a_short_straight_track_is_one_block_a_circle_many():
+    scene = np.concatenate([ground(), pole()])
+    assert len(lit(scene, straight(1000), two_sided=False)) == 1
+    tx = circle(1000)
+    bounds = box(scene.reshape(-1, 3))
+    offered = len(pulse_blocks([tx], bounds, [0.25 * reach(scene, tx[500]) / lever(bounds, tx)])[0])
+    assert 100 < offered < 500
+    assert offered / 8 < len(lit(scene, tx, two_sided=False)) < offered / 2  # not all of them need a look
+    assert len(lit(ground(), circle(1000), two_sided=False)) == 1  # nothing stands above the ground
+
+
+@pytest.mark.parametrize("track", ["straight", "circle", "jitter", "back and forth", "still", "over"])
+def test_directions_within_a_block_differ_by_no_more_than_the_limit(track):
+    random = np.random.default_rng(3)
+    tx = {
+        "straight": straight(2000, 3e3),
+        "circle": circle(3000),
+        "jitter": straight(500, 900.0) + 30 * random.standard_normal((500, 3)),
+        "back and forth": np.concatenate([straight(300, 2e3), straight(300, 2e3)[::-1]]),
+        "still": np.repeat(eye(0, 40)[None], 50, axis=0),
+        "over": np.stack([np.linspace(-60, 60, 400), np.zeros(400), np.full(400, 25.0)], axis=1),
+    }[track]
+    bounds, limit = np.array([[-20, -20, 0], [20, 20, 6.0]]), 0.01
+    blocks, looks, turns = pulse_blocks([tx], bounds, [limit])
+    assert blocks[0, 0] == 0 and blocks[-1, 1] == len(tx) and (blocks[1:, 0] == blocks[:-1, 1]).all()
+    points = random.uniform(*bounds, (30, 3))
+    worst = 0.0
+    for (first, last), look, turn in zip(blocks, looks, turns, strict=True):
+        assert first <= look < last
+        way = tx[first:last, None] - points
+        way /= np.linalg.norm(way, axis=2, keepdims=True)
+        moved = np.linalg.norm(way - way[look - first], axis=2).max()
+        assert moved <= turn + 1e-12 and turn <= limit
+        worst = max(worst, moved)
+    if track in ("straight", "circle"):
+        assert worst > 0.8 * limit and len(blocks) < 1.3 * np.ceil(total_turn(tx) / (2 * limit))
+
+
+def total_turn(tx):
+    """Way of the direction from the origin, rad."""
+    way = tx / np.linalg.norm(tx, axis=1, keepdims=True)
+    return np.linalg.norm(np.diff(way, axis=0), axis=1).sum()
+
+
+@pytest.mark.parametrize("tolerance", [0.25, 0.0625])
+def test_a_sweeping_poles_shadow_is_right_at_every_pulse_within_the_bound(tolerance):
+    scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
+    light = Light(open_device(), scene, two_sided=False, tolerance=1 / 16)
+    blocks = lit(scene, tx, two_sided=False, tolerance=tolerance)
+    assert len(blocks) > 5
+    typical, way = reach(scene, tx[350]), lever(box(scene.reshape(-1, 3)), tx)
+    u = tx[350] / np.linalg.norm(tx[350])
+    own = areas(scene) * np.abs(normals(scene) @ u) / np.linalg.norm(scene - np.roll(scene, 1, 1), axis=2).max(axis=1)
+    floor = np.arange(len(scene)) < 1800
+    worst = 0.0
+    for pulse in range(0, 700, 23):
+        block = blocks.block_of(pulse)
+        assert blocks.blocks[block, 0] <= pulse < blocks.blocks[block, 1]
+        moved = np.abs(light.share([tx[pulse]]) / 255.0 - light.share([tx[blocks.viewpoints[block]]]) / 255.0)
+        # two samplings, and two edges of a shadow narrower than a facet
+        assert (moved[floor] <= 2 * tolerance * typical / own[floor] + 2 / 16).all()
+        worst = max(worst, moved[floor].max())
+    assert worst > 0 and way == pytest.approx(6 * np.sqrt(2), rel=5e-3)
+    # one viewpoint for all of them would be far off
+    assert np.abs(light.share([tx[0]]) - 1.0 * light.share([tx[-1]])).max() == 255
+
+
+def test_shares_change_evenly_between_the_pulses_looked_from():
+    scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
+    found = lit(scene, tx, two_sided=False, tolerance=0.5)
+    light = Light(open_device(), scene, two_sided=False, tolerance=1 / 16)
+    spans = list(found.spans())
+    assert [s.first for s in spans] == [0, *(s.stop for s in spans[:-1])] and spans[-1].stop == len(tx)
+    assert len(found) - 1 <= len(spans) <= len(found) + 1
+    even = stepped = 0.0
+    for span in spans:
+        for pulse in range(span.first, span.stop, 17):
+            part = span.moments(np.array([pulse]))[0]
+            share = (span.share + part * (span.later - 1.0 * span.share)) / 255
+            assert share == pytest.approx(found.fraction_at(pulse), abs=1e-6)
+            true = light.share([tx[pulse]]) / 255.0
+            even += ((share - true) ** 2).sum()
+            stepped += ((found.fraction(found.block_of(pulse)) - true) ** 2).sum()
+    assert even < 0.7 * stepped  # the rest is that shares are counted in samples
+    for block, pulse in enumerate(found.viewpoints):
+        assert (found.fraction_at(pulse) == found.fraction(block)).all()
+    still = next(lit(scene, tx[:1], two_sided=False).spans())
+    assert (still.first, still.stop) == (0, 1) and still.later is still.share
+
+
+def test_where_shadows_hardly_move_every_sixteenth_block_is_looked_at(monkeypatch):
+    shares, asked = np.zeros((100, 50), np.uint8), []
+    shares[:, 0] = 255
+
+    def look(place):
+        asked.append(place)
+        return shares[place]
+
+    at = 3 * np.arange(100)
+    found = dict(enough_looks(look, at))
+    assert list(found) == sorted(asked) == [*range(0, 97, 8), 97, 99] and len(set(asked)) == len(asked)
+    shares[:, 1:20] = (np.arange(100) * 2)[:, None]  # even change
+    assert len(list(enough_looks(look, at))) == len(found)
+    shares[39:42, 30] = 255  # something passes: it is looked at as closely as it needs
+    assert {36, 38, 39, 40, 41, 42, 44} <= set(dict(enough_looks(look, at)))
+    assert [list(dict(enough_looks(look, at[:n]))) for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]
+
+
+def test_lighting_tells_dark_full_and_changing_facets(device):
+    scene, tx = np.concatenate([ground(20), pole()]), circle(90)
+    found = lit(scene, tx, two_sided=False, tolerance=0.25, device=device)
+    all_of_them = np.array([found.share(i) for i in range(len(found))])
+    assert (found.dark == (all_of_them == 0).all(axis=0)).all() and 2 <= found.dark.sum() < 30
+    assert (found.full == (all_of_them == 255).all(axis=0)).all() and 500 < found.full.sum() < 800
+    pulses = np.diff(found.blocks, axis=1)[:, 0]
+    assert found.dark_pairs() == (pulses * (all_of_them == 0).sum(axis=1)).sum()
+    assert found.fraction(0).dtype == np.float32 and found.fraction(-1).max() == 1
+
+
+def test_shares_that_do_not_fit_are_found_anew():
+    scene, tx = np.concatenate([ground(20), pole()]), circle(60)
+    kept, anew = lit(scene, tx, two_sided=False), lit(scene, tx, two_sided=False, max_bytes=1000)
+    assert len(anew._changes) < len(anew) == len(kept) == len(kept._changes)
+    assert all((kept.share(i) == anew.share(i)).all() for i in range(len(kept)))
+    assert sum(i.nbytes + v.nbytes for i, v in anew._changes) <= 1000
+
+
+def test_two_antennas_must_both_see_a_facet(device):
+    scene, tx, rx = np.concatenate([ground(30), pole()]), eye(0, 50)[None], eye(80, 40)[None]
+    both = lit(scene, tx, rx, tolerance=5 / 9, device=device).share(0)
+    one, other = (lit(scene, e, tolerance=5 / 9, device=device).share(0) for e in (tx, rx))
+    assert (both == np.minimum(one, other)).all() and (both != one).any() and (both != other).any()
+    # shadows that cover different halves of a facet leave nothing of it
+    plate = np.array([[[-1, -1, 0], [1, -1, 0], [0, 1, 0.0]]])
+    wall = np.array([[[0, -9, 0.05], [0, 9, 0.05], [0, 0, 30.0]]])
+    left, right = np.array([[-1e4, 0, 2e3]]), np.array([[1e4, 0, 2e3]])
+    halves = [lit(np.concatenate([plate, wall]), *e, tolerance=1 / 16).share(0)[0] / 255 for e in ((left,), (right,))]
+    joint = lit(np.concatenate([plate, wall]), left, right, tolerance=1 / 16).share(0)[0] / 255
+    assert 0.3 < min(halves) and max(halves) < 1 and joint == pytest.approx(sum(halves) - 1, abs=1.5 / 255)
+
+
+def test_facets_nobody_asks_for_shadow_all_the_same():
+    scene = np.concatenate([ground(20), pole()])
+    wanted = np.arange(len(scene)) < 800
+    all_of_them, some = (lit(scene, eye(0, 50)[None], wanted=w).share(0) for w in (None, wanted))
+    assert (some[wanted] == all_of_them[wanted]).all() and not some[~wanted].any() and (some[wanted] < 255).any()
+
+
+def test_a_scene_wholly_in_shadow_says_so():
+    under = ground(6, 4.0)
+    lid = ground(1, 100.0) + np.array([0, 0, 3])
+    wanted = np.arange(len(under) + len(lid)) < len(under)
+    with pytest.warns(sarcl.SarclWarning, match="the whole scene is in shadow"):
+        found = lit(np.concatenate([under, lid]), eye(0, 40)[None], wanted=wanted)
+    assert found.dark.all()
+    with pytest.warns(sarcl.SarclWarning, match="the side the track is on"):
+        lit(under, -eye(0, 40)[None], two_sided=False)
+
+
+@pytest.mark.parametrize(
+    "change, message",
+    [
+        ({"tx": np.zeros((0, 3))}, "tx is empty"),
+        ({"tx": np.zeros(3)}, r"tx has shape \(3,\)"),
+        ({"tx": np.full((1, 3), np.nan)}, "tx.* is nan"),
+        ({"rx": np.zeros((2, 3))}, r"rx has shape \(2, 3\), wanted \(1, 3\)"),
+        ({"tolerance": 0.05}, "tolerance is 0.05; it must be at least 0.0625"),
+        ({"engine": "optix"}, "engine is 'optix'; choose one of 'opencl', 'embree'"),
+        ({"wanted": np.ones(3, bool)}, r"wanted has shape \(3,\); wanted one for each of 8 facets"),
+        ({"heights": 7}, r"heights must be \(x, y, z\)"),
+        ({"heights": ([0, 1], [0, 1], np.zeros((3, 2)))}, r"heights z has shape \(3, 2\), wanted \(2, 2\)"),
+        ({"heights": ([1, 0], [0, 1], np.zeros((2, 2)))}, "heights x must hold at least two increasing"),
+    ],
+)
+def test_bad_input_is_refused(change, message):
+    arguments = {"triangles": ground(2), "tx": eye(0, 30)[None]} | change
+    with pytest.raises(ValueError, match=message):
+        lit(arguments.pop("triangles"), arguments.pop("tx"), **arguments)
+
+
+def test_no_facet_is_lit_too():
+    none = lit(np.zeros((0, 3, 3)), circle(5))
+    assert len(none) == 1 and none.share(0).shape == (0,) and none.block_of(4) == 0
+
+
+def test_embree_sees_what_opencl_sees():
+    pytest.importorskip("embreex")
+    scene = np.concatenate(
+        [ground(50), BODIES["frustum"].triangles, BODIES["cylinder"].triangles + np.array([9, 3, 0])]
+    )
+    for viewpoint in (eye(33, 62), np.array([3.0, -8.0, 2.0])):
+        ours, theirs = (shares(scene, viewpoint, engine=e) for e in ("opencl", "embree"))
+        assert np.abs(ours - theirs).max() <= 1 / 16 and (ours != theirs).mean() < 0.01
+        assert 0.02 < (ours < 1).mean() < 0.9
+
+
+def test_embree_where_it_is_not_installed_says_what_to_do(monkeypatch):
+    import sys
+
+    monkeypatch.setitem(sys.modules, "embreex", None)
+    with pytest.raises(ImportError, match="pip install embreex"):
+        shares(ground(2), eye(0, 30), engine="embree")
