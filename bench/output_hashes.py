@@ -20,6 +20,8 @@ Left out because they depend on the clock: `report.seconds`, `Forecast.seconds`,
 False), and how often finished tiles are written to "PATH.parts" before an image is complete (no pixel depends on it).
 No plan depends on the clock: the planner's costs are constants in the code.
 
+Left out because it follows from names and comments of kernels too: the mark of the job ("job") in an image's file.
+
 Left out because no public name reaches them: devices as if they had no float64, or one lane (the tests cover these).
 Left out because not every machine has them: Gotcha files, elevation models (rasterio), embreex, dask workers.
 """
@@ -104,13 +106,13 @@ def of_image(image: sarcl.Image) -> dict[str, Any]:
 
 
 def of_hdf5(path: Any) -> dict[str, Any]:
-    """Every dataset and attribute of an HDF5 file, but for the report, which holds seconds."""
+    """Every dataset and attribute of an HDF5 file, but for the report, which holds seconds, and the mark of the job."""
     import h5py
 
     found: dict[str, Any] = {}
 
     def visit(name: str, item: Any) -> None:
-        found.update({f"{name}@{key}": value for key, value in item.attrs.items()})
+        found.update({f"{name}@{key}": value for key, value in item.attrs.items() if key != "job"})
         if isinstance(item, h5py.Dataset) and name != "report":
             value = item[()]
             found[name] = value.decode() if isinstance(value, bytes) else value
