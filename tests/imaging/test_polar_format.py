@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import sys
 import warnings
 from dataclasses import replace
 from functools import partial
@@ -15,7 +14,7 @@ from helpers.contract_cases import build, draw
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
-from sarcl.imaging.polar_format import _wavefront
+from sarcl.imaging.polar_format import _wavefront, polar_format
 from sarcl.imaging.polar_format._wavefront import curvature, waves_about
 from sarcl.numerics import nufft2d
 from sarcl.numerics.interpolation import interpolator
@@ -302,7 +301,7 @@ def test_an_image_that_errs_more_than_asked_is_not_handed_out_silently(monkeypat
     def poor(*args):
         return replace(plan(*args), interpolator=interpolator(2, 1.25))
 
-    monkeypatch.setattr(sys.modules["sarcl.polar_format"], "make_plan", poor)  # the verb has the module's name
+    monkeypatch.setattr(polar_format, "make_plan", poor)
     with pytest.raises(sarcl.ToleranceMissed) as missed:
         sarcl.polar_format(noise_on(ARC), GRID, tolerance=1e-3, check=True)
     assert missed.value.measured > 1e-3 and missed.value.image.data.shape == GRID.shape
