@@ -23,12 +23,13 @@ bench: ready  ## run time against the error achieved; peers with ARGS='--peer-py
 results: ready  ## docs/results.md from bench/results/*.json
 	@.venv/bin/python bench/report.py
 
-lint: ready-dev  ## style, format and types
+lint: ready-dev  ## style, format, types, and imports that point down
 	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \
-	    echo "$$tool"; .venv/bin/python -m $$tool || status=1; done; exit $$status
+	    echo "$$tool"; .venv/bin/python -m $$tool || status=1; done; \
+	echo lint-imports; .venv/bin/lint-imports --no-logo || status=1; exit $$status
 
 clean:  ## remove .venv and everything made, but not the pictures in out/
-	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache
+	rm -rf .venv build dist *.egg-info .pytest_cache .mypy_cache .ruff_cache .import_linter_cache
 	find . -name __pycache__ -type d -prune -exec rm -rf {} +
 
 ready:

@@ -13,121 +13,44 @@ Two equations carry everything::
     v_p      1 inside the range window        |tau - tau_ref| <= 1/(2 frequency_step)
     I        data                             Image
 
-nouns    Waveform Trajectory Material Scene AntennaArray PhaseHistory ImageGrid Image Report Scenario
-verbs    echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices
+Public names, with the file that defines each: sarcl/__init__.pyi. Rooms and the direction of their imports:
+docs/developers/architecture.md.
 """
 
-import sys
+import ast
 from importlib import import_module
-from types import ModuleType
-from typing import TYPE_CHECKING, Any
+from pathlib import Path
+from typing import Any
 
-# Imported on first use: `sarcl --help` must not wait for numpy, and nothing probes a device at import.
-_HOME = {
-    "Waveform": "model.waveform",
-    "Trajectory": "model.trajectory",
-    "Scene": "scene.scene",
-    "Material": "scene.material",
-    "Antenna": "model.antenna",
-    "AntennaArray": "model.antenna_array",
-    "Radar": "model.radar",
-    "PhaseHistory": "model.phase_history",
-    "concatenate": "model.phase_history",
-    "ImageGrid": "model.image_grid",
-    "Image": "model.image",
-    "Report": "base.report",
-    "Scenario": "scenario.scenario",
-    "echo": "simulation.echo",
-    "beam": "arrays.beam",
-    "ambiguity": "arrays.ambiguity",
-    "Ambiguity": "arrays.ambiguity",
-    "compress": "imaging.compress",
-    "backproject": "imaging.backproject",
-    "polar_format": "imaging.polar_format.polar_format",
-    "plan": "imaging.forecast",
-    "Forecast": "imaging.forecast",
-    "plan_echo": "simulation.echo_forecast",
-    "EchoForecast": "simulation.echo_forecast",
-    "add_noise": "effects.noise",
-    "autofocus": "phase_correction.autofocus",
-    "map_aperture": "arrays.map_aperture",
-    "measure": "analysis.point_response",
-    "PointResponse": "analysis.point_response",
-    "read": "model.store",
-    "devices": "opencl.device",
-    "NoDeviceError": "opencl.device",
-    "SarclWarning": "base.errors",
-    "ToleranceMissed": "base.errors",
-}
-
-# Public modules, by the file that holds them.
-_MODULES = {
-    "shapes": "scene.shapes",
-    "pointing": "model.pointing",
-    "motion": "effects.motion",
-    "fda": "experiments.fda.measure",
-    "papers": "papers",
-}
-
-__all__ = sorted(_HOME)
-
-if TYPE_CHECKING:
-    from .analysis.point_response import PointResponse as PointResponse
-    from .analysis.point_response import measure as measure
-    from .arrays.ambiguity import Ambiguity as Ambiguity
-    from .arrays.ambiguity import ambiguity as ambiguity
-    from .arrays.beam import beam as beam
-    from .arrays.map_aperture import map_aperture as map_aperture
-    from .base.errors import SarclWarning as SarclWarning
-    from .base.errors import ToleranceMissed as ToleranceMissed
-    from .base.report import Report as Report
-    from .effects.noise import add_noise as add_noise
-    from .imaging.backproject import backproject as backproject
-    from .imaging.compress import compress as compress
-    from .imaging.forecast import Forecast as Forecast
-    from .imaging.forecast import plan as plan
-    from .imaging.polar_format.polar_format import polar_format as polar_format
-    from .model.antenna import Antenna as Antenna
-    from .model.antenna_array import AntennaArray as AntennaArray
-    from .model.image import Image as Image
-    from .model.image_grid import ImageGrid as ImageGrid
-    from .model.phase_history import PhaseHistory as PhaseHistory
-    from .model.phase_history import concatenate as concatenate
-    from .model.radar import Radar as Radar
-    from .model.store import read as read
-    from .model.trajectory import Trajectory as Trajectory
-    from .model.waveform import Waveform as Waveform
-    from .opencl.device import NoDeviceError as NoDeviceError
-    from .opencl.device import devices as devices
-    from .phase_correction.autofocus import autofocus as autofocus
-    from .scenario.scenario import Scenario as Scenario
-    from .scene.material import Material as Material
-    from .scene.scene import Scene as Scene
-    from .simulation.echo import echo as echo
-    from .simulation.echo_forecast import EchoForecast as EchoForecast
-    from .simulation.echo_forecast import plan_echo as plan_echo
+from .base.version import __version__ as __version__
 
 
-class _Package(ModuleType):
-    """A verb and its module share a name (`sarcl.echo`): importing the module must not hide the verb."""
+def _public_names() -> dict[str, tuple[str, str]]:
+    """Public name -> (module, name in it), as __init__.pyi lists them."""
+    stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
+    return {
+        alias.asname or alias.name: (f".{node.module or ''}", alias.name)
+        for node in stub.body if isinstance(node, ast.ImportFrom)
+        for alias in node.names if alias.name != "__version__"
+    }  # fmt: skip
 
-    def __setattr__(self, name: str, value: Any) -> None:
-        if not (name in _HOME and isinstance(value, ModuleType)):
-            super().__setattr__(name, value)
+
+_PUBLIC = _public_names()
+__all__ = sorted(_PUBLIC)
 
 
-sys.modules[__name__].__class__ = _Package
-
-
+# Names are imported on first use: `sarcl --help` must not wait for numpy, and no device is probed at import.
 def __getattr__(name: str) -> Any:
-    if name in _MODULES:
-        return import_module(f".{_MODULES[name]}", __name__)
-    if name not in _HOME:
-        raise AttributeError(f"module 'sarcl' has no attribute {name!r}")
-    value = getattr(import_module(f".{_HOME[name]}", __name__), name)
+    if name not in _PUBLIC:
+        raise AttributeError(f"module 'sarcl' has no attribute {name!r}; dir(sarcl) lists the public names")
+    home, attribute = _PUBLIC[name]
+    # of a public module the package that holds it is imported first, then the module itself
+    value = vars(import_module(home, __name__)).get(attribute)
+    if value is None:
+        value = import_module(f"{home.rstrip('.')}.{attribute}", __name__)
     globals()[name] = value
     return value
 
 
 def __dir__() -> list[str]:
-    return sorted([*globals(), *_HOME])
+    return [*__all__, "__version__"]

@@ -1,1 +1,34 @@
-"""sarcl/base"""
+"""What every room may use and that knows no radar.
+
+For other folders:
+
+    boxes         bounding boxes of points and their corners
+    constants     the speed of light
+    counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
+    errors        warnings and errors of the library, and the line of user code that a warning points to
+    float_pairs   float64 as pairs of float32, for kernels on devices without float64
+    morton        Morton order: neighbours in space become neighbours in memory
+    progress      progress bar for verbs: echo(..., progress=Bar())
+    report        Report: plan, errors, counts and seconds of a verb
+    stage_timer   seconds per stage of a computation
+    text          bytes, durations and spelling suggestions as text for messages
+    validation    checks of user input: name, got, wanted, remedy
+    version       the version of the package
+    wgs84         longitude, latitude and height to Earth-centred coordinates and local axes
+"""
+
+__all__ = [
+    "boxes",
+    "constants",
+    "counter_rng",
+    "errors",
+    "float_pairs",
+    "morton",
+    "progress",
+    "report",
+    "stage_timer",
+    "text",
+    "validation",
+    "version",
+    "wgs84",
+]

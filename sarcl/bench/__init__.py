@@ -1,13 +1,27 @@
-"""`sarcl bench`: time against ACHIEVED error, on this machine, with peers.
+"""`sarcl bench`: run time against achieved error, on this machine, with peers.
 
-cases       the data, and what the exact sum gives for it
-ours        sarcl as a contestant
-baseline    NumPy as a contestant
-peers       libraries in other environments as contestants, over a pipe
-fastsar_peer  what runs in the other environment; imports nothing of sarcl
-once        one image in a process of its own: the whole process is timed
-measure     contestants take turns
-figures     what the rows say: ratios at equal or smaller error, cost against size
-backproject the command
-table pareto page   figures for the terminal, as a picture, as docs/results.md
+For other folders:
+
+    backproject     the command
+    once            one image in a process of its own: python -m sarcl.bench.once
+    fastsar_peer    runs in another environment, and imports nothing of sarcl
+    channels_page   tables of bench/channels.py
+    echo_page       tables of bench/echo.py
+    page            docs/results.md and the README's table
+    pareto          rate against achieved error, as a picture
+
+For this folder alone:
+
+    _baseline       backprojection written in NumPy
+    _cases          data of the benchmark
+    _contestant     what takes part in a benchmark
+    _exact          the exact sum at some pixels
+    _figures        rates, and ratios at equal or smaller error
+    _measure        contestants take turns
+    _ours           sarcl as a contestant
+    _peers          libraries in another environment, over a pipe
+    _quiet          waits until other programs leave the processors alone
+    _table          figures as tables
 """
+
+__all__ = ["backproject", "channels_page", "echo_page", "fastsar_peer", "once", "page", "pareto"]

@@ -1,1 +1,13 @@
-"""sarcl/cli"""
+"""The command line.
+
+For other folders:
+
+    parser      main(): arguments, options, exit status
+
+For this folder alone:
+
+    _commands   what each command does
+    _job        output files and interruption of a command
+"""
+
+__all__ = ["parser"]

@@ -1,1 +1,13 @@
-"""sarcl/experiments"""
+"""Complete experiments, from a scene to a report page.
+
+For other folders:
+
+    demo          `sarcl demo`: a spotlight pass over an airfield
+    fda/          `sarcl fda`: apertures of frequency-diverse arrays
+
+For this folder alone:
+
+    _demo_scene   the airfield
+"""
+
+__all__ = ["demo", "fda"]

@@ -1,1 +1,34 @@
-"""sarcl/imaging"""
+"""backproject(), polar_format(): from a phase history to an image.
+
+For other folders:
+
+    backproject      backproject(): an image to a stated tolerance
+    choose_method    the cheapest method that meets the tolerance
+    compress         compress(): pulse compression
+    default_grid     a grid for data that come without one
+    focusing_task    what is to be focused: rows, weights, geometry
+    forecast         plan(): method, seconds, bytes and error before the work
+    profile_energy   energy of the range profiles against the energy at the pixels
+    tiling           the tiles of a grid, in bands
+    direct/          every (row, pixel) pair that is not skipped, in float32
+    factorized/      pulses decimated on a quadtree of tiles
+    float64/         direct backprojection in float64
+    polar_format/    polar_format(): plane wavefronts and one two-dimensional FFT
+    run/             devices at work, checkpoints, files
+"""
+
+__all__ = [
+    "backproject",
+    "choose_method",
+    "compress",
+    "default_grid",
+    "direct",
+    "factorized",
+    "float64",
+    "focusing_task",
+    "forecast",
+    "polar_format",
+    "profile_energy",
+    "run",
+    "tiling",
+]

@@ -1,7 +1,14 @@
-"""Readers and writers of files, one module a format.
+"""File formats: plain arrays in, plain arrays out. Nouns are built from them in model/store.py.
 
-paths   output paths checked before the work; files that appear whole or not at all
-store   sarcl's own lossless HDF5: phase histories and images
-hdf5    what store needs of HDF5: plain values in and out
-gotcha  the AFRL Gotcha volumetric data set, MATLAB 5
+For other folders:
+
+    elevation      elevation models through rasterio: positions on WGS84
+    gotcha         AFRL Gotcha volumetric SAR data set, MATLAB 5
+    hdf5           plain values, arrays and reports in HDF5
+    mesh           meshes through trimesh: triangles, names of parts, repairs
+    output_paths   output files: checked before the work, written whole or not at all
+    partial_hdf5   an HDF5 file that appears at its path only when it is complete
+    toml           TOML: line numbers of keys, and values written back as text
 """
+
+__all__ = ["elevation", "gotcha", "hdf5", "mesh", "output_paths", "partial_hdf5", "toml"]

@@ -1,1 +1,36 @@
-"""sarcl/model"""
+"""What a radar is and what it records.
+
+For other folders:
+
+    antenna           Antenna: pattern in its own axes, mounting
+    antenna_array     AntennaArray: positions and carriers of elements
+    antenna_pattern   gain of a pattern in given directions, its steepest slope, its extent
+    image             Image: pixels on a grid
+    image_grid        ImageGrid: positions of the pixels
+    lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
+    phase_history     PhaseHistory: echoes by row and frequency, with their geometry
+    pointing          attitudes of tracks: spotlight, strip map, fixed
+    radar             Radar: the radar equation as named factors
+    store             read() and write: nouns to and from the fields of files
+    trajectory        Trajectory: position of the antenna at each pulse
+    waveform          Waveform: spectrum of the pulse and of its matched filter
+
+For this folder alone:
+
+    _costas           Costas permutations by the constructions of Welch and Golomb
+"""
+
+__all__ = [
+    "antenna",
+    "antenna_array",
+    "antenna_pattern",
+    "image",
+    "image_grid",
+    "lazy_rows",
+    "phase_history",
+    "pointing",
+    "radar",
+    "store",
+    "trajectory",
+    "waveform",
+]

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..base import constants, validation
-from .costas import nearest_sizes, permutation
+from ._costas import nearest_sizes, permutation
 
 MOST = 10_000  # elements
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)

@@ -1,1 +1,32 @@
-"""sarcl/numerics"""
+"""From a tolerance to a plan: error bounds, interpolation kernels, cost.
+
+For other folders:
+
+    double_double           double-double arithmetic: sums, products and quotients with their rounding errors
+    error_bounds            error bounds of the float32 kernels
+    error_bounds_float64    error bounds of the float64 kernels
+    interpolation           interpolation kernels for range profiles in float32
+    interpolation_float64   interpolation kernels for range profiles in float64
+    nufft2d                 two-dimensional nonuniform FFT of type 1
+    plan                    the cheapest plan that meets a tolerance, and its predicted error
+    polynomials             Lagrange polynomials, Chebyshev nodes
+    pulse_geometry          antennas per pulse, as kernels/geometry.clh reads them
+    range_profiles          samples in frequency to oversampled range profiles and back
+    tiles                   points cut into tiles, as kernels/geometry.clh reads them
+    windows                 windows over frequency and over the aperture
+"""
+
+__all__ = [
+    "double_double",
+    "error_bounds",
+    "error_bounds_float64",
+    "interpolation",
+    "interpolation_float64",
+    "nufft2d",
+    "plan",
+    "polynomials",
+    "pulse_geometry",
+    "range_profiles",
+    "tiles",
+    "windows",
+]

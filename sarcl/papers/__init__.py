@@ -2,10 +2,11 @@
 
 `sarcl papers` lists them, `sarcl papers farooq` writes a page and its numbers (docs/papers.md).
 
-    paper.py     what a paper is made of: sections, rows of published and measured, the page
-    lab.py       echoes and images that several sections share
-    farooq/      Farooq 2009, frequency-diverse arrays: its sections in order, a file each
-                 range_zones.py: range zones told apart by carriers that run on from pulse to pulse
+For other folders:
+
+    lab      echoes and images that several sections share
+    paper    a paper: sections, rows of published and measured values, the page
+    farooq/  Farooq 2009, frequency-diverse arrays
 """
 
 from __future__ import annotations
@@ -14,6 +15,8 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 from ..base import text
+
+__all__ = ["PAPERS", "farooq", "find", "lab", "listing", "open_lab", "paper"]
 
 if TYPE_CHECKING:
     from .lab import Lab

@@ -1,1 +1,31 @@
-"""sarcl/scattering"""
+"""What a facet sends back, and how finely it must be computed.
+
+For other folders:
+
+    antenna_weight_error   how finely weights of antennas and distance must be followed
+    antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
+    facet_plan             subdivision and frequency nodes of facets for a tolerance
+    facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
+    physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
+    pulse_nodes            pulses at which amplitudes are computed; cubic interpolation between them
+    scatterers             from a scene to the points and facets that the kernels add
+    subdivision            facets cut to the edge length of their plan
+    mesh_quality/          warnings about meshes that are too coarse
+
+For this folder alone:
+
+    _frequency_nodes       frequencies at which amplitudes are computed
+    _rough_surface         scattering diagrams of rough facets (SARAS)
+"""
+
+__all__ = [
+    "antenna_weight_error",
+    "antenna_weights",
+    "facet_plan",
+    "facets",
+    "mesh_quality",
+    "physical_optics",
+    "pulse_nodes",
+    "scatterers",
+    "subdivision",
+]

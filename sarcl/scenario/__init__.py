@@ -1,1 +1,15 @@
-"""sarcl/scenario"""
+"""Simulations as TOML files.
+
+For other folders:
+
+    scenario   Scenario, load(), loads()
+
+For this folder alone:
+
+    _schema    tables and keys a scenario may hold
+    _tables    nouns written as tables
+"""
+
+from .scenario import Scenario, load, loads
+
+__all__ = ["Scenario", "load", "loads", "scenario"]

@@ -1,1 +1,12 @@
-"""sarcl/scene"""
+"""What reflects: points, facets, materials.
+
+For other folders:
+
+    material    Material: permittivity, conductivity, roughness below the size of a facet
+    scene       Scene: point scatterers and triangular facets
+    shapes      solids of exact dimensions as facets: sphere, box, cone ...
+    terrain     facets over grids of heights
+    triangles   areas, normals and centroids of triangles; rotations
+"""
+
+__all__ = ["material", "scene", "shapes", "terrain", "triangles"]

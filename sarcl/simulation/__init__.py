@@ -1,1 +1,20 @@
-"""sarcl/simulation"""
+"""echo(): from a scene to a phase history.
+
+For other folders:
+
+    echo               echo(): echoes of points and facets, to a stated tolerance
+    echo_forecast      plan_echo(): rows, bytes, seconds and error before the work
+    echo_output        destination of samples: memory or a file
+    echo_sampling      rows and frequencies that echoes are written to
+    scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
+    channels/          echoes of arrays
+
+For this folder alone:
+
+    _echo_check        random samples recomputed exactly
+    _facet_spreading   facets to range profiles
+    _point_spreading   points to range profiles: a nonuniform FFT of type 1
+    _spreading         what points and facets share
+"""
+
+__all__ = ["channels", "echo", "echo_forecast", "echo_output", "echo_sampling", "scene_echoes"]

@@ -1,1 +1,10 @@
-"""sarcl/imaging/direct"""
+"""Direct backprojection in float32.
+
+For other folders:
+
+    direct         the engine: every (row, pixel) pair that is not skipped
+    line_plan      plan of backprojection by lines of pixels
+    tile_kernels   the two kernels, pixel by pixel and line by line, and their buffers
+"""
+
+__all__ = ["direct", "line_plan", "tile_kernels"]

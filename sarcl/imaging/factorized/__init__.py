@@ -1,1 +1,16 @@
-"""sarcl/imaging/factorized"""
+"""Factorised backprojection: pulses are decimated on smaller and smaller tiles.
+
+For other folders:
+
+    factorized       the engine
+    plan             levels of the tree, decimation and interpolation for a tolerance
+
+For this folder alone:
+
+    _memory          blocks within a memory limit
+    _subapertures    runs of pulses, decimated level by level
+    _tile_coverage   which rows see which of the largest tiles
+    _tile_tree       the quadtree of tiles
+"""
+
+__all__ = ["factorized", "plan"]

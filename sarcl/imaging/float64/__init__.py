@@ -1,1 +1,13 @@
-"""sarcl/imaging/float64"""
+"""Direct backprojection in float64, for tolerances that complex64 cannot hold.
+
+For other folders:
+
+    direct           the engine
+    plan             the cheapest plan and its predicted error
+
+For this folder alone:
+
+    _pulse_records   rows as kernels/backproject_float64.cl reads them
+"""
+
+__all__ = ["direct", "plan"]

@@ -1,1 +1,12 @@
-"""sarcl/imaging/polar_format"""
+"""Polar format: wavefronts taken as planes.
+
+For other folders:
+
+    polar_format   polar_format(): the image, and the error of plane wavefronts
+
+For this folder alone:
+
+    _wavefront     wavenumbers of plane waves, and the error of neglected curvature
+"""
+
+__all__ = ["polar_format"]

@@ -1,1 +1,16 @@
-"""sarcl/imaging/run"""
+"""An image in the making: devices, checkpoints, files.
+
+For other folders:
+
+    checkpoint     when finished tiles are written, and when they are removed
+    dask_workers   tiles computed by the workers of a dask.distributed cluster
+    image_output   destination of pixels: memory, an array of the caller's, or a file
+    tile_files     finished tiles in files beside the image, so that a stopped run can be continued
+    workers        one device, or several that take blocks of tiles from one queue
+
+For this folder alone:
+
+    _fingerprint   everything an image's pixels depend on, as text and checksums
+"""
+
+__all__ = ["checkpoint", "dask_workers", "image_output", "tile_files", "workers"]

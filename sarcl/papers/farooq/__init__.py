@@ -2,6 +2,23 @@
 
 Source: J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, Air Force Institute
 of Technology, AFIT/DEE/ENG/09-04, 2009. Figures, tables and equations are numbered as there.
+
+For other folders:
+
+    range_zones   range zones separated by carriers that continue from pulse to pulse (sarcl's own)
+
+For this folder alone, a section or a group of sections each:
+
+    _aperture     5.2, 5.3: apparent apertures, without the switch and with it
+    _errata       errors in print
+    _field        4.4: delay of the pulse's peak against direction
+    _focus        5.1: backprojection of diverse data, unmodified and corrected
+    _honest       off-centre points, two points, spatial frequencies (sarcl's own check)
+    _pattern      chapter 3: patterns of planar arrays
+    _pulse        chapter 4: the pulse, its spectrum and its ambiguity function
+    _reference    2.2: the reference image
+    _trend        5.3.2: nulls and side lobes against the frequency step
+    _zones        range zones (sarcl's own experiment)
 """
 
 from __future__ import annotations
@@ -9,6 +26,8 @@ from __future__ import annotations
 from .. import PAPERS
 from ..paper import Paper
 from . import _aperture, _errata, _field, _focus, _honest, _pattern, _pulse, _reference, _trend, _zones
+
+__all__ = ["PAPER", "range_zones"]
 
 ABOUT = (
     "An array whose elements send a carrier each makes a pulse, by the sum of its carriers, that passes at another "

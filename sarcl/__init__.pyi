@@ -1,0 +1,53 @@
+# The one list of public names, with the file that defines each. sarcl/__init__.py reads it when a name is first used;
+# type checkers and editors read it as it stands.
+
+from .analysis.point_response import PointResponse as PointResponse
+from .analysis.point_response import measure as measure
+from .arrays import array_factor as array_factor
+from .arrays.ambiguity import Ambiguity as Ambiguity
+from .arrays.ambiguity import ambiguity as ambiguity
+from .arrays.beam import beam as beam
+from .arrays.map_aperture import map_aperture as map_aperture
+from .base import progress as progress
+from .base import wgs84 as wgs84
+from .base.errors import SarclWarning as SarclWarning
+from .base.errors import ToleranceMissed as ToleranceMissed
+from .base.report import Report as Report
+from .base.version import __version__ as __version__
+from .effects import motion as motion
+from .effects import noise as noise
+from .effects import stop_and_go as stop_and_go
+from .effects.noise import add_noise as add_noise
+from .experiments.fda import measure as fda
+from .imaging.backproject import backproject as backproject
+from .imaging.compress import compress as compress
+from .imaging.forecast import Forecast as Forecast
+from .imaging.forecast import plan as plan
+from .imaging.polar_format.polar_format import polar_format as polar_format
+from .model import pointing as pointing
+from .model import radar as radar
+from .model.antenna import Antenna as Antenna
+from .model.antenna_array import AntennaArray as AntennaArray
+from .model.image import Image as Image
+from .model.image_grid import ImageGrid as ImageGrid
+from .model.phase_history import PhaseHistory as PhaseHistory
+from .model.phase_history import concatenate as concatenate
+from .model.radar import Radar as Radar
+from .model.store import read as read
+from .model.trajectory import Trajectory as Trajectory
+from .model.waveform import Waveform as Waveform
+from .opencl.device import NoDeviceError as NoDeviceError
+from .opencl.device import devices as devices
+from .phase_correction.autofocus import autofocus as autofocus
+from .scenario.scenario import Scenario as Scenario
+from .scene import material as material
+from .scene import shapes as shapes
+from .scene.material import Material as Material
+from .scene.scene import Scene as Scene
+from .simulation.echo import echo as echo
+from .simulation.echo_forecast import EchoForecast as EchoForecast
+from .simulation.echo_forecast import plan_echo as plan_echo
+from .visibility import illumination as illumination
+
+from . import papers as papers  # isort: skip
+from . import scenario as scenario  # isort: skip
