@@ -18,7 +18,7 @@ from .effects import motion as motion
 from .effects import noise as noise
 from .effects import stop_and_go as stop_and_go
 from .effects.noise import add_noise as add_noise
-from .experiments.fda import measure as fda
+from .experiments import fda as fda
 from .imaging.backproject import backproject as backproject
 from .imaging.compress import compress as compress
 from .imaging.forecast import Forecast as Forecast

@@ -11,9 +11,9 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..model.image import Image
@@ -40,7 +40,7 @@ class PointResponse:
     reach     IRW on each side that pslr and islr cover: 10, or what the image holds
     """
 
-    position: np.ndarray
+    position: NDArray[np.float64]
     irw: tuple[float, float]
     pslr: tuple[float, float]
     islr: tuple[float, float]
@@ -67,7 +67,7 @@ class PointResponse:
         return "\n".join(lines)
 
 
-def measure(image: Image, near: Any = None) -> PointResponse:
+def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
     """Position, resolution and side lobes of one point of a complex image on a plane.
 
     image  with frequency (Hz) and tx, rx (m; rx None is tx); of its data only what is needed is read

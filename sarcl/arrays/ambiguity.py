@@ -3,9 +3,9 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.text import size_text
@@ -18,9 +18,9 @@ MOST_BYTES = 4e9
 class Ambiguity:
     """|chi| (n_delays, n_dopplers), 1 at the origin, at delays (s) and dopplers (Hz), both rising and evenly spaced."""
 
-    delays: np.ndarray
-    dopplers: np.ndarray
-    magnitude: np.ndarray
+    delays: NDArray[np.float64]
+    dopplers: NDArray[np.float64]
+    magnitude: NDArray[np.float64]
 
     @property
     def volume(self) -> float:
@@ -34,7 +34,7 @@ class Ambiguity:
 
 
 def ambiguity(
-    signal: Any, rate: float, *, max_delay: float | None = None, max_doppler: float | None = None
+    signal: ArrayLike, rate: float, *, max_delay: float | None = None, max_doppler: float | None = None
 ) -> Ambiguity:
     """|chi(tau, nu)| = |integral of s(t - tau) conj(s(t)) exp(+j 2 pi nu t) dt|/integral of |s|^2, by FFT.
 

@@ -14,18 +14,21 @@ Multiplied by exp(j 2 pi f0 t') the factor is the far field, but for the phase o
 
 from __future__ import annotations
 
-from typing import Any
+from collections.abc import Sequence
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
+
+Cosines = Sequence[ArrayLike] | np.ndarray  # (ky, kz), each (...)
 
 # 2 pi in parts of 33 bits, so that up to 2^20 of each are exact, and what is left
 _TURN = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
 
 
-def reduced(x: Any) -> tuple[np.ndarray, np.ndarray]:
+def reduced(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """x rad less its nearest whole turns, in [-pi, pi], and how many turns those are; |x| up to 6e6."""
     x = np.asarray(x, np.float64)
     validation.finite("angle", x)
@@ -35,7 +38,7 @@ def reduced(x: Any) -> tuple[np.ndarray, np.ndarray]:
     return ((x - whole * _TURN[0]) - whole * _TURN[1]) - whole * _TURN[2], whole
 
 
-def dirichlet(x: Any, n: int) -> np.ndarray:
+def dirichlet(x: ArrayLike, n: int) -> np.ndarray:
     """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. Errs by less than 1e-12 n."""
     n = validation.count("n", n)
     rest, whole = reduced(x)
@@ -45,19 +48,27 @@ def dirichlet(x: Any, n: int) -> np.ndarray:
     return np.asarray(np.where((whole % 2 != 0) & (n % 2 == 0), -ratio, ratio))
 
 
-def geometric(x: Any, n: int) -> np.ndarray:
+def geometric(x: ArrayLike, n: int) -> np.ndarray:
     """sum over 0 <= i < n of exp(j i x) = exp(j (n - 1) x/2) dirichlet(x, n)."""
     rest, _ = reduced(x)
     return np.asarray(np.exp(0.5j * (n - 1) * rest) * dirichlet(rest, n))
 
 
-def constant_factor(f0: float, *, shape: Any, spacing: Any, cosines: Any) -> np.ndarray:
+def constant_factor(
+    f0: float, *, shape: Sequence[int] | np.ndarray, spacing: ArrayLike, cosines: Cosines
+) -> np.ndarray:
     """Array factor of N by P elements on one carrier, (3.23). cosines (ky, kz), each (...)."""
     return diverse_factor(f0, shape=shape, spacing=spacing, frequency_step=(0, 0), cosines=cosines, retarded=0.0)
 
 
 def diverse_factor(
-    f0: float, *, shape: Any, spacing: Any, frequency_step: Any, cosines: Any, retarded: Any
+    f0: float,
+    *,
+    shape: Sequence[int] | np.ndarray,
+    spacing: ArrayLike,
+    frequency_step: ArrayLike,
+    cosines: Cosines,
+    retarded: ArrayLike,
 ) -> np.ndarray:
     """Array factor of N by P elements, (3.46): closed, for arrays well within `quadratic_phase`'s bound.
 
@@ -76,13 +87,15 @@ def diverse_factor(
     return out
 
 
-def power_pattern(factor: Any, peak: float | None = None) -> np.ndarray:
+def power_pattern(factor: ArrayLike, peak: float | None = None) -> np.ndarray:
     """|factor|^2 over `peak`^2; peak: the number of elements, or None: the largest |factor| given."""
     power = np.abs(np.asarray(factor)) ** 2
     return np.asarray(power / (power.max() if peak is None else validation.number("peak", peak, above=0) ** 2))
 
 
-def quadratic_phase(*, shape: Any, spacing: Any, frequency_step: Any, cosines: Any = (1.0, 1.0)) -> float:
+def quadratic_phase(
+    *, shape: Sequence[int] | np.ndarray, spacing: ArrayLike, frequency_step: ArrayLike, cosines: ArrayLike = (1.0, 1.0)
+) -> float:
     """Largest phase that the closed form leaves out, rad: the terms of (3.39), each by its modulus.
 
     Farooq holds pi/4 to be little enough. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59).
@@ -98,7 +111,7 @@ def quadratic_phase(*, shape: Any, spacing: Any, frequency_step: Any, cosines: A
 
 
 def beam_angles(
-    f0: float, *, spacing: Any, frequency_step: Any, retarded: Any, lobe: tuple[int, int] = (0, 0)
+    f0: float, *, spacing: ArrayLike, frequency_step: ArrayLike, retarded: ArrayLike, lobe: tuple[int, int] = (0, 0)
 ) -> tuple[np.ndarray, np.ndarray]:
     """(azimuth, elevation) rad of the beam at retarded time t', (3.53) and (3.54) for elements at +n d; NaN where none.
 
@@ -147,7 +160,7 @@ def center_frequency(f0: float, n: int, frequency_step: float) -> float:
 
 
 def peak_delay(
-    f0: float, *, spacing: float, frequency_step: float, azimuth: Any, elevation: Any = 0.0, n: int = 1
+    f0: float, *, spacing: float, frequency_step: float, azimuth: ArrayLike, elevation: ArrayLike = 0.0, n: int = 1
 ) -> np.ndarray:
     """When the peak passes, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
 
@@ -160,7 +173,14 @@ def peak_delay(
 
 
 def waveform(
-    f0: float, n: int, *, spacing: float, frequency_step: float, azimuth: Any, retarded: Any, pulsed: bool = False
+    f0: float,
+    n: int,
+    *,
+    spacing: float,
+    frequency_step: float,
+    azimuth: ArrayLike,
+    retarded: ArrayLike,
+    pulsed: bool = False,
 ) -> np.ndarray:
     """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16)."""
     t = np.asarray(retarded, np.float64)

@@ -5,12 +5,13 @@ from __future__ import annotations
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import float_pairs, text, validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.antenna_array import AntennaArray
 from ..opencl import device as opencl
-from ..opencl.device import Device, open_device
+from ..opencl.device import Device, DeviceChoice, open_device
 from ._beam_plan import FINE, FLUSH, FieldPlan, blocks, make_plan, middle, whole_turns_off
 
 CHUNK = 64  # elements a work-item tabulates
@@ -23,14 +24,14 @@ def beam(
     array: AntennaArray,
     f0: float,
     *,
-    times: Any,
-    positions: Any,
-    reference: Any = (0.0, 0.0, 0.0),
+    times: ArrayLike,
+    positions: ArrayLike,
+    reference: ArrayLike = (0.0, 0.0, 0.0),
     tolerance: float = 1e-5,
-    device: Any = None,
+    device: DeviceChoice | None = None,
     max_bytes: float | None = None,
     pulse: int = 0,
-) -> np.ndarray:
+) -> NDArray[np.complexfloating]:
     """The array's field, sum_n w_n exp(+j 2 pi f_n (t - |x - x_n|/c)): times.shape + positions.shape[:-1].
 
     f0         base frequency, Hz; element n sends f_n = f0 + array.offsets_at(pulse)[n]

@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal, NotRequired, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
@@ -13,15 +14,27 @@ from ..model.antenna_array import AntennaArray
 from ..model.phase_history import PhaseHistory
 from .channels import spacing
 
+MapKind = Literal["corrected", "apparent", "channels"]
 MAPPINGS = ("corrected", "apparent", "channels")
 OFFSETS = ("published", "halved")
 NEAR = 1e-3  # m by which reference ranges may differ from the distance to `center`
 LINE = 1e-9  # of an array's length: elements that lie no further off a line of even steps are on it
 
 
+class MapApertureOptions(TypedDict):
+    """Arguments of `map_aperture` but raw."""
+
+    mapping: MapKind
+    center: NotRequired[ArrayLike]
+    attitude: NotRequired[ArrayLike | None]
+    quadratic: NotRequired[bool]
+    offset: NotRequired[Literal["published", "halved"]]
+    vertical: NotRequired[ArrayLike]
+
+
 def map_aperture(
-    raw: PhaseHistory, mapping: str, *, center: Any = (0.0, 0.0, 0.0), attitude: Any = None, quadratic: bool = True,
-    offset: str = "published", vertical: Any = (0.0, 0.0, 1.0),
+    raw: PhaseHistory, mapping: MapKind, *, center: ArrayLike = (0.0, 0.0, 0.0), attitude: ArrayLike | None = None,
+    quadratic: bool = True, offset: Literal["published", "halved"] = "published", vertical: ArrayLike = (0.0, 0.0, 1.0),
 ) -> PhaseHistory:  # fmt: skip
     """Echoes of a frequency-diverse array, channels added up, for a backprojection that knows nothing of arrays.
 

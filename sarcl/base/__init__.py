@@ -12,6 +12,7 @@ For other folders:
     report        Report: plan, errors, counts and seconds of a verb
     stage_timer   seconds per stage of a computation
     text          bytes, durations and spelling suggestions as text for messages
+    types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
     version       the version of the package
     wgs84         longitude, latitude and height to Earth-centred coordinates and local axes
@@ -28,6 +29,7 @@ __all__ = [
     "report",
     "stage_timer",
     "text",
+    "types",
     "validation",
     "version",
     "wgs84",

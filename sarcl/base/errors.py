@@ -5,7 +5,10 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from typing import Any
+from typing import TYPE_CHECKING
+
+if TYPE_CHECKING:
+    from ..model.image import Image
 
 # the folder of the whole package, wherever in it this file lies
 _HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")[0]].__file__))) + os.sep
@@ -26,7 +29,7 @@ def warn(text: str) -> None:
 class ToleranceMissed(ValueError):
     """A finished image errs more than was asked, where it was checked: `image`, `tolerance`, `measured`."""
 
-    def __init__(self, tolerance: float, measured: float, image: Any) -> None:
+    def __init__(self, tolerance: float, measured: float, image: Image) -> None:
         super().__init__(
             f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the error "
             f"formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it (the image is kept: "

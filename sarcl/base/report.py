@@ -24,7 +24,7 @@ class Report:
     seed                   of the random numbers, or None
     """
 
-    plan: Mapping[str, Any] = field(default_factory=dict)
+    plan: Mapping[str, object] = field(default_factory=dict)
     tolerance: float = 0.0
     predicted_error: float = 0.0
     measured_error: float | None = None

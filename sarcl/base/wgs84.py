@@ -2,21 +2,20 @@
 
 from __future__ import annotations
 
-from typing import Any
-
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 SEMI_MAJOR = 6_378_137.0  # m, defining
 FLATTENING = 1 / 298.257223563  # defining
 ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 
 
-def ecef(longitude: Any, latitude: Any, height: Any) -> np.ndarray:
+def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArray[np.float64]:
     """Earth-centred, Earth-fixed positions, m (..., 3), of degrees and heights above the ellipsoid, m.
 
     Source: NGA.STND.0036 (WGS84), eq. (4-14): x = (N + h) cos(lat) cos(lon), ..., z = (N (1 - e^2) + h) sin(lat).
     """
-    longitude, latitude = np.radians(longitude), np.radians(latitude)
+    longitude, latitude, height = np.radians(longitude), np.radians(latitude), np.asarray(height)
     s, c = np.sin(latitude), np.cos(latitude)
     normal = SEMI_MAJOR / np.sqrt(1 - ECCENTRICITY_SQUARED * s**2)  # radius of curvature in the prime vertical
     across = (normal + height) * c
@@ -28,14 +27,14 @@ def ecef(longitude: Any, latitude: Any, height: Any) -> np.ndarray:
     )
 
 
-def up(longitude: Any, latitude: Any) -> np.ndarray:
+def up(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
     """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
     longitude, latitude = np.radians(longitude), np.radians(latitude)
     c = np.cos(latitude)
     return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
 
 
-def local_axes(longitude: float, latitude: float) -> np.ndarray:
+def local_axes(longitude: float, latitude: float) -> NDArray[np.float64]:
     """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin)."""
     lon, lat = np.radians(longitude), np.radians(latitude)
     east = np.array([-np.sin(lon), np.cos(lon), 0.0])

@@ -9,6 +9,7 @@ import sys
 import time
 from collections.abc import Sequence
 from pathlib import Path
+from typing import Any, cast
 
 from ..opencl import device as opencl
 from ._cases import Case
@@ -45,7 +46,7 @@ def _contestant(case: Case, folder: Path, device: opencl.Device, method: str, to
 
         start, busy = time.perf_counter(), time.process_time()
         image = sarcl.backproject(
-            case.raw, case.grid, tolerance=tolerance, method=method, device=device, check=False
+            case.raw, case.grid, tolerance=tolerance, method=cast(Any, method), device=device, check=False
         )  # fmt: skip
         call, busy = time.perf_counter() - start, time.process_time() - busy
         report = image.report

@@ -168,7 +168,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     """The page and the numbers of an experiment on frequency-diverse apertures."""
     import json
 
-    from ..experiments.fda import measure as experiment
+    from ..experiments.fda import experiment
     from ..experiments.fda import page as fda_page
     from ..experiments.fda.file import load
     from ..experiments.fda.text import setting, verdicts

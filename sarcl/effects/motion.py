@@ -7,9 +7,10 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import constants, validation
 from ..model.phase_history import PhaseHistory
@@ -24,11 +25,11 @@ FRAMES = ("scene", "track")
 def perturbed(
     track: Trajectory,
     *,
-    rms: Any = 0.0,
+    rms: ArrayLike = 0.0,
     correlation_time: float | None = None,
-    spectrum: tuple[Any, Any] | None = None,
-    attitude_rms: Any = 0.0,
-    frame: str = "scene",
+    spectrum: tuple[ArrayLike, ArrayLike] | None = None,
+    attitude_rms: ArrayLike = 0.0,
+    frame: Literal["scene", "track"] = "scene",
     seed: int = 0,
 ) -> Trajectory:
     """The track with smooth random errors of its positions, and of its attitude where attitude_rms is not zero.
@@ -55,7 +56,12 @@ def perturbed(
 
 
 def sinusoidal(
-    track: Trajectory, *, amplitude: Any, frequency: float, phase: Any = 0.0, frame: str = "scene"
+    track: Trajectory,
+    *,
+    amplitude: ArrayLike,
+    frequency: float,
+    phase: ArrayLike = 0.0,
+    frame: Literal["scene", "track"] = "scene",
 ) -> Trajectory:
     """The track moved by amplitude sin(2 pi frequency t + phase): m (3,), Hz, rad, one or per axis.
 
@@ -94,10 +100,10 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
 def relative(
     track: Trajectory,
     *,
-    velocity: Any = (0.0, 0.0, 0.0),
-    acceleration: Any = (0.0, 0.0, 0.0),
-    rotation: Any = (0.0, 0.0, 0.0),
-    center: Any = (0.0, 0.0, 0.0),
+    velocity: ArrayLike = (0.0, 0.0, 0.0),
+    acceleration: ArrayLike = (0.0, 0.0, 0.0),
+    rotation: ArrayLike = (0.0, 0.0, 0.0),
+    center: ArrayLike = (0.0, 0.0, 0.0),
     epoch: float = 0.0,
 ) -> Trajectory:
     """The track as a rigid body sees it that moves: its echoes from there are those of the moving body.

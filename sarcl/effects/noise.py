@@ -6,9 +6,11 @@ from dataclasses import replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import counter_rng
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.types import LazyRows
 from ..base.validation import array, count, direction, instance, number
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
@@ -24,7 +26,7 @@ def add_noise(
     nesz: float | None = None,
     temperature: float | None = None,
     radar: Radar | None = None,
-    variance: Any = None,
+    variance: ArrayLike | None = None,
     grid: ImageGrid | None = None,
     cell_area: float | None = None,
     seed: int = 0,
@@ -72,7 +74,7 @@ def add_noise(
 class Noisy:
     """Rows of a source plus noise of deviation (n_rows,) times shape (n_samples,); both are made as a slice asks."""
 
-    def __init__(self, source: Any, deviation: np.ndarray, shape: np.ndarray, seed: int) -> None:
+    def __init__(self, source: np.ndarray | LazyRows, deviation: np.ndarray, shape: np.ndarray, seed: int) -> None:
         self.source, self.deviation, self.profile, self.seed = source, deviation, shape, seed
         self.shape, self.dtype = source.shape, np.dtype(source.dtype)
 
@@ -109,7 +111,7 @@ def _kelvin(radar: Any) -> float:
     return float(radar.noise_temperature)
 
 
-def cell_area(raw: PhaseHistory, point: Any, normal: Any = (0.0, 0.0, 1.0)) -> float:
+def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> float:
     """Area, m^2, of the resolution cell at `point` on a plane: (2 pi)^2 over that of the data's spatial frequencies.
 
     Range cell on the ground times cross-range cell, both between peak and null of an unweighted image: c/(2 B sin) x
@@ -138,7 +140,7 @@ def _one_image(raw: PhaseHistory) -> np.ndarray:
     return np.asarray(raw.polarization == raw.polarization[0])
 
 
-def _density(raw: PhaseHistory, point: Any, normal: Any) -> float:
+def _density(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike) -> float:
     """(2 pi)^2 x samples per area of spatial frequencies on the plane, mean over the samples of one image.
 
     A sample lies at f g_p, g_p = (2 pi/c) (u_t + u_r) on the plane, and fills f df |g_p x dg_p| there.

@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
 from ..model.phase_history import PhaseHistory
@@ -26,12 +27,12 @@ class StopAndGo:
     A constant, and what is linear in time, only displace the image; `defocus` is what is left.
     """
 
-    flight: np.ndarray
-    chirp: np.ndarray
-    phase: np.ndarray
-    smear: np.ndarray
-    doppler: np.ndarray
-    times: np.ndarray
+    flight: NDArray[np.float64]
+    chirp: NDArray[np.float64]
+    phase: NDArray[np.float64]
+    smear: NDArray[np.float64]
+    doppler: NDArray[np.float64]
+    times: NDArray[np.float64]
 
     @property
     def defocus(self) -> np.ndarray:
@@ -43,7 +44,7 @@ class StopAndGo:
 
 def stop_and_go_error(
     track: Trajectory,
-    points: Any,
+    points: ArrayLike,
     waveform: Waveform,
     *,
     receiver: Trajectory | None = None,
@@ -79,7 +80,7 @@ def stop_and_go_error(
     )
 
 
-def receiver_at_arrival(track: Trajectory, point: Any, *, receiver: Trajectory | None = None) -> Trajectory:
+def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajectory | None = None) -> Trajectory:
     """Where the receiver is when echoes from `point`, m (3,), arrive: the receiver's track for an exact flight there.
 
     sarcl.echo(scene, chirp, track, receiver=receiver_at_arrival(track, center)) has the true two-way path of the point
@@ -94,7 +95,7 @@ def receiver_at_arrival(track: Trajectory, point: Any, *, receiver: Trajectory |
     return replace(moving, times=track.times, positions=at(when), velocities=at(when, 1))
 
 
-def pulse_motion(raw: PhaseHistory, point: Any, *, undo: bool = False) -> PhaseHistory:
+def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> PhaseHistory:
     """Echoes with the phase that motion during the pulse gives those of `point`, m (3,); undo takes it out.
 
     exp(-j pi ((f (1 + tau') - fc)^2 - (f - fc)^2)/k): range-Doppler coupling, exact for the point; others err by the

@@ -18,13 +18,14 @@ if TYPE_CHECKING:
     from ..model.phase_history import PhaseHistory
     from ..model.trajectory import Trajectory
     from ..model.waveform import Waveform
+    from ..numerics.windows import Window
 
 CENTER = 9.6e9  # Hz
 GRAZING_DEG = 35.0
 DISTANCE = 10e3  # m
 EXTENT = 50.0  # m of the picture's side
 TOLERANCE = 1e-2
-WINDOW = ("taylor", 35, 5)  # side lobes would fill the shadows
+WINDOW: Window = ("taylor", 35, 5)  # side lobes would fill the shadows
 FLOOR_DB = -45.0
 
 

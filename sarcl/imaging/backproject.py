@@ -3,24 +3,27 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack, closing
-from typing import Any, overload
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
 
 import numpy as np
+from numpy.typing import ArrayLike
 
-from ..arrays.map_aperture import map_aperture
+from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
 from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.stage_timer import Clock
+from ..base.types import PathLike, WritableArray
 from ..base.validation import choice, count, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
-from ..opencl.device import budget, open_devices
+from ..numerics.windows import Window
+from ..opencl.device import DeviceChoice, budget, open_devices
 from .choose_method import METHODS, Choice, choose
-from .focusing_task import Task, by_reason, make_task
+from .focusing_task import BeamCone, Skip, Task, by_reason, make_task
 from .run.checkpoint import Keeper
 from .run.image_output import Strip, Target, is_path
 from .run.tile_files import gaps, share
@@ -28,40 +31,68 @@ from .run.workers import BLOCKS_EACH, Crew, Local
 from .tiling import Run, extent
 from .tiling import count as pixels_in
 
+if TYPE_CHECKING:
+    import distributed
+
 log = logging.getLogger(__name__)
 
 MOST_FILES = 64  # blocks an image whose finished tiles are kept
 EDGE = 1e-5  # of a window or beam: pixels nearer may fall to either side, and no error is measured there
 Progress = Callable[[str, int, int], None]
+Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
+
+
+class BackprojectOptions(TypedDict, total=False):
+    """Options of `backproject` other than `tile`, which decides what it returns."""
+
+    tolerance: float
+    method: Literal["auto", "direct", "factorized"]
+    window: Window | None
+    weights: ArrayLike | None
+    beam: BeamCone | None
+    mapping: MapKind | MapApertureOptions | None
+    wrap: bool
+    skip: bool | Collection[Skip]
+    max_bytes: float | None
+    out: PathLike | WritableArray | None
+    resume: bool | None
+    check: bool | None
+    device: DeviceChoice | Sequence[DeviceChoice] | None
+    cluster: distributed.Client | None
+    progress: Progress | None
 
 
 @overload
-def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: None = None, **options: Any) -> Image: ...
+def backproject(
+    raw: PhaseHistory, grid: ImageGrid, *, tile: None = None, **options: Unpack[BackprojectOptions]
+) -> Image: ...
 
 
 @overload
-def backproject(raw: PhaseHistory, grid: ImageGrid, *, tile: Any, **options: Any) -> Image | None: ...
+def backproject(
+    raw: PhaseHistory, grid: ImageGrid, *, tile: Tile | None, **options: Unpack[BackprojectOptions]
+) -> Image | None: ...
 
 
-def backproject(  # type: ignore[misc]  # the overloads tell the kinds of result apart, not the options
+def backproject(
     raw: PhaseHistory,
     grid: ImageGrid,
     *,
     tolerance: float = 1e-3,
-    method: str = "auto",
-    window: Any = None,
-    weights: Any = None,
-    beam: Any = None,
-    mapping: Any = None,
+    method: Literal["auto", "direct", "factorized"] = "auto",
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    beam: BeamCone | None = None,
+    mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
-    skip: Any = True,
+    skip: bool | Collection[Skip] = True,
     max_bytes: float | None = None,
-    out: Any = None,
+    out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
-    tile: Any = None,
+    tile: Tile | None = None,
     check: bool | None = None,
-    device: Any = None,
-    cluster: Any = None,
+    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
+    cluster: distributed.Client | None = None,
     progress: Progress | None = None,
 ) -> Image | None:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).

@@ -2,11 +2,12 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Collection
 from dataclasses import dataclass
-from typing import Any, Protocol
+from typing import Any, Literal, Protocol
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.stage_timer import Clock
@@ -15,8 +16,11 @@ from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import Antennas
+from ..numerics.windows import Window
 from .tiling import GridTiling
 
+Skip = Literal["range window", "beam", "zero weight", "no data"]
+BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and where it is centred
 SKIPS = ("range window", "beam", "zero weight", "no data")
 
 
@@ -139,7 +143,13 @@ def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarra
 
 
 def make_task(
-    raw: PhaseHistory, grid: ImageGrid, window: Any, weights: Any, wrap: bool, skip: Any, beam: Any = None
+    raw: PhaseHistory,
+    grid: ImageGrid,
+    window: Window | None,
+    weights: ArrayLike | None,
+    wrap: bool,
+    skip: bool | Collection[Skip],
+    beam: BeamCone | None = None,
 ) -> Task:
     """What the options of `backproject` make of the data; ValueError for those that do not fit."""
     if not raw.compressed:
@@ -156,7 +166,7 @@ def make_task(
     return Task(raw, grid, antennas_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips))
 
 
-def weigh(raw: PhaseHistory, window: Any, weights: Any) -> tuple[np.ndarray, np.ndarray]:
+def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:
     """Weights of samples (n_samples,) and rows (n_rows,): window, raw.weight and `weights` together.
 
     The rows of each channel and polarisation, in time, share one window over the aperture.

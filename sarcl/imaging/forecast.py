@@ -5,10 +5,12 @@ from __future__ import annotations
 import copy
 import functools
 import time
+from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.stage_timer import Clock
 from ..base.text import duration, size_text
@@ -16,13 +18,14 @@ from ..base.validation import choice, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics.windows import Window
 from ..opencl import device as opencl
-from ..opencl.device import Device, open_devices
+from ..opencl.device import Device, DeviceChoice, open_devices
 from . import profile_energy
 from .choose_method import METHODS, Choice, choose
 from .factorized.plan import FactorPlan
 from .factorized.plan import moving_cost as moving_cost
-from .focusing_task import Task, make_task
+from .focusing_task import BeamCone, Skip, Task, make_task
 
 PROBE = 0.03  # s a probe of a device takes at least
 MOST_BANDS = 2**16  # of which blocks are listed: what the first takes shows in these
@@ -40,7 +43,7 @@ class Forecast:
     """
 
     method: str
-    plan: dict[str, Any]
+    plan: dict[str, object]
     seconds: float
     bytes: float
     predicted_error: float
@@ -59,14 +62,14 @@ def plan(
     grid: ImageGrid,
     *,
     tolerance: float = 1e-3,
-    method: str = "auto",
-    window: Any = None,
-    weights: Any = None,
-    beam: Any = None,
+    method: Literal["auto", "direct", "factorized"] = "auto",
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    beam: BeamCone | None = None,
     wrap: bool = False,
-    skip: Any = True,
+    skip: bool | Collection[Skip] = True,
     max_bytes: float | None = None,
-    device: Any = None,
+    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
 ) -> Forecast:
     """How `backproject(raw, grid, ...)` would make the image with these options: a Forecast, before any work.
 

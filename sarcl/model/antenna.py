@@ -3,15 +3,17 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
 from .antenna_pattern import factor_reach, table_limits, table_slope, uniform_spline
 from .pointing import rotations
 from .trajectory import Trajectory
 
+Kind = Literal["isotropic", "aperture", "gaussian", "table"]
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mounted along the body's axes
 HEADER = 16  # floats before a table's coefficients, as kernels/pattern.clh reads them
@@ -39,17 +41,35 @@ class Antenna:
     ValueError names what does not fit. An aperture does not see behind itself, a table not beyond its angles.
     """
 
-    kind: str
+    kind: Kind
     gain_db: float = 0.0
     two_way: bool = False
-    size: Any = None
-    taper: Any = (1.0, 1.0)
-    width: Any = None
-    azimuth: Any = None
-    elevation: Any = None
-    values: Any = None
+    size: NDArray[np.float64] = None  # type: ignore[assignment]  # these are there as the kind needs them
+    taper: NDArray[np.float64] = (1.0, 1.0)  # type: ignore[assignment]
+    width: NDArray[np.float64] = None  # type: ignore[assignment]
+    azimuth: NDArray[np.float64] = None  # type: ignore[assignment]
+    elevation: NDArray[np.float64] = None  # type: ignore[assignment]
+    values: NDArray[np.complex128] = None  # type: ignore[assignment]
     frequency: float | None = None
-    mount: Any = LEVEL
+    mount: NDArray[np.float64] = LEVEL  # type: ignore[assignment]
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            *,
+            kind: Kind,
+            gain_db: float = 0.0,
+            two_way: bool = False,
+            size: ArrayLike | None = None,
+            taper: ArrayLike = (1.0, 1.0),
+            width: ArrayLike | None = None,
+            azimuth: ArrayLike | None = None,
+            elevation: ArrayLike | None = None,
+            values: ArrayLike | None = None,
+            frequency: float | None = None,
+            mount: ArrayLike = LEVEL,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         validation.choice("antenna kind", self.kind, KINDS)
@@ -113,7 +133,13 @@ class Antenna:
 
     @classmethod
     def rectangular(
-        cls, *, size: Any, taper: Any = 1.0, gain_db: float = 0.0, two_way: bool = False, mount: Any = LEVEL
+        cls,
+        *,
+        size: ArrayLike,
+        taper: ArrayLike = 1.0,
+        gain_db: float = 0.0,
+        two_way: bool = False,
+        mount: ArrayLike = LEVEL,
     ) -> Antenna:
         """A rectangular aperture, m (azimuth, elevation): sinc(size_y y/lambda) sinc(size_z z/lambda) if lit evenly.
 
@@ -125,8 +151,8 @@ class Antenna:
 
     @classmethod
     def gaussian(
-        cls, *, width: Any, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
-        mount: Any = LEVEL,
+        cls, *, width: ArrayLike, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
+        mount: ArrayLike = LEVEL,
     ) -> Antenna:  # fmt: skip
         """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle off boresight times the
         unit vector of (y, z): azimuth and elevation on the axes."""
@@ -134,8 +160,9 @@ class Antenna:
 
     @classmethod
     def table(
-        cls, azimuth: Any, elevation: Any, values: Any = None, *, values_db: Any = None, gain_db: float = 0.0,
-        two_way: bool = False, frequency: float | None = None, mount: Any = LEVEL,
+        cls, azimuth: ArrayLike, elevation: ArrayLike, values: ArrayLike | None = None, *,
+        values_db: ArrayLike | None = None, gain_db: float = 0.0,
+        two_way: bool = False, frequency: float | None = None, mount: ArrayLike = LEVEL,
     ) -> Antenna:  # fmt: skip
         """A measured pattern: bicubic spline through complex amplitudes, or values_db = 20 log10 of their modulus.
 
@@ -155,7 +182,7 @@ class Antenna:
         """Amplitude gain at the peak, 10^(gain_db/20)."""
         return float(10 ** (self.gain_db / 20))
 
-    def axes(self, track: Trajectory) -> np.ndarray:
+    def axes(self, track: Trajectory) -> NDArray[np.float64]:
         """Antenna axes in the scene at every pulse, as columns, (n, 3, 3): track.attitude @ mount.
 
         ValueError where the track has no attitude, unless the antenna is isotropic, or it is no rotation.
@@ -170,13 +197,13 @@ class Antenna:
         attitude = rotations("trajectory attitude", track.attitude, (len(track),))
         return np.asarray(attitude @ self.mount)
 
-    def gain(self, directions: Any, frequency: float) -> np.ndarray:
+    def gain(self, directions: ArrayLike, frequency: float) -> np.ndarray:
         """Complex amplitude gain (...) at directions in antenna axes (..., 3), of any length, at `frequency` Hz."""
         from .antenna_pattern import pattern_gain
 
         return pattern_gain(self, np.asarray(directions, np.float64), frequency)
 
-    def ratio(self, frequency: Any) -> Any:
+    def ratio(self, frequency: float | np.ndarray) -> Any:
         """What angles are multiplied by before the pattern is looked up."""
         return 1.0 if self.frequency is None else frequency / self.frequency
 

@@ -2,10 +2,12 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
 from ._costas import nearest_sizes, permutation
@@ -28,10 +30,21 @@ class AntennaArray:
     ValueError for other shapes, more than 10 000 elements, weights that are all zero, NaN or Inf.
     """
 
-    positions: Any
-    offsets: Any
-    weights: Any = None
-    plan: Any = None
+    positions: NDArray[np.float64]
+    offsets: NDArray[np.float64]
+    weights: NDArray[np.complex128] = None  # type: ignore[assignment]
+    plan: NDArray[np.int64] | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            *,
+            positions: ArrayLike,
+            offsets: ArrayLike,
+            weights: ArrayLike | None = None,
+            plan: ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         self._set("positions", validation.array("array positions", self.positions, np.float64, ("n", 3)))
@@ -68,7 +81,13 @@ class AntennaArray:
 
     @classmethod
     def linear(
-        cls, n: int, *, spacing: float, frequency_step: float = 0.0, axis: Any = Y, weights: Any = None
+        cls,
+        n: int,
+        *,
+        spacing: float,
+        frequency_step: float = 0.0,
+        axis: ArrayLike = Y,
+        weights: ArrayLike | None = None,
     ) -> AntennaArray:
         """Element i at i spacing axis, m, sending f0 + i frequency_step, Hz; element 0 is the reference point.
 
@@ -81,13 +100,19 @@ class AntennaArray:
 
     @classmethod
     def planar(
-        cls, shape: Any, *, spacing: Any, frequency_step: Any = (0.0, 0.0), axes: Any = (Y, Z), weights: Any = None
+        cls,
+        shape: Sequence[int] | np.ndarray,
+        *,
+        spacing: ArrayLike,
+        frequency_step: ArrayLike = (0.0, 0.0),
+        axes: Sequence[Sequence[float] | np.ndarray] | np.ndarray = (Y, Z),
+        weights: ArrayLike | None = None,
     ) -> AntennaArray:
         """N by P elements: number n P + p at n dy axes[0] + p dz axes[1], sending f0 + n dfy + p dfz.
 
         shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz.
         """
-        if np.shape(shape) != (2,) or np.shape(axes) != (2, 3):
+        if np.shape(shape) != (2,) or np.shape(cast(Any, axes)) != (2, 3):
             raise ValueError(f"shape is {shape!r:.40} and axes {axes!r:.60}; give (N, P), and two directions (2, 3)")
         rows, columns = (_size(f"shape[{i}]", shape[i]) for i in range(2))
         _size("shape[0] shape[1]", rows * columns)
@@ -100,7 +125,7 @@ class AntennaArray:
 
     @classmethod
     def costas(
-        cls, n: int, *, spacing: float, frequency_step: float, axis: Any = Y, weights: Any = None
+        cls, n: int, *, spacing: float, frequency_step: float, axis: ArrayLike = Y, weights: ArrayLike | None = None
     ) -> AntennaArray:
         """Like `linear`, but element i sends f0 + g(i) frequency_step, g a Costas permutation of 0 ... n - 1.
 
@@ -115,12 +140,12 @@ class AntennaArray:
         step = validation.number("frequency_step", frequency_step)
         return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(order * step)
 
-    def with_offsets(self, offsets: Any, *, plan: Any = None) -> AntennaArray:
+    def with_offsets(self, offsets: ArrayLike, *, plan: ArrayLike | None = None) -> AntennaArray:
         """The same elements sending other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
         rows = validation.converted("array offsets", offsets, np.float64)
-        return replace(self, offsets=rows[None] if rows.ndim == 1 else rows, plan=plan)
+        return replace(self, offsets=rows[None] if rows.ndim == 1 else rows, plan=cast(Any, plan))
 
-    def subarrays(self, count: int, *, steer: Any = None, frequency: float | None = None) -> AntennaArray:
+    def subarrays(self, count: int, *, steer: ArrayLike | None = None, frequency: float | None = None) -> AntennaArray:
         """`count` equal groups of consecutive elements, each sending the carrier of its first element.
 
         steer      a direction (3,), or (azimuth, elevation) rad from x towards y and z: weights gain the phases that
@@ -230,7 +255,7 @@ def _size(name: str, n: Any) -> int:
     return out
 
 
-def _towards(steer: Any) -> np.ndarray:
+def _towards(steer: ArrayLike) -> np.ndarray:
     if np.shape(steer) == (2,):
         azimuth, elevation = validation.array("steer", steer, np.float64, (2,))
         level = np.cos(elevation)

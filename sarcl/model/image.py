@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.report import Report
 from .image_grid import ImageGrid, pair
+
+if TYPE_CHECKING:
+    import PIL.Image
+
+    from ..base.types import LazyRows, PathLike
 
 
 @dataclass(frozen=True, eq=False)
@@ -29,9 +36,22 @@ class Image:
     grid: ImageGrid
     gain: float = 1.0
     frequency: float | None = None
-    tx: np.ndarray | None = None
-    rx: np.ndarray | None = None
+    tx: NDArray[np.float64] | None = None
+    rx: NDArray[np.float64] | None = None
     report: Report | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            data: ArrayLike | LazyRows,
+            grid: ImageGrid,
+            gain: float = 1.0,
+            frequency: float | None = None,
+            tx: ArrayLike | None = None,
+            rx: ArrayLike | None = None,
+            report: Report | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         if isinstance(self.data, (list, tuple)):
@@ -59,7 +79,7 @@ class Image:
         """True until the image is detected (multilooked)."""
         return np.dtype(self.data.dtype).kind == "c"
 
-    def decibels(self) -> np.ndarray:
+    def decibels(self) -> NDArray[np.float32]:
         """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where nothing is."""
         data = np.asarray(self.data)
         with np.errstate(divide="ignore"):
@@ -70,7 +90,7 @@ class Image:
                 raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
             return (10 * np.log10(data / self.gain**2)).astype(np.float32)
 
-    def multilook(self, looks: Any) -> Image:
+    def multilook(self, looks: int | Sequence[int] | np.ndarray) -> Image:
         """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; a remainder is cut off.
 
         ValueError when the grid is no plane or the block is larger than the image.
@@ -95,14 +115,14 @@ class Image:
         )
         return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
 
-    def show(self, floor_db: float = -50.0) -> Any:
+    def show(self, floor_db: float = -50.0) -> PIL.Image.Image:
         """The picture as a PIL.Image, grey in dB from the brightest pixel down to floor_db."""
         return self._picture(floor_db)
 
-    def _repr_png_(self) -> bytes:
+    def _repr_png_(self) -> bytes | None:
         return self._picture(-50.0)._repr_png_()
 
-    def save(self, path: Any, *, floor_db: float = -50.0, title: str | None = None) -> None:
+    def save(self, path: PathLike, *, floor_db: float = -50.0, title: str | None = None) -> None:
         """Write "name.png" (grey, dB, with axes) or "name.h5" (lossless; `sarcl.read` opens it)."""
         suffix = Path(path).suffix.lower()
         if suffix == ".png":
@@ -116,7 +136,7 @@ class Image:
         else:
             raise ValueError(f"image path {str(path)!r} ends in {suffix!r}; choose '.png' or '.h5'")
 
-    def _picture(self, floor_db: float, title: str | None = None) -> Any:
+    def _picture(self, floor_db: float, title: str | None = None) -> PIL.Image.Image:
         from ..figures.decibels import picture
 
         if len(self.grid.shape) != 2:

@@ -4,10 +4,12 @@ from __future__ import annotations
 
 import functools
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
@@ -26,11 +28,11 @@ class ImageGrid:
     """
 
     shape: tuple[int, ...]
-    center: np.ndarray | None = None
+    center: NDArray[np.float64] | None = None
     spacing: tuple[float, float] | None = None
-    x_axis: np.ndarray | None = None
-    y_axis: np.ndarray | None = None
-    listed: np.ndarray | None = None
+    x_axis: NDArray[np.float64] | None = None
+    y_axis: NDArray[np.float64] | None = None
+    listed: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if (self.listed is None) == (self.spacing is None):
@@ -49,11 +51,11 @@ class ImageGrid:
     def plane(
         cls,
         *,
-        center: Any = (0.0, 0.0, 0.0),
-        shape: Any,
-        spacing: Any,
-        normal: Any = (0.0, 0.0, 1.0),
-        x_axis: Any = None,
+        center: ArrayLike = (0.0, 0.0, 0.0),
+        shape: int | Sequence[int] | np.ndarray,
+        spacing: float | Sequence[float] | np.ndarray,
+        normal: ArrayLike = (0.0, 0.0, 1.0),
+        x_axis: ArrayLike | None = None,
     ) -> ImageGrid:
         """A plane of shape (rows, columns) and spacing (row, column) m about `center`, m (3,).
 
@@ -88,7 +90,7 @@ class ImageGrid:
         return made
 
     @classmethod
-    def points(cls, positions: Any, *, valid: Any = None) -> ImageGrid:
+    def points(cls, positions: ArrayLike, *, valid: ArrayLike | None = None) -> ImageGrid:
         """Any positions, m (..., 3); the image has the shape of all axes but the last.
 
         valid  bool, of that shape: False where a cell is empty (a height model without data there), whatever its
@@ -159,21 +161,21 @@ class ImageGrid:
         return index, self.at(*index) if self.listed is None else self.listed[index]
 
     @property
-    def normal(self) -> np.ndarray:
+    def normal(self) -> NDArray[np.float64]:
         """Unit normal of a plane (3,)."""
         self._need_plane("normal")
         assert self.x_axis is not None and self.y_axis is not None
         return np.cross(self.x_axis, self.y_axis)
 
     @property
-    def positions(self) -> np.ndarray:
+    def positions(self) -> NDArray[np.float64]:
         """All pixel positions, m, float64 shape + (3,); NaN where a cell is empty."""
         if self.listed is not None:
             return self.listed
         return self.at(np.arange(self.shape[0])[:, None], np.arange(self.shape[1]))
 
     @property
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of the box that holds all pixels but empty ones, m (2, 3)."""
         if self.listed is not None:
             p = self.listed.reshape(-1, 3) if self.empty is None else self.listed[~self.empty]
@@ -181,15 +183,16 @@ class ImageGrid:
             p = self.at(np.array([0, 0, 1, 1]) * (self.shape[0] - 1), np.array([0, 1, 0, 1]) * (self.shape[1] - 1))
         return np.stack([p.min(axis=0), p.max(axis=0)])
 
-    def at(self, row: Any, column: Any) -> np.ndarray:
+    def at(self, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
         """Position, m (..., 3), of (fractional) pixel indices of a plane."""
         self._need_plane("at")
-        assert self.spacing is not None and self.y_axis is not None and self.x_axis is not None
+        assert self.center is not None and self.spacing is not None
+        assert self.y_axis is not None and self.x_axis is not None
         i = (np.asarray(row) - self.shape[0] // 2) * self.spacing[0]
         j = (np.asarray(column) - self._middle) * self.spacing[1]
         return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
 
-    def index(self, position: Any) -> np.ndarray:
+    def index(self, position: ArrayLike) -> NDArray[np.float64]:
         """Fractional (row, column) of positions, m (..., 3), projected on a plane: (..., 2)."""
         self._need_plane("index")
         assert (

@@ -7,12 +7,14 @@ from dataclasses import dataclass, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
 from .lazy_rows import in_memory, pick, stack
 
 if TYPE_CHECKING:
     from ..base.report import Report
+    from ..base.types import LazyRows, PathLike
     from .antenna_array import AntennaArray
     from .waveform import Waveform
 
@@ -48,22 +50,45 @@ class PhaseHistory:
     """
 
     samples: Any
-    frequency: Any
-    frequency_step: Any
-    tx: Any
-    reference_range: Any
-    rx: Any = None
-    time: Any = None
-    tx_channel: Any = None
-    rx_channel: Any = None
-    polarization: Any = None
-    weight: Any = None
-    tx_velocity: Any = None
-    rx_velocity: Any = None
+    frequency: NDArray[np.float64]
+    frequency_step: NDArray[np.float64]
+    tx: NDArray[np.float64]
+    reference_range: NDArray[np.float64]
+    rx: NDArray[np.float64] = None  # type: ignore[assignment]
+    time: NDArray[np.float64] | None = None
+    tx_channel: NDArray[np.int64] | None = None
+    rx_channel: NDArray[np.int64] | None = None
+    polarization: NDArray[np.str_] | None = None
+    weight: NDArray[np.float64] | None = None
+    tx_velocity: NDArray[np.float64] | None = None
+    rx_velocity: NDArray[np.float64] | None = None
     waveform: Waveform | None = None
     array: AntennaArray | None = None
     compressed: bool = True
     report: Report | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            samples: ArrayLike | LazyRows,
+            frequency: ArrayLike,
+            frequency_step: ArrayLike,
+            tx: ArrayLike,
+            reference_range: ArrayLike,
+            rx: ArrayLike | None = None,
+            time: ArrayLike | None = None,
+            tx_channel: ArrayLike | None = None,
+            rx_channel: ArrayLike | None = None,
+            polarization: ArrayLike | None = None,
+            weight: ArrayLike | None = None,
+            tx_velocity: ArrayLike | None = None,
+            rx_velocity: ArrayLike | None = None,
+            waveform: Waveform | None = None,
+            array: AntennaArray | None = None,
+            compressed: bool = True,
+            report: Report | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         samples = self.samples
@@ -138,17 +163,17 @@ class PhaseHistory:
         return int(self.samples.shape[1])
 
     @property
-    def bandwidth(self) -> np.ndarray:
+    def bandwidth(self) -> NDArray[np.float64]:
         """n_samples frequency_step, Hz (n_rows,)."""
         return self.n_samples * self.frequency_step
 
     @property
-    def center_frequency(self) -> np.ndarray:
+    def center_frequency(self) -> NDArray[np.float64]:
         """Middle of the sampled band, Hz (n_rows,)."""
         return self.frequency + (self.n_samples - 1) / 2 * self.frequency_step
 
     @property
-    def swath(self) -> np.ndarray:
+    def swath(self) -> NDArray[np.float64]:
         """Unambiguous range about the reference, m (n_rows,): +- half of c / (2 frequency_step)."""
         return constants.SPEED_OF_LIGHT / (2 * self.frequency_step)
 
@@ -170,7 +195,7 @@ class PhaseHistory:
         validation.finite("samples", block, first_row=start)
         return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
 
-    def __getitem__(self, rows: Any) -> PhaseHistory:
+    def __getitem__(self, rows: slice | Sequence[int] | np.ndarray) -> PhaseHistory:
         """The chosen rows (slice, index array or mask); a lazy source stays lazy."""
         index = np.atleast_1d(np.arange(self.n_rows)[rows])
         if index.ndim != 1:
@@ -219,7 +244,7 @@ class PhaseHistory:
         signal = np.fft.fftshift(np.fft.ifft(spectrum, axis=1), axes=1) * n
         return (delay if len(delay) > 1 else delay[0]), signal
 
-    def save(self, path: Any) -> None:
+    def save(self, path: PathLike) -> None:
         """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows."""
         from . import store
 

@@ -7,9 +7,10 @@ antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, wh
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
+from typing import Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from .trajectory import Trajectory
@@ -17,13 +18,13 @@ from .trajectory import Trajectory
 UP = (0.0, 0.0, 1.0)
 
 
-def fixed(track: Trajectory, direction: Any, *, up: Any = UP) -> Trajectory:
+def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike = UP) -> Trajectory:
     """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3)."""
     look = _units("direction", direction, len(track))
     return _looking(track, look, _units("up", up, len(track)))
 
 
-def spotlight(track: Trajectory, point: Any, *, up: Any = UP) -> Trajectory:
+def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike = UP) -> Trajectory:
     """Boresight at a point, m (3,) or (n, 3) for one that moves. ValueError where an antenna stands on it."""
     target = _vectors("point", point, len(track))
     return _looking(
@@ -31,7 +32,9 @@ def spotlight(track: Trajectory, point: Any, *, up: Any = UP) -> Trajectory:
     )
 
 
-def stripmap(track: Trajectory, look: float, *, squint: float = 0.0, side: str = "right", up: Any = UP) -> Trajectory:
+def stripmap(
+    track: Trajectory, look: float, *, squint: float = 0.0, side: Literal["right", "left"] = "right", up: ArrayLike = UP
+) -> Trajectory:
     """Boresight across the track, `look` rad off straight down, turned `squint` rad towards the velocity.
 
     side  "right" or "left" of the velocity, seen from above. The azimuth axis keeps in the plane of boresight and
@@ -60,7 +63,7 @@ def stripmap(track: Trajectory, look: float, *, squint: float = 0.0, side: str =
     return replace(track, attitude=np.stack([boresight, azimuth, np.cross(boresight, azimuth)], axis=-1))
 
 
-def steered(track: Trajectory, azimuth: Any, elevation: Any = 0.0) -> Trajectory:
+def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -> Trajectory:
     """The track's attitude turned to (azimuth, elevation) rad, one or per pulse, of its own axes.
 
     The pattern turns as a whole, as when the antenna turns: sliding spotlight, scans, platform errors.
@@ -80,7 +83,7 @@ def steered(track: Trajectory, azimuth: Any, elevation: Any = 0.0) -> Trajectory
     return replace(track, attitude=axes @ turn)
 
 
-def turned(track: Trajectory, angles: Any) -> Trajectory:
+def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
     """The track's attitude turned by rotation vectors, rad (3,) or (n, 3), about its own axes x, y, z."""
     from scipy.spatial.transform import Rotation
 
@@ -88,7 +91,7 @@ def turned(track: Trajectory, angles: Any) -> Trajectory:
     return replace(track, attitude=_attitude(track) @ turn)
 
 
-def from_quaternions(track: Trajectory, quaternions: Any, *, scalar_first: bool = True) -> Trajectory:
+def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first: bool = True) -> Trajectory:
     """Attitude from unit quaternions (n, 4) that turn body axes into the scene's; w, x, y, z, or x, y, z, w."""
     from scipy.spatial.transform import Rotation
 
@@ -109,7 +112,7 @@ def velocities(track: Trajectory) -> np.ndarray:
     return np.asarray(np.gradient(track.positions, track.times, axis=0))
 
 
-def rotations(name: str, value: Any, lead: tuple[int, ...]) -> np.ndarray:
+def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
     """`value` as rotation matrices lead + (3, 3); ValueError where one is none to 1e-6."""
     out = validation.array(name, value, np.float64, (*lead, 3, 3))
     off = np.abs(np.swapaxes(out, -1, -2) @ out - np.eye(3)).max(axis=(-1, -2))
@@ -140,13 +143,13 @@ def _looking(track: Trajectory, look: np.ndarray, up: np.ndarray) -> Trajectory:
     return replace(track, attitude=np.stack([look, side, np.cross(look, side)], axis=-1))
 
 
-def _vectors(name: str, value: Any, n: int) -> np.ndarray:
+def _vectors(name: str, value: ArrayLike, n: int) -> np.ndarray:
     """`value` (3,) or (n, 3) as (n, 3)."""
     out = validation.array(name, value, np.float64, (3,) if np.ndim(value) == 1 else (n, 3))
     return np.broadcast_to(out, (n, 3))
 
 
-def _units(name: str, value: Any, n: int) -> np.ndarray:
+def _units(name: str, value: ArrayLike, n: int) -> np.ndarray:
     out = _vectors(name, value, n)
     length = np.linalg.norm(out, axis=1, keepdims=True)
     if not length.all():

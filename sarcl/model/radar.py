@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
 from .phase_history import PhaseHistory
@@ -38,22 +39,29 @@ class Radar:
             value = validation.number("radar noise_temperature", self.noise_temperature, above=0)
             object.__setattr__(self, "noise_temperature", value)
 
-    def factor(self, frequency: Any) -> np.ndarray:
+    def factor(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that depends on no place."""
         wave = constants.SPEED_OF_LIGHT / np.asarray(frequency, np.float64)
         loss = 10 ** (self.losses_db / 10)
         return np.asarray(np.sqrt(self.power / ((4 * np.pi) ** 3 * loss)) * wave)
 
-    def amplitude(self, frequency: Any, tx_range: Any, rx_range: Any, tx_gain: Any = 1.0, rx_gain: Any = 1.0) -> Any:
+    def amplitude(
+        self,
+        frequency: ArrayLike,
+        tx_range: ArrayLike,
+        rx_range: ArrayLike,
+        tx_gain: ArrayLike = 1.0,
+        rx_gain: ArrayLike = 1.0,
+    ) -> Any:
         """sqrt(W) received from a cross section of 1 m^2: factor x spreading x amplitude gains.
 
         Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be
         complex (`Antenna.gain`). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for two antennas.
         """
-        return self.factor(frequency) * spreading(tx_range, rx_range) * tx_gain * rx_gain
+        return self.factor(frequency) * spreading(tx_range, rx_range) * np.asarray(tx_gain) * np.asarray(rx_gain)
 
 
-def spreading(tx_range: Any, rx_range: Any) -> np.ndarray:
+def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
     """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
     out = np.asarray(tx_range, np.float64) * np.asarray(rx_range, np.float64)
     if not (out > 0).all():
@@ -61,7 +69,7 @@ def spreading(tx_range: Any, rx_range: Any) -> np.ndarray:
     return 1 / out
 
 
-def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> np.ndarray:
+def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> NDArray[np.float64]:
     """Mean |noise|^2, W, of samples of the echoes `raw` at W = 1, one a row: k T_s/(df E), E = |P|^2 at its peak, s^2.
 
     A sample is the received spectrum over P's largest value (times the matched filter's, of peak 1, once compressed);

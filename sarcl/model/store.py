@@ -9,14 +9,16 @@ asked for.
 from __future__ import annotations
 
 import os
+from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 if TYPE_CHECKING:
+    from ..base.types import PathLike
     from .image import Image
     from .phase_history import PhaseHistory
 
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
@@ -271,7 +273,7 @@ _LOADERS: dict[str, Any] = {"phase_history": _load_phase_history, "image": _load
 READABLE = "sarcl's own HDF5 files (raw.save, image.save) and AFRL Gotcha .mat files (MATLAB 5)"
 
 
-def read(path: Any, *, autofocus: bool = False) -> PhaseHistory | Image:
+def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> PhaseHistory | Image:
     """Read a file, or several as one phase history, rows in the order given.
 
     What a file is follows from its first bytes, not its name. HDF5 written by sarcl gives the PhaseHistory or

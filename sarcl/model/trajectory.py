@@ -3,9 +3,10 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
@@ -22,10 +23,20 @@ class Trajectory:
     ValueError when shapes disagree, a value is not finite, or times do not increase.
     """
 
-    times: np.ndarray
-    positions: np.ndarray
-    velocities: np.ndarray | None = None
-    attitude: np.ndarray | None = None
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64] | None = None
+    attitude: NDArray[np.float64] | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            times: ArrayLike,
+            positions: ArrayLike,
+            velocities: ArrayLike | None = None,
+            attitude: ArrayLike | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         positions = validation.array("trajectory positions", self.positions, np.float64, ("n_pulses", 3))
@@ -49,14 +60,14 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.times)
 
-    def picked(self, pulses: Any) -> Trajectory:
+    def picked(self, pulses: slice | np.ndarray) -> Trajectory:
         """These pulses, a slice or numbers in order."""
         whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
         some: dict[str, Any] = {name: None if value is None else value[pulses] for name, value in whole.items()}
         return replace(self, **some)
 
     @classmethod
-    def line(cls, *, start: Any, velocity: Any, prf: float, n_pulses: int) -> Trajectory:
+    def line(cls, *, start: ArrayLike, velocity: ArrayLike, prf: float, n_pulses: int) -> Trajectory:
         """Straight track: pulse i at start + i velocity/prf (m, m/s, Hz)."""
         start = validation.array("start", start, np.float64, (3,))
         velocity = validation.array("velocity", velocity, np.float64, (3,))
@@ -76,7 +87,7 @@ class Trajectory:
         start: float = 0.0,
         arc: float = 2 * np.pi,
         n_pulses: int,
-        center: Any = (0.0, 0.0, 0.0),
+        center: ArrayLike = (0.0, 0.0, 0.0),
         prf: float = 1.0,
     ) -> Trajectory:
         """Circle about the z axis through `center`, at `height` above it, m.

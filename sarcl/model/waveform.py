@@ -3,11 +3,14 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
-from typing import Any
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
+
+Kind = Literal["chirp", "tone", "sampled"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,9 +30,21 @@ class Waveform:
     center: float
     bandwidth: float
     duration: float
-    kind: str
-    signal: np.ndarray | None = None
+    kind: Kind
+    signal: NDArray[np.complex128] | None = None
     rate: float | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            center: float,
+            bandwidth: float,
+            duration: float,
+            kind: Kind,
+            signal: ArrayLike | None = None,
+            rate: float | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         for name in ("center", "bandwidth", "duration"):
@@ -66,13 +81,13 @@ class Waveform:
         return cls(center, 4 / duration if bandwidth is None else bandwidth, duration, "tone")
 
     @classmethod
-    def sampled(cls, signal: Any, rate: float, center: float) -> Waveform:
+    def sampled(cls, signal: ArrayLike, rate: float, center: float) -> Waveform:
         """Any pulse, from complex baseband samples (n,) taken at `rate` Hz; its band is `rate` wide."""
         signal = validation.array("waveform signal", signal, np.complex128, ("n",))
         rate = validation.number("waveform rate", rate, above=0)
         return cls(center, rate, len(signal) / rate, "sampled", signal, rate)
 
-    def pulse_spectrum(self, frequency: Any) -> np.ndarray:
+    def pulse_spectrum(self, frequency: ArrayLike) -> np.ndarray:
         """Spectrum P of the pulse at `frequency` Hz (n,), complex128, largest modulus 1.
 
         A chirp's is its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
@@ -86,7 +101,7 @@ class Waveform:
             return np.sinc(f * self.duration).astype(np.complex128)
         return self._sampled_spectrum(f) / self._sampled_peak()
 
-    def matched_spectrum(self, frequency: Any) -> np.ndarray:
+    def matched_spectrum(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """Spectrum W = |P|^2 after the matched filter at `frequency` Hz (n,), float64, peak 1."""
         return np.abs(self.pulse_spectrum(frequency)) ** 2
 

@@ -2,16 +2,17 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ..base import validation
 
+Window = Literal["hamming"] | tuple[Literal["taylor"], float, float]  # sidelobe_db, nbar
 KNOWN = "None, 'hamming', ('taylor', sidelobe_db, nbar) such as ('taylor', 35, 5)"
 
 
-def weights(window: Any, n: int) -> np.ndarray:
+def weights(window: Window | None, n: int) -> np.ndarray:
     """Weights of n equal cells of an aperture or a band, float64 (n,).
 
     window  None (all ones), "hamming" or ("taylor", sidelobe_db, nbar), sidelobe_db > 0 below the main lobe
@@ -33,7 +34,7 @@ def weights(window: Any, n: int) -> np.ndarray:
     return np.ones(n)
 
 
-def parse(text: str) -> Any:
+def parse(text: str) -> Window | None:
     """The window a command line names: "none", "hamming" or "taylor:35:5" (side lobes in dB, nbar)."""
     name, *rest = text.strip().lower().split(":")
     if name == "none" and not rest:

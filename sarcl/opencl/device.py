@@ -130,7 +130,7 @@ def _try_device(index: int, platform: Any, device: Any) -> DeviceInfo:
     )
 
 
-def open_device(choice: Any = None) -> Device:
+def open_device(choice: DeviceChoice | None = None) -> Device:
     """The device to use: `choice`, else SARCL_DEVICE, else the GPU with most compute units, else a CPU.
 
     choice  a Device (returned as it is), an index, "cpu", "gpu", or any part of a platform's or device's name.
@@ -145,8 +145,8 @@ def open_device(choice: Any = None) -> Device:
     working = [(info, raw) for info, raw in _probe() if info.works]
     if not working:
         raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
-    if choice is not None and not (source == "SARCL_DEVICE" and choice.strip().lower() == "all"):
-        names = [n for n in choice.split(",") if n.strip()] if source == "SARCL_DEVICE" else [choice]
+    if choice is not None and not (source == "SARCL_DEVICE" and str(choice).strip().lower() == "all"):
+        names = [n for n in str(choice).split(",") if n.strip()] if source == "SARCL_DEVICE" else [choice]
         each = ([(i, raw) for i, raw in working if _matches(i, name)] for name in names)
         matching = next((found for found in each if found), [])
         if not matching:
@@ -333,6 +333,9 @@ class Device:
                 f"{what} failed on {self.info.name!r} ({self.info.platform}, driver {self.info.driver}): "
                 f"{_first_line(exc)}; try another device= (sarcl devices lists them)"
             ) from exc
+
+
+DeviceChoice = Device | int | str  # what `open_device` takes, or None: its own choice
 
 
 @functools.cache

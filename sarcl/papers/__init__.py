@@ -12,13 +12,14 @@ For other folders:
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING
 
 from ..base import text
 
 __all__ = ["PAPERS", "farooq", "find", "lab", "listing", "open_lab", "paper"]
 
 if TYPE_CHECKING:
+    from ..opencl.device import DeviceChoice
     from .lab import Lab
     from .paper import Paper
 
@@ -40,7 +41,7 @@ def listing() -> str:
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
 
 
-def open_lab(device: Any = None, quick: bool = False) -> Lab:
+def open_lab(device: DeviceChoice | None = None, quick: bool = False) -> Lab:
     """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
     from ..opencl.device import open_device
     from .lab import Lab

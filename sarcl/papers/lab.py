@@ -7,9 +7,9 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.map_aperture import map_aperture
+from ..arrays.map_aperture import MapKind, map_aperture
 from ..experiments.fda.case import Case
-from ..experiments.fda.measure import response
+from ..experiments.fda.experiment import response
 from ..figures import html
 from ..imaging.backproject import backproject
 from ..model.image_grid import ImageGrid
@@ -49,7 +49,7 @@ class Lab:
             )  # fmt: skip
         return self._kept[key]
 
-    def mapped(self, case: Case, mapping: str | None, points: Any = CENTER, **options: Any) -> PhaseHistory:
+    def mapped(self, case: Case, mapping: MapKind | None, points: Any = CENTER, **options: Any) -> PhaseHistory:
         """The same, mapped; None: as collected."""
         raw = self.collect(case, points)
         return raw if mapping is None else map_aperture(raw, mapping, **options)

@@ -3,17 +3,19 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import count, instance, sealed
 from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import in_memory
 from ..model.phase_history import PhaseHistory
+from ..opencl.device import DeviceChoice
 from . import _bright_points, _phase_gradient, _phase_smoothing, _search
 from ._aperture_view import Errors, View, corrected
 
@@ -41,8 +43,8 @@ class PhaseErrors:
     modes      cosines over the aperture that `phase` is made of, beside a slope; n_pulses: not smoothed
     """
 
-    phase: np.ndarray
-    range: np.ndarray
+    phase: NDArray[np.float64]
+    range: NDArray[np.float64]
     frequency: float
     found: bool
     gain: float
@@ -77,7 +79,7 @@ def autofocus(
     range_errors: bool = True,
     places: int = 200,
     max_bytes: float | None = None,
-    device: Any = None,
+    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     progress: Progress | None = None,
 ) -> Autofocus:
     """Find each pulse's phase and range error from the image on `grid`, and return raw without them.

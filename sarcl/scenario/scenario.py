@@ -9,7 +9,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
 from functools import partial
 from pathlib import Path
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Unpack
 
 import numpy as np
 
@@ -19,6 +19,9 @@ from . import _schema
 from ._schema import Where
 
 if TYPE_CHECKING:
+    from ..base.types import PathLike
+    from ..imaging.backproject import BackprojectOptions
+    from ..model.antenna import Antenna
     from ..model.antenna_array import AntennaArray
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
@@ -26,11 +29,14 @@ if TYPE_CHECKING:
     from ..model.radar import Radar
     from ..model.trajectory import Trajectory
     from ..model.waveform import Waveform
+    from ..scene.material import Material
     from ..scene.scene import Scene
+    from ..simulation.echo import EchoOptions
     from ..simulation.echo_forecast import EchoForecast
 
 # Arguments that may be complex, which TOML has no word for: a list of [real, imaginary] pairs.
 COMPLEX = {"amplitudes", "signal", "weights"}
+Table = dict[str, Any]  # of a scenario: keys and plain values, or tables in it
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,23 +60,46 @@ class Scenario:
     names the file, line and table of an unknown or missing key, a wrong type, or a value that a noun refuses.
     """
 
-    waveform: Any = None
-    trajectory: Any = None
-    receiver: Any = None
-    scene: Any = None
-    grid: Any = None
-    echo: Any = None
-    backproject: Any = None
-    materials: Any = None
-    pointing: Any = None
-    antenna: Any = None
-    receiver_pointing: Any = None
-    receiver_antenna: Any = None
-    array: Any = None
-    radar: Any = None
-    noise: Any = None
+    waveform: Table | None = None
+    trajectory: Table | None = None
+    receiver: Table | None = None
+    scene: Table | None = None
+    grid: Table | None = None
+    echo: Table | None = None
+    backproject: Table | None = None
+    materials: Table | None = None
+    pointing: Table | None = None
+    antenna: Table | None = None
+    receiver_pointing: Table | None = None
+    receiver_antenna: Table | None = None
+    array: Table | None = None
+    radar: Table | None = None
+    noise: Table | None = None
     folder: Path = Path()
     where: Where = field(default_factory=Where, repr=False)
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            waveform: Waveform | Mapping[str, object] | None = None,
+            trajectory: Trajectory | Mapping[str, object] | None = None,
+            receiver: Trajectory | Mapping[str, object] | None = None,
+            scene: Scene | Mapping[str, object] | None = None,
+            grid: ImageGrid | Mapping[str, object] | None = None,
+            echo: Mapping[str, object] | None = None,
+            backproject: Mapping[str, object] | None = None,
+            materials: Mapping[str, Material | Mapping[str, object]] | None = None,
+            pointing: Mapping[str, object] | None = None,
+            antenna: Antenna | Mapping[str, object] | None = None,
+            receiver_pointing: Mapping[str, object] | None = None,
+            receiver_antenna: Antenna | Mapping[str, object] | None = None,
+            array: AntennaArray | Mapping[str, object] | None = None,
+            radar: Radar | Mapping[str, object] | None = None,
+            noise: Mapping[str, object] | None = None,
+            folder: PathLike = Path(),
+            where: Where = ...,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         from ..scene.scene import Scene
@@ -98,7 +127,7 @@ class Scenario:
         """The scenario as TOML; `loads` gives the same tables, floats to the last bit."""
         return toml.dumps(self.tables)
 
-    def save(self, path: Any) -> None:
+    def save(self, path: PathLike) -> None:
         """Write it to a file. Mesh files must lie as before, relative to the new file."""
         from ..io import output_paths
 
@@ -119,7 +148,7 @@ class Scenario:
             return None
         return self._aimed(self._one("receiver"), "receiver_pointing" if self.receiver_pointing else "pointing")
 
-    def build_antenna(self) -> Any:
+    def build_antenna(self) -> Antenna | tuple[Antenna, Antenna] | None:
         """The Antenna, a pair (transmitting, receiving), or None."""
         if self.antenna is None:
             if self.receiver_antenna is not None:
@@ -162,7 +191,7 @@ class Scenario:
         assert scene is not None
         return scene
 
-    def simulate(self, **options: Any) -> PhaseHistory:
+    def simulate(self, **options: Unpack[EchoOptions]) -> PhaseHistory:
         """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
         import sarcl
 
@@ -175,13 +204,13 @@ class Scenario:
         with self.where.blame(("noise",), level):
             return sarcl.add_noise(raw, **level)
 
-    def plan(self, **options: Any) -> EchoForecast:
+    def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast:
         """What `simulate` with these options will take: rows, bytes, time, error."""
         import sarcl
 
         return self._echo(sarcl.plan_echo, options)
 
-    def _echo(self, verb: Callable[..., Any], options: dict[str, Any]) -> Any:
+    def _echo(self, verb: Callable[..., Any], options: Mapping[str, Any]) -> Any:
         self._check_focus()
         pieces = (self.build_scene(), self.build_waveform(), self.build_track())
         given = self._options("echo", options)
@@ -191,7 +220,7 @@ class Scenario:
                 radar=self.build_radar(), **given,
             )  # fmt: skip
 
-    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Any) -> Image:
+    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectOptions]) -> Image:
         """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
         import sarcl
 
@@ -247,7 +276,7 @@ class Scenario:
         return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
 
 
-def load(path: Any) -> Scenario:
+def load(path: PathLike) -> Scenario:
     """Read a scenario file; mesh files are found relative to its folder.
 
     ValueError names file and line of what is not TOML or not a scenario; FileNotFoundError.
@@ -264,7 +293,7 @@ def load(path: Any) -> Scenario:
     return loads(text, name=str(path), folder=path.parent)
 
 
-def loads(text: str, *, name: str = "scenario", folder: Any = ".") -> Scenario:
+def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scenario:
     """A scenario from TOML text; `name` stands for the file in messages. Raises as `load` does."""
     from ..io.toml import locate
 

@@ -4,13 +4,15 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 
 VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
+Diagram = Literal["smooth", "isotropic", "cos", "cos2", "exp", "sinc"]
 DIAGRAMS = ("smooth", "isotropic", "cos", "cos2", "exp", "sinc")
 COHERENT = ("smooth", "sinc")  # these reflect like a mirror the size of the facet
 
@@ -37,7 +39,7 @@ class Material:
     eps_r: float = None  # type: ignore[assignment]
     conductivity: float = None  # type: ignore[assignment]
     height: float = None  # type: ignore[assignment]
-    diagram: str = "smooth"
+    diagram: Diagram = "smooth"
     width: float = 0.0
     reflectivity: float = 1.0
     name: str = ""
@@ -83,7 +85,7 @@ class Material:
         """True for a perfect conductor."""
         return self.conductivity == np.inf
 
-    def lobe(self, delta: Any) -> Any:
+    def lobe(self, delta: ArrayLike) -> Any:
         """The diagram D at angles delta between normal and bisector, rad (...); 0 for smooth materials."""
         cosine = np.maximum(np.cos(delta), 0)
         if self.diagram == "exp":
@@ -99,7 +101,7 @@ class Material:
         delta, weights = (nodes + 1) * np.pi / 4, weights * np.pi / 4
         return float(2 * np.pi * (weights * self.lobe(delta) * np.cos(delta) * np.sin(delta)).sum())
 
-    def permittivity(self, frequency: Any) -> Any:
+    def permittivity(self, frequency: ArrayLike) -> Any:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
         Its imaginary part is negative: fields go as exp(+j 2 pi f t). inf for a perfect conductor.
@@ -107,11 +109,17 @@ class Material:
         frequency = np.asarray(frequency, np.float64)
         if not (frequency > 0).all():
             raise ValueError(f"frequency reaches {frequency.min():g} Hz; it must be greater than 0")
+        out: np.ndarray
         if self.conducting:
             out = np.full(frequency.shape, np.inf, np.complex128)
         else:
             out = self.eps_r - 1j * self.conductivity / (2 * np.pi * VACUUM_PERMITTIVITY * frequency)
         return np.asarray(out)[()]
+
+
+# a name of MATERIALS, or the amplitude reflectivity of a perfect conductor; one for all facets, or one for each
+MaterialLike = Material | str | float
+FacetMaterials = MaterialLike | Sequence[MaterialLike] | Sequence[Sequence[MaterialLike]] | np.ndarray
 
 
 def _number(name: str, value: Any, inf: bool) -> float:
@@ -152,7 +160,7 @@ MATERIALS: dict[str, Material] = dict(
 
 
 def resolve(
-    material: Any, materials: Any, shape: tuple[int, ...]
+    material: FacetMaterials, materials: Sequence[MaterialLike] | None, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, tuple[Material, ...]]:
     """What the keywords `material`, `materials` mean for `shape` facets or cells: (index, reflectivity, table).
 

@@ -3,21 +3,29 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from pathlib import Path
+from typing import TYPE_CHECKING, Any, Literal, cast
 
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.boxes import box as box
 from . import terrain
 from . import triangles as geometry
-from .material import METAL, Material, merge, resolve
+from .material import METAL, FacetMaterials, Material, MaterialLike, merge, resolve
 from .triangles import areas as areas
 from .triangles import centroids as centroids
 from .triangles import edges as edges
 from .triangles import normals as normals
+
+if TYPE_CHECKING:
+    import trimesh
+    from scipy.spatial.transform import Rotation
+
+    from ..base.types import PathLike
 
 log = logging.getLogger(__name__)
 
@@ -43,16 +51,32 @@ class Scene:
                      that hides by horizons, as long as its facets are all there, cut or not
     """
 
-    positions: np.ndarray
-    amplitudes: np.ndarray
-    triangles: np.ndarray
-    reflectivity: np.ndarray
-    roughness: np.ndarray
-    two_sided: np.ndarray
-    material: np.ndarray = None  # type: ignore[assignment]
+    positions: NDArray[np.float64]
+    amplitudes: NDArray[np.complex128]
+    triangles: NDArray[np.float64]
+    reflectivity: NDArray[np.float64]
+    roughness: NDArray[np.float64]
+    two_sided: NDArray[np.bool_]
+    material: NDArray[np.int32] = None  # type: ignore[assignment]
     materials: tuple[Material, ...] = ()
-    point_roughness: np.ndarray = None  # type: ignore[assignment]
+    point_roughness: NDArray[np.float64] = None  # type: ignore[assignment]
     heights: terrain.Heights | None = None
+
+    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+
+        def __init__(
+            self,
+            positions: ArrayLike,
+            amplitudes: ArrayLike,
+            triangles: ArrayLike,
+            reflectivity: ArrayLike,
+            roughness: ArrayLike,
+            two_sided: ArrayLike,
+            material: ArrayLike | None = None,
+            materials: Sequence[Material] = (),
+            point_roughness: ArrayLike | None = None,
+            heights: terrain.Heights | None = None,
+        ) -> None: ...
 
     def __post_init__(self) -> None:
         n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
@@ -94,25 +118,25 @@ class Scene:
         object.__setattr__(self, "materials", table)
 
     @classmethod
-    def points(cls, positions: Any, amplitudes: Any = 1.0) -> Scene:
+    def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0) -> Scene:
         """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
         positions = validation.array("positions", positions, np.float64, ("n", 3))
         if np.ndim(amplitudes) == 0:
-            amplitudes = [amplitudes] * len(positions)
+            amplitudes = [cast(complex, amplitudes)] * len(positions)
         amplitudes = validation.array("amplitudes", amplitudes, np.complex128, (len(positions),))
         return cls(positions, amplitudes, np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool))
 
     @classmethod
     def facets(
         cls,
-        triangles: Any,
+        triangles: ArrayLike,
         *,
-        material: Any = "metal",
-        materials: Any = None,
-        reflectivity: Any = 1.0,
-        roughness: Any = 0.0,
-        point_roughness: Any = None,
-        two_sided: Any = True,
+        material: FacetMaterials = "metal",
+        materials: Sequence[MaterialLike] | None = None,
+        reflectivity: ArrayLike = 1.0,
+        roughness: ArrayLike = 0.0,
+        point_roughness: ArrayLike | None = None,
+        two_sided: ArrayLike = True,
     ) -> Scene:
         """Facets from their corners, m (k, 3, 3). Facets of no area are left out and counted in the log.
 
@@ -150,12 +174,12 @@ class Scene:
     @classmethod
     def from_mesh(
         cls,
-        mesh: Any,
+        mesh: str | Path | trimesh.Trimesh | trimesh.Scene,
         *,
-        material: str | float | Material | Mapping[str, Any] = "metal",
+        material: MaterialLike | Mapping[str, MaterialLike] = "metal",
         scale: float = 1.0,
-        position: Any = (0.0, 0.0, 0.0),
-        rotation: Any = None,
+        position: ArrayLike = (0.0, 0.0, 0.0),
+        rotation: ArrayLike | Rotation | None = None,
         max_edge: float | None = None,
         roughness: float = 0.0,
         repair: bool = True,
@@ -190,14 +214,14 @@ class Scene:
     @classmethod
     def from_heights(
         cls,
-        x: Any,
-        y: Any,
-        z: Any,
+        x: ArrayLike,
+        y: ArrayLike,
+        z: ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike],
         *,
-        material: Any = "metal",
-        materials: Any = None,
-        roughness: Any = 0.0,
-        point_roughness: Any = 0.0,
+        material: FacetMaterials = "metal",
+        materials: Sequence[MaterialLike] | None = None,
+        roughness: ArrayLike = 0.0,
+        point_roughness: ArrayLike = 0.0,
     ) -> Scene:
         """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a cell, facing up.
 
@@ -215,18 +239,18 @@ class Scene:
     @classmethod
     def from_dem(
         cls,
-        path: Any,
+        path: PathLike,
         *,
-        bounds: Any = None,
-        center: Any = None,
-        frame: str = "local",
+        bounds: Sequence[float] | np.ndarray | None = None,
+        center: Sequence[float] | np.ndarray | None = None,
+        frame: Literal["local", "ecef"] = "local",
         heights: str | None = None,
-        geoid: Any = None,
+        geoid: str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None = None,
         nodata: float | None = None,
-        material: Any = "metal",
-        materials: Any = None,
-        roughness: Any = 0.0,
-        point_roughness: Any = 0.0,
+        material: FacetMaterials = "metal",
+        materials: Sequence[MaterialLike] | None = None,
+        roughness: ArrayLike = 0.0,
+        point_roughness: ArrayLike = 0.0,
     ) -> Scene:
         """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[dem].
 
@@ -273,13 +297,13 @@ class Scene:
         return any(self.point_roughness.strides) and bool(self.point_roughness.any())
 
     @property
-    def bounds(self) -> np.ndarray:
+    def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of the box that holds everything, m (2, 3)."""
         corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
         return box(corners)
 
     @property
-    def center(self) -> np.ndarray:
+    def center(self) -> NDArray[np.float64]:
         """Centre of that box, m (3,)."""
         return self.bounds.mean(axis=0)
 
@@ -304,7 +328,7 @@ class Scene:
         rise = ground.height_at(x, y) - float(self.bounds[0, 2]) - validation.number("depth", depth)
         return self.moved((x, y, rise))
 
-    def moved(self, by: Any) -> Scene:
+    def moved(self, by: ArrayLike) -> Scene:
         """This scene moved by a vector, m (3,)."""
         by = validation.array("by", by, np.float64, (3,))
         positions, triangles = validation.sealed(self.positions + by), validation.sealed(self.triangles + by)

@@ -15,19 +15,44 @@ parallelepiped, cylinder), Wan et al. Figs 6-8 (frustum, cuboid, cylinder).
 from __future__ import annotations
 
 import inspect
-from typing import Any
+from collections.abc import Sequence
+from typing import TYPE_CHECKING, Any, TypedDict, Unpack
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base import validation
 from . import triangles as geometry
+from .material import FacetMaterials, MaterialLike
 from .scene import Scene
+
+if TYPE_CHECKING:
+    from scipy.spatial.transform import Rotation
 
 SECTIONS = 72
 MOST_FACETS = 50_000_000
 
 
-def plate(size: Any, *, edge: float | None = None, two_sided: Any = True, **options: Any) -> Scene:
+class SurfaceOptions(TypedDict, total=False):
+    """What every shape takes beside its dimensions, for all its facets: as in Scene.facets and Scene.from_mesh."""
+
+    position: ArrayLike
+    rotation: ArrayLike | Rotation | None
+    material: FacetMaterials
+    materials: Sequence[MaterialLike] | None
+    reflectivity: ArrayLike
+    roughness: ArrayLike
+
+
+class ClosedOptions(SurfaceOptions, total=False):
+    """The same of closed shapes, whose facets reflect from outside unless two_sided says otherwise."""
+
+    two_sided: ArrayLike
+
+
+def plate(
+    size: ArrayLike, *, edge: float | None = None, two_sided: ArrayLike = True, **options: Unpack[SurfaceOptions]
+) -> Scene:
     """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` asks."""
     x, y = _dimensions("size", size, 2)
     corners = np.array([[[-x, -y, 0], [x, -y, 0]], [[-x, y, 0], [x, y, 0]]]) / 2
@@ -35,14 +60,19 @@ def plate(size: Any, *, edge: float | None = None, two_sided: Any = True, **opti
 
 
 def disc(
-    radius: float, *, edge: float | None = None, sections: int | None = None, two_sided: Any = True, **options: Any
+    radius: float,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
+    two_sided: ArrayLike = True,
+    **options: Unpack[SurfaceOptions],
 ) -> Scene:
     """A circular disc about the origin in z = 0, facing up."""
     radius = validation.number("radius", radius, above=0)
     return _turned([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
 
 
-def box(size: Any, *, edge: float | None = None, **options: Any) -> Scene:
+def box(size: ArrayLike, *, edge: float | None = None, **options: Unpack[ClosedOptions]) -> Scene:
     """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` asks."""
     x, y, z = _dimensions("size", size, 3)
     low, high = np.array([-x / 2, -y / 2, 0]), np.array([x / 2, y / 2, z])
@@ -60,7 +90,12 @@ def box(size: Any, *, edge: float | None = None, **options: Any) -> Scene:
 
 
 def cylinder(
-    radius: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+    radius: float,
+    height: float,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
+    **options: Unpack[ClosedOptions],
 ) -> Scene:
     """An upright circular cylinder with its lids."""
     radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
@@ -68,7 +103,12 @@ def cylinder(
 
 
 def cone(
-    radius: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+    radius: float,
+    height: float,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
+    **options: Unpack[ClosedOptions],
 ) -> Scene:
     """An upright circular cone with its base."""
     radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
@@ -76,7 +116,13 @@ def cone(
 
 
 def frustum(
-    bottom: float, top: float, height: float, *, edge: float | None = None, sections: int | None = None, **options: Any
+    bottom: float,
+    top: float,
+    height: float,
+    *,
+    edge: float | None = None,
+    sections: int | None = None,
+    **options: Unpack[ClosedOptions],
 ) -> Scene:
     """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
     bottom, top = validation.number("bottom", bottom, above=0), validation.number("top", top, above=0)
@@ -84,7 +130,9 @@ def frustum(
     return _turned([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
 
 
-def sphere(radius: float, *, edge: float | None = None, facets: int | None = None, **options: Any) -> Scene:
+def sphere(
+    radius: float, *, edge: float | None = None, facets: int | None = None, **options: Unpack[ClosedOptions]
+) -> Scene:
     """A sphere about the origin: an icosahedron whose edges are cut into n, 20 n^2 facets of like size.
 
     n follows from `edge`, or is the least that gives `facets`, default 2000.
@@ -154,7 +202,12 @@ def _turned(profile: Any, edge: float | None, sections: int | None, **options: A
 
 
 def _placed(
-    triangles: np.ndarray, edge: float | None, *, position: Any = (0.0, 0.0, 0.0), rotation: Any = None, **options: Any
+    triangles: np.ndarray,
+    edge: float | None,
+    *,
+    position: ArrayLike = (0.0, 0.0, 0.0),
+    rotation: ArrayLike | Rotation | None = None,
+    **options: Any,
 ) -> Scene:
     """Facets cut, turned and moved."""
     position = validation.array("position", position, np.float64, (3,))
@@ -163,7 +216,7 @@ def _placed(
     return scene if edge is None else scene.split(validation.number("edge", edge, above=0))
 
 
-def _dimensions(name: str, size: Any, n: int) -> list[float]:
+def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
     size = validation.array(name, size, np.float64, (n,))
     return [validation.number(f"{name}[{i}]", v, above=0) for i, v in enumerate(size)]
 

@@ -2,24 +2,28 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
-from typing import Any
+from collections.abc import Collection, Sequence
+from typing import Any, Literal, TypedDict
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
 from ..base import wgs84
 from ..base.report import Report
+from ..base.types import PathLike
 from ..base.validation import array as numbers
 from ..base.validation import choice, count, direction, instance
 from ..base.validation import tolerance as allowed_error
+from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.phase_history import PhaseHistory
+from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics import plan
 from ..numerics.pulse_geometry import Antennas
-from ..opencl.device import budget, open_device
+from ..opencl.device import DeviceChoice, budget, open_device
 from ..scattering import antenna_weights
 from ..scattering.facets import POLARIZATIONS
 from ..scene.scene import Scene
@@ -28,7 +32,37 @@ from .channels.array_echo import array_echo
 from .echo_output import Target
 from .scene_echoes import Order, Progress, Work
 
+Polarization = Literal["HH", "HV", "VH", "VV"]
+Skip = Literal[
+    "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
+]  # fmt: skip
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
+
+
+class EchoOptions(TypedDict, total=False):
+    """Options of `echo`."""
+
+    receiver: Trajectory | None
+    polarization: Polarization | Literal["all"] | Sequence[Polarization]
+    vertical: ArrayLike | None
+    range_window: ArrayLike | None
+    reference: ArrayLike | None
+    array: AntennaArray | None
+    channels: Literal["simultaneous", "separated"]
+    receive: Literal["reference", "own", "all"]
+    antenna: Antenna | tuple[Antenna, Antenna] | None
+    radar: Radar | None
+    shadows: bool | Literal["embree"]
+    seed: int
+    skip: bool | Collection[Skip]
+    compressed: bool
+    max_edge: float | Literal["auto"] | None
+    max_bytes: float | None
+    out: PathLike | None
+    tolerance: float
+    check: bool | None
+    device: DeviceChoice | None
+    progress: Progress | None
 
 
 def echo(
@@ -37,25 +71,25 @@ def echo(
     track: Trajectory,
     *,
     receiver: Trajectory | None = None,
-    polarization: str | Sequence[str] = "HH",
-    vertical: Any = None,
-    range_window: Any = None,
-    reference: Any = None,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    range_window: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
     array: AntennaArray | None = None,
-    channels: str = "simultaneous",
-    receive: str = "reference",
-    antenna: Any = None,
-    radar: Any = None,
-    shadows: bool | str = True,
+    channels: Literal["simultaneous", "separated"] = "simultaneous",
+    receive: Literal["reference", "own", "all"] = "reference",
+    antenna: Antenna | tuple[Antenna, Antenna] | None = None,
+    radar: Radar | None = None,
+    shadows: bool | Literal["embree"] = True,
     seed: int = 0,
-    skip: Any = True,
+    skip: bool | Collection[Skip] = True,
     compressed: bool = True,
-    max_edge: float | str | None = "auto",
+    max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
-    out: Any = None,
+    out: PathLike | None = None,
     tolerance: float = 1e-3,
     check: bool | None = None,
-    device: Any = None,
+    device: DeviceChoice | None = None,
     progress: Progress | None = None,
 ) -> PhaseHistory:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.

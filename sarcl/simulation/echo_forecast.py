@@ -5,7 +5,7 @@ from __future__ import annotations
 import logging
 import time
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Unpack
 
 import numpy as np
 
@@ -18,7 +18,7 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from . import echo_sampling
-from .echo import echo
+from .echo import EchoOptions, echo
 from .echo_output import log as output_log
 
 FEW, MORE = 8, 40  # pulses from the middle of the track that are really made
@@ -39,7 +39,7 @@ class EchoForecast:
     bytes: float
     seconds: float
     contributions: float
-    plan: dict[str, Any]
+    plan: dict[str, object]
     predicted_error: float
 
     def __str__(self) -> str:
@@ -48,7 +48,7 @@ class EchoForecast:
         return text
 
 
-def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Any) -> EchoForecast:
+def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Unpack[EchoOptions]) -> EchoForecast:
     """How `echo(scene, waveform, track, ...)` would go with these options: an EchoForecast, before any of it is kept.
 
     Up to 40 pulses from the middle of the track are made, and timed. Raises what `echo` would, `out` is not touched.
@@ -56,7 +56,9 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: An
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         validation.instance(name, value, kind)
     receiver, array = options.get("receiver"), options.get("array")
-    given = {k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")}
+    given: dict[str, Any] = {
+        k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")
+    }
     real, rx = scene.realized(options.get("seed", 0)), echo_sampling.receiver_positions(track, receiver)
     asked = options.get("reference")
     point = scene.center if asked is None else validation.array("reference", asked, np.float64, (3,))

@@ -3,15 +3,16 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ..base.errors import warn
 from ..base.validation import array, choice, number, sealed
-from ..opencl.device import Device, budget, open_device
+from ..opencl.device import Device, DeviceChoice, budget, open_device
 from ..scene.terrain import check_above, heights_of
 from ._aspect_blocks import STRIDE, blocks_around, enough_looks, lever, pulse_blocks, reach, scene_box
 from ._facet_samples import PROBES, SAMPLES, places
@@ -229,14 +230,14 @@ def lit(
     tx: np.ndarray,
     rx: np.ndarray | None = None,
     *,
-    heights: Any = None,
+    heights: Sequence[ArrayLike] | None = None,
     on_heights: np.ndarray | None = None,
     two_sided: np.ndarray | bool = True,
     wanted: np.ndarray | None = None,
     tolerance: float = 0.25,
     max_bytes: float | None = None,
-    engine: str = "opencl",
-    device: Any = None,
+    engine: Literal["opencl", "embree"] = "opencl",
+    device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Lighting:
     """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.

@@ -22,7 +22,7 @@ UNITS = {
 }  # fmt: skip
 
 
-def sweep(case: Case, **values: Any) -> list[Case]:
+def sweep(case: Case, **values: float | Sequence[object] | np.ndarray) -> list[Case]:
     """`case` at every combination of the values of its fields, the last key's running fastest.
 
     values     lists, one a field:  sweep(case, frequency_step=[20e6, 2e6], aperture=[200.0, 400.0])

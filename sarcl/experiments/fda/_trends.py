@@ -7,7 +7,7 @@ from typing import Any
 
 from ...figures import html
 from ._sweep import UNITS, shown
-from .measure import CONVENTIONAL, nearer
+from .experiment import CONVENTIONAL, nearer
 from .text import at_most
 
 DECADE = 20.0  # ratio of values from which on the axis is in decades

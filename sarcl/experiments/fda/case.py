@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
@@ -16,6 +16,7 @@ from ...model.antenna_array import AntennaArray
 from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
+from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.channels.channel_rows import RECEIVE
 from ...simulation.echo import echo
@@ -66,15 +67,15 @@ class Case:
     mappings: tuple[str, ...] = ("unmodified", "corrected", "apparent", "channels")
     points: tuple[float, ...] = (0.0, 2.0, 2.25)
     separations: tuple[float, ...] = (0.1, 0.125, 0.15, 0.2, 0.25, 0.3, 0.35)
-    progression: str = "linear"
+    progression: Literal["linear", "costas", "vertical", "planar", "subarrays"] = "linear"
     groups: int | None = None
     steer: float = 0.0
-    path: str = "line"
+    path: Literal["line", "circle"] = "line"
     squint: float = 0.0
     height: float = 0.0
-    receive: str = "reference"
+    receive: Literal["reference", "own", "all"] = "reference"
     series: str = ""
-    swept: tuple[tuple[str, Any], ...] = ()
+    swept: tuple[tuple[str, object], ...] = ()
 
     def __post_init__(self) -> None:
         for name, allowed in (("progression", PROGRESSIONS), ("path", PATHS), ("receive", RECEIVE)):
@@ -236,14 +237,14 @@ class Case:
         """One element a channel: the array, or of subarrays each group as one element at its middle."""
         return self.array() if self.groups is None else as_channels(self.array(), self.groups)
 
-    def collect(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
+    def collect(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
         """Echoes of unit points at (0, y, 0): channels added up at the reference element, or kept apart."""
         tone = Waveform.tone(center=self.center, duration=1 / self.channel_step)
         kept = "simultaneous" if self.receive == "reference" else "separated"
         raw = self._echo(places, tone, self.track(), device, array=self.array(), channels=kept, receive=self.receive)
         return raw if self.groups is None else replace(raw, array=self.channels())
 
-    def conventional(self, places: Sequence[float], device: Any = None) -> PhaseHistory:
+    def conventional(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
         """The same points as a conventional antenna sees them: the same phase centres and track, a chirp of the band.
 
         One antenna at the mean phase centre; where they spread (`is_wide`), an element for each channel, all sending

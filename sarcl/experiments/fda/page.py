@@ -7,7 +7,7 @@ from typing import Any
 
 from ...figures.html import heading, page, plot, table, words
 from . import _trends
-from .measure import CONVENTIONAL, RESOLVED
+from .experiment import CONVENTIONAL, RESOLVED
 from .text import setting, verdicts
 
 __all__ = ["html", "section", "setting", "verdicts"]

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .measure import CONVENTIONAL, NEAR, RESOLVED, nearer
+from .experiment import CONVENTIONAL, NEAR, RESOLVED, nearer
 
 SAME = 0.02  # relative: widths that differ by less are one
 WEAK = -6.0  # dB of a unit point: less than this is no main lobe on its place

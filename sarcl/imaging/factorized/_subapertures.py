@@ -41,7 +41,7 @@ class Track:
 
 def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
     """An order of the rows, (n,), in which each smooth run of alike rows is consecutive; and the runs."""
-    keys = [raw.frequency, raw.frequency_step]
+    keys: list[np.ndarray] = [raw.frequency, raw.frequency_step]
     keys += [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
     group = np.zeros(raw.n_rows, np.int64)
     for key in keys:

@@ -4,9 +4,9 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
-from typing import Any
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import SarclWarning, ToleranceMissed
@@ -19,8 +19,9 @@ from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import LARGEST
+from ...numerics.windows import Window
 from ...opencl import device as opencl
-from ...opencl.device import open_device
+from ...opencl.device import DeviceChoice, open_device
 from ..focusing_task import Task, make_task
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
@@ -33,10 +34,10 @@ def polar_format(
     grid: ImageGrid,
     *,
     tolerance: float = 1e-2,
-    window: Any = None,
-    weights: Any = None,
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
     max_bytes: float | None = None,
-    device: Any = None,
+    device: DeviceChoice | None = None,
     check: bool | None = None,
     progress: Progress | None = None,
 ) -> Image:

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...arrays.array_factor import diverse_factor
@@ -60,7 +62,7 @@ def _poles(out: Section) -> None:
     angles = np.arange(-84.63, 85.0, 1.0)  # off the poles themselves
     elevation, azimuth = np.meshgrid(np.radians(angles), np.radians(angles), indexing="ij")
     u = directions(azimuth, elevation)
-    given = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
+    given: dict[str, Any] = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
     right = np.abs(diverse_factor(F0, cosines=(u[..., 1], u[..., 2]), **given)) / 81
     phase = [
         2 * np.pi * (STEPS[i] * -TIME + F0 * SPACING[i] * u[..., 1 + i] / SPEED_OF_LIGHT) for i in (0, 1)

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...experiments.fda import measure, page
+from ...experiments.fda import experiment, page
 from ..lab import Lab, system
 from ..paper import Section
 
@@ -29,9 +29,9 @@ def section(lab: Lab) -> Section:
         "at the centre alone. Here are points off it, pairs of points, and the spatial frequencies that were "
         "collected, beside a conventional antenna of the same band and track."
     )
-    for result in measure.run(cases, device=lab.device):
+    for result in experiment.run(cases, device=lab.device):
         rows, name = result["mapped"], result["name"]
-        plain, apparent, own = (rows[k] for k in (measure.CONVENTIONAL, "apparent", "channels"))
+        plain, apparent, own = (rows[k] for k in (experiment.CONVENTIONAL, "apparent", "channels"))
         shifts = [p["error"] for p in apparent["points"]]
         off = max(shifts, key=abs)
         out.states(
@@ -67,7 +67,7 @@ def section(lab: Lab) -> Section:
 
 def _least(row: dict[str, Any]) -> float:
     """Least separation at which two points are told apart, m; infinite where there is none."""
-    return min((d["separation"] for d in row["dips"] if d["dip_db"] >= measure.RESOLVED), default=float("inf"))
+    return min((d["separation"] for d in row["dips"] if d["dip_db"] >= experiment.RESOLVED), default=float("inf"))
 
 
 def _from(separation: float) -> str:

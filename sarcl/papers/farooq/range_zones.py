@@ -29,6 +29,7 @@ from ...model.antenna_array import AntennaArray
 from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
+from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.echo import echo
 
@@ -83,7 +84,7 @@ class RangeZones:
         return Trajectory(pulse / self.prf, np.stack([0 * y, y, 0 * y], axis=1))
 
 
-def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: Any = None) -> PhaseHistory:
+def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: DeviceChoice | None = None) -> PhaseHistory:
     """What the receiver records: echoes of all zones added up in every interval, a row for each pulse and element.
 
     scenes  one a zone, from zone 0 on, where `radar.place` says; None: an empty zone

@@ -7,13 +7,14 @@ centres, band and track. What is flown: case.py; what is measured: docs/fda.md.
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any
+from typing import Any, cast
 
 import numpy as np
 
-from ...arrays.map_aperture import map_aperture
+from ...arrays.map_aperture import MapKind, map_aperture
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
+from ...opencl.device import DeviceChoice
 from ._sweep import sweep
 from .case import RAW, REACH, Case
 
@@ -28,7 +29,10 @@ NEAR = 0.25  # of a null width: how far their peaks may stand from them
 
 
 def run(
-    cases: Sequence[Case], *, device: Any = None, progress: Callable[[str, int, int], None] | None = None
+    cases: Sequence[Case],
+    *,
+    device: DeviceChoice | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
     """What was measured of each case: plain numbers, ready for JSON."""
     out = []
@@ -41,7 +45,7 @@ def run(
     return out
 
 
-def measure(case: Case, device: Any = None) -> dict[str, Any]:
+def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
     """Responses at every place, dips at every separation and the data's support, of every mapping that applies.
 
     "not_applicable" holds the others, with the reason. "collected" is the support of the channels themselves.
@@ -89,10 +93,10 @@ def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
         if name == RAW:
             raise ValueError("every row holds its own channel's place and carrier as it is: that is 'channels'")
         return raw
-    return raw if name == RAW else map_aperture(raw, name, attitude=case.track().attitude)
+    return raw if name == RAW else map_aperture(raw, cast(MapKind, name), attitude=case.track().attitude)
 
 
-def cut(raw: PhaseHistory, case: Case, y: float, device: Any = None) -> tuple[np.ndarray, np.ndarray]:
+def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = None) -> tuple[np.ndarray, np.ndarray]:
     """Image along cross-range about (0, y, 0): places, m (n,), and amplitudes (n,), 1 for a focused unit point."""
     from ...imaging.backproject import backproject
     from ...model.image_grid import ImageGrid

@@ -1,0 +1,291 @@
+"""Public parameters say what they take, their annotations resolve, and mypy reads them in a program of a user."""
+
+from __future__ import annotations
+
+import ast
+import dataclasses
+import inspect
+import re
+import subprocess
+import sys
+import textwrap
+import tomllib
+import types
+import typing
+from importlib.resources import files
+from pathlib import Path
+
+import pytest
+
+import sarcl
+from sarcl import motion, shapes
+from sarcl.arrays import map_aperture
+from sarcl.experiments.fda import _array, case
+from sarcl.imaging import choose_method, focusing_task
+from sarcl.imaging.backproject import BackprojectOptions
+from sarcl.model import antenna
+from sarcl.papers.farooq import range_zones
+from sarcl.scattering import facets
+from sarcl.scene import material
+from sarcl.simulation.channels import channel_rows
+from sarcl.simulation.echo import SKIPS, EchoOptions, Polarization, Skip
+
+ROOT = Path(__file__).parents[2]
+MODULES = {f"sarcl.{n}": getattr(sarcl, n) for n in sarcl.__all__ if inspect.ismodule(getattr(sarcl, n))}
+MODULES["sarcl.papers.farooq.range_zones"] = range_zones
+ONLY = {"sarcl.illumination": ("lit", "Lighting")}  # of a module whose other names are not for users
+EXTRAS = {"distributed": types.SimpleNamespace(Client=object)}  # packages of extras, which need not be installed
+
+
+def public() -> dict[str, typing.Any]:
+    """Functions and classes for users, by the name they are known under."""
+    found = {f"sarcl.{name}": getattr(sarcl, name) for name in sarcl.__all__}
+    found = {name: value for name, value in found.items() if not inspect.ismodule(value)}
+    for name, module in MODULES.items():
+        offered = ONLY.get(name) or getattr(module, "__all__", None)
+        for each, value in list(vars(module).items()):
+            if each.startswith("_") or not (inspect.isfunction(value) or inspect.isclass(value)):
+                continue
+            if each in offered if offered else value.__module__ == module.__name__:
+                found[f"{name}.{each}"] = value
+    return found
+
+
+PUBLIC = public()
+
+
+def namespace(thing: typing.Any) -> dict[str, typing.Any]:
+    """What annotations of a function or class may name: its module's names, those imported for type checkers too."""
+    module = sys.modules[thing.__module__]
+    out = dict(vars(module))
+    for node in ast.parse(inspect.getsource(module)).body:
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            for line in node.body:
+                try:
+                    exec(compile(ast.Module([line], []), module.__name__, "exec"), out)
+                except ModuleNotFoundError as exc:
+                    out[exc.name] = EXTRAS[exc.name]
+    return out
+
+
+def hints_of(thing: typing.Any, names: dict[str, typing.Any]) -> dict[str, typing.Any]:
+    return typing.get_type_hints(thing, names, names)
+
+
+def checker_init(kind: type) -> ast.FunctionDef | None:
+    """The __init__ that a class shows to type checkers alone: what its fields are made from."""
+    tree = ast.parse(textwrap.dedent(inspect.getsource(kind))).body[0]
+    assert isinstance(tree, ast.ClassDef)
+    for node in tree.body:
+        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
+            return next(f for f in node.body if isinstance(f, ast.FunctionDef) and f.name == "__init__")
+    return None
+
+
+def methods_of(kind: type) -> list[typing.Any]:
+    """Public functions that a class defines, and its constructor unless a type checker is shown another."""
+    own = [
+        vars(kind).get(n) for n in vars(kind) if not n.startswith("_") or n in ("__call__", "__getitem__", "__add__")
+    ]
+    made = [m.__func__ if isinstance(m, (classmethod, staticmethod)) else m for m in own]
+    built = dataclasses.is_dataclass(kind) or "__init__" in vars(kind)
+    constructor = [kind.__init__] if built and not checker_init(kind) else []
+    return constructor + [m for m in made if inspect.isfunction(m)]
+
+
+def parameters(thing: typing.Any) -> dict[str, typing.Any]:
+    """Types of all parameters of a function, or of a class's constructor and public methods, by name."""
+    names, found = namespace(thing), {}
+    if inspect.isclass(thing):
+        init = checker_init(thing)
+        given = [] if init is None else [*init.args.args[1:], *init.args.kwonlyargs]
+        for one in given:
+            assert one.annotation is not None
+            found[f"{one.arg}"] = eval(ast.unparse(one.annotation), names)
+    for call in methods_of(thing) if inspect.isclass(thing) else [thing]:
+        hints = hints_of(call, names)
+        written = inspect.signature(call, follow_wrapped=False).parameters if not hasattr(call, "__signature__") else {}
+        code = call.__code__
+        listed = code.co_varnames[
+            : code.co_argcount + code.co_kwonlyargcount + bool(code.co_flags & 4) + bool(code.co_flags & 8)
+        ]
+        for name in written or listed:
+            if name not in ("self", "cls"):
+                found[f"{call.__name__}({name})"] = hints.get(name, inspect.Parameter.empty)
+    return found
+
+
+def is_vague(kind: typing.Any) -> bool:
+    """True for no annotation, for Any, and for what holds Any, however deep; numpy's own types are whole."""
+    if kind in (typing.Any, inspect.Parameter.empty):
+        return True
+    origin = typing.get_origin(kind)
+    if origin is typing.Literal or str(getattr(origin or kind, "__module__", "")).startswith("numpy"):
+        return False
+    if typing.is_typeddict(kind):
+        return any(is_vague(k) for k in hints_of(kind, namespace(kind)).values())
+    inner = [a for arg in typing.get_args(kind) for a in (arg if isinstance(arg, list) else [arg])]
+    return any(is_vague(a) for a in inner if a is not ...)
+
+
+def test_vagueness_is_found_wherever_it_hides():
+    assert all(map(is_vague, (typing.Any, dict[str, typing.Any], typing.Any | None, tuple[int, list[typing.Any]])))
+    assert is_vague(typing.Callable[[typing.Any], int])
+    assert not any(map(is_vague, (int, str | None, typing.Callable[..., None], typing.Literal["a", "b"])))
+
+
+def test_the_names_are_those_of_the_package_and_of_the_modules_for_users():
+    assert len(PUBLIC) > 90 and {"sarcl.echo", "sarcl.shapes.cone", "sarcl.illumination.lit"} <= set(PUBLIC)
+
+
+@pytest.mark.parametrize("name", PUBLIC)
+def test_no_public_parameter_is_untyped_or_any(name):
+    vague = {parameter: kind for parameter, kind in parameters(PUBLIC[name]).items() if is_vague(kind)}
+    assert not vague
+
+
+NOUNS = [kind for kind in PUBLIC.values() if inspect.isclass(kind) and checker_init(kind)]
+
+
+@pytest.mark.parametrize("kind", NOUNS, ids=lambda kind: kind.__name__)
+def test_a_constructor_shown_to_type_checkers_is_the_real_one(kind):
+    shown = checker_init(kind).args
+    real = list(inspect.signature(kind).parameters.values())
+    assert [a.arg for a in [*shown.args[1:], *shown.kwonlyargs]] == [p.name for p in real]
+    assert {a.arg for a in shown.kwonlyargs} == {p.name for p in real if p.kind is p.KEYWORD_ONLY}
+    optional = [a.arg for a in shown.args[len(shown.args) - len(shown.defaults) :]] if shown.defaults else []
+    optional += [a.arg for a, default in zip(shown.kwonlyargs, shown.kw_defaults, strict=True) if default]
+    assert optional == [p.name for p in real if p.default is not p.empty]
+
+
+@pytest.mark.parametrize(
+    ("options", "verb", "others"),
+    [
+        (EchoOptions, sarcl.echo, {"scene", "waveform", "track"}),
+        (BackprojectOptions, sarcl.backproject, {"raw", "grid", "tile"}),
+        (map_aperture.MapApertureOptions, sarcl.map_aperture, {"raw"}),
+    ],
+)
+def test_options_are_those_of_the_verb_they_are_handed_to(options, verb, others):
+    names = namespace(options)
+    wanted = {name: kind for name, kind in hints_of(verb, names).items() if name not in others | {"return"}}
+    assert hints_of(options, names) == wanted
+
+
+@pytest.mark.parametrize("shape", shapes.SHAPES, ids=lambda shape: shape.__name__)
+def test_options_of_a_shape_are_those_that_it_spells_out(shape):
+    hints = hints_of(shape, namespace(shape))
+    (options,) = typing.get_args(hints["options"])
+    own = set(hints) - {"options", "return"}
+    assert set(inspect.signature(shape).parameters) == own | set(
+        typing.get_type_hints(options, namespace(shape), namespace(shape))
+    )
+
+
+@pytest.mark.parametrize(
+    ("literal", "words"),
+    [
+        (Skip, SKIPS),
+        (Polarization, facets.POLARIZATIONS),
+        (focusing_task.Skip, focusing_task.SKIPS),
+        (antenna.Kind, antenna.KINDS),
+        (material.Diagram, material.DIAGRAMS),
+        (map_aperture.MapKind, map_aperture.MAPPINGS),
+        ((sarcl.echo, "channels"), channel_rows.CHANNELS),
+        ((sarcl.echo, "receive"), channel_rows.RECEIVE),
+        ((sarcl.map_aperture, "offset"), map_aperture.OFFSETS),
+        ((sarcl.backproject, "method"), choose_method.METHODS),
+        ((sarcl.plan, "method"), choose_method.METHODS),
+        ((motion.perturbed, "frame"), motion.FRAMES),
+        ((motion.sinusoidal, "frame"), motion.FRAMES),
+        ((case.Case, "progression"), _array.PROGRESSIONS),
+        ((case.Case, "path"), case.PATHS),
+        ((case.Case, "receive"), channel_rows.RECEIVE),
+    ],
+)
+def test_words_of_a_literal_are_those_that_are_accepted(literal, words):
+    if isinstance(literal, tuple):
+        thing, name = literal
+        literal = hints_of(thing, namespace(thing))[name]
+    assert typing.get_args(literal) == words
+
+
+def test_the_marker_and_the_shared_types_come_with_the_package():
+    assert files("sarcl").joinpath("py.typed").is_file()
+    packed = tomllib.loads((ROOT / "pyproject.toml").read_text())["tool"]["setuptools"]["package-data"]["sarcl"]
+    assert set(packed) == {"__init__.pyi", "py.typed"}
+    light = "import sarcl.base.types, sys; print('numpy' in sys.modules)"
+    assert subprocess.run([sys.executable, "-c", light], capture_output=True, text=True).stdout == "False\n"
+
+
+MISTAKES = """
+sarcl.echo(scene, chirp, track, polarization="HX")  # Argument "polarization" to "echo"
+sarcl.echo(scene, chirp, track, skip={"beams"})  # Literal['beams']
+sarcl.backproject(raw, grid, windo="hamming")  # Unexpected keyword argument "windo"
+sarcl.backproject(raw, grid, window="haming")  # No overload variant of "backproject"
+sarcl.backproject(raw, grid, out=3)  # No overload variant of "backproject"
+sarcl.Trajectory.line(start=None, velocity=(0, 1, 0), prf=1.0, n_pulses=2)  # Argument "start"
+sarcl.PhaseHistory(object(), frequency=1e9, frequency_step=1e6, tx=[(0, 0, 0)], reference_range=1.0)  # Argument 1
+sarcl.PhaseHistory([[1j]], frequency=object(), frequency_step=1e6, tx=[(0, 0, 0)], reference_range=1.0)  # "frequency"
+sarcl.Scene.points([(0, 0, 0)], amplitude=1.0)  # Unexpected keyword argument "amplitude"
+sarcl.shapes.box((1, 1, 1), rough=0.1)  # Unexpected keyword argument "rough"
+sarcl.plan_echo(scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
+sarcl.Antenna(kind="dish")  # Literal['dish']
+image.save(5)  # Argument 1 to "save"
+image.grid.shapes  # has no attribute "shapes"
+"""
+
+
+GOOD = '''
+class Rows:
+    """Samples that are read as they are needed."""
+
+    shape, dtype = (2, 4), np.dtype(np.complex64)
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.ones((2, 4), self.dtype)[rows]
+
+
+lazy = sarcl.PhaseHistory(
+    Rows(), frequency=[9e9, 9e9], frequency_step=1e6, tx=np.zeros((2, 3)), reference_range=(7e3, 7e3), polarization="HH"
+)
+bandwidth: float = float((lazy.frequency + lazy.n_samples * lazy.frequency_step).max())
+sarcl.echo(scene, chirp, track, polarization=["HH", "HV"], skip={"range window"}, shadows="embree", device=0)
+sarcl.backproject(raw, grid, beam=(0.1, (1, 0, 0)), device=["cpu", 1], mapping={"mapping": "apparent"})
+sarcl.backproject(raw, grid, out=Path("a.h5"), tile=(1, 4))
+sarcl.backproject(raw, grid, out=np.empty(grid.shape, np.complex64), skip=False).save("a.png")
+sarcl.Trajectory([0, 1], [(0, 0, 1), (0, 1, 1)]).picked(slice(1))
+sarcl.Scene.from_mesh("tank.stl", material={"hull": "metal", "*": 0.5}, rotation=0.3)
+sarcl.shapes.cone(3, 5, roughness=0.01, position=(0, 0, 1)).on(scene, 10, 0)
+sarcl.Scenario(waveform=chirp, scene=scene, grid={"plane": {"shape": [64, 64], "spacing": 0.1}}, folder=Path("."))
+'''
+
+
+@pytest.fixture(scope="module")
+def said(tmp_path_factory):
+    """What mypy says of the README's first example, of more that is right, and of a program of mistakes, by line."""
+    api = pytest.importorskip("mypy.api", reason="mypy is not installed: pip install 'sarcl[dev]'")
+    example = re.search(r"```python\n(import numpy.*?)```", (ROOT / "README.md").read_text(), re.S)[1]
+    program = "from pathlib import Path\n" + example.replace("import sarcl\n", "import sarcl\nimport sarcl.shapes\n")
+    path = tmp_path_factory.mktemp("user") / "program.py"
+    path.write_text(program + GOOD + MISTAKES)
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)  # the cache of `mypy` in the repository serves here too
+        out, error, _ = api.run(["--config-file", "pyproject.toml", str(path)])
+    assert not error, error
+    right = len((program + GOOD).splitlines())
+    found = [re.match(r".*program\.py:(\d+): error: (.*)", line) for line in out.splitlines()]
+    return right, [(int(m[1]), m[2]) for m in found if m], out
+
+
+def test_mypy_accepts_a_program_of_a_user(said):
+    right, found, out = said
+    assert not [text for line, text in found if line <= right], out
+
+
+def test_mypy_reports_mistakes_of_a_user(said):
+    right, found, out = said
+    for number, line in enumerate(MISTAKES.splitlines(), right + 1):
+        if line:
+            word = line.rpartition("# ")[2]
+            assert any(at == number and word in text for at, text in found), f"{line}\n{out}"
