@@ -209,9 +209,10 @@ def wheel(tmp_path_factory):
 
 
 def test_every_module_and_kernel_is_in_the_wheel(wheel):
-    wanted = {p for p in tree(".py", ".cl", ".clh") if p.startswith("sarcl/")}
-    wanted |= {f"sarcl/{p}" for p in tree(".py", ".cl", ".clh") if p.startswith("kernels/")}
-    assert {p.relative_to(wheel).as_posix() for p in wheel.rglob("*") if p.suffix in (".py", ".cl", ".clh")} == wanted
+    kinds = ".py", ".pyi", ".typed", ".cl", ".clh"
+    wanted = {p for p in tree(*kinds) if p.startswith("sarcl/")}
+    wanted |= {f"sarcl/{p}" for p in tree(*kinds) if p.startswith("kernels/")}
+    assert {p.relative_to(wheel).as_posix() for p in wheel.rglob("*") if p.suffix in kinds} == wanted
     folders = {os.path.dirname(p) for p in wanted}
     assert {p for p in folders if f"{p}/__init__.py" not in wanted} == set()  # each is a package
 
