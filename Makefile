@@ -2,10 +2,10 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench results lint clean ready ready-dev
+.PHONY: help demo test bench results architecture lint clean ready ready-dev
 
 ARGS ?=
-CODE = sarcl kernels tests bench
+CODE = sarcl kernels tests bench docs
 
 help:  ## this list
 	@echo "make GOAL [ARGS='...' handed to the command] [PYTHON=/path/to/python3.12]"
@@ -20,8 +20,11 @@ test: ready  ## the tests
 bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
 	@.venv/bin/sarcl bench backproject $(ARGS)
 
-results: ready  ## docs/results.md from bench/results/*.json
+results: ready  ## docs/guide/results.md from bench/results/*.json
 	@.venv/bin/python bench/report.py
+
+architecture: ready  ## the drawing and the table of docs/developers/architecture.md, from the imports
+	@.venv/bin/python docs/developers/draw_architecture.py
 
 lint: ready-dev  ## style, format, types, and imports that point down
 	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \

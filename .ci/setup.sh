@@ -66,7 +66,7 @@ $3, and installing packages needs root. Type
 
     sudo apt-get install -y $2
 
-$again (Without root: see docs/install.md.)
+$again (Without root: see docs/guide/install.md.)
 END
     fi
     say "installing $2 with apt ($5)"
@@ -257,7 +257,7 @@ have_device() {
         stop 1 <<END
 an OpenCL driver crashed while we looked for devices (status $status, its words are above).
 In a chroot or container PoCL needs /sys and /proc: mount them. A broken driver is passed over by
-pointing OCL_ICD_VENDORS at a folder with only the .icd files that work; see docs/install.md.
+pointing OCL_ICD_VENDORS at a folder with only the .icd files that work; see docs/guide/install.md.
 END
     fi
     stop 1 <<END
@@ -280,7 +280,7 @@ END
     fi
     stop 3 <<END
 no OpenCL device here can build a kernel, although pocl-opencl-icd is installed; the table
-above says why. See docs/install.md for other drivers, install one, $again
+above says why. See docs/guide/install.md for other drivers, install one, $again
 END
 }
 

@@ -6,7 +6,7 @@
 //
 // The brackets are a table over times and one over points, a row an element; the field is their product.
 //
-// source    Farooq 2009, equation 3.11, with spherical ranges instead of plane waves; docs/fda.md, Fields
+// source    Farooq 2009, equation 3.11, with spherical ranges instead of plane waves; docs/theory/fda.md
 // symbols   f_n = f0 + offset, Hz; fc the mean of the extreme f_n; o_n = f_n - fc
 //           p_n       element from the reference point, m;  v, R  point from there and its length, m
 //           t0, s     a block's time and t - t0, s;  R0, rho  a block's range and R - R0, m

@@ -5,7 +5,7 @@
 //   s_p(f)  = f^e sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
 //
 // source    sarcl/scattering/physical_optics.py; amplitudes between NODES frequencies f_m and between knots by interpolation
-//           (docs/facets.md)
+//           (docs/theory/facets.md)
 // symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of gains.clh; delta, kappa, sigma as in
 //                      geometry.clh
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m

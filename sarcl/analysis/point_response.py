@@ -3,8 +3,8 @@
     range        on the grid's plane, where the two-way path grows fastest: its gradient, projected
     cross-range  on the plane, perpendicular to range
 
-Cuts along both go through the interpolated peak (_image_interpolator.py). docs/measure.md states every convention;
-sarcl/reference/quality.py measures an exact image by brute force.
+Cuts along both go through the interpolated peak (_image_interpolator.py). docs/guide/measure.md states every
+convention; sarcl/reference/quality.py measures an exact image by brute force.
 """
 
 from __future__ import annotations

@@ -1,4 +1,4 @@
-"""What an array's field errs by, in which numbers it is summed, and in which blocks; docs/fda.md derives the terms."""
+"""What an array's field errs by, in which numbers it is summed, and in which blocks: docs/theory/fda.md derives it."""
 
 from __future__ import annotations
 

@@ -41,7 +41,7 @@ def map_aperture(
     mapping    "corrected": the delay and phase of every channel's element, as `center` sees it, are taken out: data of
                one antenna at the reference point, for points at `center` (Farooq 2009, equations 5.4 and 5.5)
                "apparent": the same, from the apparent positions that the wavefront of the peak points back to
-               (equations 5.14 to 5.18, signs corrected: docs/fda.md)
+               (equations 5.14 to 5.18, signs corrected: docs/theory/fda.md)
                "channels": a row for each channel, at its own element and carrier: backprojection of these is the
                matched filter of the whole model, at any point
     center     the point whose phase and delay are removed from raw, m (3,): the `reference` of `sarcl.echo`

@@ -7,7 +7,7 @@ For other folders:
     fastsar_peer    runs in another environment, and imports nothing of sarcl
     channels_page   tables of bench/channels.py
     echo_page       tables of bench/echo.py
-    page            docs/results.md and the README's table
+    page            docs/guide/results.md and the README's table
     pareto          rate against achieved error, as a picture
 
 For this folder alone:

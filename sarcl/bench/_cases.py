@@ -53,7 +53,7 @@ class Case:
         return self.raw.n_rows * self.grid.size
 
     def errors(self, values: np.ndarray) -> tuple[float, float]:
-        """Relative L2 error of an image's `values` at `at`: as docs/accuracy.md says, and relative to |I|."""
+        """Relative L2 error of an image's `values` at `at`: as docs/theory/accuracy.md says, and relative to |I|."""
         wrong = float(np.linalg.norm(values - self.wanted))
         own = float(np.linalg.norm(self.wanted))
         return wrong / max(own, self.norm), wrong / own

@@ -25,12 +25,12 @@ HEAD = [
 MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
 GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
 EXPLAINED = (
-    "error: relative L2 against the exact sum, as docs/accuracy.md says; of |I|: relative to the image alone. form: "
-    "data in memory to finished image, without what can be worked out once for a geometry (sarcl's plan, fastsar's "
-    "former), shortest and median run; call: with it; kernel: of that in the device's kernels; process: a new "
-    "process that reads the data and makes one image; cpu: seconds of all processors together (sarcl's call, a peer's "
-    "form), which other programs on the machine hardly touch. Gbp/s: 1e9 pulses x pixels a second, from the shortest "
-    "form."
+    "error: relative L2 against the exact sum, as docs/theory/accuracy.md says; of |I|: relative to the image alone. "
+    "form: data in memory to finished image, without what can be worked out once for a geometry (sarcl's plan, "
+    "fastsar's former), shortest and median run; call: with it; kernel: of that in the device's kernels; process: a "
+    "new process that reads the data and makes one image; cpu: seconds of all processors together (sarcl's call, a "
+    "peer's form), which other programs on the machine hardly touch. Gbp/s: 1e9 pulses x pixels a second, from the "
+    "shortest form."
 )
 
 

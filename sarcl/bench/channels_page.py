@@ -1,4 +1,4 @@
-"""Tables of bench/channels.py's documents, for a terminal and for docs/results.md."""
+"""Tables of bench/channels.py's documents, for a terminal and for docs/guide/results.md."""
 
 from __future__ import annotations
 
@@ -19,8 +19,8 @@ HEAD = [
     "seconds over one call's",
 ]
 EXPLAINED = """A contribution: a scatterer seen by a pulse of a sender at a receiver. Few are visited where a scene lets
-channels be interpolated between places of the array (docs/fda.md); the last column compares shortest runs. The error of
-calls a channel is the largest of nine of them.
+channels be interpolated between places of the array (docs/theory/fda.md); the last column compares shortest runs. The
+error of calls a channel is the largest of nine of them.
 """
 
 

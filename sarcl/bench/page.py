@@ -1,4 +1,4 @@
-"""docs/results.md and the table in README.md, from the JSON files of `sarcl bench backproject`."""
+"""docs/guide/results.md and the table in README.md, from the JSON files of `sarcl bench backproject`."""
 
 from __future__ import annotations
 
@@ -12,8 +12,8 @@ from .backproject import FORMAT
 
 INTRODUCTION = """# Results
 
-Made by `make results` from the JSON files under bench/results; `make bench` measures, see the
-[notes](#how-to-read-this) at the end.
+Made by `make results` from the JSON files under bench/results; `make bench` measures this machine. The columns are
+explained [at the end](#how-to-read-this); [how it is measured](../developers/benchmarks.md) is a page of its own.
 
 """
 OTHER = {"echo": echo_page.section, "channels": channels_page.section}  # kinds of documents that are not of images
@@ -21,10 +21,10 @@ README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "
 
 
 def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
-    """Write docs/results.md, a picture docs/results-NAME.png for each results/NAME.json, and the README's table.
+    """Write results.md into the folder `docs`, a picture results-NAME.png beside it for each results/NAME.json, and
+    the README's table.
 
-    docs/results-notes.md, where there is one, ends the page. Returns the files written. ValueError where there is
-    no JSON file, or one of another format.
+    Returns the files written. ValueError where there is no JSON file, or one of another format.
     """
     documents = {path.stem: read(path) for path in sorted(results.glob("*.json"))}
     if not documents:
@@ -42,9 +42,6 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
             written.append(picture)
         page += section(name, document, drawn)
     page += f"## How to read this\n\n{_table.EXPLAINED}\n"
-    notes = docs / "results-notes.md"
-    if notes.exists():
-        page += "\n" + notes.read_text()
     (docs / "results.md").write_text(page)
     written.append(docs / "results.md")
     if readme is not None:

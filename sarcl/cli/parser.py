@@ -78,7 +78,7 @@ def _demo(p: argparse.ArgumentParser) -> None:
 
 
 def _simulate(p: argparse.ArgumentParser) -> None:
-    p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/scenarios.md")
+    p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/guide/scenarios.md")
     p.add_argument("-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)")
     p.add_argument(
         "--image",
@@ -146,12 +146,14 @@ def _focus(p: argparse.ArgumentParser) -> None:
 
 
 def _fda(p: argparse.ArgumentParser) -> None:
-    p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/fda.md)")
+    p.add_argument("experiment", metavar="FILE.toml", help="cases to run (docs/guide/fda.md)")
     p.add_argument("-o", "--output", metavar="PATH", help="the page, default FILE.html, with FILE.json beside it")
 
 
 def _papers(p: argparse.ArgumentParser) -> None:
-    p.add_argument("paper", nargs="?", metavar="NAME", help="the paper to do again (docs/papers.md); none: list them")
+    p.add_argument(
+        "paper", nargs="?", metavar="NAME", help="the paper to do again (docs/guide/papers.md); none: list them"
+    )
     p.add_argument(
         "-o",
         "--output",

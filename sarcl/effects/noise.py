@@ -45,7 +45,7 @@ def add_noise(
     Samples are noisy when they are read; nothing is loaded. Windows and weights widen the cell and let noise through by
     one and the same factor, so the NESZ holds for any. Noise has passed the matched filter: it follows
     |P(f)| where the rows are compressed and their waveform known. ValueError says what is missing.
-    Source: docs/radar.md.
+    Source: docs/theory/radar.md.
     """
     instance("raw", raw, PhaseHistory)
     seed = count("seed", seed, 0)

@@ -57,7 +57,7 @@ def stop_and_go_error(
 
     flight: c tau = |T(t) - x| + |x - R(t + tau)| is solved. chirp: the echo of p(t) is p((t - tau)/(1 + tau')), whose
     spectrum is P(f (1 + tau')). For a chirp of rate k = bandwidth/duration, P = exp(-j pi (f - fc)^2/k), that is
-    a delay of tau' fc/k more, and little else (docs/radar.md). ValueError for pulses that are no chirps.
+    a delay of tau' fc/k more, and little else (docs/theory/radar.md). ValueError for pulses that are no chirps.
     """
     if waveform.kind != "chirp":
         raise ValueError(f"stop and go's error is told for chirps, not for a {waveform.kind!r} waveform")

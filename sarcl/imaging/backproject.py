@@ -125,7 +125,7 @@ def backproject(
     Returns an Image. ValueError: a tolerance that cannot be met (with the best that can), data not compressed,
     arguments that do not fit, tiles of another job in "PATH.parts"; ToleranceMissed, a ValueError that holds the
     finished image: the check measured more than the tolerance; MemoryError: max_bytes too small for a single row.
-    Source: Farooq 2009, section 2.2.2; docs/accuracy.md and docs/large.md.
+    Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
     instance("raw", raw, PhaseHistory)

@@ -1,6 +1,6 @@
 """Error formulas: numbers in, numbers out. Every bound is a worst case, relative, and small errors add.
 
-docs/accuracy.md derives each; tests/numerics/test_accuracy.py measures each.
+docs/theory/accuracy.md derives each; tests/numerics/test_accuracy.py measures each.
 """
 
 from __future__ import annotations

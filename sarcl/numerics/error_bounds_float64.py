@@ -1,6 +1,6 @@
 """Error formulas of float64 backprojection: numbers in, numbers out. Every bound is a worst case, and errors add.
 
-docs/accuracy.md derives each; tests/imaging/test_precise.py measures each.
+docs/theory/accuracy.md derives each; tests/imaging/test_precise.py measures each.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """Short interpolation kernels for range profiles in float32: their weights, transforms and largest errors.
 
-docs/accuracy.md derives the errors; tests/numerics/test_accuracy.py measures them.
+docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py measures them.
 """
 
 from __future__ import annotations

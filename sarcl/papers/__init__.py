@@ -1,6 +1,6 @@
 """Papers done again with sarcl: what each one prints beside what comes out here.
 
-`sarcl papers` lists them, `sarcl papers farooq` writes a page and its numbers (docs/papers.md).
+`sarcl papers` lists them, `sarcl papers farooq` writes a page and its numbers (docs/guide/papers.md).
 
 For other folders:
 

@@ -96,7 +96,7 @@ def autofocus(
     else raw comes back as it was and errors.found is False. What shifts the image is not seen: the mean, and the
     least-squares fit of a shift across range, of the phase are left alone.
     TypeError, ValueError: arguments of the wrong kind; too few pulses; pulses that lack a channel others have; data
-    not compressed; an image that is zero. Sources: _phase_gradient.py; docs/autofocus.md.
+    not compressed; an image that is zero. Sources: _phase_gradient.py; docs/theory/autofocus.md.
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)

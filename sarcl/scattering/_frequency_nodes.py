@@ -1,6 +1,6 @@
 """At how few frequencies facets are computed: how their amplitudes change over the band, from samples of them.
 
-docs/facets.md derives it; tests/scattering/test_facet_engine.py holds it against facets at random phases.
+docs/theory/facets.md derives it; tests/scattering/test_facet_engine.py holds it against facets at random phases.
 """
 
 from __future__ import annotations

@@ -9,7 +9,7 @@ so that it does not depend on how finely a surface is cut: sigma0 = pi |S|^2 D/O
 isotropic diagram. (SARAS gives the shapes of eq. (11), not their scale.) Of roughness with rms height h the coherent
 part keeps exp(-(q.n h)^2) of its power, and the diagram has the rest.
 
-source   Franceschetti et al. 1992 (SARAS), eq. (11); docs/facets.md
+source   Franceschetti et al. 1992 (SARAS), eq. (11); docs/theory/facets.md
 """
 
 from __future__ import annotations

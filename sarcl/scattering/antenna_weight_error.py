@@ -1,7 +1,8 @@
 """How finely weights of antennas and distance have to be followed: over facets, over the band, in float32.
 
 From up to 400 facets and 200 points at up to 32 pulses, with what each of them sends back there: errors are relative to
-the echoes' norm, so that a scene in a side lobe asks for more than one amid the beam. docs/radar.md derives each term.
+the echoes' norm, so that a scene in a side lobe asks for more than one amid the beam.
+docs/theory/radar.md derives each term.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How facets are computed to a tolerance: how finely they are cut, at how many frequencies, and what that errs.
 
-docs/facets.md derives each term; tests/scattering/test_facet_engine.py measures the sum.
+docs/theory/facets.md derives each term; tests/scattering/test_facet_engine.py measures the sum.
 """
 
 from __future__ import annotations

@@ -1,6 +1,6 @@
 """How many pulses share what facets send back: knots, whose amplitudes are computed, and Lagrange's cubics between.
 
-docs/facets.md says what that errs: it is measured on samples, and held by tests.
+docs/theory/facets.md says what that errs: it is measured on samples, and held by tests.
 """
 
 from __future__ import annotations

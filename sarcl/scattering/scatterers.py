@@ -115,8 +115,8 @@ def _terrain(scene: Scene, antennas: Antennas) -> dict[str, Any]:
 def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> float:
     """How much a facet's lit share may err: a quarter, or more where facets are small beside a resolution cell.
 
-    The bound on how far a shadow's edge moves (docs/shadows.md) is several times what it moves: the edge is then off by
-    about half a cell at most, or by a quarter of a facet.
+    The bound on how far a shadow's edge moves (docs/theory/shadows.md) is several times what it moves: the edge is then
+    off by about half a cell at most, or by a quarter of a facet.
     """
     typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
     try:

@@ -1,4 +1,4 @@
-"""Scenario files: a simulation as TOML, its tables and keys the Python names. See docs/scenarios.md."""
+"""Scenario files: a simulation as TOML, its tables and keys the Python names. See docs/guide/scenarios.md."""
 
 from __future__ import annotations
 

@@ -134,7 +134,7 @@ def _made(name: str, eps_r: float, conductivity: float) -> tuple[str, Material]:
 
 
 METAL = Material(name="metal")
-# Values at 10 GHz; where each comes from stands in docs/scenes.md. Add your own: MATERIALS["snow"] = Material(1.5).
+# Values at 10 GHz; docs/guide/scenes.md names the source of each. Add your own: MATERIALS["snow"] = Material(1.5).
 MATERIALS: dict[str, Material] = dict(
     [
         ("metal", METAL),

@@ -133,7 +133,8 @@ def check_above(name: str, grid: Heights, ends: np.ndarray) -> None:
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it.
 
-    None too for cells twice as long or wide as others: range lines would miss some of their edges (docs/shadows.md).
+    None too for cells twice as long or wide as others: range lines would miss some of their edges
+    (docs/theory/shadows.md).
     """
     x, y, z = grid
     steps = np.concatenate([np.diff(x), np.diff(y)])

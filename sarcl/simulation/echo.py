@@ -95,7 +95,7 @@ def echo(
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed.
 
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
-                  coefficients, the exact phase of the wave over every facet, single scattering (docs/facets.md)
+                  coefficients, the exact phase of the wave over every facet, single scattering (docs/theory/facets.md)
     track         transmitter; receiver  a track of as many pulses, default the transmitter's
     polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": a row a pulse for
                   each, pulse by pulse. Points send back what they are sent: nothing in HV and VH
@@ -114,7 +114,7 @@ def echo(
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
     shadows       True: of every facet only the share counts that both antennas see, along the track; "embree": the
                   same, rays by that library (package embreex), quicker, and not to the bit the same on all devices
-                  (docs/shadows.md; points are always seen)
+                  (docs/theory/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
                   "out of beam", "equal channels" (of one carrier and place), "interpolated channels" (echoes from few

@@ -250,7 +250,7 @@ def lit(
     wanted      (k,) bool: facets whose share is asked for; the others only shadow, their share is 0
     tolerance   by how much a facet's share errs at most where the edge of a shadow is straight (1/16 or more; 5/9: all
                 or nothing by its centroid), and again at most between the pulses of a block, for the facet of middle
-                size; see docs/shadows.md
+                size; see docs/theory/shadows.md
     max_bytes   of the shares kept, default a quarter of the memory blocks `echo` may use; the others are found anew
                 each time they are asked for
     engine      "opencl", or "embree" for the rays (package embreex; edges may differ in single samples)

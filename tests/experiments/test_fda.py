@@ -371,7 +371,7 @@ def test_half_a_wave_of_the_centre_frequency_is_the_default_spacing():
 
 
 def test_the_experiments_of_the_documentation_load_word_for_word(tmp_path):
-    text = (Path(__file__).parents[2] / "docs" / "fda.md").read_text()
+    text = (Path(__file__).parents[2] / "docs" / "guide" / "fda.md").read_text()
     files = re.findall(r"```toml\n(.*?)```", text, re.S)
     made = []
     for i, words in enumerate(files):

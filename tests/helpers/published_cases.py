@@ -56,7 +56,7 @@ class Radar:
         return np.asarray(image.data) / image.gain
 
     def powers(self, scene, pair=(0, 0)):
-        """Mean cross section of facets whose roughness has a diagram, m^2 (k,): pi |S|^2 D A/Omega, docs/facets.md."""
+        """Mean RCS of facets whose roughness has a diagram, m^2 (k,): pi |S|^2 D A/Omega, docs/theory/facets.md."""
         normal, area = physical_optics.normals_and_areas(scene.triangles)
         permittivity = np.array([m.permittivity(self.center) for m in scene.materials])[scene.material]
         s = physical_optics.scattering_matrix(normal, self.up, self.up, permittivity)[:, pair[0], pair[1]]

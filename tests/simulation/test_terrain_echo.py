@@ -72,7 +72,7 @@ def test_horizons_and_rays_give_the_same_echoes(name, terrains):
     assert boxes <= (~terrains[0][1]).sum() < (100 * boxes or 1)
     shadowed = [r.report.contributions_skipped["shadowed"] for r in (by_horizons, by_rays)]
     assert shadowed[0] == pytest.approx(shadowed[1], rel=0.03) and shadowed[0] > 0
-    # samples at the edges of shadows differ (docs/shadows.md): 1e-3 of the power
+    # samples at the edges of shadows differ (docs/theory/shadows.md): 1e-3 of the power
     difference = np.linalg.norm(by_horizons.samples - by_rays.samples) / np.linalg.norm(by_rays.samples)
     assert difference < 0.05
     dark = sarcl.echo(without(scene), WAVE, track(), **options, shadows=False)

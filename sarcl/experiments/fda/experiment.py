@@ -1,7 +1,7 @@
 """Experiments on frequency-diverse apertures: what a mapping does to a point, to its neighbours, and to the data.
 
 Every case is collected once, mapped in every way asked for, and set beside a conventional antenna with the same phase
-centres, band and track. What is flown: case.py; what is measured: docs/fda.md.
+centres, band and track. What is flown: case.py; what is measured: docs/guide/fda.md.
 """
 
 from __future__ import annotations

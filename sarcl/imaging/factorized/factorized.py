@@ -3,7 +3,7 @@
 About the centre of a small tile, what its pixels see changes slowly from pulse to pulse, so fewer pulses carry it
 (kernels/merge_subapertures.cl). Cost grows as N^2 log N for N pulses of N samples and N x N pixels.
 Source: McCorkle and Rofheart
-1996 (quadtree); docs/accuracy.md.
+1996 (quadtree); docs/theory/accuracy.md.
 """
 
 from __future__ import annotations

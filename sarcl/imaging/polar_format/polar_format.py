@@ -58,7 +58,7 @@ def polar_format(
     sarcl.SarclWarning where they are not to the grid's border, and where that lies beyond the range window, in
     which echoes repeat. ValueError: bistatic or uncompressed data, listed points, one row, a tolerance that cannot
     be met; ToleranceMissed: the check measured more than the tolerance; MemoryError: max_bytes too small.
-    Source: Farooq 2009, equations 2.59 to 2.64; docs/polar_format.md.
+    Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()
     instance("raw", raw, PhaseHistory)

@@ -14,7 +14,8 @@ told from what has edges by three rules:
   the rule above: heights that differ at random from neighbour to neighbour are relief, no curve (white noise 13 %,
   mountains 20 to 30 %)
 
-source   Max 1999, "Weights for computing vertex normals from facet normals", J. Graphics Tools 4(2); docs/facets.md
+source   Max 1999, "Weights for computing vertex normals from facet normals", J. Graphics Tools 4(2);
+         docs/theory/facets.md
 """
 
 from __future__ import annotations

@@ -2,7 +2,7 @@
 
 dB = 10 log10(|flat|^2/|curved|^2) of every smooth surface as a whole, from the sums of _curved_echo.py over the mesh at
 hand, at up to 16 pulses and frequencies of the band. No bound, but what flat facets change, to the physics of echoes:
-docs/facets.md holds it against exact spheres, cylinders and other bodies.
+docs/theory/facets.md holds it against exact spheres, cylinders and other bodies.
 """
 
 from __future__ import annotations

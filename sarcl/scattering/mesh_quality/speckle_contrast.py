@@ -9,7 +9,7 @@ C, standard deviation over mean of the intensity, is 1 for speckle. g, the mean 
 up to over its squared mean, says how unevenly a lattice of pairs, a third of a diagonal apart, covers the image: 1 for
 s1, s2 <= 1; sinc^2 has a triangle for a transform. s1 s2/2 is a facet's area, and 4/9 = (integral sinc^4/(integral
 sinc^2)^2)^2: what a sum of few unit phasors lacks of a Gaussian. Facets whose diagram makes their amplitudes Rayleigh
-do not lack it. docs/facets.md and tests/scattering/test_fineness.py hold this against such sums.
+do not lack it. docs/theory/facets.md and tests/scattering/test_fineness.py hold this against such sums.
 
 source   moments of sums of independent phasors: Goodman 2007, "Speckle phenomena in optics", section 3.6
 """
