@@ -12,6 +12,7 @@ from .base import progress as progress
 from .base import wgs84 as wgs84
 from .base.errors import SarclWarning as SarclWarning
 from .base.errors import ToleranceMissed as ToleranceMissed
+from .base.errors import ToleranceUnreachable as ToleranceUnreachable
 from .base.report import Report as Report
 from .base.version import __version__ as __version__
 from .effects import motion as motion

@@ -7,6 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import ToleranceUnreachable
+from ..base.tolerances import rounded_up
 from ..opencl.device import Device
 
 FLUSH = 16  # elements added plainly before they join the compensated total
@@ -33,7 +35,7 @@ class FieldPlan:
 def make_plan(
     device: Device, tolerance: float, highest: float, extent: float, last_time: float, farthest: float
 ) -> FieldPlan:
-    """The cheapest numbers that meet `tolerance`. ValueError names the best tolerance there is.
+    """The cheapest numbers that meet `tolerance`. ToleranceUnreachable names the best tolerance there is.
 
     highest carrier, Hz; extent of the array about its reference point, m; latest |t|, s; farthest point, m.
     """
@@ -44,21 +46,29 @@ def make_plan(
     # a path's difference: |p|(|p| + 2 |v|)/(R + r) <= 3 |p|, every step relative to that; then sums of turns
     wide = 2 * np.pi * (turns * (3 * PATH_STEPS[fp64] + SHIFT_STEPS[fp64]) + 2 * SHIFT_STEPS[fp64])
     fixed = np.inf if turns > MOST_TURNS else float(host + wide)
-    allowed = min(tolerance / 10, ALLOWED)  # for what times and ranges differ from their blocks' middles, together
-    numbers = [double for double in (False, True) if (fp64 or not double) and (double or tolerance >= FINE)]
-    rounding = U32 if tolerance >= FINE else 0.0  # of the result
-    for double in numbers:
-        error = fixed + _rounding(double) + rounding + allowed
-        if error <= tolerance:
-            return FieldPlan(double, error, allowed / (4 * np.pi * SHIFT_STEPS[fp64]))
-    least = max(FINE, fixed + _rounding(fp64) + U32 + ALLOWED)  # as complex64
-    if fp64 and fixed + _rounding(True) < 0.9 * FINE:
-        least = (fixed + _rounding(True)) / 0.9
-    raise ValueError(
-        f"tolerance {tolerance:.1e} cannot be met on {device.info.name!r}{'' if fp64 else ' without float64'}; the "
-        f"best here is {1.05 * least:.1e} ({highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away, an array of "
-        f"{turns:.1e})"
-    )
+
+    def met(tolerance: float) -> FieldPlan | None:
+        allowed = min(tolerance / 10, ALLOWED)  # for what times and ranges differ from their blocks' middles, together
+        numbers = [double for double in (False, True) if (fp64 or not double) and (double or tolerance >= FINE)]
+        rounding = U32 if tolerance >= FINE else 0.0  # of the result
+        for double in numbers:
+            error = fixed + _rounding(double) + rounding + allowed
+            if error <= tolerance:
+                return FieldPlan(double, error, allowed / (4 * np.pi * SHIFT_STEPS[fp64]))
+        return None
+
+    found = met(tolerance)
+    if found is not None:
+        return found
+    least = fixed + _rounding(fp64)
+    best = rounded_up(least if fp64 else max(FINE, least + U32))
+    while best < 1 and not met(best):
+        best = rounded_up(1.05 * best)
+    raise ToleranceUnreachable(
+        tolerance, best if best < 1 else None, "rounding of path differences",
+        how=f"on {device.info.name!r}{'' if fp64 else ' without float64'}, for points "
+        f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {turns:.1e}",
+    )  # fmt: skip
 
 
 def _rounding(double: bool) -> float:

@@ -42,8 +42,8 @@ def beam(
     max_bytes  memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
 
     Distances to every element are exact, the phase is absolute, nothing falls off with range. An array of one carrier
-    is evaluated once a point. ValueError: bad input, or a tolerance that cannot be met, naming the best one;
-    MemoryError: max_bytes too small for one tile.
+    is evaluated once a point. ValueError: bad input; ToleranceUnreachable: a tolerance that cannot be
+    met, naming the best one; MemoryError: max_bytes too small for one tile.
     """
     validation.instance("array", array, AntennaArray)
     f0 = validation.number("f0", f0)

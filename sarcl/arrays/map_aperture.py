@@ -8,7 +8,7 @@ from typing import Any, Literal, NotRequired, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import validation
+from ..base import errors, validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.antenna_array import AntennaArray
 from ..model.phase_history import PhaseHistory
@@ -131,7 +131,7 @@ def _array_of(raw: PhaseHistory) -> AntennaArray:
     if not isinstance(raw.array, AntennaArray) or raw.waveform is None:
         raise ValueError("raw has no array and waveform: map_aperture wants echoes made with array=")
     if raw.tx_channel is not None:
-        raise ValueError(
+        raise errors.NotApplicable(
             "raw's channels are kept apart already, each with its own position and carrier: backproject them as they "
             "are"
         )
@@ -168,12 +168,12 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
         carriers = raw.waveform.center + offsets
         apart = spacing(carriers)
         if apart is None or len(np.unique(carriers)) < array.n:
-            raise ValueError(
+            raise errors.NotApplicable(
                 "the array's channels share carriers, or are not evenly spaced, so that samples cannot be told apart "
                 "by frequency; make the echoes with channels='separated'"
             )
         if raw.waveform.kind != "tone" and raw.waveform.bandwidth > apart * (1 + 1e-9):
-            raise ValueError(
+            raise errors.NotApplicable(
                 f"channels {apart / 1e6:g} MHz apart share samples: their pulses are "
                 f"{raw.waveform.bandwidth / 1e6:g} MHz wide; make the echoes with channels='separated', or send tones"
             )
@@ -205,7 +205,7 @@ def _progression(array: AntennaArray) -> np.ndarray:
         or off > LINE * np.linalg.norm(array.positions[-1])
         or bent > LINE * np.abs(change).max()
     ):
-        raise ValueError(
+        raise errors.NotApplicable(
             "apparent positions and the paper's linear correction are told from elements and carriers that progress in "
             "even steps along a line; use mapping='corrected' with quadratic=True, or 'channels'"
         )

@@ -11,7 +11,8 @@ For other folders:
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb
     stage_timer   seconds per stage of a computation
-    text          bytes, durations and spelling suggestions as text for messages
+    text          bytes, durations, tolerances and spelling suggestions as text for messages
+    tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
     version       the version of the package
@@ -29,6 +30,7 @@ __all__ = [
     "report",
     "stage_timer",
     "text",
+    "tolerances",
     "types",
     "validation",
     "version",

@@ -5,7 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
+
+from .text import tolerance_text
 
 if TYPE_CHECKING:
     from ..model.image import Image
@@ -36,3 +38,52 @@ class ToleranceMissed(ValueError):
             "in its file, or in this error's .image)"
         )
         self.tolerance, self.measured, self.image = tolerance, measured, image
+
+
+class ToleranceUnreachable(ValueError):
+    """A planner's refusal: no plan meets the tolerance. Planners alone raise it; callers catch it by this name.
+
+    asked   the tolerance that was asked for: that of the user, where a verb raises this
+    best    the smallest tolerance known to be met, rounded up: it can be asked for as it is; None: none is known
+    limit   the term that limits the error, such as "float32 range profiles"
+    remedy  what else to do, or ""
+    how     what cannot meet the tolerance, in words, such as "in complex64"; default: the limit
+    """
+
+    def __init__(self, asked: float, best: float | None, limit: str, remedy: str = "", how: str = "") -> None:
+        self.asked, self.limit, self.remedy, self.how = float(asked), limit, remedy, how
+        self.best = None if best is None else float(best)
+        text = f"tolerance {tolerance_text(self.asked)} cannot be met {how or f'here: the limit is {limit}'}"
+        if self.best is not None:
+            text += f"; the best here is {tolerance_text(self.best)}"
+        if remedy:
+            text += f"{';' if self.best is None else ':'} {remedy}"
+        super().__init__(text)
+        self.where = ""
+
+    def __reduce__(self) -> Any:
+        return type(self), (self.asked, self.best, self.limit, self.remedy, self.how), {"where": self.where}
+
+    def __str__(self) -> str:
+        return " ".join(part for part in (self.where, super().__str__()) if part)
+
+    def restated(self, asked: float, best: float | None, remedy: str | None = None) -> ToleranceUnreachable:
+        """The same refusal for the tolerance `asked`, of which self.asked was a share."""
+        return ToleranceUnreachable(asked, best, self.limit, self.remedy if remedy is None else remedy, self.how)
+
+    def placed(self, where: str) -> ToleranceUnreachable:
+        """The same refusal, its message after `where`: the file and line that asked for the tolerance."""
+        out = self.restated(self.asked, self.best)
+        out.where = " ".join(part for part in (where, self.where) if part)
+        return out
+
+
+class NothingSeen(ValueError):
+    """No scatterer adds anything to the echoes of these pulses: out of the beam or range window, dark, or turned away.
+
+    Other pulses may see some.
+    """
+
+
+class NotApplicable(ValueError):
+    """A method does not apply to these data, whatever the tolerance; the message says why."""

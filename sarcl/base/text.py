@@ -12,6 +12,12 @@ def size_text(nbytes: float) -> str:
     return f"{nbytes:.3g} {units[power]}"
 
 
+def tolerance_text(value: float) -> str:
+    """A tolerance with all its digits, at least two: 1.0e-03."""
+    shown = (f"{value:.{digits}e}" for digits in range(1, 17))
+    return next((text for text in shown if float(text) == value), f"{value:.17e}")
+
+
 def duration(seconds: float) -> str:
     """Seconds as text a person reads."""
     if seconds < 120:

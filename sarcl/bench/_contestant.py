@@ -36,7 +36,7 @@ class Contestant:
 
     who, device      library; name of the device, or of the peer's backend
     method, setting  "direct" or "factorized"; tolerance or options in words
-    run              makes the image: Reading; raises Absent (or ValueError, for what cannot be met)
+    run              makes the image: Reading; raises Absent (or ToleranceUnreachable, for what cannot be met)
     process          seconds of a whole new process that makes the image, or None where there is no such
     facts            other columns of its row
     check            (wanted, norm) where the run is of fewer pulses than the case; None: the case's own

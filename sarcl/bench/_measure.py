@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import ToleranceMissed, ToleranceUnreachable
 from . import _quiet
 from ._cases import Case
 from ._contestant import Absent, Contestant, Reading
@@ -64,7 +65,7 @@ def measure(
                 row["disturbed"] = row.get("disturbed", 0) + 1
             try:
                 _take(row, contestant, case, limit, paces, warm=round_ == 0)
-            except (Absent, ValueError, MemoryError) as exc:
+            except (Absent, ToleranceUnreachable, ToleranceMissed, MemoryError) as exc:
                 row["absent"] = " ".join(str(exc).split())
     for _ in range(processes):
         for row, contestant in zip(rows, contestants, strict=True):

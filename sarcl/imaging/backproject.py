@@ -122,9 +122,10 @@ def backproject(
     cluster    a dask.distributed.Client whose workers make the tiles, each on a device of its own
     progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
-    Returns an Image. ValueError: a tolerance that cannot be met (with the best that can), data not compressed,
-    arguments that do not fit, tiles of another job in "PATH.parts"; ToleranceMissed, a ValueError that holds the
-    finished image: the check measured more than the tolerance; MemoryError: max_bytes too small for a single row.
+    Returns an Image. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the best that can.
+    ValueError: data not compressed, arguments that do not fit, tiles of another job in "PATH.parts". ToleranceMissed, a
+    ValueError that holds the finished image: the check measured more than the tolerance. MemoryError: max_bytes too
+    small for a single row.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()

@@ -2,18 +2,23 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
 
+from ..base.errors import ToleranceUnreachable
+from ..base.tolerances import reachable, rounded_up
 from ..numerics import error_bounds
+from ..numerics import plan as numerics_plan
 from ..numerics.plan import LEAST_TOLERANCE
 from ..opencl.device import Device
 from . import profile_energy
-from .direct import direct, tile_kernels
-from .factorized import factorized
+from .direct import tile_kernels
+from .direct.direct import Direct, make_plan
 from .factorized import plan as factorized_plan
+from .factorized.factorized import Factorized
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
 from .focusing_task import Engine, Task
@@ -23,6 +28,8 @@ METHODS = ("auto", "direct", "factorized")
 WORTH = 0.8  # of the direct method's cost, below which sub-apertures are taken
 FLOAT64 = 1.3  # cost of sarcl/imaging/float64/plan.py's unit
 TINY = 1e-35  # of samples, below which pixels come near complex64's smallest numbers
+ROUNDING = 0.5  # of a tolerance: the most that rounding of what pixels do not see may take
+MOST_TOLERANCE = 0.99  # that is looked for
 SMALL = 3e7  # pairs below which looking for sub-apertures takes longer than they save
 
 
@@ -59,57 +66,129 @@ class Choice:
 
 
 def choose(task: Task, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> Choice:
-    """The cheapest way to `tolerance` among `method`, or among all for "auto"; ValueError names the best there is.
+    """The cheapest way to `tolerance` among `method`, or among all for "auto".
 
     lanes    the devices work on vectors of pixels, as CPUs do
     float64  they have it, so that what complex64 cannot meet may be met
+    ToleranceUnreachable names the best there is; ValueError for samples or paths that no tolerance fits.
     """
-    if tolerance < LEAST_TOLERANCE:
-        if method == "factorized":
-            raise ValueError(f"tolerance {tolerance:.1e} cannot be met with sub-apertures; method='direct' can")
-        return _precise(task, tolerance)
-    strongest = float(profile_energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
-    if 0 < strongest < TINY:
-        raise ValueError(
-            f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the samples "
-            f"up, or ask for a tolerance below {LEAST_TOLERANCE:.0e}, which is met in complex128"
-        )
-    # errors are relative to what interpolation reads and transforms round, a tolerance to what pixels see
-    seen = profile_energy.seen(task)
-    near = max(1.0, seen.near if seen.near > 1.25 else 1.0)
-    rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(seen.whole - near, 0.0)
-    inner = (tolerance - rounding) / near
-
-    def offer(name: str, made: tuple[Any, GridTiling], engine: Any) -> Choice:
-        error = min(near * made[0].predicted_error + rounding, tolerance)
-        return Choice(name, *made, engine, error, made[0].cost)
-
     if method == "factorized":
-        if rounding > 0.5 * tolerance:
-            raise ValueError(f"tolerance {tolerance:.1e} cannot be met with sub-apertures; method='direct' may")
-        return offer(method, factorized_plan.make_plan(task, inner, lanes), factorized.Factorized)
-    try:
-        if rounding > 0.5 * tolerance:
-            raise ValueError(
-                f"tolerance {tolerance:.1e} cannot be met in complex64: these pixels are "
-                f"{20 * np.log10(seen.whole):.0f} dB darker than what else is in the same rows; the best here is "
-                f"{2.5 * rounding:.1e}"
-            )
-        straight = offer("direct", direct.make_plan(task, inner, lanes), direct.Direct)
-    except ValueError as exc:
-        if not float64:
-            raise
-        try:
-            return _precise(task, tolerance)
-        except ValueError:
-            raise exc from None
-    if method == "direct" or task.pairs < SMALL:
+        return _merged(task, tolerance, lanes, float64)
+    straight = _straight(task, tolerance, lanes, float64)
+    if method == "direct" or straight.dtype != np.complex64 or task.pairs < SMALL:
         return straight
     try:
-        fewer = offer("factorized", factorized_plan.make_plan(task, inner, lanes), factorized.Factorized)
-    except ValueError:
+        fewer = _Float32(task, tolerance).factorized(lanes)
+    except ToleranceUnreachable:
         return straight
     return fewer if fewer.cost < WORTH * straight.cost else straight
+
+
+class _Float32:
+    """Plans in complex64 for one task and tolerance. ValueError where samples are too small for complex64.
+
+    Errors are relative to what interpolation reads and transforms round, a tolerance to what pixels see: `inner` is
+    what is left of it for plans.
+    """
+
+    def __init__(self, task: Task, tolerance: float) -> None:
+        strongest = float(profile_energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
+        if 0 < strongest < TINY:
+            raise ValueError(
+                f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the "
+                f"samples up, or ask for a tolerance below {LEAST_TOLERANCE:.0e}, which is met in complex128"
+            )
+        self.task, self.tolerance, self.seen = task, tolerance, profile_energy.seen(task)
+        self.near = max(1.0, self.seen.near if self.seen.near > 1.25 else 1.0)
+        self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
+            self.seen.whole - self.near, 0.0
+        )
+        self.inner = (tolerance - self.rounding) / self.near
+
+    def direct(self, lanes: bool) -> Choice:
+        """Every pair of row and pixel. ToleranceUnreachable names the best in complex64."""
+        self._must_round_less("in complex64", self._best())
+        try:
+            made = make_plan(self.task, self.inner, lanes)
+        except ToleranceUnreachable as refused:
+            raise refused.restated(self.tolerance, self._best()) from None
+        return self._offer("direct", made, Direct)
+
+    def factorized(self, lanes: bool) -> Choice:
+        """With sub-apertures. ToleranceUnreachable says why not, but names no best."""
+        self._must_round_less("with sub-apertures", None)
+        try:
+            made = factorized_plan.make_plan(self.task, self.inner, lanes)
+        except ToleranceUnreachable as refused:
+            raise refused.restated(self.tolerance, None) from None
+        return self._offer("factorized", made, Factorized)
+
+    def _best(self) -> float:
+        """The smallest tolerance that `direct` meets: what rounds takes half of it at most, plans the rest."""
+        least = max(
+            LEAST_TOLERANCE,
+            numerics_plan.least(self.task.raw.n_samples, tile_kernels.CHUNK) * self.near + self.rounding,
+        )
+        return rounded_up(max(least, self.rounding / ROUNDING) * (1 + 1e-9))
+
+    def _must_round_less(self, how: str, best: float | None) -> None:
+        if self.rounding > ROUNDING * self.tolerance:
+            dark = f"these pixels are {20 * np.log10(self.seen.whole):.0f} dB darker than what else is in the same rows"
+            raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
+
+    def _offer(self, name: str, made: tuple[Any, GridTiling], engine: Any) -> Choice:
+        error = min(self.near * made[0].predicted_error + self.rounding, self.tolerance)
+        return Choice(name, *made, engine, error, made[0].cost)
+
+
+def _straight(task: Task, tolerance: float, lanes: bool, float64: bool) -> Choice:
+    """By the direct method, in complex64 if that can, else in complex128 if the devices can."""
+    if tolerance >= LEAST_TOLERANCE:
+        try:
+            return _Float32(task, tolerance).direct(lanes)
+        except ToleranceUnreachable:
+            if not float64 or float64_plan.too_long(task):
+                raise
+    elif not float64:
+        best = reachable(lambda t: _straight(task, t, lanes, False), LEAST_TOLERANCE)
+        raise ToleranceUnreachable(tolerance, best, "float32", float64_direct.remedy(), how="without float64")
+    return _precise(task, tolerance)
+
+
+def _merged(task: Task, tolerance: float, lanes: bool, float64: bool) -> Choice:
+    """With sub-apertures, which only complex64 has. Where they cannot, the best that they can takes a search."""
+    try:
+        if tolerance < LEAST_TOLERANCE:
+            raise ToleranceUnreachable(tolerance, None, "float32 range profiles", how="with sub-apertures")
+        return _Float32(task, tolerance).factorized(lanes)
+    except ToleranceUnreachable as refused:
+        try:
+            _straight(task, tolerance, lanes, float64)
+            remedy = "method='direct' can"
+        except ToleranceUnreachable:
+            remedy = ""
+        best = _search(lambda t: _Float32(task, t).factorized(lanes), max(tolerance, LEAST_TOLERANCE))
+        raise refused.restated(tolerance, best, remedy) from None
+
+
+def _search(plan: Callable[[float], object], above: float) -> float | None:
+    """A tolerance from `above` on that `plan` meets, at most 1.5 times the smallest; None: none below 1. Plans are slow
+    to make, so few are: at twice the tolerance each time, then halfway back."""
+
+    def met(tolerance: float) -> bool:
+        try:
+            plan(tolerance)
+        except ToleranceUnreachable:
+            return False
+        return True
+
+    failed, best = 0.0, rounded_up(above)
+    while not met(best):
+        if best >= MOST_TOLERANCE:
+            return None
+        failed, best = best, min(rounded_up(2 * best), MOST_TOLERANCE)
+    middle = rounded_up(float(np.sqrt(best * failed))) if failed else best
+    return middle if middle < best and met(middle) else best
 
 
 def _precise(task: Task, tolerance: float) -> Choice:

@@ -12,6 +12,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.errors import ToleranceUnreachable
 from ..base.stage_timer import Clock
 from ..base.text import duration, size_text
 from ..base.validation import choice, instance
@@ -127,7 +128,10 @@ def _cheaper(
     """The plan of the smallest error that costs noticeably less."""
     for factor in (2, 3, 10, 30):
         if tolerance * factor < 1:
-            other = choose(task, method, tolerance * factor, lanes, float64)
+            try:
+                other = choose(task, method, tolerance * factor, lanes, float64)
+            except ToleranceUnreachable:  # sub-apertures that a tighter tolerance allows may be refused here
+                continue
             if _work(task, other) < 0.95 * _work(task, chosen):
                 return other.predicted_error, seconds * _work(task, other)
     return None

@@ -18,6 +18,7 @@ TAPS, FINER, TERMS = 12, 4.0, 6  # of a kernel that errs by 1e-11
 
 
 _norms: WeakKeyDictionary[Task, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
+_seen: WeakKeyDictionary[Task, Energy] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
@@ -37,6 +38,13 @@ def seen(task: Task) -> Energy:
 
     Energy(1, 1) where no pixel sees anything.
     """
+    if task not in _seen:
+        _seen[task] = _look(task)
+    return _seen[task]
+
+
+def _look(task: Task) -> Energy:
+    """As `seen`, anew."""
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
     count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))

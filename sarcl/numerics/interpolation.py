@@ -6,9 +6,13 @@ docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py meas
 from __future__ import annotations
 
 import functools
+from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
+
+from ..base.errors import ToleranceUnreachable
+from ..base.tolerances import rounded_up
 
 MARGIN = 1.06  # of errors that are taken on a grid of frequencies and places
 LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
@@ -139,6 +143,26 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     return (waves * kernel).sum(axis=(-1, -2))
 
 
+def _interpolators(n_samples: int, carrier: float) -> Iterator[tuple[Interpolator, int]]:
+    """Every interpolator there is for rows of n_samples, and the profile length it needs."""
+    from ..opencl import fft
+
+    for taps in TERMS:
+        for oversample in (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64):
+            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
+            # and an even length puts delay 0 on a sample
+            length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
+            while not off_carrier(length, carrier):
+                length = 2 * fft.good_length(length // 2 + 1)
+            if length <= max(LONGEST, 2 * n_samples * taps):
+                yield interpolator(taps, float(oversample)), length
+
+
+def least_error(n_samples: int, carrier: float = 0.0) -> float:
+    """The smallest error that `choose_interpolator` can meet, for rows of n_samples."""
+    return min(made.error for made, _ in _interpolators(n_samples, carrier))
+
+
 @functools.lru_cache(maxsize=4096)
 def choose_interpolator(
     error: float, n_samples: int, pairs_per_row: float, carrier: float = 0.0
@@ -151,29 +175,18 @@ def choose_interpolator(
     pairs_per_row  contributions read from a row: they weigh taps against the length of the FFT
     carrier        centre frequency in steps between samples, for scatterers that lie evenly: see off_carrier
     The choice never depends on memory, so that results do not.
-    ValueError names the smallest error there is when none is small enough.
+    ToleranceUnreachable names the smallest error there is when none is small enough.
     """
-    from ..opencl import fft
-
     best: tuple[float, Interpolator, int] | None = None
     least = np.inf
-    for taps in TERMS:
-        for oversample in (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64):
-            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
-            # and an even length puts delay 0 on a sample
-            length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
-            while not off_carrier(length, carrier):
-                length = 2 * fft.good_length(length // 2 + 1)
-            if length > max(LONGEST, 2 * n_samples * taps):
-                continue
-            made = interpolator(taps, float(oversample))
-            least = min(least, made.error)
-            # in contributions: half of one per sample and doubling for the FFT, and what long rows lose to caches
-            cost = pairs_per_row * TAP_COST[taps] + length * (0.5 * np.log2(length) + length / 4000)
-            if made.error <= error and (best is None or cost < best[0]):
-                best = cost, made, length
+    for made, length in _interpolators(n_samples, carrier):
+        least = min(least, made.error)
+        # in contributions: half of one per sample and doubling for the FFT, and what long rows lose to caches
+        cost = pairs_per_row * TAP_COST[made.taps] + length * (0.5 * np.log2(length) + length / 4000)
+        if made.error <= error and (best is None or cost < best[0]):
+            best = cost, made, length
     if best is None:
-        raise ValueError(f"an interpolation error of {error:.1e} cannot be met; the least is {least:.1e}")
+        raise ToleranceUnreachable(error, rounded_up(least), "interpolation of float32 range profiles")
     return best[1], best[2], best[0] / pairs_per_row
 
 

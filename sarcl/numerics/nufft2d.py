@@ -8,8 +8,10 @@ from typing import Any
 
 import numpy as np
 
+from ..base.errors import ToleranceUnreachable
 from ..base.stage_timer import Clock
 from ..base.text import size_text
+from ..base.tolerances import rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
 from .error_bounds import U32, sum_rounding
@@ -49,7 +51,7 @@ class GridPlan:
 def make_plan(
     tolerance: float, shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, n_samples: int, tile: int
 ) -> GridPlan:
-    """The cheapest plan whose predicted error is at most `tolerance`; ValueError names the best there is.
+    """The cheapest plan whose predicted error is at most `tolerance`; ToleranceUnreachable names the best there is.
 
     turns, step  (n_rows, 2): turns from one pixel to the next, of a row's middle sample, and more with every sample
     tile         cells a side of a tile
@@ -74,12 +76,11 @@ def make_plan(
             if error <= tolerance and (best is None or cost < best.cost):
                 best = GridPlan(kernel, (length[0], length[1]), crowding, error, cost)
     if best is None or tolerance < LEAST_TOLERANCE:
-        least = max(least, LEAST_TOLERANCE)
-        digits = 10.0 ** (np.floor(np.log10(least)) - 1)
-        raise ValueError(
-            f"tolerance {tolerance:.1e} cannot be met by a polar format image; the best here is "
-            f"{np.ceil(least / digits - 1e-9) * digits:.1e}: backproject goes further"
-        )
+        reach = rounded_up(max(least, LEAST_TOLERANCE))
+        raise ToleranceUnreachable(
+            tolerance, reach if reach < 1 else None, "rounding of the float32 grid", "backproject goes further",
+            how="by a polar format image",
+        )  # fmt: skip
     return best
 
 

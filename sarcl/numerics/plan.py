@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import ToleranceUnreachable
+from ..base.tolerances import rounded_up
 from . import error_bounds, interpolation
 from .interpolation import Interpolator
 
@@ -19,6 +21,8 @@ LEAST_TOLERANCE = 1e-6  # of complex64 results
 RANGE_COST = {0: 1.0, 1: 1.5, 2: 2.2}
 ORDER_COST = {2: 1.0, 3: 1.05, 0: 1.33}
 TILE_COST = 20.0
+FIXED = 0.8  # of a tolerance: the most that ranges and sums may take of it, the rest is for interpolation
+PROFILES = "float32 range profiles"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,23 +86,22 @@ def cheapest(
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
     chunk        rows or points summed in float32; least_tolerance: below it none is offered
     carrier      Hz, that no image of the kernel may lie on (accuracy.off_carrier); 0: any may
-    ValueError names the best tolerance there is.
+    ToleranceUnreachable names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
-    least, steps = np.inf, carrier * n_samples / bandwidth if bandwidth else 0.0
+    steps = carrier_steps(carrier, n_samples, bandwidth)
     for per_tile, radius in tiles:
         for mode, range_cost in RANGE_COST.items():
             for order in (2, 3, 0) if mode < 2 else (0,):
                 fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
                 fixed += error_bounds.sum_rounding(chunk, n_samples)
-                least = min(least, fixed)
-                if fixed > 0.8 * tolerance:
+                if fixed > FIXED * tolerance:
                     continue
                 try:
                     interpolator, length, cost = interpolation.choose_interpolator(
                         tolerance - fixed, n_samples, points_per_row, steps
                     )
-                except ValueError:
+                except ToleranceUnreachable:  # another range mode may leave more to the interpolator
                     continue
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 if mode == 0 and radius * sigma > 2**20:
@@ -108,11 +111,21 @@ def cheapest(
                 if best is None or cost < best[0]:
                     best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error, cost)
     if best is None or tolerance < least_tolerance:
-        reach = max(least_tolerance, 1.3 * least)
-        digits = 10.0 ** (np.floor(np.log10(reach)) - 1)
-        reach = np.ceil(reach / digits - 1e-9) * digits  # rounded up: what is printed can be asked for
-        raise ValueError(f"tolerance {tolerance:.1e} cannot be met in complex64; the best here is {reach:.1e}")
+        reach = rounded_up(max(least_tolerance, least(n_samples, chunk, steps)))
+        raise ToleranceUnreachable(tolerance, reach, PROFILES, how="in complex64")
     return best[1]
+
+
+def carrier_steps(carrier: float, n_samples: int, bandwidth: float) -> float:
+    """A carrier, Hz, in steps between the n_samples of a band, Hz: as accuracy.off_carrier takes it."""
+    return carrier * n_samples / bandwidth if bandwidth else 0.0
+
+
+def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
+    """The smallest tolerance that `cheapest` meets, wherever antennas and scatterers stand: ranges in wide numbers err
+    least, and by the same in a tile of any size."""
+    fixed = error_bounds.range_error(0.0, np.inf, 0.0, 0.0, 2, 0) + error_bounds.sum_rounding(chunk, n_samples)
+    return float(max(fixed / FIXED, fixed + interpolation.least_error(n_samples, steps)) * (1 + 1e-9))
 
 
 def skips(skip: Any, known: tuple[str, ...]) -> set[str]:

@@ -12,6 +12,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..base.boxes import box
+from ..base.errors import NothingSeen
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
@@ -26,24 +27,16 @@ STEP = 1e-4  # rad, of the differences that stand for derivatives
 
 
 def beam_error(
-    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray, tolerance: float
+    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray
 ) -> BeamError:
-    """Errors for a scene. ValueError where it is out of the beam, or so far out that tolerance cannot be met."""
+    """Errors for a scene. NothingSeen where it is out of the beam."""
     if not beam.weighs:
         return BeamError()
     for pulses, many in ((PULSES, 1), (16 * PULSES, 4)):  # look closer before saying that nothing is lit
         found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
         if found is not None:
-            break
-    else:
-        raise ValueError(_unlit(beam, scene))
-    if found.rounding > 0.3 * tolerance:
-        raise ValueError(
-            f"tolerance {tolerance:.1e} cannot be met with these antennas: gains in float32 err by "
-            f"{found.rounding:.1e} of the echoes, which lie {20 * np.log10(found.dim):.0f} dB below the beam's peak; "
-            f"aim at the scene, or ask for {4 * found.rounding:.1e}"
-        )
-    return found
+            return found
+    raise NothingSeen(_unlit(beam, scene))
 
 
 def _sampled(

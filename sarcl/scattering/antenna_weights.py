@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base.boxes import box
+from ..base.errors import ToleranceUnreachable
 from ..base.validation import instance
 from ..model.antenna import Antenna, pair_of
 from ..model.radar import Radar, spreading
@@ -17,6 +18,7 @@ from ..model.waveform import Waveform
 from ..opencl.device import Device
 
 MOST_NODES = 16
+ROUNDING, OVER_BAND = 0.3, 0.7  # of a tolerance: the most that float32 gains, and gains over the band, may take
 LEBESGUE = 4.0  # 1 + the Lebesgue constant of up to 16 Chebyshev nodes: what interpolation adds to the best fit's error
 
 
@@ -40,15 +42,25 @@ class BeamError:
         enough = np.flatnonzero(self.over_band[1:] <= tolerance)
         return int(enough[0]) + 1 if len(enough) else MOST_NODES
 
+    def check(self, tolerance: float) -> None:
+        """ToleranceUnreachable where rounding leaves too little of the tolerance."""
+        if self.rounding > ROUNDING * tolerance:
+            raise ToleranceUnreachable(
+                tolerance, self.rounding / ROUNDING * (1 + 1e-9), "float32 gains of the antennas", "aim at the scene",
+                how="with these antennas: gains are in float32, and the echoes lie "
+                f"{20 * np.log10(self.dim):.0f} dB below the beam's peak",
+            )  # fmt: skip
+
     def of(self, n: int, tolerance: float) -> float:
-        """Error of points at n nodes. ValueError where it leaves too little of the tolerance."""
+        """Error of points at n nodes. ToleranceUnreachable where it leaves too little of the tolerance."""
         error = self.rounding + float(self.over_band[n])
-        if error > 0.7 * tolerance:
-            raise ValueError(
-                f"tolerance {tolerance:.1e} cannot be met with these antennas: gains change so much over the band "
-                f"that {n} frequencies leave {error:.1e} of the echoes; ask for {2 * error:.1e}, or halve the band and "
-                "add the halves' images"
-            )
+        if error > OVER_BAND * tolerance:
+            raise ToleranceUnreachable(
+                tolerance, error / OVER_BAND * (1 + 1e-9), "gains over the band",
+                "halve the band and add the halves' images",
+                how=f"with these antennas: gains change too much over the band to be interpolated between {n} "
+                "frequencies",
+            )  # fmt: skip
         return error
 
     def with_phase(self, n: int, of_phase: Sequence[float]) -> float:

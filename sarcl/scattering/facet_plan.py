@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import ToleranceUnreachable
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import Antennas
 from ..scene.scene import Scene
@@ -74,7 +75,7 @@ def plan_facets(
 
     center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
     cut                False: facets stay as they are;  weights  what antennas and distance err
-    ValueError where more than 50 million facets would be needed, with what fewer could do.
+    ToleranceUnreachable where more than 50 million facets would be needed, with what fewer could do.
     """
     longest = np.maximum.reduce(edges(scene.triangles))
     mirror, highest = coherent(scene), center + bandwidth / 2
@@ -83,7 +84,7 @@ def plan_facets(
     distance = nearest(scene, antennas, bounds)
     weights = weights or BeamError()
     best: tuple[float, FacetPlan] | None = None
-    least, edge = np.inf, min(top, finest)
+    least, edge, fine = np.inf, min(top, finest), False
     while True:
         corner = TO_CORNER * edge
         count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
@@ -91,6 +92,7 @@ def plan_facets(
         if mirror.any():
             fixed += _spherical(corner, distance, highest) + weights.steepness * corner
         if fixed < SHARE * tolerance and count <= MOST_FACETS:
+            fine = True
             band = over_band(
                 scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
             )  # fmt: skip
@@ -107,16 +109,23 @@ def plan_facets(
         if settled or not cut or not mirror.any() or count > MOST_FACETS:
             break
         edge /= LADDER
+    reach = least / SHARE * (1 + 1e-9) if np.isfinite(least) else None
     if best is None and not cut:
-        raise ValueError(
-            f"tolerance {tolerance:.1e} cannot be met with facets of up to {top:.3g} m uncut; the best is "
-            f"{least / SHARE:.1e}: let echo cut them (max_edge='auto')"
+        raise ToleranceUnreachable(
+            tolerance, reach, "facets as large as they are", how=f"with facets of up to {top:.3g} m uncut"
         )
+    if best is None and fine:
+        raise ToleranceUnreachable(
+            tolerance, reach, "amplitudes over the band", "halve the band and add the halves' images",
+            how=f"with facets' amplitudes interpolated between {MOST_NODES} frequencies",
+        )  # fmt: skip
+    if best is None and _rounding(0.0, highest) + weights.rounding >= SHARE * tolerance:
+        raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
     if best is None:
-        raise ValueError(
-            f"tolerance {tolerance:.1e} would cut these facets into more than {MOST_FACETS:,}; the best here is "
-            f"{least / SHARE:.1e}, or take a smaller scene"
-        )
+        raise ToleranceUnreachable(
+            tolerance, reach, "number of facets", "take a smaller scene",
+            how=f"without cutting these facets into more than {MOST_FACETS:,}",
+        )  # fmt: skip
     return best[1]
 
 

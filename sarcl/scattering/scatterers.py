@@ -119,31 +119,37 @@ def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> f
     off by about half a cell at most, or by a quarter of a facet.
     """
     typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
-    try:
-        return float(np.clip(4 * resolution_edge(waveform, antennas, scene) / typical, 0.25, 8.0))
-    except ValueError:  # nothing is resolved
-        return 0.25
+    edge, _ = _half_cell(waveform, antennas, scene)
+    return float(np.clip(4 * edge / typical, 0.25, 8.0)) if np.isfinite(edge) else 0.25
 
 
 def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
-    """Half the finer of range and cross-range resolution at the scene's centre, m."""
+    """Half the finer of range and cross-range resolution at the scene's centre, m. ValueError where there is none."""
+    edge, standing = _half_cell(waveform, antennas, scene)
+    if standing is not None:
+        raise ValueError(
+            f"an antenna stands at the scene's centre at pulse {standing}, where no resolution can be told to cut "
+            "facets to; pass max_edge=... in metres, or None"
+        )
+    if not np.isfinite(edge):
+        raise ValueError("forward scattering resolves nothing to cut facets to; pass max_edge=... in metres, or None")
+    return edge
+
+
+def _half_cell(waveform: Waveform, antennas: Antennas, scene: Scene) -> tuple[float, int | None]:
+    """Half the finer of range and cross-range resolution at the scene's centre, m, inf where nothing is resolved; and
+    the pulse at which an antenna stands there, which resolves nothing either."""
     look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
     for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
         distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)
         if not distance.all():
-            raise ValueError(
-                f"an antenna stands at the scene's centre at pulse {int(np.argmin(distance))}, where no resolution can "
-                "be told to cut facets to; pass max_edge=... in metres, or None"
-            )
+            return np.inf, int(np.argmin(distance))
         look += (ends - scene.center) / distance / 2
     along = float(np.linalg.norm(look, axis=1).max())
     turn = float(np.linalg.norm(look - look[0], axis=1).max())
     range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf
     cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
-    edge = min(range_cell, cross_cell) / 2
-    if not np.isfinite(edge):
-        raise ValueError("forward scattering resolves nothing to cut facets to; pass max_edge=... in metres, or None")
-    return edge
+    return min(range_cell, cross_cell) / 2, None
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> np.ndarray:

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import replace
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import ToleranceUnreachable
 from ..base.validation import number
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import Antennas
@@ -19,16 +20,35 @@ from .facet_plan import FacetPlan, coherent, plan_facets
 from .scatterers import resolution_edge
 
 
-def cut(
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """How a scene's facets are cut: by which plan, those without a coherent part to about `finest`, m.
+
+    crowd  what `crowding` says, with room;  cuts  False: facets are left as they are
+    """
+
+    plan: FacetPlan
+    finest: float
+    crowd: float
+    cuts: bool
+
+    def made(self, scene: Scene) -> tuple[FacetPlan, Scene]:
+        """The scene's facets, without its points, and the plan with their number."""
+        scene = _without_points(scene)
+        made = cut_facets(scene, self.plan, self.finest) if self.cuts else scene
+        return replace(self.plan, n_facets=len(made.triangles)), made
+
+
+def plan_cut(
     scene: Scene, waveform: Waveform, antennas: Antennas, polarizations: Sequence[str], vertical: np.ndarray,
     max_edge: float | str | None, share: float, weights: BeamError,
-) -> tuple[FacetPlan, Scene, float]:  # fmt: skip
-    """The plan of a scene's facets within `share` of a tolerance, the facets cut as it says, and what `crowding` says.
+) -> Cut:  # fmt: skip
+    """How to cut a scene's facets within `share` of a tolerance.
 
     max_edge  as `sarcl.echo` takes it;  weights  what antennas and distance err
-    ValueError where max_edge means nothing, or the share cannot be kept.
+    ValueError where max_edge means nothing, ToleranceUnreachable where the share cannot be kept.
     """
-    scene = replace(scene, positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
+    scene = _without_points(scene)
     finest = np.inf
     if max_edge == "auto" and (scene.roughness.any() or any(m.diagram not in COHERENT for m in scene.materials)):
         finest = resolution_edge(waveform, antennas, scene)
@@ -36,23 +56,27 @@ def cut(
         finest = number("max_edge", max_edge, above=0)
     elif max_edge not in ("auto", None):
         raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
-    wanted, crowd = share, 1.0
+    crowd = 1.0
     for _ in range(6):
-        plan = plan_facets(
-            wanted / crowd, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
-            vertical, finest, cut=max_edge is not None, weights=weights,
-        )  # fmt: skip
+        try:
+            plan = plan_facets(
+                share / crowd, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
+                vertical, finest, cut=max_edge is not None, weights=weights,
+            )  # fmt: skip
+        except ToleranceUnreachable as refused:
+            raise refused.restated(share, None if refused.best is None else refused.best * crowd) from None
         found = 1.0 if max_edge is None else crowding(scene, plan.max_edge, antennas, plan.nodes)
         if found <= crowd:
-            break
+            return Cut(plan, finest, crowd, max_edge is not None)
         crowd = 1.1 * found
-    else:
-        raise ValueError(
-            f"tolerance {share:.1e} cannot be met with these facets: cut finely enough, their edges' echoes cancel to "
-            f"less than a {crowd:.0f}th; ask for a looser one, or let fewer facets make up a plane"
-        )
-    made = scene if max_edge is None else cut_facets(scene, plan, finest)
-    return replace(plan, n_facets=len(made.triangles)), made, crowd
+    raise ToleranceUnreachable(
+        share, None, "edges of cut facets", "let fewer facets make up a plane",
+        how=f"with these facets: cut finely enough, their edges' echoes cancel to less than a {crowd:.0f}th",
+    )  # fmt: skip
+
+
+def _without_points(scene: Scene) -> Scene:
+    return replace(scene, positions=np.zeros((0, 3)), amplitudes=np.zeros(0, np.complex128))
 
 
 def cut_facets(scene: Scene, plan: FacetPlan, finest: float) -> Scene:

@@ -13,6 +13,7 @@ from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
+from ..base.errors import ToleranceMissed, ToleranceUnreachable
 from ..base.text import unknown
 
 Path = tuple[str | int, ...]
@@ -127,6 +128,10 @@ class Where:
             named = next((RENAMED.get(w, w) for w in words if RENAMED.get(w, w) in keys), None)
             if named is None and not always:
                 raise
+            if isinstance(exc, ToleranceMissed):  # it holds the finished image
+                raise
+            if isinstance(exc, ToleranceUnreachable):
+                raise exc.placed(self.text(path, named)) from exc
             kind = ValueError if isinstance(exc, TypeError) else type(exc)
             raise kind(f"{self.text(path, named)} {exc}") from exc
 

@@ -7,6 +7,7 @@ For other folders:
     echo_output        destination of samples: memory or a file
     echo_sampling      rows and frequencies that echoes are written to
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
+    spreading         what points and facets share
     channels/          echoes of arrays
 
 For this folder alone:
@@ -14,7 +15,6 @@ For this folder alone:
     _echo_check        random samples recomputed exactly
     _facet_spreading   facets to range profiles
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
-    _spreading         what points and facets share
 """
 
-__all__ = ["channels", "echo", "echo_forecast", "echo_output", "echo_sampling", "scene_echoes"]
+__all__ = ["channels", "echo", "echo_forecast", "echo_output", "echo_sampling", "scene_echoes", "spreading"]

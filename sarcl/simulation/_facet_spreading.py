@@ -21,7 +21,7 @@ from ..scattering.facets import POLARIZATIONS, Facets
 from ..scattering.pulse_nodes import Knots, plan_knots
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
-from ._spreading import plan_tiles, splits, terms
+from .spreading import Band, plan_tiles, splits, terms
 
 MOST_PULSES = 256  # a block, where amplitudes are shared: knots at its ends serve it alone
 KNOTS_SHARE = 0.2  # of the tolerance left, for what lies between knots
@@ -52,7 +52,9 @@ class FacetSpreader:
         """
         n_samples, left = samples.shape[2], self.tolerance - self.facet_plan.predicted_error
         highest = float(self.frequencies[-1])
-        knots = plan_knots(part, self.beam, self.made, self.vertical, highest, KNOTS_SHARE * left)
+        band = Band(n_samples, self.bandwidth, float(self.antennas.frequency.mean()))
+        room = left - band.least_tolerance(len(part), left)  # what range profiles need comes first
+        knots = plan_knots(part, self.beam, self.made, self.vertical, highest, min(KNOTS_SHARE * left, room))
         work = _Work(self, part, knots, left - knots.error, n_samples)
         clock.lap("scene")
         basis = self.facet_plan.basis(self.frequencies).astype(np.float32)

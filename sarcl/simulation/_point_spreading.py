@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import Antennas
 from ..opencl.device import Device
 from ..scattering.antenna_weights import Beam
 from ..scattering.scatterers import Points
-from ._spreading import plan_tiles, splits, terms
+from .spreading import plan_tiles, splits, terms
 
 
 class Spreader:

@@ -31,6 +31,7 @@ from . import echo_sampling
 from .channels.array_echo import array_echo
 from .echo_output import Target
 from .scene_echoes import Order, Progress, Work
+from .spreading import Band
 
 Polarization = Literal["HH", "HV", "VH", "VV"]
 Skip = Literal[
@@ -129,8 +130,9 @@ def echo(
     check         recompute 256 random samples exactly; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
-    Stop and go. Returns a PhaseHistory. ValueError, MemoryError, sarcl.NoDeviceError say what does not fit. Source:
-    the echo equation of sarcl/__init__.py.
+    Stop and go. Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the
+    best that can, before the work starts. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
+    Source: the echo equation of sarcl/__init__.py.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
@@ -173,7 +175,8 @@ def echo(
         pulse = waveform.pulse_spectrum(frequencies)
         if progress:
             progress("scene", 0, 3)
-        work, worst = Work(order, given, scene, waveform, antennas, weights), 0.0
+        bands = [Band(n_samples, waveform.bandwidth, float(antennas.frequency[0]))]
+        work, worst = Work(order, given, scene, waveform, antennas, weights, bands), 0.0
         spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
         for start in range(0, len(tx), target.pulses):
             at = slice(start, min(start + target.pulses, len(tx)))

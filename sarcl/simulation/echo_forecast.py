@@ -10,7 +10,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from ..arrays.channels import channels_of, is_single, sampling
-from ..base import validation
+from ..base import errors, validation
 from ..base.text import duration, size_text
 from ..model import store
 from ..model.antenna_array import AntennaArray
@@ -73,7 +73,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
 
     def made(n: int) -> tuple[float, Any]:
         """Seconds of n pulses from the middle of the track, else from where there is something to be seen."""
-        said = None
+        said: ValueError | None = None
         for first in ((len(track) - n) // 2, 0, len(track) - n):
             at, some = slice(first, first + n), array
             if isinstance(array, AntennaArray) and array.plan is not None:
@@ -84,7 +84,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
                     scene, waveform, track.picked(at), receiver=None if receiver is None else receiver.picked(at),
                     array=some, check=False, **given,
                 )  # fmt: skip
-            except ValueError as exc:
+            except (errors.NothingSeen, errors.ToleranceUnreachable) as exc:  # elsewhere more may be seen
                 said = said or exc
             else:
                 return time.perf_counter() - start, raw

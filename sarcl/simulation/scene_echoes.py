@@ -2,32 +2,36 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable
 from dataclasses import dataclass, field
 from typing import Any
 
 import numpy as np
 
-from ..base.errors import warn
+from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.stage_timer import Clock
+from ..base.tolerances import reachable
 from ..model.waveform import Waveform
+from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import Antennas
 from ..opencl.device import Device
 from ..scattering.antenna_weight_error import beam_error
 from ..scattering.antenna_weights import Beam, BeamError
-from ..scattering.facet_plan import FacetPlan
+from ..scattering.facet_plan import MOST_FACETS, FacetPlan
 from ..scattering.facets import Facets
 from ..scattering.mesh_quality import facet_error, speckle_contrast
 from ..scattering.scatterers import Points, facets_of, points_of
-from ..scattering.subdivision import cut
+from ..scattering.subdivision import Cut, plan_cut
 from ..scene.scene import Scene
 from ._echo_check import exact_samples, how_many, measure_error
 from ._facet_spreading import FacetSpreader
 from ._point_spreading import Spreader
+from .spreading import Band
 
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 UNSEEN = 1e-3  # of a tolerance: what the beam may leave out of it. So little, since what is left out may be specular
+NODES = 0.3  # of a tolerance: the most that gains at nodes over the band may err, where there are enough nodes
 Progress = Callable[[str, int, int], None]
 
 
@@ -67,28 +71,33 @@ class Work:
     facets: Facets | None
 
     def __init__(
-        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: Antennas, weights: Beam
-    ) -> None:
-        """given  the scene as it came;  scene  with its random heights;  waveform  over the whole band."""
+        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: Antennas, weights: Beam,
+        bands: Iterable[Band],
+    ) -> None:  # fmt: skip
+        """given  the scene as it came;  scene  with its random heights;  waveform  over the whole band
+        bands  of all samples that will be asked for: whether the tolerance can be met is known before the work starts
+
+        ToleranceUnreachable where it cannot; NothingSeen where no scatterer is left.
+        """
         self.order, self.waveform = order, waveform
-        # points and facets err independently: each gets its share, so that the sum keeps the tolerance
-        self.share = order.tolerance / np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1)
-        self.blur: BeamError = beam_error(weights, scene, waveform, order.polarizations, order.vertical, self.share)
+        self.share = order.tolerance / parts_of(scene)
+        self.blur: BeamError = beam_error(weights, scene, waveform, order.polarizations, order.vertical)
+        planned = self._planned(scene, antennas, bands)
         if "out of beam" in order.skips:
             weights = weights.within(UNSEEN * self.share / self.blur.dim, waveform)
         self.weights, self.n_pulses = weights, len(antennas.tx)
         self.points, self.skipped = points_of(scene, order.skips, self.n_pulses)
         self.facets, self.judged = None, dict[str, Any]()
-        if len(scene.triangles):
-            self._ready(given, scene, antennas)
+        if planned is not None:
+            self._ready(given, scene, antennas, planned)
         if self.facets is None and self.points is not None and not order.same:
-            raise ValueError(
+            raise NothingSeen(
                 f"polarization is {order.polarizations}, in which points send back nothing: ask for 'HH' or 'VV', or "
                 "give facets"
             )
         if self.points is None and self.facets is None:
             reasons = ", ".join(why for why, n in self.skipped.items() if n) or "the scene is empty"
-            raise ValueError(f"nothing is left to reflect: {reasons}; move the track or the scene")
+            raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
         if self.points is not None:
             bounded(self.points.largest() * weights.peak)
             weights.clear_of(self.points.positions)
@@ -96,13 +105,28 @@ class Work:
         self.pairs = self.gated = self.behind = self.unlit = 0
         order.clock.lap("scene")
 
-    def _ready(self, given: Scene, scene: Scene, antennas: Antennas) -> None:
+    def _planned(self, scene: Scene, antennas: Antennas, bands: Iterable[Band]) -> Cut | None:
+        """How facets are cut, None where there are none. ToleranceUnreachable in the caller's own numbers."""
+        order, bands = self.order, tuple(dict.fromkeys(bands))
+
+        def plan(tolerance: float, max_edge: float | str | None = order.max_edge) -> Cut | None:
+            return plan_scene(order, scene, self.waveform, antennas, self.blur, bands, tolerance, max_edge)
+
+        try:
+            return plan(order.tolerance)
+        except ToleranceUnreachable as refused:
+            scale, remedy = order.tolerance / refused.asked, refused.remedy
+            above = order.tolerance if refused.best is None else max(refused.best * scale, order.tolerance)
+            if order.max_edge is None and _meets(lambda: plan(order.tolerance, "auto")):
+                remedy = "let echo cut them (max_edge='auto')"
+            raise refused.restated(order.tolerance, reachable(plan, above), remedy) from None
+
+    def _ready(self, given: Scene, scene: Scene, antennas: Antennas, planned: Cut) -> None:
         """Facets cut, culled and lit."""
         order = self.order
         self.facet_plan: FacetPlan
-        self.facet_plan, pieces, self.crowd = cut(
-            scene, self.waveform, antennas, order.polarizations, order.vertical, order.max_edge, self.share, self.blur
-        )
+        self.facet_plan, pieces = planned.made(scene)
+        self.crowd = planned.crowd
         # curves are told from facets as they came, speckle from what is added up
         self.judged = _warned(
             facet_error.judge(given, antennas, self.waveform), speckle_contrast.judge(pieces, antennas, self.waveform)
@@ -145,7 +169,7 @@ class Work:
         self.plans, gate, added = [], "range window" in order.skips, 0
         if self.points is not None:
             if order.same:
-                nodes = chebyshev(waveform.center, waveform.bandwidth, self.blur.nodes(0.3 * self.share))
+                nodes = chebyshev(waveform.center, waveform.bandwidth, self.blur.nodes(NODES * self.share))
                 error = self.blur.of(len(nodes), self.share)
                 spreader = Spreader(
                     order.device, antennas, waveform.bandwidth, len(frequencies), self.share - error, order.budget,
@@ -219,18 +243,18 @@ class Work:
         return found
 
     def must_show(self, near: float, far: float) -> None:
-        """ValueError where nothing at all was added."""
+        """NothingSeen where nothing at all was added."""
         if self.gated == self.pairs:
-            raise ValueError(
+            raise NothingSeen(
                 f"every scatterer is outside the range window of {near:g} to {far:g} m about the reference; "
                 "widen range_window or move reference"
             )
         if self.gated + self.unlit == self.pairs:
-            raise ValueError(
+            raise NothingSeen(
                 "no scatterer in the range window is ever in the beam; aim the antenna with sarcl.pointing"
             )
         if self.gated + self.unlit + self.behind == self.pairs:
-            raise ValueError(
+            raise NothingSeen(
                 "every facet in the range window faces away from an antenna; move the track or turn the scene"
             )
 
@@ -244,6 +268,49 @@ class Work:
             "contributions_done": self.pairs - self.gated - self.behind - self.unlit,
             "contributions_skipped": {**skipped, "range window": self.gated},
         }
+
+
+def parts_of(scene: Scene) -> float:
+    """By how much errors of a scene's parts may add up: points and facets err independently, each gets its share of the
+    tolerance, so that the sum keeps it."""
+    return float(np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1))
+
+
+def plan_scene(
+    order: Order, scene: Scene, waveform: Waveform, antennas: Antennas, blur: BeamError, bands: Iterable[Band],
+    tolerance: float, max_edge: float | str | None,
+) -> Cut | None:  # fmt: skip
+    """How a scene's facets are cut for `tolerance`, None where there are none.
+
+    ToleranceUnreachable where gains, facets, or samples of one of `bands` cannot keep their shares of it.
+    """
+    share, made = tolerance / parts_of(scene), None
+    blur.check(share)
+    if len(scene.triangles):
+        made = plan_cut(scene, waveform, antennas, order.polarizations, order.vertical, max_edge, share, blur)
+        left = share / made.crowd - made.plan.predicted_error
+        _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.crowd)  # pieces: not counted yet
+    n_points = int(np.count_nonzero(scene.amplitudes)) if "zero reflectivity" in order.skips else len(scene.amplitudes)
+    if n_points and order.same:
+        left = share - blur.of(blur.nodes(NODES * share), share)
+        _profiles_fit(bands, left, n_points, share, LEAST_TOLERANCE)
+    return made
+
+
+def _profiles_fit(bands: Iterable[Band], left: float, n: int, share: float, least: float = 0.0) -> None:
+    """ToleranceUnreachable where range profiles of n scatterers need more than is `left` of a share of it."""
+    for band in bands:
+        needed = max(band.least_tolerance(n, left), least)
+        if left < needed:
+            raise ToleranceUnreachable(share, needed + (share - left), PROFILES, how="in complex64")
+
+
+def _meets(plan: Callable[[], object]) -> bool:
+    try:
+        plan()
+    except ToleranceUnreachable:
+        return False
+    return True
 
 
 def band_of(waveform: Waveform, center: float, bandwidth: float) -> Waveform:

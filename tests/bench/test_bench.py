@@ -296,13 +296,13 @@ def test_a_program_that_is_no_peer_is_absent_in_words(tmp_path):
 
 def test_a_method_that_cannot_is_absent_in_words(monkeypatch):
     def refuse(*_, **__):
-        raise ValueError("method is 'factorized'; choose one of 'auto', 'direct'")
+        raise sarcl.ToleranceUnreachable(1e-3, 2e-2, "thinning", how="with sub-apertures")
 
     monkeypatch.setattr(sarcl, "backproject", refuse)
     document = bench.run(**{**SMALL, "methods": ["factorized"]}, with_peers=False)
     (only,) = document["cases"][0]["rows"]
-    assert only["absent"].startswith("method is 'factorized'")
-    assert "absent: method is 'factorized'" in _table.text(document["cases"][0])
+    assert only["absent"].startswith("tolerance 1.0e-03 cannot be met with sub-apertures")
+    assert "absent: tolerance 1.0e-03 cannot be met" in _table.text(document["cases"][0])
     with pytest.raises(ValueError, match="nothing to draw"):
         pareto.picture(document["cases"])
 

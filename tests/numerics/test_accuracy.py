@@ -69,7 +69,7 @@ def test_the_cheapest_interpolator_meets_its_share_and_the_impossible_is_named()
         made, length, _ = interpolation.choose_interpolator(error, 1000, 1e6)
         assert made.error <= error
         assert length >= made.oversample * 1000 and length % 2 == 0
-    with pytest.raises(ValueError, match="the least is"):
+    with pytest.raises(ValueError, match="the best here is"):
         interpolation.choose_interpolator(1e-12, 1000, 1e6)
 
 

@@ -13,6 +13,7 @@ import numpy as np
 
 from ...arrays.map_aperture import MapKind, map_aperture
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import NotApplicable
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
 from ._sweep import sweep
@@ -82,7 +83,7 @@ def _mapped(
             continue
         try:
             mapped = _map(case, raw, name)
-        except ValueError as exc:
+        except NotApplicable as exc:
             refused[name] = str(exc)
         else:
             yield name, mapped
@@ -91,7 +92,7 @@ def _mapped(
 def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
     if raw.tx_channel is not None and name in (RAW, "channels"):
         if name == RAW:
-            raise ValueError("every row holds its own channel's place and carrier as it is: that is 'channels'")
+            raise NotApplicable("every row holds its own channel's place and carrier as it is: that is 'channels'")
         return raw
     return raw if name == RAW else map_aperture(raw, cast(MapKind, name), attitude=case.track().attitude)
 

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
 from ...numerics import error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
@@ -222,7 +223,7 @@ def choose(
                 reads = grid.size * SAMPLE * vectors / side**2
                 try:
                     made, length, cost = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
-                except ValueError:
+                except ToleranceUnreachable:  # other lines may leave more to the interpolator
                     continue
                 per_pair += (cost - interpolation.TAP_COST[2]) * reads / grid.size
             else:

@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import ToleranceUnreachable
 from ...numerics import error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.plan import ORDER_COST, RANGE_COST, Plan, cheapest
@@ -82,23 +83,27 @@ class FactorPlan:
 
 
 def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, GridTiling]:
-    """The cheapest plan whose predicted error is at most `tolerance`; ValueError where sub-apertures cannot meet it.
+    """The cheapest plan whose predicted error is at most `tolerance`.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay
+    ToleranceUnreachable where sub-apertures cannot meet it: it says why, but no best tolerance, which takes a search.
     """
     order, runs = runs_of(task.raw)
     a = task.antennas
     rx = None if a.rx is None else a.rx[order]
     track = Track(a.tx[order], rx, a.frequency[order], a.frequency_step[order], tuple(runs))
-    reason = "neighbouring pulses differ too much"
+    reason = ""
     for lines in (True, False) if lanes and task.grid.is_plane else (False,):  # near an antenna lines bend too much
         case = _Case(task, track, order, tolerance, lines)
-        for _, choice in sorted(case.candidates(), key=lambda c: c[0])[:TRIES]:
-            try:
-                return case.build(*choice)
-            except ValueError as exc:
-                reason = str(exc)
-    raise ValueError(f"tolerance {tolerance:.1e} cannot be met with sub-apertures here: {reason}")
+        tried = sorted(case.candidates(), key=lambda c: c[0])[:TRIES]
+        for _, choice in tried:
+            made = case.build(*choice)
+            if not isinstance(made, str):
+                return made
+            reason = made
+        if not tried and not reason:
+            reason = case.untried()
+    raise ToleranceUnreachable(tolerance, None, reason, how=f"with sub-apertures here: {reason}")
 
 
 def _spacing(taps: int, error: float) -> float | None:
@@ -146,6 +151,21 @@ class _Case:
                     if made:
                         yield made[0], (chain, taps, spacing, nodes, fine, made[1], share)
 
+    def untried(self) -> str:
+        """Why there is no candidate at all."""
+        share = 0.75 * self.tolerance / 3  # of a chain of one level, the least there is
+        fine = [s for s in (_spacing(nodes, share) for nodes in TAPS) if s is not None]
+        if not fine:
+            return f"interpolation with {TAPS[-1]} taps between nodes errs by more than its share of the tolerance"
+        n_rows, leaf = self.task.raw.n_rows, min(self.leaves.values())
+        if n_rows < 4:
+            return f"the aperture has {n_rows} pulses; at least 4 are needed to merge any"
+        tiles = "tiles" if self.task.grid.is_plane else "tiles of listed points"
+        return (
+            f"neighbouring pulses see the smallest {tiles}, of {leaf:.3g} m radius, from directions that differ too "
+            "much to be merged"
+        )
+
     def _cost(
         self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float
     ) -> tuple[float, list[int]] | None:
@@ -166,8 +186,8 @@ class _Case:
 
     def build(
         self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, thins: list[int], share: float
-    ) -> tuple[FactorPlan, GridTiling]:  # fmt: skip
-        """The plan of a candidate, its errors computed for the track as it is; ValueError where they are too large."""
+    ) -> tuple[FactorPlan, GridTiling] | str:  # fmt: skip
+        """The plan of a candidate, its errors computed for the track as it is; where they are too large, which are."""
         raw, grid = self.task.raw, self.task.grid
         between = interpolation.line_interpolator(taps, spacing)
         length = 2 * fft.good_length(int(np.ceil(spacing * raw.n_samples / 2)))
@@ -175,7 +195,7 @@ class _Case:
         made = (interpolation.interpolator(t, length / raw.n_samples) for t in interpolation.TERMS)
         first = next((i for i in made if i.error <= share), None)
         if first is None:
-            raise ValueError(f"no interpolator errs by less than {share:.1e}")
+            return f"interpolation of range profiles with {max(interpolation.TERMS)} taps errs by more than its share"
         tiling = LineTiling(grid, chain[-1]) if self.lines else GridTiling(grid, chain[-1])
         factors = tuple(side // chain[-1] for side in chain)
         radii = self._radii(tiling, factors)
@@ -193,15 +213,17 @@ class _Case:
             source = thinned_out.nodes
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
-            raise ValueError(f"thinning errs by {error:.1e} already")
+            return "thinning out the pulses leaves too little of the tolerance for the pixels"
         edge = self._edge(tiling)
+        if edge is None:
+            return f"tiles at the edge of the range window cannot be focused{' by lines' if self.lines else ''}"
         # from the leaves up: a tile's profiles hold those of its children, and what their interpolation touches
         reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
         for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
             apart = radius if not grid.is_plane else radius - below * (1 - 2 / chain[-1])
             reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
         if self.task.wrap and reach[-1] + 4 * GUARD > length:
-            raise ValueError("its largest tiles are wider than the period in which ranges repeat")
+            return "the largest tiles are wider than the period in which ranges repeat"
         levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], thinnings, strict=True))
         sources = [raw.n_rows, *(len(v.thinning.nodes) for v in levels)]
         cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * PROFILE * spacing * raw.n_samples
@@ -244,22 +266,22 @@ class _Case:
                     best = Plan(*source, tiling.per_tile, mode, order, error, cost)
         return best
 
-    def _edge(self, tiling: GridTiling) -> LinePlan | Plan:
-        """For tiles that some pulse sees only in part: directly, on the same leaves."""
+    def _edge(self, tiling: GridTiling) -> LinePlan | Plan | None:
+        """For tiles that some pulse sees only in part: directly, on the same leaves. None where nothing can."""
         raw = self.task.raw
         if self.lines:
-            plan = line_plan.choose(
+            return line_plan.choose(
                 self.tolerance, self.task.grid, self.task.antennas, n_samples=raw.n_samples, bandwidth=self.bandwidth,
                 highest=self.highest, sides=(tiling.side,),
             )  # fmt: skip
-            if plan is None:
-                raise ValueError("edges of the range window cannot be focused by lines")
-            return plan
-        return cheapest(
-            self.tolerance, [(tiling.per_tile, tiling.radius)], distance=self.distance, frequency=self.highest,
-            bandwidth=self.bandwidth, n_samples=raw.n_samples, points_per_row=self.task.grid.size, chunk=CHUNK,
-            least_tolerance=0.0,
-        )  # fmt: skip
+        try:
+            return cheapest(
+                self.tolerance, [(tiling.per_tile, tiling.radius)], distance=self.distance, frequency=self.highest,
+                bandwidth=self.bandwidth, n_samples=raw.n_samples, points_per_row=self.task.grid.size, chunk=CHUNK,
+                least_tolerance=0.0,
+            )  # fmt: skip
+        except ToleranceUnreachable:
+            return None
 
 
 def moving_cost(samples: float, taps: int, nodes: int) -> float:

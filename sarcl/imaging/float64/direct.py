@@ -133,9 +133,13 @@ class Precise:
 
 
 def _no_float64(device: Device) -> str:
+    return f"tolerances below 1e-6 need float64, which {device.info.name!r} lacks; its best is 1e-6: {remedy()}"
+
+
+def remedy() -> str:
+    """What to do on a device without float64."""
     able = [f"{i.index}: {i.name}" for i in devices() if i.works and i.fp64]
-    remedy = f"choose device= one of {'; '.join(able)}" if able else "no device here has it"
-    return f"tolerances below 1e-6 need float64, which {device.info.name!r} lacks; its best is 1e-6: {remedy}"
+    return f"choose device= one of {'; '.join(able)}" if able else "no device here has float64"
 
 
 def tile_positions(tiling: GridTiling, first: int, last: int) -> tuple[np.ndarray, list[np.ndarray | None]]:

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import ToleranceUnreachable
+from ...base.tolerances import rounded_up
 from ...numerics import error_bounds_float64, interpolation_float64
 from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
@@ -78,21 +80,21 @@ class Plan:
 def make_plan(task: Task, tolerance: float) -> tuple[Plan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    ValueError names the best tolerance there is.
+    ToleranceUnreachable names the best tolerance there is; ValueError for paths that are too long (`too_long`).
     """
+    long = too_long(task)
+    if long:
+        raise ValueError(long)
     tilings = {side**2: GridTiling(task.grid, side) for side in SIDES}
     seen = profile_energy.seen(task)
     plans = sorted(_plans(task, tilings, seen), key=lambda p: p.cost)
     good = next((p for p in plans if p.predicted_error <= tolerance), None)
     if good is None:
-        least = min(p.predicted_error for p in plans)
-        digits = 10.0 ** (np.floor(np.log10(least)) - 1)
-        reach = np.ceil(1.001 * least / digits) * digits  # rounded up: what is printed can be asked for
         dark = f": these pixels are {20 * np.log10(seen.near):.0f} dB darker than what lies beside them in their rows"
-        raise ValueError(
-            f"tolerance {tolerance:.1e} cannot be met in complex128{dark if seen.near > 10 else ''}; "
-            f"the best here is {reach:.1e}"
-        )
+        raise ToleranceUnreachable(
+            tolerance, rounded_up(min(p.predicted_error for p in plans)), "float64 range profiles",
+            how=f"in complex128{dark if seen.near > 10 else ''}",
+        )  # fmt: skip
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
     named = Plan(good.kernel, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other)
@@ -102,7 +104,6 @@ def make_plan(task: Task, tolerance: float) -> tuple[Plan, GridTiling]:
 def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator[Plan]:
     """Every plan there is. Memory plays no part: neither plan nor image depends on it."""
     raw, grid = task.raw, task.grid
-    _check_paths(task)
     frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())
     distance = task.antennas.distance(grid.bounds)
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
@@ -136,14 +137,18 @@ def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator
                     yield Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
 
 
-def _check_paths(task: Task) -> None:
-    """ValueError for paths whose turns pairs of float64 cannot split into whole ones and the rest."""
+def too_long(task: Task) -> str | None:
+    """What is wrong with paths whose cycles pairs of float64 cannot split into whole ones and the rest; None: nothing.
+
+    No tolerance is met in complex128 then.
+    """
     raw, grid = task.raw, task.grid
     ends = (raw.tx, raw.rx, grid.bounds)
     longest = 2 * sum(float(np.abs(x).max()) for x in ends) + float(np.abs(raw.reference_range).max())
     turns = 2 * float(raw.frequency.max()) / SPEED_OF_LIGHT * longest
-    if turns > MOST_TURNS:
-        raise ValueError(
-            f"paths of up to {longest:.1e} m are {turns:.1e} turns of phase, float64 counts {MOST_TURNS:.1e}; give "
-            "positions about a nearer origin"
-        )
+    if turns <= MOST_TURNS:
+        return None
+    return (
+        f"paths of up to {longest:.1e} m are {turns:.1e} turns of phase, float64 counts {MOST_TURNS:.1e}; give "
+        "positions about a nearer origin"
+    )

@@ -56,8 +56,9 @@ def polar_format(
     The report's plan says what plane waves err against `backproject`, which the tolerance does not count: the
     largest phase, what of it blurs, by how much pixels are displaced, and the radius in which images are sharp.
     sarcl.SarclWarning where they are not to the grid's border, and where that lies beyond the range window, in
-    which echoes repeat. ValueError: bistatic or uncompressed data, listed points, one row, a tolerance that cannot
-    be met; ToleranceMissed: the check measured more than the tolerance; MemoryError: max_bytes too small.
+    which echoes repeat. ValueError: bistatic or uncompressed data, listed points, one row;
+    ToleranceUnreachable: a tolerance that cannot be met; ToleranceMissed: the check measured more than the tolerance;
+    MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()

@@ -15,6 +15,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...scattering.antenna_weights import Beam
 from ...scene.scene import Scene
 from ..scene_echoes import Work, band_of
+from ..spreading import Band
 from ._chebyshev_positions import Places, places_of
 from ._response_samples import Views
 from ._separate import Layout, during, run
@@ -130,6 +131,16 @@ class Between:
         turned = angle / max(float(off_vertical.min()), 1e-12)
         return sides.rx is sides.tx and max(angle**1.5, turned**2) <= GRAZING * tolerance
 
+    @property
+    def bands(self) -> list[Band]:
+        """Of every run: the whole band."""
+        return [self.layout.band(self._frequencies)]
+
+    @property
+    def _frequencies(self) -> np.ndarray:
+        grid = self.layout.grid
+        return np.asarray(grid.frequency + grid.step * np.arange(grid.n))
+
     def pulses(self, budget: float) -> int:
         """Pulses to be filled at a time: what is made at the places, and of a channel, takes half the budget."""
         rows, grid = self.layout.rows, self.layout.grid
@@ -142,7 +153,7 @@ class Between:
         """As `Apart.fill`."""
         grid, sides, worst = self.layout.grid, self.layout.rows.sides, 0.0
         at = slice(start, start + len(samples))
-        frequencies = grid.frequency + grid.step * np.arange(grid.n)
+        frequencies = self._frequencies
         band = band_of(self.layout.waveform, float(frequencies.mean()), grid.n * grid.step)
         reach = SPEED_OF_LIGHT / (4 * grid.step)
         made = np.empty((len(self.tx), len(self.rx), len(samples), samples.shape[3], grid.n), np.complex64)

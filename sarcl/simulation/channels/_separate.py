@@ -10,6 +10,7 @@ from ...arrays.channels import Channel, Sampling
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import Antennas
 from ..scene_echoes import Work, band_of
+from ..spreading import Band
 from .channel_rows import Rows, antennas_of
 
 
@@ -37,6 +38,11 @@ class Layout:
         pulse = replace(self.waveform, center=channel.carrier).pulse_spectrum(frequencies)
         return np.asarray(np.abs(pulse) ** 2 if self.compressed else pulse)
 
+    def band(self, frequencies: np.ndarray) -> Band:
+        """Of a run of the engines at frequencies, Hz (n,)."""
+        n, step = len(frequencies), self.grid.step
+        return Band(n, n * step, float(frequencies[0]) + n // 2 * step)
+
     def shape(self, n_pulses: int) -> tuple[int, ...]:
         """Of samples: (pulses, senders, receivers, polarizations, samples)."""
         n = self.grid.width if self.rows.separated else self.grid.n
@@ -63,6 +69,12 @@ class Apart:
 
     def __init__(self, layout: Layout) -> None:
         self.layout, self.runs = layout, layout.runs
+
+    @property
+    def bands(self) -> list[Band]:
+        """Of every run."""
+        made = [self.layout.samples(channel)[1] for channel in self.layout.sent]
+        return [self.layout.band(frequencies) for frequencies in made]
 
     def pulses(self, budget: float) -> int:
         """Pulses to be filled at a time: all, the engines keep to the budget."""

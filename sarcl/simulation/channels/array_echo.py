@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.channels import channels_of, sampling, warn_of
+from ...base.errors import ToleranceUnreachable
 from ...base.report import Report
 from ...base.validation import choice
 from ...model.antenna_array import AntennaArray
@@ -15,11 +16,12 @@ from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.plan import LEAST_TOLERANCE
+from ...numerics.pulse_geometry import Antennas
 from ...scattering.antenna_weights import Beam
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo_output import Target
-from ..scene_echoes import Order, Progress, Work, band_of, bounded
+from ..scene_echoes import Order, Work, band_of, bounded
 from ._interpolated import Between
 from ._separate import Apart, Layout, during
 from .channel_rows import CHANNELS, RECEIVE, Rows, Sides, antennas_of
@@ -53,17 +55,8 @@ def array_echo(
     rows = Rows(array, sides, point, channels, receive, order.polarizations)
     layout = Layout(rows, sent, grid, (near, far), waveform, compressed)
     with Target(layout.shape(len(track)), out, order.budget, (near, far)) as target:
-        for way, its_order in _ways(layout, scene, weights, order):
-            try:
-                work = Work(its_order, given, scene, whole, everywhere, weights)
-                worst = _filled(way, work, target)
-                break
-            except _Raised as exc:
-                assert exc.__cause__ is not None
-                raise exc.__cause__ from None
-            except ValueError:  # what float32 cannot keep between places it may keep without
-                if isinstance(way, Apart):
-                    raise
+        way, work = _way(layout, scene, given, whole, everywhere, weights, order)
+        worst = _filled(way, work, target)
         work.must_show(near, far)
         order.clock.lap("spectra")
         measured = None
@@ -89,31 +82,29 @@ def array_echo(
         )  # fmt: skip
 
 
-def _ways(layout: Layout, scene: Scene, weights: Beam, order: Order) -> list[tuple[Apart | Between, Order]]:
-    """Ways to make the samples, the cheaper first, and what is asked of the engines there."""
-    ways: list[tuple[Apart | Between, Order]] = [(Apart(layout), order)]
-    shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
-    if BETWEEN in order.skips and layout.runs > len(layout.rows.sides.tx) and shared:
-        between = Between(layout, scene, weights, order.vertical, order.tolerance)
-        scatterers = len(scene.positions) + len(scene.triangles)
-        if between.tolerance >= LEAST_TOLERANCE and between.pays(scatterers):
-            ways.insert(0, (between, replace(order, tolerance=between.tolerance, progress=_outside(order.progress))))
-    return ways
-
-
-class _Raised(Exception):
-    """What the caller's own progress raised: never a reason to try another way."""
-
-
-def _outside(progress: Progress | None) -> Progress | None:
-    def told(stage: str, done: int, total: int) -> Any:
-        assert progress is not None
+def _way(
+    layout: Layout, scene: Scene, given: Scene, whole: Waveform, everywhere: Antennas, weights: Beam, order: Order
+) -> tuple[Apart | Between, Work]:
+    """The cheaper way to make the samples whose plan keeps the tolerance, and the scene made ready for it."""
+    between = _between(layout, scene, weights, order)
+    if between is not None:
+        inner = replace(order, tolerance=between.tolerance)
         try:
-            return progress(stage, done, total)
-        except ValueError as exc:
-            raise _Raised from exc
+            return between, Work(inner, given, scene, whole, everywhere, weights, between.bands)
+        except ToleranceUnreachable:  # interpolated channels leave less of the tolerance to the echoes at the places
+            pass
+    apart = Apart(layout)
+    return apart, Work(order, given, scene, whole, everywhere, weights, apart.bands)
 
-    return told if progress else None
+
+def _between(layout: Layout, scene: Scene, weights: Beam, order: Order) -> Between | None:
+    """Channels interpolated between few places, where that may be done and is cheaper."""
+    shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
+    if BETWEEN not in order.skips or layout.runs <= len(layout.rows.sides.tx) or not shared:
+        return None
+    between = Between(layout, scene, weights, order.vertical, order.tolerance)
+    worth = between.pays(len(scene.positions) + len(scene.triangles))
+    return between if worth and between.tolerance >= LEAST_TOLERANCE else None
 
 
 def _filled(way: Apart | Between, work: Work, target: Target) -> float:

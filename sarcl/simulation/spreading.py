@@ -2,17 +2,36 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from ..base.boxes import box
 from ..base.morton import morton_order
 from ..numerics.error_bounds import U32
-from ..numerics.plan import LEAST_TOLERANCE, Plan, cheapest
+from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import Antennas
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
 
 PER_TILE = (256, 64)
+
+
+@dataclass(frozen=True)
+class Band:
+    """The band of a row of samples: how many, over which bandwidth, Hz, about which carrier, Hz."""
+
+    n_samples: int
+    bandwidth: float
+    carrier: float
+
+    def least_tolerance(self, n_scatterers: int, tolerance: float) -> float:
+        """The smallest tolerance that `plan_tiles` meets.
+
+        tolerance  that is asked for: it says how many scatterers are summed in float32
+        """
+        steps = carrier_steps(self.carrier, self.n_samples, self.bandwidth)
+        return least(self.n_samples, _chunk(n_scatterers, tolerance), steps)
 
 
 def plan_tiles(
@@ -30,11 +49,16 @@ def plan_tiles(
         bandwidth=bandwidth,
         n_samples=n_samples,
         points_per_row=len(positions),
-        chunk=min(len(positions), max(min(PER_TILE), int(terms(tolerance)))),
+        chunk=_chunk(len(positions), tolerance),
         least_tolerance=least_tolerance,
         carrier=float(antennas.frequency.mean()),
     )
     return plan, *made[plan.per_tile]
+
+
+def _chunk(n_scatterers: int, tolerance: float) -> int:
+    """Scatterers summed in float32."""
+    return min(n_scatterers, max(min(PER_TILE), int(terms(tolerance))))
 
 
 def splits(device: Device, n_pulses: int, tiles: Tiles) -> int:
