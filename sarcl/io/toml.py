@@ -9,6 +9,8 @@ from typing import Any
 
 Path = tuple[str | int, ...]
 
+WIDTH = 80  # characters of the longest array that stays on one line
+
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _SCALAR = re.compile(r"[^\s,\]}#]+(?: \d[^\s,\]}#]*)?")  # a date and its time may stand apart
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}' r"|'''.*?'{3,5}" r'|"(?:\\.|[^"\\])*"' r"|'[^']*'", re.DOTALL)
@@ -139,9 +141,6 @@ def _unquote(text: str) -> str:
     return _ESCAPE.sub(plain, text[1:-1])
 
 
-WIDTH = 80
-
-
 def dumps(tables: Mapping[str, Any]) -> str:
     """TOML text of nested tables of str, bool, int, float, lists and dicts.
 
@@ -176,7 +175,7 @@ def _holds_tables(value: Any) -> bool:
 
 
 def _key(key: str) -> str:
-    return key if re.fullmatch(r"[A-Za-z0-9_-]+", key) else _string(key)
+    return key if _BARE.fullmatch(key) else _string(key)
 
 
 def _value(value: Any, name: str) -> str:

@@ -1,4 +1,4 @@
-"""What is known of an antenna's pattern as a whole: its steepest slope, how far it reaches, its spline's numbers."""
+"""Antenna patterns in float64: gain in a direction, steepest slope, limits of a level, spline coefficients."""
 
 from __future__ import annotations
 
@@ -11,10 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 if TYPE_CHECKING:
     from .antenna import Antenna
 
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from .antenna import Antenna
+SLACK = 1e-3  # of a table's step: a direction this little outside the table gets the value at its edge
 
 
 def uniform_spline(values: np.ndarray) -> np.ndarray:
@@ -38,7 +35,6 @@ def _fine(axis: np.ndarray) -> np.ndarray:
 
 def table_slope(antenna: Antenna) -> float:
     """Largest gradient of a table on a grid four times finer, 1/rad."""
-
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     squares = np.zeros((len(a), len(e)))
     for s in splines(antenna):
@@ -48,7 +44,6 @@ def table_slope(antenna: Antenna) -> float:
 
 def table_limits(antenna: Antenna, level: float, ratio: float) -> tuple[float, float, float]:
     """Largest direction cosines along azimuth and elevation where a table reaches `level`; -1 if nowhere behind."""
-
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     power = sum(s(a, e) ** 2 for s in splines(antenna))
     seen = power >= level**2
@@ -107,7 +102,6 @@ def _gaussian(antenna: Antenna, x: np.ndarray, y: np.ndarray, z: np.ndarray, fre
 
 
 def _table(antenna: Antenna, x: np.ndarray, y: np.ndarray, z: np.ndarray, frequency: float) -> np.ndarray:
-
     angles = [np.arctan2(y, x), np.arctan2(z, np.hypot(x, y))]
     inside = np.ones(x.shape, bool)
     for i, axis in enumerate((antenna.azimuth, antenna.elevation)):
@@ -141,6 +135,3 @@ def two_way_gain(
     """
     out = pattern_gain(antennas[0], (points - tx) @ axes[0], frequency)
     return out if antennas[1] is None else out * pattern_gain(antennas[1], (points - rx) @ axes[1], frequency)
-
-
-SLACK = 1e-3  # of a step: angles this little outside a table are its edge
