@@ -78,7 +78,7 @@ class Job:
         print(text, flush=True)
 
     def expect(self, path: Any) -> None:
-        """This path is going to be written; raises what `paths.check_writable` does where it cannot be."""
+        """This path is going to be written; raises what `output_paths.check_writable` does where it cannot be."""
         output_paths.check_writable(path)
         self.outputs[str(path)] = identity(path)
 

@@ -59,7 +59,7 @@ def picture(
 
 
 def write_png(picture: Picture, path: Any) -> None:
-    """Write a PNG that appears whole or not at all; raises what `files.paths.check_writable` raises."""
+    """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises."""
     from ..io import output_paths
 
     with output_paths.atomic(path) as part:

@@ -7,8 +7,12 @@ For other folders:
     hdf5           plain values, arrays and reports in HDF5
     mesh           meshes through trimesh: triangles, names of parts, repairs
     output_paths   output files: checked before the work, written whole or not at all
-    partial_hdf5   an HDF5 file that appears at its path only when it is complete
+    sarcl_hdf5     sarcl's own HDF5 file: writers of phase histories and images from plain fields
     toml           TOML: line numbers of keys, and values written back as text
+
+For this folder alone:
+
+    _partial_hdf5  an HDF5 file that appears at its path only when it is complete
 """
 
-__all__ = ["elevation", "gotcha", "hdf5", "mesh", "output_paths", "partial_hdf5", "toml"]
+__all__ = ["elevation", "gotcha", "hdf5", "mesh", "output_paths", "sarcl_hdf5", "toml"]

@@ -11,7 +11,7 @@ For other folders:
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
     radar             Radar: the radar equation as named factors
-    store             read() and write: nouns to and from the fields of files
+    store             read(): the fields of files as nouns; a file in the making finished as a noun
     trajectory        Trajectory: position of the antenna at each pulse
     waveform          Waveform: spectrum of the pulse and of its matched filter
 

@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.report import Report
+from ..io import hdf5, sarcl_hdf5
 from .image_grid import ImageGrid, pair
 
 if TYPE_CHECKING:
@@ -123,16 +124,20 @@ class Image:
         return self._picture(-50.0)._repr_png_()
 
     def save(self, path: PathLike, *, floor_db: float = -50.0, title: str | None = None) -> None:
-        """Write "name.png" (grey, dB, with axes) or "name.h5" (lossless; `sarcl.read` opens it)."""
+        """Write "name.png" (grey, dB, with axes) or "name.h5" (lossless; `sarcl.read` opens it).
+
+        On any exception `path` is as it was.
+        """
         suffix = Path(path).suffix.lower()
         if suffix == ".png":
             from ..figures.decibels import write_png
 
             write_png(self._picture(floor_db, title), path)
         elif suffix in (".h5", ".hdf5"):
-            from . import store
-
-            store.save_image(self, path)
+            with sarcl_hdf5.ImageWriter(path, sarcl_hdf5.fields_of(self.grid), self.data.dtype) as out:
+                for a, b in hdf5.blocks(out.data):
+                    out.data[a:b] = np.asarray(self.data[a:b])
+                out.close(image_fields(self))
         else:
             raise ValueError(f"image path {str(path)!r} ends in {suffix!r}; choose '.png' or '.h5'")
 
@@ -152,3 +157,8 @@ class Image:
         return picture(
             self.decibels(), spacing=grid.spacing, floor_db=floor_db, title=title, origin=origin, names=names
         )
+
+
+def image_fields(image: Image) -> dict[str, Any]:
+    """All fields but data and grid, by name, as a file of sarcl's holds them."""
+    return {name: getattr(image, name) for name in ("gain", "frequency", "tx", "rx", "report")}

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
+from ..io import hdf5, sarcl_hdf5
 from .lazy_rows import in_memory, pick, stack
 
 if TYPE_CHECKING:
@@ -245,10 +246,32 @@ class PhaseHistory:
         return (delay if len(delay) > 1 else delay[0]), signal
 
     def save(self, path: PathLike) -> None:
-        """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows."""
-        from . import store
+        """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows.
 
-        store.save_phase_history(self, path)
+        `path` may be the file that the samples are read from. ValueError for a NaN or Inf in lazily read samples;
+        FileNotFoundError, PermissionError and the like before anything is written. On any exception `path` is as
+        it was.
+        """
+        writer = sarcl_hdf5.EchoWriter(path, self.n_rows, self.n_samples, self.samples.dtype)
+        try:
+            for a, b in hdf5.blocks(writer.samples):
+                writer.samples[a:b] = self.read(a, b)
+            writer.close(phase_history_fields(self))
+        finally:
+            writer.abandon()
+
+
+def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
+    """All fields but the samples, by name, as a file of sarcl's holds them: rx is None where it is tx."""
+    names = ("frequency", "frequency_step", "reference_range", "tx", *PER_ROW)
+    return {
+        **{name: getattr(raw, name) for name in names},
+        "rx": None if raw.rx is raw.tx else raw.rx,
+        "compressed": bool(raw.compressed),
+        "waveform": None if raw.waveform is None else sarcl_hdf5.fields_of(raw.waveform),
+        "array": None if raw.array is None else sarcl_hdf5.fields_of(raw.array),
+        "report": raw.report,
+    }
 
 
 def _words(name: str, value: Any) -> np.ndarray:

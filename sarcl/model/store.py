@@ -1,9 +1,7 @@
-"""sarcl's own HDF5 file: a phase history or an image, every number as it was, to the bit.
+"""Files read as a PhaseHistory or an Image, and files in the making finished as one.
 
-Root attributes: sarcl_file = "phase_history" or "image", format = 1. Fields are datasets and attributes of
-the nouns' own names; a field that is None is left out. Samples and image data lie row after row,
-uncompressed, and are written and read in blocks of rows; a loaded noun keeps the file open and reads what is
-asked for.
+`read` finds out what a file is and loads it. sarcl/io/sarcl_hdf5.py describes and writes sarcl's own HDF5 file; an
+object loaded from one keeps the file open and reads the rows of samples or data that are asked for.
 """
 
 from __future__ import annotations
@@ -11,68 +9,21 @@ from __future__ import annotations
 import os
 from collections.abc import Sequence
 from pathlib import Path
-from typing import TYPE_CHECKING
-
-if TYPE_CHECKING:
-    from ..base.types import PathLike
-    from .image import Image
-    from .phase_history import PhaseHistory
-
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..io import hdf5
-from ..io.partial_hdf5 import Unfinished
-
-FILE_BYTES = 2**17  # of the rest: a waveform, a report, HDF5's own
-ROW_BYTES = 130  # of a row: its geometry, numbers and the name of its polarisation
+from ..io import gotcha, hdf5, sarcl_hdf5
+from .antenna_array import AntennaArray
+from .image import Image, image_fields
+from .image_grid import ImageGrid
+from .phase_history import PER_ROW, PhaseHistory, concatenate, phase_history_fields
+from .waveform import Waveform
 
 if TYPE_CHECKING:
-    from .image import Image
-    from .image_grid import ImageGrid
-    from .phase_history import PhaseHistory
+    from ..base.types import PathLike
 
-
-def save_phase_history(raw: PhaseHistory, path: Any) -> None:
-    """Write a PhaseHistory, its samples in blocks of rows. `path` may be the file its samples are read from.
-
-    ValueError for a NaN or Inf in lazily read samples; FileNotFoundError, PermissionError and the like before
-    anything is written. On any exception `path` is as it was.
-    """
-
-    writer = EchoWriter(path, raw.n_rows, raw.n_samples, raw.samples.dtype)
-    try:
-        for a, b in hdf5.blocks(writer.samples):
-            writer.samples[a:b] = raw.read(a, b)
-        writer.close(raw)
-    finally:
-        writer.abandon()
-
-
-def _put_phase_history(file: Any, raw: PhaseHistory) -> None:
-    """All but the samples."""
-    from .phase_history import PER_ROW
-
-    for name in ("frequency", "frequency_step", "reference_range", "tx", *PER_ROW):
-        hdf5.put(file, name, getattr(raw, name))
-    if raw.rx is not raw.tx:
-        hdf5.put(file, "rx", raw.rx)
-    file.attrs["compressed"] = bool(raw.compressed)
-    for name, noun in (("waveform", raw.waveform), ("array", raw.array)):
-        if noun is not None:
-            group = file.create_group(name)
-            for field in noun.__dataclass_fields__:
-                hdf5.put(group, field, getattr(noun, field))
-    hdf5.put_report(file, raw.report)
-
-
-def save_image(image: Image, path: Any) -> None:
-    """Write an Image, complex or real, in blocks of rows; on any exception `path` is as it was."""
-    with image_writer(path, image.grid, image.data.dtype) as out:
-        for a, b in hdf5.blocks(out.data):
-            out.data[a:b] = np.asarray(image.data[a:b])
-        out.close(**{name: getattr(image, name) for name in ("gain", "frequency", "tx", "rx", "report")})
+READABLE = "sarcl's own HDF5 files (raw.save, image.save) and AFRL Gotcha .mat files (MATLAB 5)"
 
 
 def load(path: Any) -> PhaseHistory | Image:
@@ -105,131 +56,33 @@ def load(path: Any) -> PhaseHistory | Image:
         raise
 
 
-class ImageWriter:
-    """An image file in the making, for images larger than memory. Made by `image_writer`.
+def finish_image(
+    writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, *, gain: float = 1.0, frequency: Any = None, tx: Any = None,
+    rx: Any = None, report: Any = None,
+) -> Image:  # fmt: skip
+    """Complete an image file, move it to its path and return the Image, read from there as it is needed.
 
-    data   of the grid's shape and dtype, read and written in slices like an h5py.Dataset, zero until written; write
-           whole rows where you can
-    finish(...) puts the file in its place; abandon() removes it. As a context manager it abandons what was
-    not finished. With `claim`, one run at a time makes this file, and takes over what a killed one left.
+    ValueError names a field that does not fit; then the file is abandoned.
     """
-
-    def __init__(self, path: Any, grid: ImageGrid, dtype: Any, claim: bool = False) -> None:
-        self.path, self.grid = Path(path), grid
-        self._made = Unfinished(path, "image", grid.size * np.dtype(dtype).itemsize, claim)
-        try:
-            with self._made.writing():
-                group = self._made.file.create_group("grid")
-                for name in grid.__dataclass_fields__:
-                    hdf5.put(group, name, getattr(grid, name))
-            self.data = self._made.dataset("data", tuple(grid.shape), dtype)
-        except BaseException:
-            self.abandon()
-            raise
-
-    def mark(self, job: str) -> None:
-        """Note which job made this file, for `job_of`."""
-        with self._made.writing():
-            self._made.file.attrs["job"] = job
-
-    def finish(
-        self, *, gain: float = 1.0, frequency: Any = None, tx: Any = None, rx: Any = None, report: Any = None
-    ) -> Image:
-        """Complete the file, move it to its path and return the Image, read from there as it is needed."""
-        self.close(gain=gain, frequency=frequency, tx=tx, rx=rx, report=report)
-        image: Any = load(self.path)
-        return image
-
-    def close(self, **fields: Any) -> None:
-        """Complete the file and move it to its path."""
-        from .image import Image
-
-        if not self._made.is_open:
-            raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
-        try:
-            image = Image(self.data, self.grid, **fields)  # checks the fields
-            with self._made.writing():
-                for name in ("gain", "frequency", "tx", "rx"):
-                    hdf5.put(self._made.file, name, getattr(image, name))
-                hdf5.put_report(self._made.file, image.report)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `finish`."""
-        self._made.abandon()
-
-    def __enter__(self) -> ImageWriter:
-        return self
-
-    def __exit__(self, *exc: object) -> None:
-        self.abandon()
-
-
-class EchoWriter:
-    """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `finish` or `abandon`."""
-
-    def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
-        self.path, nbytes = Path(path), n_rows * n_samples * np.dtype(dtype).itemsize
-        self._made = Unfinished(path, "phase_history", nbytes + n_rows * ROW_BYTES)
-        try:
-            self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
-            self._made.reserve(nbytes + n_rows * ROW_BYTES)
-        except BaseException:
-            self.abandon()
-            raise
-
-    def close(self, raw: PhaseHistory) -> None:
-        """Complete the file with all of `raw` but its samples, and move it to its path."""
-        try:
-            array = (
-                0 if raw.array is None else sum(np.size(getattr(raw.array, n)) for n in raw.array.__dataclass_fields__)
-            )
-            self._made.reserve(raw.n_rows * ROW_BYTES + 16 * array + FILE_BYTES)
-            with self._made.writing():
-                _put_phase_history(self._made.file, raw)
-            self._made.commit()
-        except BaseException:
-            self.abandon()
-            raise
-
-    def finish(self, **fields: Any) -> PhaseHistory:
-        """Complete the file with the other fields of a PhaseHistory, and return that, read as it is needed."""
-        from .phase_history import PhaseHistory
-
-        self.close(PhaseHistory(self.samples, **fields))
-        raw: Any = load(self.path)
-        return raw
-
-    def abandon(self) -> None:
-        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
-        self._made.abandon()
-
-
-def image_writer(path: Any, grid: ImageGrid, dtype: Any = np.complex64, claim: bool = False) -> ImageWriter:
-    """Begin an image file of grid.shape and dtype; raises what `paths.check_writable` does, before work."""
-    return ImageWriter(path, grid, dtype, claim)
-
-
-def job_of(path: Any) -> str | None:
-    """The mark of the job that made an image file; None where there is no such file, or no mark in it."""
-    import h5py
-
+    writer.check_open()
     try:
-        with h5py.File(path, "r", locking="best-effort") as file:
-            job = file.attrs.get("job")
-            return job if isinstance(job, str) else None
-    except OSError:
-        return None
+        image = Image(writer.data, grid, gain=gain, frequency=frequency, tx=tx, rx=rx, report=report)
+    except BaseException:
+        writer.abandon()
+        raise
+    writer.close(image_fields(image))
+    made: Any = load(writer.path)
+    return made
+
+
+def finish_phase_history(writer: sarcl_hdf5.EchoWriter, **fields: Any) -> PhaseHistory:
+    """Complete a file of echoes with the other fields of a PhaseHistory, and return that, read as it is needed."""
+    writer.close(phase_history_fields(PhaseHistory(writer.samples, **fields)))
+    made: Any = load(writer.path)
+    return made
 
 
 def _load_phase_history(file: Any) -> PhaseHistory:
-    from .antenna_array import AntennaArray
-    from .phase_history import PER_ROW, PhaseHistory
-    from .waveform import Waveform
-
     waveform = None
     if "waveform" in file:
         waveform = Waveform(**{n: hdf5.get(file["waveform"], n) for n in Waveform.__dataclass_fields__})
@@ -250,9 +103,6 @@ def _load_phase_history(file: Any) -> PhaseHistory:
 
 
 def _load_image(file: Any) -> Image:
-    from .image import Image
-    from .image_grid import ImageGrid
-
     stored = {n: hdf5.get(file["grid"], n) for n in ImageGrid.__dataclass_fields__}
     plane = ("center", "spacing", "x_axis", "y_axis")
     if stored["listed"] is None and any(stored[n] is None for n in plane):
@@ -270,9 +120,6 @@ def _load_image(file: Any) -> Image:
 _LOADERS: dict[str, Any] = {"phase_history": _load_phase_history, "image": _load_image}
 
 
-READABLE = "sarcl's own HDF5 files (raw.save, image.save) and AFRL Gotcha .mat files (MATLAB 5)"
-
-
 def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> PhaseHistory | Image:
     """Read a file, or several as one phase history, rows in the order given.
 
@@ -285,8 +132,6 @@ def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> Pha
     damaged, or does not fit the others.
     """
     if isinstance(path, (list, tuple)):
-        from .phase_history import PhaseHistory, concatenate
-
         if not path:
             raise ValueError("read was given an empty list of files; give at least one (does the pattern match?)")
         parts = [read(p, autofocus=autofocus) for p in path]
@@ -300,9 +145,6 @@ def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> Pha
     kind = _kind(path)
     if kind == "hdf5":
         return load(path)
-    from ..io import gotcha
-    from .phase_history import PhaseHistory
-
     return PhaseHistory(**gotcha.load(path, autofocus))
 
 

@@ -12,7 +12,7 @@ import numpy as np
 from ..arrays.channels import channels_of, is_single, sampling
 from ..base import errors, validation
 from ..base.text import duration, size_text
-from ..model import store
+from ..io import sarcl_hdf5
 from ..model.antenna_array import AntennaArray
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
@@ -103,6 +103,6 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     rows = raw.n_rows // more * len(track)
     n_samples = raw.n_samples if n_samples is None else n_samples
     return EchoForecast(
-        rows, n_samples, rows * (8.0 * n_samples + store.ROW_BYTES), longer + slope * (len(track) - more),
+        rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), longer + slope * (len(track) - more),
         raw.report.contributions_done / more * len(track), dict(raw.report.plan), raw.report.predicted_error,
     )  # fmt: skip

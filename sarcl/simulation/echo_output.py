@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.text import size_text
 from ..base.validation import sealed
+from ..io.sarcl_hdf5 import ROW_BYTES, EchoWriter
 from ..model import store
 from ..model.phase_history import PhaseHistory
 
@@ -22,7 +23,7 @@ class Target:
     """Samples (n_pulses, ..., n_samples), complex64; a row is all but the first axis' last.
 
     out  the file they are written to, or None: memory. Its size is logged before the work.
-    MemoryError says how many bytes they would take; for a file, raises what `files.paths.check_writable` does.
+    MemoryError says how many bytes they would take; for a file, raises what `output_paths.check_writable` does.
     """
 
     def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
@@ -33,8 +34,8 @@ class Target:
         n_rows = shape[0] * self.a_pulse
         nbytes = 8.0 * n_rows * shape[-1]
         text = f"{n_rows} rows of {shape[-1]} samples: {size_text(nbytes)}"
-        log.info("echoes of %d pulses, %s", shape[0], text + f", and {size_text(n_rows * store.ROW_BYTES)} of geometry")
-        geometry, room = float(COPIES * n_rows * store.ROW_BYTES), _memory()
+        log.info("echoes of %d pulses, %s", shape[0], text + f", and {size_text(n_rows * ROW_BYTES)} of geometry")
+        geometry, room = float(COPIES * n_rows * ROW_BYTES), _memory()
         if geometry > room:
             raise MemoryError(
                 f"echoes of {shape[0]} pulses are {n_rows} rows, whose geometry alone takes {size_text(geometry)} of "
@@ -42,7 +43,7 @@ class Target:
                 "carriers are told apart by their frequencies"
             )
         if out is not None:
-            self.writer = store.EchoWriter(out, n_rows, shape[-1])
+            self.writer = EchoWriter(out, n_rows, shape[-1])
             self.pulses = max(1, int(SHARE * budget / (nbytes / shape[0])))
             return
         self.pulses = shape[0]
@@ -80,7 +81,7 @@ class Target:
     def finish(self, **fields: Any) -> PhaseHistory:
         """The PhaseHistory of these samples and the other fields."""
         if self.writer is not None:
-            return self.writer.finish(**fields)
+            return store.finish_phase_history(self.writer, **fields)
         return PhaseHistory(sealed(self.whole.reshape(-1, self.shape[-1])), **fields)
 
     def __enter__(self) -> Target:

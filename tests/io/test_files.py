@@ -11,7 +11,7 @@ import pytest
 from scipy.io import savemat
 
 import sarcl
-from sarcl.io import gotcha, hdf5, output_paths
+from sarcl.io import gotcha, hdf5, output_paths, sarcl_hdf5
 from sarcl.model import store
 from sarcl.model.phase_history import PER_ROW
 
@@ -291,12 +291,16 @@ def test_an_image_is_written_in_blocks_of_rows(tmp_path, monkeypatch):
     assert same(sarcl.read(tmp_path / "a.h5").data, data)
 
 
+def image_writer(path, grid):
+    return sarcl_hdf5.ImageWriter(path, sarcl_hdf5.fields_of(grid))
+
+
 def test_an_image_larger_than_memory_is_written_piece_by_piece(tmp_path):
     path, grid = tmp_path / "a.h5", a_grid()
-    out = store.image_writer(path, grid, np.complex64)
+    out = image_writer(path, grid)
     assert not path.exists()
     out.data[2:4] = 1 + 2j
-    image = out.finish(gain=2.0, frequency=1e9, tx=(1, 2, 3), rx=(1, 2, 3), report=a_report())
+    image = store.finish_image(out, grid, gain=2.0, frequency=1e9, tx=(1, 2, 3), rx=(1, 2, 3), report=a_report())
     assert (image.data[2:4] == 1 + 2j).all() and not image.data[:2].any() and image.gain == 2
     assert isinstance(image.data, h5py.Dataset) and same(image.grid, grid)
     assert leftovers(tmp_path) == [] and path.exists()
@@ -305,30 +309,32 @@ def test_an_image_larger_than_memory_is_written_piece_by_piece(tmp_path):
 
 
 def test_an_abandoned_image_leaves_nothing(tmp_path):
-    out = store.image_writer(tmp_path / "a.h5", a_grid(), np.complex64)
+    out = image_writer(tmp_path / "a.h5", a_grid())
     out.data[0] = 1
     out.abandon()
     out.abandon()
-    with pytest.raises(KeyboardInterrupt), store.image_writer(tmp_path / "a.h5", a_grid(), np.complex64):
+    with pytest.raises(KeyboardInterrupt), image_writer(tmp_path / "a.h5", a_grid()):
         raise KeyboardInterrupt
     assert list(tmp_path.iterdir()) == []
     with pytest.raises(ValueError, match="finished or abandoned already"):
-        out.finish()
+        store.finish_image(out, a_grid())
+    with pytest.raises(ValueError, match="finished or abandoned already"):
+        out.close({"gain": 1.0})
 
 
 def test_an_image_with_a_wrong_field_is_not_finished(tmp_path):
-    out = store.image_writer(tmp_path / "a.h5", a_grid(), np.complex64)
+    out = image_writer(tmp_path / "a.h5", a_grid())
     with pytest.raises(ValueError, match="gain"):
-        out.finish(gain=-1)
+        store.finish_image(out, a_grid(), gain=-1)
     assert list(tmp_path.iterdir()) == []
 
 
 def test_an_image_file_is_refused_before_the_work_when_it_cannot_be_written(tmp_path):
     with pytest.raises(FileNotFoundError, match="missing"):
-        store.image_writer(tmp_path / "missing" / "a.h5", a_grid())
+        image_writer(tmp_path / "missing" / "a.h5", a_grid())
     huge = sarcl.ImageGrid.plane(shape=(10**7, 10**7), spacing=1.0)
     with pytest.raises(OSError, match="GB free"):
-        store.image_writer(tmp_path / "a.h5", huge)
+        image_writer(tmp_path / "a.h5", huge)
     assert list(tmp_path.iterdir()) == []
 
 

@@ -9,6 +9,8 @@ from typing import Any
 import numpy as np
 
 from ...base.text import size_text
+from ...io import sarcl_hdf5
+from ...model import store
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ..tiling import GridTiling, extent, row_shape
@@ -30,9 +32,7 @@ class Target:
                     'take a smaller shape, or out="image.h5" to make it in a file'
                 ) from None
         elif is_path(out):
-            from ...model import store
-
-            self.writer = store.image_writer(out, grid, dtype, claim=True)
+            self.writer = sarcl_hdf5.ImageWriter(out, sarcl_hdf5.fields_of(grid), dtype, claim=True)
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data
         else:
@@ -55,7 +55,7 @@ class Target:
         if self.writer is not None:
             if job is not None:
                 self.writer.mark(job)
-            return self.writer.finish(**fields)
+            return store.finish_image(self.writer, self.grid, **fields)
         return Image(self.data, self.grid, **fields)
 
 

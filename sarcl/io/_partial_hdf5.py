@@ -24,7 +24,8 @@ class Unfinished:
 
     kind     what it will hold, for hdf5.sign and in messages;  n_bytes  it needs, about
     claim    one run at a time makes this file, and takes over what a killed one left
-    A write that fails, on a full disk, raises OSError with what would do. Raises what `paths.check_writable` does.
+    A write that fails, on a full disk, raises OSError with what would do. Raises what
+    `output_paths.check_writable` does.
     """
 
     def __init__(self, path: Any, kind: str, n_bytes: int, claim: bool = False) -> None:

@@ -1,0 +1,144 @@
+"""Writers of sarcl's own HDF5 file: a phase history or an image, every number as it was, to the bit.
+
+Root attributes: sarcl_file = "phase_history" or "image", format = 1. Every field is an attribute (a number or a
+word), a dataset (an array) or a group of these (a grid, a waveform, an array of antennas), named as the field of
+the Python object; a field that is None is left out. Samples and image data lie row after row, uncompressed, and
+are written in blocks of rows. Only plain values come in; sarcl/model/store.py reads the file back as an object.
+"""
+
+from __future__ import annotations
+
+import dataclasses
+import math
+from collections.abc import Mapping
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from . import hdf5
+from ._partial_hdf5 import Unfinished
+
+FILE_BYTES = 2**17  # bytes of all that is no row and no array: a waveform, a report, HDF5's own tables
+ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and the name of its polarisation
+
+
+def fields_of(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass by name, as the writers here take them; arrays are not copied."""
+    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+
+
+def job_of(path: Any) -> str | None:
+    """The mark of the job that made an image file; None where there is no such file, or no mark in it."""
+    import h5py
+
+    try:
+        with h5py.File(path, "r", locking="best-effort") as file:
+            job = file.attrs.get("job")
+            return job if isinstance(job, str) else None
+    except OSError:
+        return None
+
+
+class ImageWriter:
+    """An image file in the making, also for images larger than memory.
+
+    grid   the fields of the ImageGrid by name; the image has the shape grid["shape"]
+    dtype  the type of the pixels
+    claim  True: one run at a time makes this file, and takes over the file that a killed run left
+    data   of the grid's shape and dtype, read and written in slices like an h5py.Dataset, zero until written; write
+           whole rows where you can
+
+    `close` puts the file in its place; `abandon` removes it. As a context manager it abandons what was not closed.
+    Raises what `output_paths.check_writable` does, before anything is written.
+    """
+
+    def __init__(self, path: Any, grid: Mapping[str, Any], dtype: Any = np.complex64, claim: bool = False) -> None:
+        self.path, shape = Path(path), tuple(grid["shape"])
+        self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, claim)
+        try:
+            with self._made.writing():
+                _put_group(self._made.file, "grid", grid)
+            self.data = self._made.dataset("data", shape, dtype)
+        except BaseException:
+            self.abandon()
+            raise
+
+    def mark(self, job: str) -> None:
+        """Note which job made this file, for `job_of`."""
+        with self._made.writing():
+            self._made.file.attrs["job"] = job
+
+    def check_open(self) -> None:
+        """ValueError where the file was finished or abandoned already."""
+        if not self._made.is_open:
+            raise ValueError(f"the image file {str(self.path)!r} was finished or abandoned already")
+
+    def close(self, fields: Mapping[str, Any]) -> None:
+        """Complete the file with all fields of the image but data and grid, and move it to its path."""
+        self.check_open()
+        try:
+            with self._made.writing():
+                _put_fields(self._made.file, fields)
+            self._made.commit()
+        except BaseException:
+            self.abandon()
+            raise
+
+    def abandon(self) -> None:
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
+        self._made.abandon()
+
+    def __enter__(self) -> ImageWriter:
+        return self
+
+    def __exit__(self, *exc: object) -> None:
+        self.abandon()
+
+
+class EchoWriter:
+    """A file of echoes in the making: `samples` (n_rows, n_samples), zero until written; then `close` or `abandon`."""
+
+    def __init__(self, path: Any, n_rows: int, n_samples: int, dtype: Any = np.complex64) -> None:
+        nbytes = n_rows * n_samples * np.dtype(dtype).itemsize
+        self.path, self._row_bytes = Path(path), n_rows * ROW_BYTES
+        self._made = Unfinished(path, "phase_history", nbytes + self._row_bytes)
+        try:
+            self.samples = self._made.dataset("samples", (n_rows, n_samples), dtype)
+            self._made.reserve(nbytes + self._row_bytes)
+        except BaseException:
+            self.abandon()
+            raise
+
+    def close(self, fields: Mapping[str, Any]) -> None:
+        """Complete the file with all fields of the phase history but its samples, and move it to its path."""
+        try:
+            array = sum(np.size(value) for value in (fields["array"] or {}).values())
+            self._made.reserve(self._row_bytes + 16 * array + FILE_BYTES)
+            with self._made.writing():
+                _put_fields(self._made.file, fields)
+            self._made.commit()
+        except BaseException:
+            self.abandon()
+            raise
+
+    def abandon(self) -> None:
+        """Remove the unfinished file; `path` is as it was. Nothing happens after `close`."""
+        self._made.abandon()
+
+
+def _put_fields(file: Any, fields: Mapping[str, Any]) -> None:
+    """Write fields in the order given: a mapping as a group, the report as JSON, any other value as `hdf5.put` does."""
+    for name, value in fields.items():
+        if name == "report":
+            hdf5.put_report(file, value)
+        elif isinstance(value, Mapping):
+            _put_group(file, name, value)
+        else:
+            hdf5.put(file, name, value)
+
+
+def _put_group(file: Any, name: str, fields: Mapping[str, Any]) -> None:
+    group = file.create_group(name)
+    for field, value in fields.items():
+        hdf5.put(group, field, value)
