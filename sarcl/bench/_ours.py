@@ -42,10 +42,10 @@ def describe(device: opencl.Device) -> str:
 
 def _contestant(case: Case, folder: Path, device: opencl.Device, method: str, tolerance: float) -> Contestant:
     def run() -> Reading:
-        import sarcl
+        from ..imaging.backproject import backproject
 
         start, busy = time.perf_counter(), time.process_time()
-        image = sarcl.backproject(
+        image = backproject(
             case.raw, case.grid, tolerance=tolerance, method=cast(Any, method), device=device, check=False
         )  # fmt: skip
         call, busy = time.perf_counter() - start, time.process_time() - busy

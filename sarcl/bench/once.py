@@ -9,8 +9,7 @@ from pathlib import Path
 
 def main(folder: str, options: str) -> None:
     """Read the case in `folder`, open the device, make the image."""
-    import sarcl
-
+    from ..imaging.backproject import backproject
     from ..opencl.device import open_device
     from . import _cases
 
@@ -19,7 +18,7 @@ def main(folder: str, options: str) -> None:
     if not given["fp64"]:
         device = device.without_fp64()
     raw, grid = _cases.load(Path(folder))
-    sarcl.backproject(
+    backproject(
         raw, grid, tolerance=given["tolerance"], method=given["method"], device=device, check=False
     )  # fmt: skip
 

@@ -1,4 +1,7 @@
-"""What the commands of sarcl/cli/parser.py do. Every output path is checked before the work starts."""
+"""What the commands of sarcl/cli/parser.py do, and the table that `sarcl devices` prints.
+
+Every output path is checked before the work starts.
+"""
 
 from __future__ import annotations
 
@@ -18,6 +21,8 @@ if TYPE_CHECKING:
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
+
+HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory", "largest buffer")
 
 
 def run(args: argparse.Namespace, outputs: Outputs) -> int:
@@ -40,15 +45,13 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
 
 def devices(args: argparse.Namespace, job: Job) -> int:
     """Print the table of devices, the one in use marked; 3 where none works."""
-    import sarcl
+    from ..opencl import device as opencl
 
-    from ..opencl.device import open_devices
-
-    found = sarcl.devices()
+    found = opencl.devices()
     works = any(d.works for d in found)
     try:
-        print(device_table(found, [d.info.index for d in open_devices(None)]))
-    except sarcl.NoDeviceError as exc:
+        print(device_table(found, [d.info.index for d in opencl.open_devices(None)]))
+    except opencl.NoDeviceError as exc:
         print(device_table(found, []))
         print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
     return 0 if works else 3
@@ -113,9 +116,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
 
 def focus(args: argparse.Namespace, job: Job) -> int:
     """An image from echoes."""
-    import sarcl
-
     from ..model.phase_history import PhaseHistory
+    from ..model.store import read
     from ..opencl.device import open_devices
     from ..scenario.scenario import load
 
@@ -127,7 +129,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     _check_floor(args.floor_db)
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
-    raw = sarcl.read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
+    raw = read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
     if not isinstance(raw, PhaseHistory):
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
     if args.polarization is not None or args.channel is not None:
@@ -139,10 +141,14 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
     how["beam"] = None if args.beam is None else math.radians(args.beam)
     if args.dry_run:
-        print(sarcl.plan(raw, grid, **how, device=devices))
+        from ..imaging.forecast import plan
+
+        print(plan(raw, grid, **how, device=devices))
         return 0
+    from ..imaging.backproject import backproject
+
     _focus(
-        lambda out: sarcl.backproject(
+        lambda out: backproject(
             raw, grid, **how, out=out, device=devices, progress=job.progress,
             tile=args.tile, resume=args.resume,
         ),
@@ -153,14 +159,15 @@ def focus(args: argparse.Namespace, job: Job) -> int:
 
 def measure(args: argparse.Namespace, job: Job) -> int:
     """The point response near a position, or at the brightest pixel, as a table."""
-    import sarcl
-
     from ..model.image import Image
+    from ..model.store import read
 
-    image = sarcl.read(args.image)
+    image = read(args.image)
     if not isinstance(image, Image):
         raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
-    print(sarcl.measure(image, near=args.near))
+    from ..analysis import point_response
+
+    print(point_response.measure(image, near=args.near))
     return 0
 
 
@@ -305,12 +312,12 @@ def _default_grid(raw: PhaseHistory, job: Job, given: dict[str, Any]) -> ImageGr
 
 
 def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
-    import sarcl
-
     if raw.compressed:
         return raw
+    from ..imaging.compress import compress
+
     job.say("the echoes still have the pulse's spectrum: compressing them first")
-    return sarcl.compress(raw)
+    return compress(raw)
 
 
 def _focus(make: Callable[[str | None], Image | None], outputs: list[str], floor_db: float, job: Job) -> None:
@@ -341,9 +348,6 @@ def _say_report(what: str, report: Report | None, job: Job) -> None:
 
 def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:
     print(f"sarcl: warning: {message}", file=sys.stderr)
-
-
-HEAD = ("", "", "device", "platform", "kind", "works", "fp64", "vector", "memory", "largest buffer")
 
 
 def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:

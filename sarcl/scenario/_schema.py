@@ -42,43 +42,74 @@ _ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
 
 def calls(section: str) -> dict[str, Call]:
     """The calls a section can stand for, by the name of its table; "" is the section's own table."""
-    import sarcl
-
-    from ..scene import shapes
-
+    # each section imports the rooms it needs and no more: the verbs load pyopencl
     if section in ("trajectory", "receiver"):
-        t = sarcl.Trajectory
-        return {"line": t.line, "circle": t.circle, "": t}
+        from ..model.trajectory import Trajectory
+
+        return {"line": Trajectory.line, "circle": Trajectory.circle, "": Trajectory}
     if section == "waveform":
-        w = sarcl.Waveform
-        return {"chirp": w.chirp, "tone": w.tone, "sampled": w.sampled}
+        from ..model.waveform import Waveform
+
+        return {"chirp": Waveform.chirp, "tone": Waveform.tone, "sampled": Waveform.sampled}
     if section == "scene":
-        s = sarcl.Scene
+        from ..scene import shapes
+        from ..scene.scene import Scene
+
         return {
-            "points": s.points,
-            "from_mesh": s.from_mesh,
-            "from_heights": s.from_heights,
-            "from_dem": s.from_dem,
-            "facets": s.facets,
+            "points": Scene.points,
+            "from_mesh": Scene.from_mesh,
+            "from_heights": Scene.from_heights,
+            "from_dem": Scene.from_dem,
+            "facets": Scene.facets,
             **{shape.__name__: shape for shape in shapes.SHAPES},
         }
     if section in ("antenna", "receiver_antenna"):
-        a = sarcl.Antenna
-        return {"isotropic": a.isotropic, "rectangular": a.rectangular, "gaussian": a.gaussian, "table": a.table}
-    if section == "array":
-        array = sarcl.AntennaArray
-        return {"linear": array.linear, "planar": array.planar, "costas": array.costas, "": array}
-    if section in ("pointing", "receiver_pointing"):
-        from ..model import pointing as p
+        from ..model.antenna import Antenna
 
-        return {"spotlight": p.spotlight, "stripmap": p.stripmap, "fixed": p.fixed}
-    if section in ("radar", "noise"):
-        return {"": sarcl.Radar if section == "radar" else sarcl.add_noise}
+        return {
+            "isotropic": Antenna.isotropic,
+            "rectangular": Antenna.rectangular,
+            "gaussian": Antenna.gaussian,
+            "table": Antenna.table,
+        }
+    if section == "array":
+        from ..model.antenna_array import AntennaArray
+
+        return {
+            "linear": AntennaArray.linear,
+            "planar": AntennaArray.planar,
+            "costas": AntennaArray.costas,
+            "": AntennaArray,
+        }
+    if section in ("pointing", "receiver_pointing"):
+        from ..model import pointing
+
+        return {"spotlight": pointing.spotlight, "stripmap": pointing.stripmap, "fixed": pointing.fixed}
+    if section == "radar":
+        from ..model.radar import Radar
+
+        return {"": Radar}
     if section == "materials":
-        return {"": sarcl.Material}
+        from ..scene.material import Material
+
+        return {"": Material}
     if section == "grid":
-        return {"plane": sarcl.ImageGrid.plane, "points": sarcl.ImageGrid.points}
-    return {"": getattr(sarcl, section)}
+        from ..model.image_grid import ImageGrid
+
+        return {"plane": ImageGrid.plane, "points": ImageGrid.points}
+    if section == "noise":
+        from ..effects.noise import add_noise
+
+        return {"": add_noise}
+    if section == "echo":
+        from ..simulation.echo import echo
+
+        return {"": echo}
+    if section == "backproject":
+        from ..imaging.backproject import backproject
+
+        return {"": backproject}
+    raise KeyError(section)
 
 
 SECTIONS = (

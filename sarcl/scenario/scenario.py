@@ -193,22 +193,24 @@ class Scenario:
 
     def simulate(self, **options: Unpack[EchoOptions]) -> PhaseHistory:
         """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
-        import sarcl
+        from ..simulation.echo import echo
 
-        raw = self._echo(sarcl.echo, options)
+        raw = self._echo(echo, options)
         if self.noise is None:
             return raw
+        from ..effects.noise import add_noise
+
         level = self._options("noise", {})
         if "nesz" in level or "nesz_db" in level:
             level.setdefault("grid", None if "cell_area" in level else self.build_grid())
         with self.where.blame(("noise",), level):
-            return sarcl.add_noise(raw, **level)
+            return add_noise(raw, **level)
 
     def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast:
         """What `simulate` with these options will take: rows, bytes, time, error."""
-        import sarcl
+        from ..simulation.echo_forecast import plan_echo
 
-        return self._echo(sarcl.plan_echo, options)
+        return self._echo(plan_echo, options)
 
     def _echo(self, verb: Callable[..., Any], options: Mapping[str, Any]) -> Any:
         self._check_focus()
@@ -222,13 +224,13 @@ class Scenario:
 
     def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectOptions]) -> Image:
         """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
-        import sarcl
+        from ..imaging.backproject import backproject
 
         given = self._options("backproject", options)
         if grid is None:
             grid = self.build_grid()
         with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
-            return sarcl.backproject(raw, grid, **given)
+            return backproject(raw, grid, **given)
 
     def _aimed(self, track: Trajectory, section: str) -> Trajectory:
         table = getattr(self, section)

@@ -298,7 +298,7 @@ def test_a_method_that_cannot_is_absent_in_words(monkeypatch):
     def refuse(*_, **__):
         raise sarcl.ToleranceUnreachable(1e-3, 2e-2, "thinning", how="with sub-apertures")
 
-    monkeypatch.setattr(sarcl, "backproject", refuse)
+    monkeypatch.setattr("sarcl.imaging.backproject.backproject", refuse)
     document = bench.run(**{**SMALL, "methods": ["factorized"]}, with_peers=False)
     (only,) = document["cases"][0]["rows"]
     assert only["absent"].startswith("tolerance 1.0e-03 cannot be met with sub-apertures")

@@ -188,8 +188,8 @@ def no_work(monkeypatch):
     def refuse(*args, **options):
         raise AssertionError("the work began")
 
-    for name in ("echo", "backproject", "compress"):
-        monkeypatch.setattr(sarcl, name, refuse)
+    for verb in ("simulation.echo.echo", "imaging.backproject.backproject", "imaging.compress.compress"):
+        monkeypatch.setattr(f"sarcl.{verb}", refuse)
 
 
 def test_an_output_that_cannot_be_written_is_found_before_the_work(raw_file, here, capsys, no_work):
@@ -259,7 +259,7 @@ def test_tracebacks_are_for_debug_only(here, capsys):
 
 
 def test_what_is_nobodys_fault_is_status_1(monkeypatch, capsys):
-    monkeypatch.setattr(sarcl, "read", lambda *a, **k: 1 / 0)
+    monkeypatch.setattr("sarcl.model.store.read", lambda *a, **k: 1 / 0)
     assert "ZeroDivisionError" in refused(capsys, "measure", "x.h5", status=1)
 
 

@@ -112,7 +112,8 @@ def test_the_keys_are_read_from_the_python_signatures(section):
 def test_the_verbs_get_their_tables_as_arguments_and_the_caller_has_the_last_word(monkeypatch):
     seen = {}
     scenario = loads(TEXT + "tolerance = 1e-4\n")
-    monkeypatch.setattr(sarcl, "backproject", lambda raw, grid, **options: seen.update(options))
+    verb = "sarcl.imaging.backproject.backproject"
+    monkeypatch.setattr(verb, lambda raw, grid, **options: seen.update(options))
     scenario.focus(None, tolerance=1e-2)
     assert seen == {"window": ("taylor", 35, 5), "tolerance": 1e-2}
 
