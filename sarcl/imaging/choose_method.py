@@ -15,8 +15,8 @@ from ..numerics import plan as numerics_plan
 from ..numerics.plan import LEAST_TOLERANCE
 from ..opencl.device import Device
 from . import profile_energy
+from .direct import direct as direct_method
 from .direct import tile_kernels
-from .direct.direct import Direct, make_plan
 from .factorized import plan as factorized_plan
 from .factorized.factorized import Factorized
 from .float64 import direct as float64_direct
@@ -109,10 +109,10 @@ class _Float32:
         """Every pair of row and pixel. ToleranceUnreachable names the best in complex64."""
         self._must_round_less("in complex64", self._best())
         try:
-            made = make_plan(self.task, self.inner, lanes)
+            made = direct_method.make_plan(self.task, self.inner, lanes)
         except ToleranceUnreachable as refused:
             raise refused.restated(self.tolerance, self._best()) from None
-        return self._offer("direct", made, Direct)
+        return self._offer("direct", made, direct_method.Direct)
 
     def factorized(self, lanes: bool) -> Choice:
         """With sub-apertures. ToleranceUnreachable says why not, but names no best."""
