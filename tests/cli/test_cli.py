@@ -11,27 +11,12 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
+from helpers.scenario_cases import SCENARIO
 
 import sarcl
 from sarcl.cli import parser
 from sarcl.cli._commands import device_table
 
-SCENARIO = """\
-[waveform.chirp]
-center = 9.6e9
-bandwidth = 300e6
-duration = 1e-6
-
-[trajectory.circle]
-radius = 7e3
-height = 5e3
-arc = 0.03
-n_pulses = 48
-
-[[scene.points]]
-positions = [[0, 0, 0], [3, 2, 0]]
-amplitudes = [1, 0.1]
-"""
 GRID = """
 [grid.plane]
 shape = [64, 64]

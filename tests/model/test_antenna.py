@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.antenna_cases import FC, everyone, measured
 
 import sarcl
 from sarcl import pointing
@@ -11,7 +12,6 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.model.antenna import Antenna, pair_of
 from sarcl.model.antenna_pattern import two_way_gain
 
-FC = 9.6e9
 WAVE = SPEED_OF_LIGHT / FC
 TRACK = sarcl.Trajectory.line(start=(-4e3, -50, 3e3), velocity=(0, 100, 0), prf=10, n_pulses=11)
 
@@ -20,28 +20,6 @@ def toward(azimuth, elevation):
     """Directions (..., 3) at azimuth and elevation, rad."""
     a, e = np.broadcast_arrays(azimuth, elevation)
     return np.stack([np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)], axis=-1)
-
-
-def measured(step_deg=0.5, reach_deg=12.0, **options):
-    """A smooth complex pattern as a table, and the function it samples."""
-    axis = np.deg2rad(np.arange(-reach_deg, reach_deg + 1e-9, step_deg))
-
-    def shape(a, e):
-        return np.exp(-((a / 0.08) ** 2) - (e / 0.1) ** 2 + 3j * a * e / 0.01 + 2j * e)
-
-    return Antenna.table(axis, axis, shape(axis[:, None], axis), **options), shape
-
-
-def everyone():
-    return {
-        "isotropic": Antenna.isotropic(),
-        "aperture": Antenna.rectangular(size=(0.4, 0.2)),
-        "tapered": Antenna.rectangular(size=(0.4, 0.2), taper=(0.08, 0.3)),
-        "gaussian": Antenna.gaussian(width=(0.05, 0.12)),
-        "wide gaussian": Antenna.gaussian(width=1.2, frequency=FC / 1.1),
-        "table": measured()[0],
-        "table that shrinks": measured(frequency=FC * 1.1)[0],
-    }
 
 
 def test_an_evenly_lit_aperture_is_a_sinc_in_both_axes():

@@ -4,11 +4,11 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.kernel_probe import probe
 
 from sarcl.base import float_pairs
 from sarcl.numerics import interpolation
 from sarcl.numerics.pulse_geometry import Antennas
-from sarcl.opencl import device as opencl
 from sarcl.reference.geometry import half_path
 from sarcl.reference.interp import interpolate
 
@@ -20,33 +20,6 @@ WIDE = {
     "div": ("w_div(a, b)", lambda a, b: a / b, 12 * 2.0**-48),
     "sqrt": ("w_sqrt(a)", lambda a, b: np.sqrt(a), 5 * 2.0**-48),
 }
-
-
-def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doubleword.clh"), **macros):
-    """Run `body` on VW lanes of every input at once; returns (n_out, n) float32."""
-    lanes = device.info.vector_width
-    n = -(-inputs.shape[1] // lanes) * lanes
-    padded = np.ones((len(inputs), n), np.float32)
-    padded[:, : inputs.shape[1]] = inputs
-    text = "".join(f'#include "{h}"\n' for h in headers) + (
-        "__kernel void probe(__global const float *x, __global const float *table, int n, __global float *out) {\n"
-        f"    int i = get_global_id(0);\n    {body}\n}}\n"
-    )
-    expanded = opencl.source.__wrapped__
-
-    def source(file):
-        if file != "probe.cl":
-            return expanded(file)
-        return "\n".join(expanded(line.split('"')[1]) if "#include" in line else line for line in text.split("\n"))
-
-    monkeypatch.setattr(opencl, "source", source)
-    table = macros.pop("table", None)
-    built = device._build("probe.cl", {"VW": lanes, "FP64": int(device.info.fp64), **macros})["probe"]
-    buffer = device.upload(padded)
-    weights = device.upload(np.zeros(1, np.float32) if table is None else table)
-    out = device.zeros(4 * n_out * n)
-    device.run(built, (n // lanes,), None, buffer, weights, n, out)
-    return device.download(out, np.empty((n_out, n), np.float32))[:, : inputs.shape[1]]
 
 
 def pairs(random, n):

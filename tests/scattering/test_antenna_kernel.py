@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from model.test_antenna import FC, everyone, measured
-from numerics.test_kernels import probe
+from helpers.antenna_cases import FC, everyone, measured
+from helpers.kernel_probe import probe
 from scipy.spatial.transform import Rotation
 
 from sarcl.model.antenna import Antenna

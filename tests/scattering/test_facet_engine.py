@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_facet import plate
+from helpers.facet_cases import WET, plate, seen_from, still
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
@@ -19,18 +19,7 @@ from sarcl.scene.triangles import centroids, normals
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=1e-6)
 NAMES = ("HH", "HV", "VH", "VV")
-WET = Material(eps_r=6.0, conductivity=0.5)
 ROUGH = Material(eps_r=6.0, height=np.inf, diagram="cos")
-
-
-def seen_from(distance, elevation, azimuth=0.0):
-    """A viewpoint so many rad off the vertical, m (3,)."""
-    side = np.sin(elevation) * np.array([np.cos(azimuth), np.sin(azimuth), 0])
-    return distance * (side + np.array([0, 0, np.cos(elevation)]))
-
-
-def still(*places):
-    return sarcl.Trajectory(np.arange(len(places)) / 100.0, np.array(places))
 
 
 def oracle(raw, scene, rows=None, n=5):

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from numerics.test_kernels import probe
-from test_facet import adversarial_phases, facing, random_units
+from helpers.facet_cases import adversarial_phases, facing, random_units
+from helpers.kernel_probe import probe
 
 from sarcl.base import float_pairs
 from sarcl.base.constants import SPEED_OF_LIGHT

@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.facet_cases import WET, seen_from, still
 from scipy import stats
-from test_facet_engine import WET, seen_from, still
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from test_array_echo import EACH, F0, SCENE, STEP, TONE, error, line, passing
+from helpers.array_cases import EACH, F0, SCENE, STEP, TONE, error, line, passing
 
 import sarcl
 from sarcl import shapes

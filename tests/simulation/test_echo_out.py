@@ -8,7 +8,8 @@ import sys
 
 import numpy as np
 import pytest
-from test_array_echo import F0, SCENE, TONE, WINDOW, line, passing
+from helpers.array_cases import F0, SCENE, TONE, WINDOW, line, passing
+from helpers.scenario_cases import SCENARIO
 
 import sarcl
 from sarcl import shapes
@@ -182,8 +183,6 @@ def test_a_forecast_refuses_what_echo_would():
 
 
 def test_dry_run_says_what_simulating_takes_and_writes_nothing(tmp_path, monkeypatch, capsys):
-    from cli.test_cli import SCENARIO
-
     monkeypatch.chdir(tmp_path)
     (tmp_path / "s.toml").write_text(SCENARIO)
     assert parser.main(["simulate", "s.toml", "--dry-run"]) == 0
@@ -194,7 +193,7 @@ def test_dry_run_says_what_simulating_takes_and_writes_nothing(tmp_path, monkeyp
 
 MEASURE = """
 import resource, sys, numpy as np, sarcl
-from test_array_echo import line, passing
+from helpers.array_cases import line, passing
 scene = sarcl.Scene.points([[0.0, 0, 0], [0.2, 0.4, 0]])
 tone = sarcl.Waveform.tone(center=10e9, duration=5e-7)
 def run(n, pulses, **options):

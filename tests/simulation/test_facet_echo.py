@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from scattering.test_facet import CONDUCTOR, UP, far_amplitude, plate, quarters
+from helpers.facet_cases import CONDUCTOR, UP, far_amplitude, plate, quarters
 from scipy.special import fresnel as fresnel_integrals
 
 from sarcl.base.constants import SPEED_OF_LIGHT
