@@ -23,7 +23,7 @@ import json, sys
 import numpy as np
 from pathlib import Path
 from sarcl.bench import backproject as bench
-from sarcl.bench import cases, exact
+from sarcl.bench import _cases, _exact
 folder = None
 def answer(content):
     print(json.dumps(content), flush=True)
@@ -42,9 +42,9 @@ for line in sys.stdin:
     if options.get("upsample") == 16:
         answer({"error": "ValueError: 16 is too much"})
         continue
-    raw, grid = cases.load(folder)
+    raw, grid = _cases.load(folder)
     at = json.loads((folder / "case.json").read_text())["at"]
-    values = exact.backproject(raw, grid.at(*np.array(at)))[0] * 1.01
+    values = _exact.backproject(raw, grid.at(*np.array(at)))[0] * 1.01
     answer({"seconds": {"setup": 0.25, "form": 0.5, "cpu": 0.9}, "values": [[v.real, v.imag] for v in values]})
 """
 

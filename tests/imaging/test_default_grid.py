@@ -4,6 +4,7 @@ import numpy as np
 import pytest
 
 import sarcl
+from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.default_grid import default_grid
 
 
@@ -34,15 +35,15 @@ def test_the_default_grid_lies_where_the_reference_ranges_meet(track, point, cen
 def test_the_default_pixels_are_half_the_resolution_on_the_ground():
     grid = default_grid(seen(ARC, (0, 0, 0))).grid
     grazing = np.arctan2(5, 7)
-    across = 0.886 * sarcl.check.SPEED_OF_LIGHT / 9.6e9 / (2 * 0.06 * np.cos(grazing))
-    along = 0.886 * sarcl.check.SPEED_OF_LIGHT / (2 * 300e6 * np.cos(grazing))
+    across = 0.886 * SPEED_OF_LIGHT / 9.6e9 / (2 * 0.06 * np.cos(grazing))
+    along = 0.886 * SPEED_OF_LIGHT / (2 * 300e6 * np.cos(grazing))
     assert grid.spacing[0] == pytest.approx(across / 2, rel=0.05)
     assert grid.spacing[1] == pytest.approx(along / 2, rel=0.05)
 
 
 def test_the_default_size_is_what_is_unambiguous_but_1024_pixels_at_most():
     few, many = (default_grid(seen(ARC, (0, 0, 0), n_samples=n)).grid for n in (64, 20_000))
-    swath = sarcl.check.SPEED_OF_LIGHT / (2 * 300e6 / 64) / np.cos(np.arctan2(5, 7))
+    swath = SPEED_OF_LIGHT / (2 * 300e6 / 64) / np.cos(np.arctan2(5, 7))
     assert few.shape[1] * few.spacing[1] == pytest.approx(swath, rel=0.02)
     assert max(many.shape) == 1024
 

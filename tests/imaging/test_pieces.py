@@ -12,6 +12,7 @@ import subprocess
 import sys
 import time
 from dataclasses import dataclass, fields, replace
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -302,8 +303,8 @@ sys.path.insert(0, {tests!r})
 import os, signal, random
 from helpers.cases import noise_history
 import sarcl
-from sarcl import keeper
-keeper.PERIOD = 0.0
+from sarcl.imaging.run import checkpoint
+checkpoint.PERIOD = 0.0
 left = {calls}
 def deadly(call):
     def wrapped(*args, **options):
@@ -324,7 +325,7 @@ sarcl.backproject(raw, grid, out={path!r}, max_bytes=1e6)
 
 def deadly_run(path, calls, before):
     """Focus in a process that kills itself at its `calls`-th change of a file: its exit status."""
-    code = SCRIPT.format(tests=os.path.dirname(__file__), calls=calls, before=before, path=str(path))
+    code = SCRIPT.format(tests=str(Path(__file__).parents[1]), calls=calls, before=before, path=str(path))
     return subprocess.run([sys.executable, "-c", code], timeout=120, capture_output=True).returncode
 
 

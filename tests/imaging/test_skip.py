@@ -17,6 +17,7 @@ from sarcl.imaging.factorized._tile_tree import tree_of
 from sarcl.imaging.focusing_task import SKIPS, by_reason, make_task, tally
 from sarcl.imaging.tiling import GridTiling
 from sarcl.model.image_grid import ImageGrid
+from sarcl.opencl.device import open_device
 from sarcl.reference.backproject import backproject as exact
 
 PLANE = ImageGrid.plane(shape=(90, 110), spacing=0.5)
@@ -93,7 +94,7 @@ def test_a_spotlight_is_aimed_at_the_grids_centre(device):
 def test_both_kernels_see_the_same_beam_and_window(lanes, tolerance, bistatic):
     raw = noise_history(n_rows=33, n_samples=32, bistatic=bistatic)  # a swath of +-4 m
     beam = spread(10e3, 14.0), aimed(raw, (0, 2, 0), sweep=20.0)
-    device = sarcl.cl.open_device()
+    device = open_device()
     counts, images = {}, {}
     for skip in (True, False, {"beam"}, {"range window"}):
         task = make_task(raw, PLANE, None, None, False, skip, beam)
@@ -174,7 +175,7 @@ BROADSIDE = (0.7, 0.0, -0.714)
 
 def looked_at(chosen, task):
     """How the factorised method sees a whole task."""
-    engine = chosen.on(sarcl.cl.open_device(), task)
+    engine = chosen.on(open_device(), task)
     last = chosen.tiling.n_bands
     return engine._look(tree_of(chosen.tiling, 0, last, chosen.plan.factors), 0, last)
 
@@ -329,7 +330,7 @@ def test_bands_without_any_data(monkeypatch):
     raw = noise_history(n_rows=10)
     positions = np.random.default_rng(2).uniform(-3, 3, (500, 3))
     positions[:150] = positions[200:330] = np.nan
-    for device in (sarcl.cl.open_device(), sarcl.cl.open_device().without_fp64()):
+    for device in (open_device(), open_device().without_fp64()):
         image = sarcl.backproject(raw, ImageGrid.points(positions), tolerance=1e-4, max_bytes=1e6, device=device)
         assert near(image, raw) <= 1e-4
         assert (image.data == 0).tolist() == np.isnan(positions[:, 0]).tolist()
@@ -390,7 +391,7 @@ def test_bad_cells_say_what_was_wanted(name):
 
 
 def test_tolerances_below_complex64_know_beams_and_empty_cells():
-    device = next((d for d in map(sarcl.cl.open_device, range(len(sarcl.devices()))) if d.info.fp64), None)
+    device = next((d for d in map(open_device, range(len(sarcl.devices()))) if d.info.fp64), None)
     if device is None:
         pytest.skip("no float64")
     raw = noise_history(n_rows=12, n_samples=32)

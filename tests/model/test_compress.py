@@ -9,6 +9,7 @@ import numpy as np
 import pytest
 
 import sarcl
+from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.reference.echo import echo as exact_echo
 
 TOLERANCE = {
@@ -64,7 +65,7 @@ def test_compressing_gives_the_compressed_echo_of_the_same_frequencies(device, n
 def test_compressing_equals_echoing_compressed_where_their_frequencies_are_equal(name):
     # the uncompressed window is longer by the pulse: a window as much wider has the same frequencies
     wave, half = WAVES[name], 12.0
-    longer = half + sarcl.check.SPEED_OF_LIGHT * wave.duration / 4
+    longer = half + SPEED_OF_LIGHT * wave.duration / 4
     options = {"tolerance": TOLERANCE["echo"]}
     later = sarcl.echo(SCENE, wave, TRACK, compressed=False, range_window=(-half, half), **options)
     at_once = sarcl.echo(SCENE, wave, TRACK, range_window=(-longer, longer), **options)

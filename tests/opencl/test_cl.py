@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import subprocess
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
@@ -55,7 +56,10 @@ def test_a_name_that_matches_nothing_lists_what_there_is():
 
 
 def test_without_any_platform_the_remedy_is_named(tmp_path):
-    code = "import sarcl\nprint(sarcl.devices())\nsarcl.backproject.__module__\nfrom sarcl import cl\ncl.open_device()"
+    code = (
+        "import sarcl\nprint(sarcl.devices())\nsarcl.backproject.__module__\n"
+        "from sarcl.opencl.device import open_device\nopen_device()"
+    )
     run = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
     if "()" not in run.stdout:
         pytest.skip("this loader does not heed OCL_ICD_VENDORS")
@@ -78,8 +82,6 @@ def test_verbs_stay_verbs_after_their_modules_are_imported():
 
 
 def test_only_the_room_opencl_imports_pyopencl():
-    from pathlib import Path
-
     package = Path(sarcl.__file__).parent
     guilty = [p for p in package.rglob("*.py") if "import pyopencl" in p.read_text() and p.parent.name != "opencl"]
     assert guilty == []
@@ -128,10 +130,10 @@ def test_threads_follow_the_environment(monkeypatch):
 
 def test_one_thread_gives_the_same_image_as_all(tmp_path):
     code = (
-        "import sys; sys.path.insert(0, 'tests')\n"
-        "from cases import noise_history\nimport sarcl, numpy as np\nfrom sarcl import cl\n"
+        f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
+        "from helpers.cases import noise_history\nimport sarcl\nfrom sarcl.opencl.device import open_device\n"
         "image = sarcl.backproject(noise_history(), sarcl.ImageGrid.plane(shape=40, spacing=.2), device='cpu')\n"
-        "print(cl.open_device('cpu').queue.device.max_compute_units, complex(image.data.sum()))"
+        "print(open_device('cpu').queue.device.max_compute_units, complex(image.data.sum()))"
     )
     if not any(d.works and d.kind == "cpu" for d in sarcl.devices()):
         pytest.skip("no CPU device")

@@ -215,8 +215,7 @@ def test_450_senders_and_450_receivers_stream_within_their_limit(tmp_path):
     import os
     from pathlib import Path
 
-    here = str(Path(__file__).parent)
-    path = os.pathsep.join([here, str(Path(here).parent), os.environ.get("PYTHONPATH", "")])
+    path = os.pathsep.join([str(Path(__file__).parents[1]), os.environ.get("PYTHONPATH", "")])
     found = subprocess.run(
         [sys.executable, "-W", "ignore", str(script), str(tmp_path / "a.h5")], capture_output=True, text=True,
         env={**os.environ, "PYTHONPATH": path}, check=True,
