@@ -1,0 +1,79 @@
+"""The public names: one list, each reachable after a bare import, and nothing else shown."""
+
+from __future__ import annotations
+
+import ast
+import subprocess
+import sys
+from pathlib import Path
+
+import pytest
+
+import sarcl
+
+PACKAGE = Path(sarcl.__file__).parent
+MODULES = (
+    "array_factor", "fda", "illumination", "material", "motion", "noise", "papers", "pointing", "progress", "radar",
+    "scenario", "shapes", "stop_and_go", "wgs84",
+)  # fmt: skip
+
+
+def run(code: str) -> str:
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr
+    return done.stdout.strip()
+
+
+@pytest.mark.parametrize("name", sarcl.__all__)
+def test_every_public_name_is_there_and_is_what_it_is_called(name):
+    value = getattr(sarcl, name)
+    assert value is getattr(sarcl, name)
+    if name not in MODULES:
+        assert value.__name__ == name and value.__module__.startswith("sarcl.")
+
+
+def test_public_modules_are_there_after_a_bare_import():
+    code = f"import sarcl; print([type(getattr(sarcl, n)).__name__ for n in {MODULES!r}])"
+    assert run(code) == str(["module"] * len(MODULES))
+    assert run("import sarcl; print(sarcl.shapes.sphere.__name__, sarcl.fda.run.__name__)") == "sphere run"
+
+
+def test_dir_shows_the_public_names_and_nothing_else():
+    assert dir(sarcl) == sorted([*sarcl.__all__, "__version__"])
+    # rooms that were imported on the way are no public names
+    assert (
+        run("import sarcl; sarcl.Scene, sarcl.echo; print('imaging' in dir(sarcl), 'Path' in dir(sarcl))")
+        == "False False"
+    )
+
+
+def test_all_of_the_contract_is_there():
+    wanted = (
+        "Waveform Trajectory Scene Material Antenna AntennaArray Radar PhaseHistory ImageGrid Image Report Scenario "
+        "echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices "
+        "plan plan_echo Forecast EchoForecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
+        "ToleranceMissed ToleranceUnreachable"
+    ).split()
+    assert set(sarcl.__all__) == {*wanted, *MODULES}
+
+
+def test_a_star_import_brings_them_all():
+    assert run("from sarcl import *; print(Scene.__name__, shapes.__name__)") == "Scene sarcl.scene.shapes"
+
+
+def test_a_name_that_is_not_there_is_told_with_where_to_look():
+    with pytest.raises(AttributeError, match=r"no attribute 'backprojekt'; dir\(sarcl\) lists the public names"):
+        _ = sarcl.backprojekt
+    assert not hasattr(sarcl, "cl")
+
+
+def test_an_import_brings_nothing_that_takes_time():
+    heavy = "numpy scipy pyopencl reikna trimesh h5py PIL".split()
+    assert run(f"import sys, sarcl; print([m for m in {heavy!r} if m in sys.modules])") == "[]"
+
+
+def test_names_are_written_once():
+    code = (PACKAGE / "__init__.py").read_text()
+    names = {n for n in sarcl.__all__ if n[0].isupper()}
+    constants = {n.value for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
+    assert not names & constants
