@@ -18,8 +18,8 @@ docs/developers/architecture.md.
 """
 
 import ast
+import pkgutil
 from importlib import import_module
-from pathlib import Path
 from typing import Any
 
 from .base.version import __version__ as __version__
@@ -27,7 +27,7 @@ from .base.version import __version__ as __version__
 
 def _public_names() -> dict[str, tuple[str, str]]:
     """Public name -> (module, name in it), as __init__.pyi lists them."""
-    stub = ast.parse(Path(__file__).with_name("__init__.pyi").read_text(encoding="utf-8"))
+    stub = ast.parse(pkgutil.get_data(__name__, "__init__.pyi") or b"")
     return {
         alias.asname or alias.name: (f".{node.module or ''}", alias.name)
         for node in stub.body if isinstance(node, ast.ImportFrom)
