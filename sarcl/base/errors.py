@@ -46,12 +46,12 @@ class ToleranceUnreachable(ValueError):
     asked   the tolerance that was asked for: that of the user, where a verb raises this
     best    the smallest tolerance known to be met, rounded up: it can be asked for as it is; None: none is known
     limit   the term that limits the error, such as "float32 range profiles"
-    remedy  what else to do, or ""
+    remedy  what to do: pass the best tolerance, where nothing else is known to help
     how     what cannot meet the tolerance, in words, such as "in complex64"; default: the limit
     """
 
     def __init__(self, asked: float, best: float | None, limit: str, remedy: str = "", how: str = "") -> None:
-        self.asked, self.limit, self.remedy, self.how = float(asked), limit, remedy, how
+        self.asked, self.limit, self.how, self._remedy = float(asked), limit, how, remedy
         self.best = None if best is None else float(best)
         text = f"tolerance {tolerance_text(self.asked)} cannot be met {how or f'here: the limit is {limit}'}"
         if self.best is not None:
@@ -61,15 +61,21 @@ class ToleranceUnreachable(ValueError):
         super().__init__(text)
         self.where = ""
 
+    @property
+    def remedy(self) -> str:
+        if self._remedy or self.best is None:
+            return self._remedy
+        return f"pass tolerance={tolerance_text(self.best)} or larger"
+
     def __reduce__(self) -> Any:
-        return type(self), (self.asked, self.best, self.limit, self.remedy, self.how), {"where": self.where}
+        return type(self), (self.asked, self.best, self.limit, self._remedy, self.how), {"where": self.where}
 
     def __str__(self) -> str:
         return " ".join(part for part in (self.where, super().__str__()) if part)
 
     def restated(self, asked: float, best: float | None, remedy: str | None = None) -> ToleranceUnreachable:
         """The same refusal for the tolerance `asked`, of which self.asked was a share."""
-        return ToleranceUnreachable(asked, best, self.limit, self.remedy if remedy is None else remedy, self.how)
+        return ToleranceUnreachable(asked, best, self.limit, self._remedy if remedy is None else remedy, self.how)
 
     def placed(self, where: str) -> ToleranceUnreachable:
         """The same refusal, its message after `where`: the file and line that asked for the tolerance."""

@@ -115,7 +115,7 @@ class Work:
         try:
             return plan(order.tolerance)
         except ToleranceUnreachable as refused:
-            scale, remedy = order.tolerance / refused.asked, refused.remedy
+            scale, remedy = order.tolerance / refused.asked, None
             above = order.tolerance if refused.best is None else max(refused.best * scale, order.tolerance)
             if order.max_edge is None and _meets(lambda: plan(order.tolerance, "auto")):
                 remedy = "let echo cut them (max_edge='auto')"

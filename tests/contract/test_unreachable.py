@@ -109,6 +109,9 @@ def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name, monkeypa
     assert asked < refused.best < 1
     written = {float(number) for number in re.findall(r"\d(?:\.\d+)?e-\d+", str(refused))}
     assert written == {asked, refused.best}
+    assert (
+        refused.remedy in str(refused) or refused.remedy == f"pass tolerance={tolerance_text(refused.best)} or larger"
+    )
     made = make(refused.best)
     report = getattr(made, "report", None)
     assert report is None or report.predicted_error <= refused.best
@@ -119,6 +122,8 @@ def test_the_message_names_what_is_asked_the_best_and_a_remedy():
     assert str(refused) == (
         "tolerance 1.25e-03 cannot be met with sub-apertures; the best here is 2.0e-02: method='direct' can"
     )
+    assert ToleranceUnreachable(1e-3, 2e-2, "thinning").remedy == "pass tolerance=2.0e-02 or larger"
+    assert ToleranceUnreachable(1e-3, 2e-2, "thinning").restated(1e-2, 0.2).remedy == "pass tolerance=2.0e-01 or larger"
     assert str(ToleranceUnreachable(1e-3, None, "thinning")) == (
         "tolerance 1.0e-03 cannot be met here: the limit is thinning"
     )
@@ -170,7 +175,7 @@ def test_why_no_sub_apertures_are_tried_is_true():
 def test_a_remedy_is_named_only_where_it_works(monkeypatch):
     with pytest.raises(ToleranceUnreachable) as caught:
         sarcl.backproject(SMOOTH, PLANE, tolerance=1e-20, method="factorized")
-    assert caught.value.remedy == ""
+    assert caught.value.remedy == f"pass tolerance={tolerance_text(caught.value.best)} or larger"
     make, asked, _ = REFUSED["facets uncut"]
     with pytest.raises(ToleranceUnreachable, match="let echo cut them") as caught:
         make(asked)
@@ -218,7 +223,7 @@ def test_a_scenario_hands_on_the_image_that_missed_its_tolerance(monkeypatch):
     def missed(raw, grid, *, tolerance):
         raise sarcl.ToleranceMissed(1e-3, 2e-3, "the image")
 
-    monkeypatch.setattr(sarcl, "backproject", missed)
+    monkeypatch.setattr("sarcl.imaging.backproject.backproject", missed)
     scenario = loads(SCENARIO, name="f.toml")
     with pytest.raises(sarcl.ToleranceMissed, match=r"^tolerance 1\.0e-03 was missed") as caught:
         scenario.focus(RAW, PLANE)
