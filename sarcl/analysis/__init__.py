@@ -1,4 +1,4 @@
-"""measure(): what an image shows.
+"""measure(): the response of a point in an image.
 
 For other folders:
 
@@ -6,8 +6,8 @@ For other folders:
 
 For this folder alone:
 
-    _image_interpolator   a complex image between its pixels
-    _peaks                the brightest pixel, or the peak near a position
+    _image_interpolator   values of a complex image between its pixels
+    _peaks                search for the brightest pixel, or for the peak near a position
 """
 
 __all__ = ["point_response"]

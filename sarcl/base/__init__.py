@@ -1,11 +1,11 @@
-"""What every room may use and that knows no radar.
+"""Tools for every room that know nothing of radar.
 
 For other folders:
 
     boxes         bounding boxes of points and their corners
     constants     the speed of light
     counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
-    errors        warnings and errors of the library, and the line of user code that a warning points to
+    errors        warnings and errors of the library; a warning points to the user's line that called it
     float_pairs   float64 as pairs of float32, for kernels on devices without float64
     morton        Morton order: neighbours in space become neighbours in memory
     progress      progress bar for verbs: echo(..., progress=Bar())

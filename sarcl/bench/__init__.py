@@ -14,10 +14,10 @@ For this folder alone:
 
     _baseline       backprojection written in NumPy
     _cases          data of the benchmark
-    _contestant     what takes part in a benchmark
+    _contestant     a program that takes part, and a run of it
     _exact          the exact sum at some pixels
-    _figures        rates, and ratios at equal or smaller error
-    _measure        contestants take turns
+    _figures        rates, ratios at equal or smaller error, cost against size
+    _measure        runs and times the contestants, which take turns
     _ours           sarcl as a contestant
     _peers          libraries in another environment, over a pipe
     _quiet          waits until other programs leave the processors alone

@@ -48,7 +48,7 @@ def run(
 ) -> Document:
     """Measure and return everything that was found, ready for JSON.
 
-    scenes, data   see `cases.make`; sizes: pulses = samples = pixels a side, at least 8
+    scenes, data   see `_cases.make`; sizes: pulses = samples = pixels a side, at least 8
     devices        as `sarcl.devices` names them; None: every one that works; no_fp64: each once more without float64
     methods        "direct", "factorized", "auto"
     peer_python    an interpreter that has fastsar, default this one; peer_backend: which of its backends

@@ -1,4 +1,4 @@
-"""What the commands of sarcl/cli/parser.py do, and the table that `sarcl devices` prints.
+"""The commands that sarcl/cli/parser.py reads, one function each, and the table that `sarcl devices` prints.
 
 Every output path is checked before the work starts.
 """

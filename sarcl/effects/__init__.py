@@ -1,4 +1,4 @@
-"""What real recordings have and ideal echoes lack.
+"""Noise and motion, which ideal echoes lack.
 
 For other folders:
 

@@ -6,15 +6,15 @@ For other folders:
     choose_method    the cheapest method that meets the tolerance
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
-    focusing_task    what is to be focused: rows, weights, geometry
+    focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
-    tiling           the tiles of a grid, in bands
+    tiling           a grid in tiles, the tiles in bands
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
     polar_format/    polar_format(): plane wavefronts and one two-dimensional FFT
-    run/             devices at work, checkpoints, files
+    run/             the work in blocks: devices, checkpoints, output files
 """
 
 __all__ = [

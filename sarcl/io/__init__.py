@@ -1,4 +1,4 @@
-"""File formats: plain arrays in, plain arrays out. Nouns are built from them in sarcl/model/store.py.
+"""File formats: plain arrays in, plain arrays out. sarcl/model/store.py makes objects of them.
 
 For other folders:
 

@@ -11,7 +11,7 @@ For other folders:
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
     radar             Radar: the radar equation as named factors
-    store             read(): the fields of files as nouns; a file in the making finished as a noun
+    store             read(): files as PhaseHistory or Image; output files completed and opened as such
     trajectory        Trajectory: position of the antenna at each pulse
     waveform          Waveform: spectrum of the pulse and of its matched filter
 

@@ -1,4 +1,4 @@
-"""Short interpolation kernels for range profiles in float32: their weights, transforms and largest errors.
+"""Short interpolation kernels for range profiles in float32: weights, transforms, largest errors, cheapest choice.
 
 docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py measures them.
 """

@@ -85,7 +85,7 @@ def cheapest(
     tiles        choices of (points a tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
     chunk        rows or points summed in float32; least_tolerance: below it none is offered
-    carrier      Hz, that no image of the kernel may lie on (accuracy.off_carrier); 0: any may
+    carrier      Hz, that no image of the kernel may lie on (interpolation.off_carrier); 0: any may
     ToleranceUnreachable names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
@@ -117,7 +117,7 @@ def cheapest(
 
 
 def carrier_steps(carrier: float, n_samples: int, bandwidth: float) -> float:
-    """A carrier, Hz, in steps between the n_samples of a band, Hz: as accuracy.off_carrier takes it."""
+    """A carrier, Hz, in steps between the n_samples of a band, Hz: as interpolation.off_carrier takes it."""
     return carrier * n_samples / bandwidth if bandwidth else 0.0
 
 

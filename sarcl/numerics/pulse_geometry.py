@@ -1,4 +1,4 @@
-"""Antennas and tiles of points as kernels/geometry.clh wants them: extended precision here, float32 pairs there."""
+"""Antennas per pulse as kernels/geometry.clh reads them: extended precision here, pairs of float32 there."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Points cut into tiles for the kernels: each tile's center and the points' offsets from it."""
+"""Points cut into tiles for the kernels: each tile's reference point and the points' offsets from it."""
 
 from __future__ import annotations
 

@@ -1,4 +1,7 @@
-"""OpenCL: devices that really build, programs built once, memory blocks. The only importer of pyopencl."""
+"""OpenCL devices that passed a trial build, the choice among them, programs built once, buffers, memory budget.
+
+The only importer of pyopencl; reikna is imported here and in fft.py.
+"""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""View: the pulses of a phase history as seen on a grid, with trial errors taken off. What `refocus` works with."""
+"""View: the pulses of a phase history as seen on a grid, with trial errors taken off. _search.py works on it."""
 
 from __future__ import annotations
 

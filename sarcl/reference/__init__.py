@@ -1,6 +1,8 @@
-"""Float64 NumPy twin of every kernel: short, slow and obviously right.
+"""Float64 NumPy twins of kernels and of verbs without a kernel: short, slow and obviously right.
 
-Tests and the check= code of simulation and imaging import them; plans never do.
+Tests, the check= code of simulation and imaging, and the benchmark import them; plans never do. The twins of facet.clh,
+gains.clh and pattern.clh are formulas that plans need too: scattering/physical_optics, scattering/antenna_weights and
+model/antenna_pattern.
 
 For other folders:
 

@@ -1,4 +1,4 @@
-"""Reference of kernels/spread_facets.cl: the echo of triangular facets by physical optics, in float64."""
+"""Echo of triangular facets by physical optics: sums and integrals of sarcl/scattering/physical_optics.py."""
 
 from __future__ import annotations
 

@@ -2,15 +2,15 @@
 
 For other folders:
 
-    antenna_weight_error   how finely weights of antennas and distance must be followed
+    antenna_weight_error   errors of antenna_weights over facets, over the band and in float32
     antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
     facet_plan             subdivision and frequency nodes of facets for a tolerance
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
-    pulse_nodes            pulses at which amplitudes are computed; cubic interpolation between them
+    pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them
     scatterers             from a scene to the points and facets that the kernels add
     subdivision            facets cut to the edge length of their plan
-    mesh_quality/          warnings about meshes that are too coarse
+    mesh_quality/          warnings about meshes that are too coarse for their curves or for speckle
 
 For this folder alone:
 

@@ -1,4 +1,4 @@
-"""What facets that are rough below their size send back: SARAS's re-irradiation diagrams, normalised to keep power.
+"""Echo of facets that are rough below their size, in float64: SARAS's re-irradiation diagrams, scaled to keep power.
 
 A smooth plate's bistatic pattern obeys  integral over the hemisphere of |I|^2 cos dOmega = lambda^2 A. A rough one
 spreads the same power as its diagram D(delta) says, with a Rayleigh amplitude and a uniform phase:

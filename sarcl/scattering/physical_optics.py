@@ -1,4 +1,4 @@
-"""What a planar facet sends back by physical optics: phase integral, Fresnel coefficients, vector scattering.
+"""Physical optics of a planar facet in float64: phase integral, Fresnel coefficients, scattering matrix.
 
     a_rt = k/(2 sqrt(pi)) S_rt I,   |a|^2 = radar cross section, m^2;   k = 2 pi f/c;   time dependence exp(+j omega t)
     I    = integral over the facet of exp(+j q.rho) dA,   q = k (u_t + u_r), rho from the centroid

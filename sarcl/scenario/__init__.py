@@ -7,7 +7,7 @@ For other folders:
 For this folder alone:
 
     _schema    tables and keys a scenario may hold
-    _tables    nouns written as tables
+    _tables    objects such as Scene or Trajectory written as tables
 """
 
 from .scenario import Scenario, load, loads

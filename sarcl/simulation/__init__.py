@@ -7,8 +7,8 @@ For other folders:
     echo_output        destination of samples: memory or a file
     echo_sampling      rows and frequencies that echoes are written to
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
-    spreading         what points and facets share
-    channels/          echoes of arrays
+    spreading          plan, tiles and sums that points and facets share
+    channels/          echoes of the channels of an array
 
 For this folder alone:
 

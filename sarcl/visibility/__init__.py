@@ -7,10 +7,10 @@ For other folders:
 For this folder alone:
 
     _aspect_blocks     blocks of pulses that share one shadow
-    _embree_rays       rays by Embree (package embreex)
+    _embree_rays       shadows of facets, by rays of Embree (package embreex)
     _facet_samples     sample positions on a facet
-    _ray_casting       rays through a tree of boxes
-    _terrain_horizon   what a terrain of heights hides, by horizons along range lines
+    _ray_casting       shadows of facets, by rays through a tree of boxes
+    _terrain_horizon   shadows of terrain, by horizons along range lines
 """
 
 __all__ = ["illumination"]

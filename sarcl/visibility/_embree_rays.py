@@ -29,7 +29,7 @@ class EmbreeOccluders:
         self._mesh = TriangleMesh(self._scene, ((triangles - frame.center) * frame.unit).astype(np.float32))
 
     def hide(self, facets: Facets, index: Any, n: int, places: Any, viewpoint: np.ndarray, hidden: Any) -> None:
-        """Set the bits of hidden samples: as `shadow.Occluders.hide`."""
+        """Set the bits of hidden samples: as `_ray_casting.Occluders.hide`."""
         samples = places[1]
         row = self.device.download(facets.buffer, np.empty((facets.size, 12), np.float32))
         row = row[self.device.download(index, np.empty(n, np.int32))]

@@ -1,4 +1,4 @@
-"""What share of each facet both antennas see, pulse block by pulse block."""
+"""The share of each facet that both antennas see, by blocks of pulses: back faces, terrain horizons, rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The frequency-by-frequency echo of physical_optics.py, which the engine is held to, against closed forms."""
+"""The frequency-by-frequency echo of sarcl/reference/facet.py, which the engine is held to, against closed forms."""
 
 from __future__ import annotations
 

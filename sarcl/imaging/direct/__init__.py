@@ -2,7 +2,7 @@
 
 For other folders:
 
-    direct         the engine: every (row, pixel) pair that is not skipped
+    direct         plan and engine: every (row, pixel) pair that is not skipped
     line_plan      plan of backprojection by lines of pixels
     tile_kernels   the two kernels, pixel by pixel and line by line, and their buffers
 """

@@ -52,7 +52,7 @@ def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[Plan | 
 
 
 class Direct:
-    """The loops over row blocks and tiles on one device; see task.Engine."""
+    """The loops over row blocks and tiles on one device; see focusing_task.Engine."""
 
     dtype = np.complex64
 
@@ -105,7 +105,7 @@ class Direct:
         return max(1, int(self._shares(nbytes)[1] / (planes * self.tiling.per_tile)))
 
     def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
-        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling = self.tiling
         tiles, orders = tiling.bands(first, last)
         most = self._tiles_at_once(budget)

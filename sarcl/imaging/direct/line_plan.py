@@ -1,4 +1,4 @@
-"""Direct backprojection onto planes, a line of pixels at a time: the engine of backproject_lines.cl and its plan."""
+"""Plan of direct backprojection onto planes, a line of pixels at a time (kernels/backproject_lines.cl)."""
 
 from __future__ import annotations
 

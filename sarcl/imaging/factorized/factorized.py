@@ -45,7 +45,7 @@ class _Descent:
 
 
 class Factorized:
-    """The loops over levels on one device; see task.Engine."""
+    """The loops over levels on one device; see focusing_task.Engine."""
 
     dtype = np.complex64
 
@@ -119,7 +119,7 @@ class Factorized:
         return 1000 * self.plan.length
 
     def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
-        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
         skipped, done, of = 0, 0, tiling.pixels(first, last)
 

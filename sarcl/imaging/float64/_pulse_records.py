@@ -1,4 +1,4 @@
-"""Pairs of float64 on the host, and rows as kernels/backproject_float64.cl wants them."""
+"""Geometry of rows as kernels/backproject_float64.cl reads it: float64, and pairs of float64."""
 
 from __future__ import annotations
 

@@ -23,7 +23,7 @@ LARGEST = 1e290  # of a profile: sums of any number of such rows still fit in co
 
 
 class Precise:
-    """The loops over row blocks and tiles on one device; see task.Engine. ValueError where it has no float64."""
+    """The loops over row blocks and tiles; see focusing_task.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
 
@@ -67,7 +67,7 @@ class Precise:
         return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
 
     def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
-        """Focus bands first ... last - 1 into `flat`; see task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
         positions, orders = tile_positions(tiling, first, last)
         positions, lanes = by_range(positions, raw.tx[middle], raw.rx[middle])

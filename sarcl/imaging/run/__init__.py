@@ -1,4 +1,4 @@
-"""An image in the making: devices, checkpoints, files.
+"""Making an image in blocks: devices, checkpoints, output files.
 
 For other folders:
 

@@ -39,7 +39,7 @@ class Order:
 
 
 class Cluster:
-    """The workers of a distributed.Client: see crew.Crew."""
+    """The workers of a distributed.Client: see workers.Crew."""
 
     least_pixels = 0.0
 

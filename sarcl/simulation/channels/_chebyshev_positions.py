@@ -21,7 +21,7 @@ ELEMENTS = 1000  # at most looked at
 BLOCK = 64  # elements at a time
 FLAT = 1e-9  # of an array's extent: what is no wider than this is a line, or a plane
 
-Response = Callable[[np.ndarray], np.ndarray]  # at places, m (n, 3): complex (n, k), see `array_views.Views`
+Response = Callable[[np.ndarray], np.ndarray]  # at places, m (n, 3): complex (n, k), see `_response_samples.Views`
 
 
 @dataclass(frozen=True, eq=False)

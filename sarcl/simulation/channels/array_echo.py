@@ -120,7 +120,7 @@ def _filled(way: Apart | Between, work: Work, target: Target) -> float:
 
 def _measured(work: Work, layout: Layout, samples: Target) -> float:
     """Relative error of 256 random samples, 16 each of 16 rows, against the exact sum over channels and scatterers; of
-    fewer where there are many facets, as `measure_error` does for one channel, or many channels."""
+    fewer where there are many facets, as `_echo_check.measure_error` does for one channel, or many channels."""
     rows, sent, grid = layout.rows, layout.sent, layout.grid
     random, draws = np.random.default_rng(0), min(work.draws, 16 if len(sent) < 8 else 4 if len(sent) < 64 else 2)
     sums = np.zeros(3)
