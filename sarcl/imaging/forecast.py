@@ -24,8 +24,7 @@ from ..opencl import device as opencl
 from ..opencl.device import Device, DeviceChoice, open_devices
 from . import profile_energy
 from .choose_method import METHODS, Choice, choose
-from .factorized.plan import FactorPlan
-from .factorized.plan import moving_cost as moving_cost
+from .factorized.plan import FactorPlan, moving_cost
 from .focusing_task import BeamCone, Skip, Task, make_task
 
 PROBE = 0.03  # s a probe of a device takes at least

@@ -12,14 +12,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
-from ..base.boxes import box as box
+from ..base.boxes import box
 from . import terrain
 from . import triangles as geometry
 from .material import METAL, FacetMaterials, Material, MaterialLike, merge, resolve
-from .triangles import areas as areas
-from .triangles import centroids as centroids
-from .triangles import edges as edges
-from .triangles import normals as normals
+from .triangles import areas, edges
 
 if TYPE_CHECKING:
     import trimesh
