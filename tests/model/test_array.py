@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.model import costas
+from sarcl.model import _costas as costas
 from sarcl.model.antenna_array import AntennaArray
 
 C = 299_792_458.0
