@@ -38,7 +38,7 @@ Row = dict[str, Any]
 def main() -> None:
     """Measure, print the tables, and write the JSON file."""
     from sarcl.bench import backproject, channels_page
-    from sarcl.opencl.device import open_device
+    from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--repeats", type=int, default=3)

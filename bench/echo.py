@@ -55,7 +55,7 @@ Row = dict[str, Any]
 def main() -> None:
     """Measure, print the tables, and write the JSON file."""
     from sarcl.bench import backproject, echo_page
-    from sarcl.opencl.device import open_device
+    from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
     parser.add_argument("--points", type=int, default=1_000_000)

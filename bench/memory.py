@@ -18,7 +18,7 @@ import h5py
 import numpy as np
 
 import sarcl
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 
 
 def resident() -> float:

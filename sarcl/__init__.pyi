@@ -37,8 +37,8 @@ from .model.radar import Radar as Radar
 from .model.store import read as read
 from .model.trajectory import Trajectory as Trajectory
 from .model.waveform import Waveform as Waveform
-from .opencl.device import NoDeviceError as NoDeviceError
-from .opencl.device import devices as devices
+from .opencl.choose_device import NoDeviceError as NoDeviceError
+from .opencl.device_list import devices as devices
 from .phase_correction.autofocus import autofocus as autofocus
 from .scenario.scenario import Scenario as Scenario
 from .scene import material as material

@@ -7,7 +7,8 @@ from pathlib import Path
 
 import pytest
 
-from sarcl.opencl.device import REMEDY, devices, open_device
+from sarcl.opencl.choose_device import REMEDY, open_device
+from sarcl.opencl.device_list import devices
 
 
 def _devices():

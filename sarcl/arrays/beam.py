@@ -10,8 +10,9 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import float_pairs, text, validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.antenna_array import AntennaArray
-from ..opencl import device as opencl
-from ..opencl.device import Device, DeviceChoice, open_device
+from ..opencl import memory_budget
+from ..opencl.choose_device import open_device
+from ..opencl.device import Device, DeviceChoice
 from ._beam_plan import FINE, FLUSH, FieldPlan, blocks, make_plan, middle, whole_turns_off
 
 CHUNK = 64  # elements a work-item tabulates
@@ -61,7 +62,7 @@ def beam(
     validation.finite("positions", x)
     origin = validation.array("reference", reference, np.float64, (3,))
     opened = open_device(device)
-    budget = opencl.budget(opened, max_bytes)
+    budget = memory_budget.budget(opened, max_bytes)
     points = x.reshape(-1, 3)
     kind = np.complex64 if tolerance >= FINE else np.complex128
     out = np.empty((t.size, len(points)), kind)

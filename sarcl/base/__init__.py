@@ -12,6 +12,7 @@ For other folders:
     report        Report: plan, errors, counts and seconds of a verb
     stage_timer   seconds per stage of a computation
     text          bytes, durations, tolerances and spelling suggestions as text for messages
+    threads       how many processors computations of this process use
     tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
@@ -30,6 +31,7 @@ __all__ = [
     "report",
     "stage_timer",
     "text",
+    "threads",
     "tolerances",
     "types",
     "validation",

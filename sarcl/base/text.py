@@ -31,3 +31,9 @@ def unknown(key: str, known: list[str], what: str) -> str:
     close = get_close_matches(key, known, 1)
     guess = f"; did you mean {close[0]!r}?" if close else ";"
     return f"unknown {what} {key!r}{guess} known: {', '.join(known)}"
+
+
+def first_line(error: BaseException) -> str:
+    """First line of the message of an error, at most 200 characters; the name of its class when it has none."""
+    text = str(error).strip()
+    return text.splitlines()[0][:200] if text else type(error).__name__

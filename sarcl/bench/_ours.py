@@ -11,7 +11,8 @@ from collections.abc import Sequence
 from pathlib import Path
 from typing import Any, cast
 
-from ..opencl import device as opencl
+from ..opencl import device_list
+from ..opencl.device import Device
 from ._cases import Case
 from ._contestant import Absent, Contestant, Reading
 
@@ -19,7 +20,7 @@ BEFORE = ("plan",)  # stages of a report that depend on geometry and tolerance a
 
 
 def contestants(
-    case: Case, folder: Path, devices: Sequence[opencl.Device], methods: Sequence[str], tolerances: Sequence[float]
+    case: Case, folder: Path, devices: Sequence[Device], methods: Sequence[str], tolerances: Sequence[float]
 ) -> list[Contestant]:
     """sarcl on every device, by every method, at every tolerance; `folder` holds the saved case."""
     return [
@@ -30,17 +31,17 @@ def contestants(
     ]
 
 
-def describe(device: opencl.Device) -> str:
+def describe(device: Device) -> str:
     """A device in a few words, no two alike: platform, processor, and whether it is its twin without float64."""
     info = device.info
     platform = "PoCL" if info.platform == "Portable Computing Language" else info.platform.split()[0].split("(")[0]
     name = re.sub(r"^(pthread|cpu)-[^ ]*-", "", info.name)  # PoCL puts its target before the processor's name
     words = name if platform.lower() in name.lower() else f"{platform} {name}"
-    alike = [d for d in opencl.devices() if d.works and (d.platform, d.name) == (info.platform, info.name)]
+    alike = [d for d in device_list.devices() if d.works and (d.platform, d.name) == (info.platform, info.name)]
     return words + (f" ({info.index})" if len(alike) > 1 else "") + ("" if info.fp64 else ", no float64")
 
 
-def _contestant(case: Case, folder: Path, device: opencl.Device, method: str, tolerance: float) -> Contestant:
+def _contestant(case: Case, folder: Path, device: Device, method: str, tolerance: float) -> Contestant:
     def run() -> Reading:
         from ..imaging.backproject import backproject
 

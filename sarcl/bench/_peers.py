@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from ..opencl.device import threads
+from ..base.threads import threads
 from ._cases import Case
 from ._contestant import Absent, Contestant, Reading
 

@@ -13,10 +13,13 @@ from typing import Any
 
 import numpy as np
 
+from ..base.threads import threads
 from ..base.validation import choice, count, number
 from ..base.version import __version__
 from ..imaging.choose_method import METHODS
-from ..opencl import device as opencl
+from ..opencl import device_list
+from ..opencl.choose_device import open_device
+from ..opencl.device import Device
 from . import _baseline, _cases, _contestant, _ours, _peers, _table
 from ._contestant import Absent
 from ._measure import Paces, alternate, measure
@@ -67,7 +70,7 @@ def run(
     repeats, pixels = count("repeats", repeats), count("pixels", pixels, least=256)
     limit, patience = number("limit", limit, above=0), number("patience", patience, least=0)
     python = _peers.check_python(peer_python)
-    opened = [opencl.open_device(d) for d in _listed(devices)]
+    opened = [open_device(d) for d in _listed(devices)]
     twins = [d.without_fp64() for d in opened if no_fp64 and d.info.fp64]
     opened += twins
 
@@ -146,10 +149,10 @@ def _others(
 def _listed(devices: Sequence[Any] | None) -> list[Any]:
     if devices:
         return list(dict.fromkeys(devices))
-    return [info.index for info in opencl.devices() if info.works] or [None]
+    return [info.index for info in device_list.devices() if info.works] or [None]
 
 
-def _device(device: opencl.Device) -> dict[str, Any]:
+def _device(device: Device) -> dict[str, Any]:
     info = device.info
     return {
         "index": info.index,
@@ -162,7 +165,7 @@ def _device(device: opencl.Device) -> dict[str, Any]:
     }
 
 
-def header(devices: Sequence[opencl.Device]) -> Document:
+def header(devices: Sequence[Device]) -> Document:
     """What every document begins with: machine, devices, and room for peers."""
     return {"format": FORMAT, "machine": _machine(), "devices": [_device(d) for d in devices], "peers": []}
 
@@ -182,7 +185,7 @@ def _machine() -> dict[str, Any]:
     return {
         "processor": processor or platform.machine(),
         "processors": os.cpu_count(),
-        "threads": opencl.threads(),
+        "threads": threads(),
         "system": platform.system(),
         "python": platform.python_version(),
         "numpy": np.__version__,

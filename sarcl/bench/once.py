@@ -10,7 +10,7 @@ from pathlib import Path
 def main(folder: str, options: str) -> None:
     """Read the case in `folder`, open the device, make the image."""
     from ..imaging.backproject import backproject
-    from ..opencl.device import open_device
+    from ..opencl.choose_device import open_device
     from . import _cases
 
     given = json.loads(options)

@@ -45,13 +45,14 @@ def run(args: argparse.Namespace, outputs: Outputs) -> int:
 
 def devices(args: argparse.Namespace, job: Job) -> int:
     """Print the table of devices, the one in use marked; 3 where none works."""
-    from ..opencl import device as opencl
+    from ..opencl import device_list
+    from ..opencl.choose_device import NoDeviceError, open_devices
 
-    found = opencl.devices()
+    found = device_list.devices()
     works = any(d.works for d in found)
     try:
-        print(device_table(found, [d.info.index for d in opencl.open_devices(None)]))
-    except opencl.NoDeviceError as exc:
+        print(device_table(found, [d.info.index for d in open_devices(None)]))
+    except NoDeviceError as exc:
         print(device_table(found, []))
         print(f"sarcl: {'' if works else 'error: '}{exc}", file=sys.stderr)
     return 0 if works else 3
@@ -76,7 +77,7 @@ def demo(args: argparse.Namespace, job: Job) -> int:
 
 def simulate(args: argparse.Namespace, job: Job) -> int:
     """Echoes of a scenario, and their image where there is a grid or --image asks for one."""
-    from ..opencl.device import open_device
+    from ..opencl.choose_device import open_device
     from ..scenario.scenario import load
 
     scenario = load(args.scenario)
@@ -118,7 +119,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     """An image from echoes."""
     from ..model.phase_history import PhaseHistory
     from ..model.store import read
-    from ..opencl.device import open_devices
+    from ..opencl.choose_device import open_devices
     from ..scenario.scenario import load
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
@@ -180,7 +181,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     from ..experiments.fda.file import load
     from ..experiments.fda.text import setting, verdicts
     from ..io import output_paths
-    from ..opencl.device import open_device
+    from ..opencl.choose_device import open_device
 
     title, cases = load(args.experiment)
     output = args.output or f"{Path(args.experiment).stem}.html"

@@ -90,7 +90,7 @@ def run(
     Returns the image. OSError, before any work, when `out` cannot be made or written.
     """
     from ..imaging.backproject import backproject
-    from ..opencl.device import open_device
+    from ..opencl.choose_device import open_device
     from ..simulation.echo import echo
     from . import _demo_scene
 

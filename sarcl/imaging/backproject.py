@@ -21,7 +21,9 @@ from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
-from ..opencl.device import DeviceChoice, budget, open_devices
+from ..opencl.choose_device import open_devices
+from ..opencl.device import DeviceChoice
+from ..opencl.memory_budget import budget
 from .choose_method import METHODS, Choice, choose
 from .focusing_task import BeamCone, Skip, Task, by_reason, make_task
 from .run.checkpoint import Keeper

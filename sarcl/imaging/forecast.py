@@ -20,8 +20,9 @@ from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
-from ..opencl import device as opencl
-from ..opencl.device import Device, DeviceChoice, open_devices
+from ..opencl import memory_budget
+from ..opencl.choose_device import open_devices
+from ..opencl.device import Device, DeviceChoice
 from . import profile_energy
 from .choose_method import METHODS, Choice, choose
 from .factorized.plan import FactorPlan, moving_cost
@@ -84,7 +85,7 @@ def plan(
     devices = open_devices(device)
     lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
     chosen = choose(task, method, tolerance, lanes, float64)
-    working = sum(_bytes(task, chosen, d, min(opencl.budget(d, max_bytes), d.info.memory)) for d in devices)
+    working = sum(_bytes(task, chosen, d, min(memory_budget.budget(d, max_bytes), d.info.memory)) for d in devices)
     # of a pixel in all rows that see it, at cost 1
     seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
     return Forecast(

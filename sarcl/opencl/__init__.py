@@ -2,8 +2,15 @@
 
 For other folders:
 
-    device   devices that passed a trial build, device choice, memory budget, programs, buffers
-    fft      FFT of rows: reikna on GPUs, scipy.fft on CPU devices
+    choose_device  the device that is used: as asked for, as SARCL_DEVICE says, or the best one that works
+    device         an open device: its programs, each built once, its buffers and its queue
+    device_list    OpenCL devices of this machine, each tried with a small kernel
+    fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
+    memory_budget  bytes that a computation may take on a device
+
+For this folder alone:
+
+    _programs      kernel files as one text each, and the care that every build of a program needs
 """
 
-__all__ = ["device", "fft"]
+__all__ = ["choose_device", "device", "device_list", "fft", "memory_budget"]

@@ -8,7 +8,9 @@ from typing import Any
 
 import numpy as np
 
-from .device import Device, quiet, threads
+from ..base.threads import threads
+from ._programs import quiet
+from .device import Device
 
 
 def good_length(n: int) -> int:

@@ -43,7 +43,7 @@ def listing() -> str:
 
 def open_lab(device: DeviceChoice | None = None, quick: bool = False) -> Lab:
     """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
-    from ..opencl.device import open_device
+    from ..opencl.choose_device import open_device
     from .lab import Lab
 
     return Lab(open_device(device), quick)

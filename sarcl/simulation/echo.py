@@ -23,7 +23,9 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics import plan
 from ..numerics.pulse_geometry import Antennas
-from ..opencl.device import DeviceChoice, budget, open_device
+from ..opencl.choose_device import open_device
+from ..opencl.device import DeviceChoice
+from ..opencl.memory_budget import budget
 from ..scattering import antenna_weights
 from ..scattering.facets import POLARIZATIONS
 from ..scene.scene import Scene

@@ -12,7 +12,9 @@ from numpy.typing import ArrayLike
 
 from ..base.errors import warn
 from ..base.validation import array, choice, number, sealed
-from ..opencl.device import Device, DeviceChoice, budget, open_device
+from ..opencl.choose_device import open_device
+from ..opencl.device import Device, DeviceChoice
+from ..opencl.memory_budget import budget
 from ..scene.terrain import check_above, heights_of
 from ._aspect_blocks import STRIDE, blocks_around, enough_looks, lever, pulse_blocks, reach, scene_box
 from ._facet_samples import PROBES, SAMPLES, places

@@ -11,7 +11,7 @@ import sarcl
 from sarcl.bench._exact import backproject as quick_sum
 from sarcl.imaging.direct import direct, line_plan
 from sarcl.numerics import interpolation
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 
 SLOW = pytest.mark.slow
 

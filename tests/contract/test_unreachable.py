@@ -18,7 +18,7 @@ from sarcl import pointing, shapes
 from sarcl.base.errors import NothingSeen, ToleranceUnreachable
 from sarcl.base.text import tolerance_text
 from sarcl.base.tolerances import reachable, rounded_up
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 from sarcl.scenario.scenario import loads
 
 PLANE = sarcl.ImageGrid.plane(shape=(40, 40), spacing=0.3)
@@ -350,7 +350,7 @@ MAY_CATCH = {
     "bench/_peers.py": "text that is no JSON",
     "bench/_quiet.py": "/proc/stat of a system that has none",
     "base/validation.py": "what numpy, float and int say of input",
-    "opencl/device.py": "a driver's trial: whatever it raises, the device does not work",
+    "opencl/device_list.py": "a driver's trial: whatever it raises, the device does not work",
     "cli/parser.py": "text of a command line; the last resort of a program",
     "simulation/echo_output.py": "numpy's sizes that overflow; a system that does not say its memory",
     "experiments/fda/file.py": "the file and case are put before a message, which is raised again",

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.opencl import device as opencl
+from sarcl.opencl import _programs
 
 
 def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doubleword.clh"), **macros):
@@ -17,14 +17,14 @@ def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doub
         "__kernel void probe(__global const float *x, __global const float *table, int n, __global float *out) {\n"
         f"    int i = get_global_id(0);\n    {body}\n}}\n"
     )
-    expanded = opencl.source.__wrapped__
+    expanded = _programs.source.__wrapped__
 
     def source(file):
         if file != "probe.cl":
             return expanded(file)
         return "\n".join(expanded(line.split('"')[1]) if "#include" in line else line for line in text.split("\n"))
 
-    monkeypatch.setattr(opencl, "source", source)
+    monkeypatch.setattr("sarcl.opencl.device.source", source)
     table = macros.pop("table", None)
     built = device._build("probe.cl", {"VW": lanes, "FP64": int(device.info.fp64), **macros})["probe"]
     buffer = device.upload(padded)

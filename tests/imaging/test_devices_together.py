@@ -14,7 +14,9 @@ import sarcl
 from sarcl.imaging.direct.direct import Direct
 from sarcl.imaging.run.workers import cut
 from sarcl.imaging.tiling import GridTiling, count
-from sarcl.opencl.device import Device, devices, open_device, open_devices
+from sarcl.opencl.choose_device import open_device, open_devices
+from sarcl.opencl.device import Device
+from sarcl.opencl.device_list import devices
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
 
@@ -236,7 +238,7 @@ def test_workers_of_a_cluster_make_the_image_of_one_device(raw, client, tmp_path
 
 def test_every_worker_opens_its_device_in_its_own_process(raw, client):
     def contexts():
-        from sarcl.opencl.device import _open
+        from sarcl.opencl.choose_device import _open
 
         return os.getpid(), _open.cache_info().currsize
 

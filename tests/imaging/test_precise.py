@@ -13,7 +13,7 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64.plan import WIDE, make_plan
 from sarcl.numerics import error_bounds_float64, interpolation_float64
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact_image
 
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(9, 11), spacing=(0.9, 0.7))

@@ -13,8 +13,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64._pulse_records import packed
 from sarcl.imaging.focusing_task import antennas_of
 from sarcl.numerics import error_bounds_float64, interpolation_float64
-from sarcl.opencl import device as opencl
-from sarcl.opencl import fft
+from sarcl.opencl import _programs, fft
 from sarcl.reference.interp import interpolate
 
 # name -> (expression in pairs, twin in Decimal, error bound relative to the result)
@@ -31,12 +30,12 @@ def probe(device, monkeypatch, body, inputs, n_out, header="doubledouble.clh", *
     n = -(-inputs.shape[1] // lanes) * lanes
     padded = np.ones((len(inputs), n))
     padded[:, : inputs.shape[1]] = inputs
-    expanded = opencl.source.__wrapped__
+    expanded = _programs.source.__wrapped__
     text = "\n".join(expanded(h) for h in dict.fromkeys(["doubledouble.clh", header])) + (
         "\n__kernel void probe(__global const double *x, __global const double *table, int n, __global double *out) {\n"
         f"    int i = get_global_id(0);\n    {body}\n}}\n"
     )
-    monkeypatch.setattr(opencl, "source", lambda file: text if file == "probe.cl" else expanded(file))
+    monkeypatch.setattr("sarcl.opencl.device.source", lambda file: text if file == "probe.cl" else expanded(file))
     table = macros.pop("table", np.zeros(1))
     built = device._build("probe.cl", {"VW": lanes, "FP64": 1, **macros})["probe"]
     out = device.zeros(8 * n_out * n)

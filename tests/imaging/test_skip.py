@@ -17,7 +17,7 @@ from sarcl.imaging.factorized._tile_tree import tree_of
 from sarcl.imaging.focusing_task import SKIPS, by_reason, make_task, tally
 from sarcl.imaging.tiling import GridTiling
 from sarcl.model.image_grid import ImageGrid
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact
 
 PLANE = ImageGrid.plane(shape=(90, 110), spacing=0.5)

@@ -11,8 +11,9 @@ import pytest
 
 import sarcl
 from sarcl.base import float_pairs
-from sarcl.opencl import device as opencl
-from sarcl.opencl import fft
+from sarcl.base.threads import threads
+from sarcl.opencl import _programs, fft
+from sarcl.opencl.choose_device import open_device
 
 
 def run_python(code, **environment):
@@ -32,24 +33,24 @@ def test_every_working_device_gave_the_right_numbers_in_a_trial():
 
 def test_device_is_chosen_by_argument_then_environment_then_kind(monkeypatch):
     info = next(d for d in sarcl.devices() if d.works)
-    assert opencl.open_device(info.index).info == info
-    assert opencl.open_device(str(info.index)).info == info
-    assert opencl.open_device(info.name[:12].upper()).info.name == info.name
-    opened = opencl.open_device(info.kind)
-    assert opencl.open_device(opened) is opened
+    assert open_device(info.index).info == info
+    assert open_device(str(info.index)).info == info
+    assert open_device(info.name[:12].upper()).info.name == info.name
+    opened = open_device(info.kind)
+    assert open_device(opened) is opened
     monkeypatch.setenv("SARCL_DEVICE", "no such thing")
-    assert opencl.open_device(info.index).info == info
+    assert open_device(info.index).info == info
     with pytest.raises(sarcl.NoDeviceError, match="SARCL_DEVICE 'no such thing' matches no working"):
-        opencl.open_device()
+        open_device()
     monkeypatch.setenv("SARCL_DEVICE", "")
-    best = opencl.open_device()
+    best = open_device()
     if any(d.works and d.kind == "gpu" for d in sarcl.devices()):
         assert best.info.kind == "gpu"
 
 
 def test_a_name_that_matches_nothing_lists_what_there_is():
     with pytest.raises(sarcl.NoDeviceError) as caught:
-        opencl.open_device("abacus")
+        open_device("abacus")
     assert "'abacus'" in str(caught.value)
     for info in sarcl.devices():
         assert info.name in str(caught.value)
@@ -58,7 +59,7 @@ def test_a_name_that_matches_nothing_lists_what_there_is():
 def test_without_any_platform_the_remedy_is_named(tmp_path):
     code = (
         "import sarcl\nprint(sarcl.devices())\nsarcl.backproject.__module__\n"
-        "from sarcl.opencl.device import open_device\nopen_device()"
+        "from sarcl.opencl.choose_device import open_device\nopen_device()"
     )
     run = run_python(code, OCL_ICD_VENDORS=str(tmp_path))
     if "()" not in run.stdout:
@@ -93,7 +94,7 @@ def test_kernels_are_built_once_for_each_set_of_macros(device):
 
 
 def test_includes_are_expanded_once_and_lines_point_at_the_files():
-    text = opencl.source("backproject.cl")
+    text = _programs.source("backproject.cl")
     assert "#include" not in text
     assert text.count('#line 1 "doubleword.clh"') == 1
     line = text.split("\n").index(
@@ -108,7 +109,7 @@ def test_includes_are_expanded_once_and_lines_point_at_the_files():
 
 
 def test_a_kernel_that_does_not_build_names_file_device_and_log(device, monkeypatch):
-    monkeypatch.setattr(opencl, "source", lambda file: "__kernel void broken(int x) { y = 1; }")
+    monkeypatch.setattr("sarcl.opencl.device.source", lambda file: "__kernel void broken(int x) { y = 1; }")
     with pytest.raises(RuntimeError, match=r"kernels/broken.cl does not build on '.*'") as caught:
         device.kernel("broken.cl", "broken")
     assert "undeclared" in str(caught.value) or "error" in str(caught.value)
@@ -122,16 +123,16 @@ def test_a_buffer_larger_than_the_device_allows_says_need_have_and_remedy(device
 
 def test_threads_follow_the_environment(monkeypatch):
     monkeypatch.setenv("SARCL_THREADS", "1")
-    assert opencl.threads() == 1
+    assert threads() == 1
     monkeypatch.setenv("SARCL_THREADS", "many")
     with pytest.raises(ValueError, match="SARCL_THREADS is 'many'"):
-        opencl.threads()
+        threads()
 
 
 def test_one_thread_gives_the_same_image_as_all(tmp_path):
     code = (
         f"import sys; sys.path.insert(0, {str(Path(__file__).parents[1])!r})\n"
-        "from helpers.cases import noise_history\nimport sarcl\nfrom sarcl.opencl.device import open_device\n"
+        "from helpers.cases import noise_history\nimport sarcl\nfrom sarcl.opencl.choose_device import open_device\n"
         "image = sarcl.backproject(noise_history(), sarcl.ImageGrid.plane(shape=40, spacing=.2), device='cpu')\n"
         "print(open_device('cpu').queue.device.max_compute_units, complex(image.data.sum()))"
     )

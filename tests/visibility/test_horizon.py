@@ -7,7 +7,7 @@ import pytest
 from scipy.ndimage import gaussian_filter
 
 import sarcl
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import CENTROID, overshadowed, sample
 from sarcl.scene.terrain import above
 from sarcl.scene.triangles import areas, centroids, normals

@@ -9,7 +9,7 @@ from scipy.spatial import ConvexHull
 
 import sarcl
 from sarcl.base.boxes import box
-from sarcl.opencl.device import open_device
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import areas, centroids, normals
 from sarcl.visibility import illumination

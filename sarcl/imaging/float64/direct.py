@@ -11,7 +11,8 @@ from ...base import text
 from ...base.stage_timer import Clock
 from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
-from ...opencl.device import Device, devices
+from ...opencl.device import Device
+from ...opencl.device_list import devices
 from ..focusing_task import Task, tally
 from ..tiling import GridTiling
 from ._pulse_records import packed

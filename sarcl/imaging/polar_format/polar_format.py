@@ -20,8 +20,9 @@ from ...model.phase_history import PhaseHistory
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import LARGEST
 from ...numerics.windows import Window
-from ...opencl import device as opencl
-from ...opencl.device import DeviceChoice, open_device
+from ...opencl import memory_budget
+from ...opencl.choose_device import open_device
+from ...opencl.device import DeviceChoice
 from ..focusing_task import Task, make_task
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
@@ -76,7 +77,7 @@ def polar_format(
     if task.raw.n_rows < 2:
         raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
     opened = open_device(device)
-    budget = min(opencl.budget(opened, max_bytes), opened.info.memory)
+    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
     waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
     bent = curvature(task.raw, waves, grid)
     _warn(task, waves, bent)

@@ -18,8 +18,9 @@ import numpy as np
 
 from ...base.stage_timer import Clock
 from ...model.lazy_rows import Picked, Stacked
-from ...opencl import device as opencl
-from ...opencl.device import Device, listed, open_device
+from ...opencl import memory_budget
+from ...opencl.choose_device import open_device, split_choice
+from ...opencl.device import Device
 from ..choose_method import Choice
 from ..focusing_task import Engine, Task
 from ..tiling import Run, count, extent
@@ -152,7 +153,7 @@ _engine: tuple[str, Engine, Device] | None = None
 
 def _open(choice: Any, place: int) -> Device:
     """In a worker: the device of number `place` of its machine."""
-    choices = listed(choice)
+    choices = split_choice(choice)
     return open_device(choices[place % len(choices)])
 
 
@@ -172,7 +173,7 @@ def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray
             device = _open(order.device, places.get(get_worker().address, 0))
             _engine = order.name, order.chosen.on(device, order.task), device
         _, engine, device = _engine
-        budget = min(opencl.budget(device, order.max_bytes), device.info.memory)
+        budget = min(memory_budget.budget(device, order.max_bytes), device.info.memory)
         strip, skipped = Strip(order.chosen.tiling, *run, order.chosen.dtype), 0
         ends = {last for _, last in engine.blocks(budget)}
         for first, last in cut(order.chosen.tiling, [run], float("inf"), ends):

@@ -1,0 +1,60 @@
+"""Kernel files as one text each, and the care that every build of a program needs."""
+
+from __future__ import annotations
+
+import functools
+import re
+import time
+import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from importlib.resources import files
+from pathlib import Path
+
+STALE = 5.0  # s, after which a lock on the cache of binaries is nobody's
+
+
+@functools.cache
+def source(file: str) -> str:
+    """A kernel file with its #include lines expanded on the host: -I is not portable and breaks on spaces.
+
+    Each header is included once; #line keeps compilers' messages pointing at the real files.
+    """
+    seen: set[str] = set()
+
+    def expand(name: str) -> str:
+        seen.add(name)
+        out = [f'#line 1 "{name}"']
+        for n, line in enumerate(files("sarcl.kernels").joinpath(name).read_text().splitlines(), 1):
+            match = re.match(r'\s*#include "([^"]+)"', line)
+            if match and match[1] not in seen:
+                out += [expand(match[1]), f'#line {n + 1} "{name}"']
+            elif not match:
+                out.append(line)
+        return "\n".join(out)
+
+    return expand(file)
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Round every build. Compilers that succeed may still chat; that is not for the user."""
+    _drop_stale_lock()
+    with warnings.catch_warnings():
+        warnings.simplefilter("ignore")
+        yield
+
+
+def _drop_stale_lock() -> None:
+    """Remove the lock that a killed process has left on pyopencl's cache of binaries.
+
+    pyopencl holds it for milliseconds, but waits a minute for one that nobody holds, and then fails.
+    """
+    import platformdirs
+
+    for lock in Path(platformdirs.user_cache_dir("pyopencl", "pyopencl")).glob("pyopencl-compiler-cache-*/lock"):
+        try:
+            if time.time() - lock.stat().st_mtime > STALE:
+                lock.unlink()
+        except OSError:  # gone already, or somebody else's
+            pass

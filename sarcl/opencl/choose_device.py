@@ -1,0 +1,90 @@
+"""The device that is used: as asked for, as SARCL_DEVICE says, or the best one that works."""
+
+from __future__ import annotations
+
+import functools
+import os
+from typing import Any
+
+from .device import Device, DeviceChoice
+from .device_list import DeviceInfo, devices, probe
+
+REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
+
+
+class NoDeviceError(RuntimeError):
+    """No OpenCL device fits: none works, or none matches what was asked for."""
+
+
+def open_device(choice: DeviceChoice | None = None) -> Device:
+    """The device to use: `choice`, else SARCL_DEVICE, else the GPU with most compute units, else a CPU.
+
+    choice  a Device (returned as it is), an index, "cpu", "gpu", or any part of a platform's or device's name.
+    SARCL_DEVICE may name several, for `backproject` ("all", or "0,1"): here the first of them that works.
+    NoDeviceError lists what there is when nothing works or nothing matches. Never asks.
+    """
+    if isinstance(choice, Device):
+        return choice
+    source = "device"
+    if choice is None:
+        choice, source = os.environ.get("SARCL_DEVICE") or None, "SARCL_DEVICE"
+    working = [(info, raw) for info, raw in probe() if info.works]
+    if not working:
+        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
+    if choice is not None and not (source == "SARCL_DEVICE" and str(choice).strip().lower() == "all"):
+        names = [n for n in str(choice).split(",") if n.strip()] if source == "SARCL_DEVICE" else [choice]
+        each = ([(i, raw) for i, raw in working if _matches(i, name)] for name in names)
+        matching = next((found for found in each if found), [])
+        if not matching:
+            raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
+        working = matching
+    order = {"gpu": 0, "accelerator": 1, "cpu": 2}
+    best = min((i for i, _ in working), key=lambda i: (order[i.kind], -i.units, i.index))
+    return _open(best.index)
+
+
+def _matches(info: DeviceInfo, choice: Any) -> bool:
+    text = str(choice).strip().lower()
+    if text.isdigit():
+        return info.index == int(text)
+    return text == info.kind or text in f"{info.platform} {info.name}".lower()
+
+
+def _listing() -> str:
+    infos = devices()
+    if not infos:
+        return "no OpenCL platform at all"
+    return "; ".join(f"{i.index}: {i.name} ({i.platform}{'' if i.works else ': ' + i.why})" for i in infos)
+
+
+def open_devices(choice: Any) -> list[Device]:
+    """The devices `choice` stands for: one as `open_device` takes it, a list of such, or "all" that work.
+
+    "0,1" is a list too, as SARCL_DEVICE may hold it. ValueError for a device named twice.
+    """
+    choices = split_choice(choice)
+    if not choices:
+        raise ValueError("device is an empty list; name at least one, or leave it out")
+    opened = [open_device(c) for c in choices]
+    for i, device in enumerate(opened):
+        if device in opened[:i]:
+            twice = choices[opened.index(device)]
+            raise ValueError(f"device {choices[i]!r} and {twice!r} are both {device.info.name}; name it once")
+    return opened
+
+
+def split_choice(choice: Any) -> list[Any]:
+    """The devices `choice` names, each as `open_device` takes it."""
+    if choice is None:
+        choice = os.environ.get("SARCL_DEVICE") or None
+    if isinstance(choice, str) and choice.strip().lower() == "all":
+        return [info.index for info in devices() if info.works] or [None]
+    if isinstance(choice, str) and "," in choice:
+        return [name.strip() for name in choice.split(",") if name.strip()]
+    return list(choice) if isinstance(choice, (list, tuple)) else [choice]
+
+
+@functools.cache
+def _open(index: int) -> Device:
+    info, raw = probe()[index]
+    return Device(info, raw)
