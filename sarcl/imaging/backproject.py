@@ -25,7 +25,7 @@ from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
 from .choose_method import METHODS, Choice, choose
-from .focusing_task import BeamCone, Skip, Task, by_reason, make_task
+from .focusing_task import BeamCone, Skip, Skipped, Task, make_task
 from .run.checkpoint import Keeper
 from .run.image_output import Strip, Target, is_path
 from .run.tile_files import gaps, share
@@ -165,11 +165,10 @@ def backproject(
         if grid.empty is not None and not target.grid.is_plane:
             target.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
         target.finish()
-        outside, unlit = by_reason(skipped)
         no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
-        done = task.pairs - outside - unlit - no_data
+        done = task.pairs - skipped.window - skipped.beam - no_data
         if done == 0:
-            where, remedy = ("range window", "") if unlit == 0 else ("range window and beam", " and the beam")
+            where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
             text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
             log.warning(text, where, remedy)
         measured = None
@@ -187,8 +186,8 @@ def backproject(
             measured_error=measured,
             contributions_done=done,
             contributions_skipped={
-                "range window": outside,
-                "beam": unlit,
+                "range window": skipped.window,
+                "beam": skipped.beam,
                 "zero weight": (raw.n_rows - task.raw.n_rows) * grid.size,
                 "no data": no_data,
             },
@@ -256,10 +255,10 @@ def _fill(
     bands: Run,
     clock: Clock,
     progress: Progress | None,
-) -> tuple[int, int]:
+) -> tuple[Skipped, int]:
     """Some bands, into `target` or only into files: (pairs skipped, bands that were in files)."""
     tiling, n_rows = chosen.tiling, task.raw.n_rows
-    there, skipped = [], 0
+    there, skipped = [], Skipped()
     for run, values, missed in keeper.found(*bands) if keeper else ():
         if target is not None:
             target.flat[extent(tiling, *run)] = values

@@ -55,21 +55,42 @@ class Task:
         return self.raw.n_rows * self.grid.size
 
 
+@dataclass(frozen=True)
+class Skipped:
+    """Numbers of (row, pixel) pairs that were left out, by reason.
+
+    window  pairs outside the range window of the row
+    beam    pairs inside the range window but outside the beam
+    """
+
+    window: int = 0
+    beam: int = 0
+
+    @classmethod
+    def of_tiles(cls, missed: np.ndarray, sizes: np.ndarray) -> Skipped:
+        """From the rows left out of every tile, by reason (2, n_tiles), and the pixels of each tile (n_tiles,)."""
+        return cls(*(int((rows * sizes).sum()) for rows in missed))
+
+    def __add__(self, other: Skipped) -> Skipped:
+        return Skipped(self.window + other.window, self.beam + other.beam)
+
+
 class Engine(Protocol):
     """One way to focus a task on one device. Every module of a method has one.
 
-    A class made as (device, task, plan, tiling). It may have an attribute least_pixels: how many pixels a block
-    should have so that what every block costs anew does not show; without, blocks are as large as memory
-    allows, and so is what a killed run loses.
+    A class made as (device, task, plan, tiling).
 
-    plan    with describe(method) -> dict and predicted_error; never a matter of device or memory
-    tiling  GridTiling whose bands are the units of work; fixed by grid, geometry and tolerance
-    dtype   of the pixels: complex64 or complex128
+    plan          with describe(method) -> dict and predicted_error; independent of the device and its memory
+    tiling        tiling whose bands are the units of work; fixed by grid, geometry and tolerance
+    dtype         data type of the pixels: complex64 or complex128
+    least_pixels  pixels a block should have at least, so that the cost of the range profiles, which every block makes
+                  anew, stays below a tenth; inf: blocks are as large as memory allows, and a killed run loses as much
     """
 
     plan: Any
     tiling: GridTiling
     dtype: Any
+    least_pixels: float
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
@@ -78,32 +99,26 @@ class Engine(Protocol):
         """
         ...
 
-    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+    def fill(
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> Skipped:
         """Write the pixels of bands first ... last - 1 to their places in `flat` (Target.flat).
 
         budget  bytes on the device, all in all
         tick    called as tick(rows_done): how many of the task's rows these bands have had so far
-        Returns how many (row, pixel) pairs were skipped, as `tally` puts it.
+        Returns the number of (row, pixel) pairs that were skipped.
         """
         ...
 
-
-_BEAM = 2**64  # pairs outside a beam are counted in multiples of it, so that one whole number carries both reasons
-
-
-def tally(missed: np.ndarray, sizes: np.ndarray) -> int:
-    """Pairs left out, for `by_reason`, from rows left out of every tile (2, n_tiles) and pixels of each (n_tiles,).
-
-    It is a plain int, so that workers and files hand it on and add it up as such: the pairs outside the range window,
-    where there is no beam.
-    """
-    window, beam = (int((rows * sizes).sum()) for rows in missed)
-    return window + _BEAM * beam
+    def working(self, nbytes: float) -> float:
+        """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
+        ...
 
 
-def by_reason(skipped: int) -> tuple[int, int]:
-    """Pairs outside the range window, and outside the beam, from the sum of what `tally` returned."""
-    return skipped % _BEAM, skipped // _BEAM
+def working_bytes(tiling: GridTiling, run: tuple[int, int], length: int, nbytes: float) -> float:
+    """Estimated bytes that a direct engine takes for a run of bands: sums and values of the pixels, and the range
+    profiles, of `length` samples, of 256 rows; nbytes at most."""
+    return min(24.0 * tiling.pixels(*run) + 8.0 * length * 256, nbytes)
 
 
 def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarray | None, float]:

@@ -7,7 +7,7 @@ import functools
 import time
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -141,11 +141,7 @@ def _bytes(task: Task, chosen: Choice, device: Device, budget: float) -> float:
     """What a device holds at a time; its budget is kept."""
     tiling = copy.copy(chosen.tiling)
     tiling.n_bands = min(tiling.n_bands, MOST_BANDS)
-    engine: Any = chosen.engine(device, task, chosen.plan, tiling)
-    if hasattr(engine, "working"):
-        return min(float(engine.working(budget)), budget)
-    first, last = engine.blocks(budget)[0]
-    return min(24.0 * tiling.pixels(first, last) + 8.0 * chosen.plan.length * 256, budget)
+    return float(chosen.engine(device, task, chosen.plan, tiling).working(budget))
 
 
 @functools.lru_cache(maxsize=16)

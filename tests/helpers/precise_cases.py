@@ -10,7 +10,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging.float64.direct import Precise
 from sarcl.imaging.float64.plan import make_plan
-from sarcl.imaging.focusing_task import Task, antennas_of, beam_of, by_reason
+from sarcl.imaging.focusing_task import Skipped, Task, antennas_of, beam_of
 
 
 def task_of(raw, grid, *, wrap=False, skips=("range window", "beam"), samples=None, rows=None, beam=None):
@@ -26,9 +26,10 @@ def focus(raw, grid, tolerance, device, *, budget=2.0**28, plan=None, **options)
     made, tiling = make_plan(task, tolerance)
     engine = Precise(device, task, plan or made, tiling)
     flat = np.full(grid.shape if grid.is_plane else grid.size, np.nan, engine.dtype)
-    skipped = sum(engine.fill(a, b, flat, budget, Clock(), lambda rows: None) for a, b in engine.blocks(budget))
-    reasons = by_reason(skipped)
-    return flat.reshape(grid.shape), made, reasons[0] if options.get("beam") is None else reasons
+    fills = (engine.fill(a, b, flat, budget, Clock(), lambda rows: None) for a, b in engine.blocks(budget))
+    skipped = sum(fills, Skipped())
+    counts = skipped.window if options.get("beam") is None else (skipped.window, skipped.beam)
+    return flat.reshape(grid.shape), made, counts
 
 
 def decimal_image(raw, points, wrap=False):

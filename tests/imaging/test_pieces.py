@@ -20,7 +20,7 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.imaging.choose_method import choose
-from sarcl.imaging.focusing_task import make_task
+from sarcl.imaging.focusing_task import Skipped, make_task
 from sarcl.imaging.run import checkpoint, tile_files
 from sarcl.imaging.run._fingerprint import job, mark
 from sarcl.imaging.run.image_output import Strip, Target
@@ -192,6 +192,15 @@ def found(raw, path):
     described = job(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype)
     files = tile_files.Pieces(tile_files.folder_of(path), described, chosen.tiling, chosen.dtype)
     return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
+
+
+def test_tile_files_name_why_pairs_were_skipped(raw, tmp_path):
+    tiling, skipped = planned(raw).tiling, Skipped(window=2**70, beam=3)
+    files = tile_files.Pieces(tmp_path / "image.h5.parts", {}, tiling, np.complex64)
+    files.save(0, 1, [np.zeros((count(tiling, 0, 1) // 301, 301), np.complex64)], skipped)
+    (path,) = tiles(tmp_path)
+    assert b'"skipped": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
+    assert [(run, n) for run, _, n in files.found(0, tiling.n_bands)] == [((0, 1), skipped)]
 
 
 def test_a_short_run_that_fails_leaves_nothing_unless_asked(raw, tmp_path):

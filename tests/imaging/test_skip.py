@@ -14,7 +14,7 @@ from sarcl.base.stage_timer import Clock
 from sarcl.imaging import choose_method
 from sarcl.imaging.direct import direct
 from sarcl.imaging.factorized._tile_tree import tree_of
-from sarcl.imaging.focusing_task import SKIPS, by_reason, make_task, tally
+from sarcl.imaging.focusing_task import SKIPS, Skipped, make_task
 from sarcl.imaging.tiling import GridTiling
 from sarcl.model.image_grid import ImageGrid
 from sarcl.opencl.choose_device import open_device
@@ -101,7 +101,8 @@ def test_both_kernels_see_the_same_beam_and_window(lanes, tolerance, bistatic):
         plan, tiling = direct.make_plan(task, tolerance, lanes)
         data = np.empty(PLANE.shape, np.complex64)
         engine = direct.Direct(device, task, plan, tiling)
-        counts[str(skip)] = by_reason(engine.fill(0, tiling.n_bands, data, 2**28, Clock(), lambda rows: None))
+        skipped = engine.fill(0, tiling.n_bands, data, 2**28, Clock(), lambda rows: None)
+        counts[str(skip)] = skipped.window, skipped.beam
         images[str(skip)] = sarcl.Image(data, PLANE)
     assert near(images["True"], raw, beam) <= tolerance
     for other in images.values():
@@ -406,9 +407,9 @@ def test_tolerances_below_complex64_know_beams_and_empty_cells():
     assert change(image, whole) <= 1e-9 and sum(whole.report.contributions_skipped.values()) == 0
 
 
-def test_both_counts_travel_as_one_number():
+def test_counts_of_skipped_pairs_add_up_by_reason():
     missed, sizes = np.array([[3, 0], [1, 2]]), np.array([2**40, 5])
-    assert by_reason(tally(missed, sizes) + tally(missed, sizes)) == (6 * 2**40, 2 * 2**40 + 20)
+    assert Skipped.of_tiles(missed, sizes) + Skipped.of_tiles(missed, sizes) == Skipped(6 * 2**40, 2 * 2**40 + 20)
 
 
 BAD_BEAMS = {

@@ -13,7 +13,7 @@ from ...numerics import range_profiles
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
-from ..focusing_task import Task, tally
+from ..focusing_task import Skipped, Task, working_bytes
 from ..tiling import GridTiling, place_tiles
 from . import line_plan
 from .line_plan import LinePlan
@@ -83,6 +83,10 @@ class Direct:
                 first = band
         return [*blocks, (first, tiling.n_bands)]
 
+    def working(self, nbytes: float) -> float:
+        """See focusing_task.Engine."""
+        return working_bytes(self.tiling, self.blocks(nbytes)[0], self.plan.length, nbytes)
+
     def _shares(self, nbytes: float) -> tuple[float, float, float]:
         """Bytes for rows' profiles, pixels and tiles' constants: one, two and one parts of four.
 
@@ -104,12 +108,14 @@ class Direct:
         planes = 16 if self.tiling.grid.is_plane else 16 + 24
         return max(1, int(self._shares(nbytes)[1] / (planes * self.tiling.per_tile)))
 
-    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+    def fill(
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling = self.tiling
         tiles, orders = tiling.bands(first, last)
         most = self._tiles_at_once(budget)
-        skipped, values = 0, np.empty(0, np.complex64)
+        skipped, values = Skipped(), np.empty(0, np.complex64)
         whole = last - first > 1 or tiles.n_tiles <= most
         if not tiling.grid.is_plane:
             values = np.empty(tiling.pixels(first, last), np.complex64)
@@ -127,7 +133,7 @@ class Direct:
                 values[start * tiles.per_tile : stop * tiles.per_tile] = self._values(image, stop - start)
             else:
                 place_tiles(tiling, self._values(image, stop - start), first, start, stop, flat)
-            skipped += tally(missed, tiling.tile_sizes(first, last)[start:stop])
+            skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
         if len(values):
             tiling.place(values, first, last, orders, flat)
         clock.lap("write")

@@ -23,7 +23,7 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..direct.direct import Direct
 from ..direct.tile_kernels import Placed, pass_of
-from ..focusing_task import Task, tally
+from ..focusing_task import Skipped, Task
 from ..tiling import GridTiling
 from ._memory import Room
 from ._tile_coverage import Sight, alike, look, without
@@ -110,18 +110,20 @@ class Factorized:
         return self.room.blocks(nbytes)
 
     def working(self, nbytes: float) -> float:
-        """Bytes that `fill` takes for the first block, about, when it is given nbytes."""
-        return self.room.working(nbytes)
+        """See focusing_task.Engine."""
+        return min(self.room.working(nbytes), nbytes)
 
     @property
-    def least_pixels(self) -> int:
+    def least_pixels(self) -> float:
         """Making a row's profile anew for every block costs as much as this many pixels, ten times over."""
-        return 1000 * self.plan.length
+        return 1000.0 * self.plan.length
 
-    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+    def fill(
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
-        skipped, done, of = 0, 0, tiling.pixels(first, last)
+        skipped, done, of = Skipped(), 0, tiling.pixels(first, last)
 
         def part_of(pixels: int) -> Callable[[float], None]:
             return lambda rows: tick((done * n_rows + rows * pixels) / of)
@@ -142,7 +144,7 @@ class Factorized:
                 image, missed = self._sums(some, _seen(sight, tops), budget, clock, part_of(pixels))
                 sums = self.device.download(image, np.empty((4, pixels), np.float32))
                 values[at] = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(-1, tiling.per_tile)
-                skipped += tally(missed, sizes[at])
+                skipped += Skipped.of_tiles(missed, sizes[at])
                 done += pixels
             tiling.place(values.ravel(), first, last, tiling.bands(first, last)[1], flat)
             clock.lap("write")
@@ -161,7 +163,7 @@ class Factorized:
             made = part.download(self.device, image, a, b, tree.slot)
             at = slice(left * tiling.wide, left * tiling.wide + made.shape[1])
             flat[a * tiling.high : a * tiling.high + len(made), at] = made
-            skipped += tally(missed, part.tile_sizes(a, b)[tree.slot])
+            skipped += Skipped.of_tiles(missed, part.tile_sizes(a, b)[tree.slot])
             done += pixels
             clock.lap("write")
         return skipped

@@ -13,7 +13,7 @@ from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
 from ...opencl.device import Device
 from ...opencl.device_list import devices
-from ..focusing_task import Task, tally
+from ..focusing_task import Skipped, Task, working_bytes
 from ..tiling import GridTiling
 from ._pulse_records import packed
 from .plan import CHUNK, Plan
@@ -27,6 +27,7 @@ class Precise:
     """The loops over row blocks and tiles; see focusing_task.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
+    least_pixels = np.inf
 
     def __init__(self, device: Device, task: Task, plan: Plan, tiling: GridTiling) -> None:
         if not device.info.fp64:
@@ -60,6 +61,10 @@ class Precise:
                 first = band
         return [*blocks, (first, self.tiling.n_bands)]
 
+    def working(self, nbytes: float) -> float:
+        """See focusing_task.Engine."""
+        return working_bytes(self.tiling, self.blocks(nbytes)[0], self.plan.length, nbytes)
+
     @property
     def _row_bytes(self) -> float:
         return 16.0 * (self.plan.length + 2 * padding(self.plan.kernel))
@@ -67,7 +72,9 @@ class Precise:
     def _tiles_at_once(self, nbytes: float) -> int:
         return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
 
-    def fill(self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]) -> int:
+    def fill(
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+    ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
         positions, orders = tile_positions(tiling, first, last)
@@ -85,7 +92,7 @@ class Precise:
             np.put_along_axis(values[run], lanes[run], made, axis=1)
         tiling.place(values.ravel(), first, last, orders, flat)
         clock.lap("write")
-        return tally(missed, tiling.tile_sizes(first, last))
+        return Skipped.of_tiles(missed, tiling.tile_sizes(first, last))
 
     def _tiles(
         self, positions: np.ndarray, budget: float, clock: Clock, tick: Callable[[float], None]

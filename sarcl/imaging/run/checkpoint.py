@@ -15,8 +15,8 @@ from ...io.hdf5 import BLOCK_BYTES
 from ...model import store
 from ...model.image import Image
 from ..choose_method import Choice
-from ..focusing_task import Task
-from ..tiling import Run, extent
+from ..focusing_task import Skipped, Task
+from ..tiling import Run, extent, row_shape
 from . import _fingerprint
 from .tile_files import Pieces, discard, folder_of, gaps
 
@@ -26,12 +26,9 @@ PERIOD = 1.0  # s; a run that is over sooner leaves no files
 WORTH = 60.0  # s of work that are kept when a run fails or is interrupted, unless resume=True
 
 
-def _parts(flat: Any, at: slice) -> Iterator[np.ndarray]:
-    """Rows `at` of Target.flat, or all of a Strip, some at a time: they may lie in a file."""
-    if hasattr(flat, "values"):
-        yield flat.values
-        return
-    step = max(1, int(BLOCK_BYTES // (np.dtype(flat.dtype).itemsize * max(1, math.prod(flat.shape[1:])))))
+def _parts(flat: Any, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
+    """Rows `at` of Target.flat or of a Strip, of row_bytes each, some at a time: they may lie in a file."""
+    step = max(1, BLOCK_BYTES // row_bytes)
     for start in range(at.start, at.stop, step):
         yield flat[start : min(start + step, at.stop)]
 
@@ -54,7 +51,8 @@ class Keeper:
         self.pieces: Pieces | None = None
         self.begun = time.monotonic()
         self.fresh = True
-        self._waiting: list[tuple[int, int, int]] = []
+        self._waiting: list[tuple[int, int, Skipped]] = []
+        self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(row_shape(chosen.tiling.grid))
         if resume is False:
             discard(self.folder)
         elif resume or self.folder.exists():
@@ -78,12 +76,12 @@ class Keeper:
         """Every band has a file."""
         return self.pieces is not None and not gaps(self.pieces.runs(), 0, self.chosen.tiling.n_bands)
 
-    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, int]]:
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
         """Tiles of earlier runs; see Pieces.found."""
         if self.pieces is not None:
             yield from self.pieces.found(first, last)
 
-    def keep(self, first: int, last: int, flat: Any, skipped: int) -> None:
+    def keep(self, first: int, last: int, flat: Any, skipped: Skipped) -> None:
         """Bands first ... last - 1 are finished in `flat` (Target.flat, or a Strip of just them)."""
         if self.resume is False:
             return
@@ -93,7 +91,7 @@ class Keeper:
         try:
             pieces = self.pieces or self._open()
             for a, b, n in self._waiting:
-                pieces.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b)), n)
+                pieces.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b), self._row_bytes), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise

@@ -22,7 +22,7 @@ from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
 from ..choose_method import Choice
-from ..focusing_task import Engine, Task
+from ..focusing_task import Engine, Skipped, Task
 from ..tiling import Run, count, extent
 from .image_output import Strip
 from .workers import Done, FlatFor, cut
@@ -163,7 +163,7 @@ def _width(choice: Any, place: int) -> int:
         return _open(choice, place).info.vector_width
 
 
-def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray, int, str]:
+def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray, Skipped, str]:
     """In a worker: pixels of a run of bands, pairs skipped, and the device's name."""
     global _engine
     from distributed import get_worker
@@ -174,7 +174,7 @@ def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray
             _engine = order.name, order.chosen.on(device, order.task), device
         _, engine, device = _engine
         budget = min(memory_budget.budget(device, order.max_bytes), device.info.memory)
-        strip, skipped = Strip(order.chosen.tiling, *run, order.chosen.dtype), 0
+        strip, skipped = Strip(order.chosen.tiling, *run, order.chosen.dtype), Skipped()
         ends = {last for _, last in engine.blocks(budget)}
         for first, last in cut(order.chosen.tiling, [run], float("inf"), ends):
             skipped += engine.fill(first, last, strip, budget, Clock(), lambda _: None)

@@ -67,6 +67,9 @@ class Strip:
         self.start = at.start
         self.values = np.empty((at.stop - at.start, *row_shape(tiling.grid)), dtype)
 
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return self.values[rows.start - self.start : rows.stop - self.start]
+
     def __setitem__(self, at: Any, block: np.ndarray) -> None:
         rows, *rest = at if isinstance(at, tuple) else (at,)
         self.values[(slice(rows.start - self.start, rows.stop - self.start), *rest)] = block

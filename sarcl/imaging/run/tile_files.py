@@ -14,18 +14,20 @@ import re
 import secrets
 import struct
 from collections.abc import Iterable, Iterator
+from dataclasses import asdict
 from itertools import chain
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ..focusing_task import Skipped
 from ..tiling import GridTiling, Run, count, extent, row_shape
 from ._fingerprint import as_bytes, checker, difference, mark
 
 log = logging.getLogger(__name__)
 
-MAGIC = b"sarcl tiles 1\n"
+MAGIC = b"sarcl tiles 2\n"
 NAME = re.compile(r"bands-(\d+)-(\d+)\.tiles")
 DIGEST = 32  # bytes
 
@@ -56,7 +58,7 @@ class Pieces:
         """Runs of bands that have a file, by their names."""
         return sorted(found for path in _tiles(self.folder) if (found := self._named(path)))
 
-    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, int]]:
+    def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
         """Whole files of this job with any of bands first ... last - 1, none twice: (run, pixels, pairs skipped).
 
         A damaged file is removed, another job's left alone; both are warned of.
@@ -75,9 +77,9 @@ class Pieces:
             end = b
             yield (a, b), values, skipped
 
-    def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: int) -> None:
+    def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: Skipped) -> None:
         """Put the pixels of bands first ... last - 1, given in parts, in a file, whole or not at all."""
-        head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": int(skipped)}
+        head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": asdict(skipped)}
         text = json.dumps(head).encode()
         check = checker()
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
@@ -137,29 +139,29 @@ class Pieces:
                 "job was given to continue it, or resume=False (--no-resume) to throw its tiles away"
             )
 
-    def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, int, str]:
+    def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, Skipped, str]:
         """Pixels, pairs skipped and "", or None and why not."""
         try:
             data = path.read_bytes()
         except OSError as exc:
-            return None, 0, f"cannot be read ({exc.strerror})"
+            return None, Skipped(), f"cannot be read ({exc.strerror})"
         view = memoryview(data)
         start = len(MAGIC) + 8
         if len(data) < start + DIGEST or not data.startswith(MAGIC):
-            return None, 0, "is truncated or damaged"
+            return None, Skipped(), "is truncated or damaged"
         if checker(view[:-DIGEST]).digest() != data[-DIGEST:]:
-            return None, 0, "is truncated or damaged (its checksum differs)"
+            return None, Skipped(), "is truncated or damaged (its checksum differs)"
         start += struct.unpack("<Q", data[len(MAGIC) : start])[0]
         head = json.loads(data[len(MAGIC) + 8 : start])
         if head["job"] != self.mark:
-            return None, 0, FOREIGN
+            return None, Skipped(), FOREIGN
         at = extent(self.tiling, first, last)
         size = count(self.tiling, first, last) * self.dtype.itemsize
         fits = len(data) - DIGEST - start == size and head["dtype"] == self.dtype.str
         if not fits or (head["first"], head["last"]) != (first, last):
-            return None, 0, "does not hold what its name says"
+            return None, Skipped(), "does not hold what its name says"
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
-        return values.reshape(at.stop - at.start, *row_shape(self.tiling.grid)), head["skipped"], ""
+        return values.reshape(at.stop - at.start, *row_shape(self.tiling.grid)), Skipped(**head["skipped"]), ""
 
     def _mark_in(self, path: Path) -> str | None:
         """The fingerprint in a file's head; None where it has none that can be read."""

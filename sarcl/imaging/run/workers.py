@@ -10,10 +10,10 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...base.stage_timer import Clock
-from ..focusing_task import Engine
+from ..focusing_task import Engine, Skipped
 from ..tiling import GridTiling, Run, count
 
-Done = tuple[int, int, Any, int]  # a run, where its pixels are, pairs skipped
+Done = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
 FlatFor = Callable[[int, int], Any]  # where the pixels of a run go
 BLOCKS_EACH = 4  # blocks a worker, so that none waits long for the slowest
 
@@ -71,7 +71,7 @@ class Local:
     def __init__(self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int) -> None:
         self.engines, self.budgets, self.names, self.n_rows = engines, budgets, names, n_rows
         self.size = len(engines)
-        self.least_pixels = max(float(getattr(engine, "least_pixels", "inf")) for engine in engines)
+        self.least_pixels = max(float(engine.least_pixels) for engine in engines)
 
     def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
         """See Crew; each block is one that every engine can take."""
