@@ -24,12 +24,12 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
-from .choose_method import METHODS, Choice, choose
-from .focusing_task import BeamCone, Skip, Skipped, Task, make_task
-from .run.checkpoint import Keeper
-from .run.image_output import Strip, Target, is_path
+from .choose_method import METHODS, MethodChoice, choose
+from .focusing_task import BeamCone, FocusingTask, Skip, Skipped, make_task
+from .run.checkpoint import Checkpoint
+from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
-from .run.workers import BLOCKS_EACH, Crew, Local
+from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
 from .tiling import Run, extent
 from .tiling import count as pixels_in
 
@@ -139,32 +139,41 @@ def backproject(
     tolerance = allowed_error(tolerance)
     piece = _piece(tile, resume, out)
     task = make_task(raw, grid, window, weights, wrap, skip, beam)
-    crew, chosen = _crew(task, method, tolerance, device, cluster, max_bytes)
+    workers, chosen = _open_workers(task, method, tolerance, device, cluster, max_bytes)
     clock.lap("plan")
 
     with ExitStack() as stack:
-        keeper = None
+        checkpoint = None
         if is_path(out):
-            keeper = Keeper(out, task, chosen, tolerance, True if piece else resume)
-            stack.push(keeper)
-        if piece and keeper:
-            finished = keeper.finished()
+            checkpoint = Checkpoint(out, task, chosen, tolerance, True if piece else resume)
+            stack.push(checkpoint)
+        if piece and checkpoint:
+            finished = checkpoint.finished()
             if finished is not None:
                 return finished
-            _fill(crew, task, chosen, None, keeper, share(chosen.tiling.n_bands, *piece, chosen.unit), clock, progress)
-            if not keeper.complete():
+            _fill(
+                workers,
+                task,
+                chosen,
+                None,
+                checkpoint,
+                share(chosen.tiling.n_bands, *piece, chosen.unit),
+                clock,
+                progress,
+            )
+            if not checkpoint.complete():
                 return None
         try:
-            target = Target(grid, out, stack, chosen.dtype)
+            output = ImageOutput(grid, out, stack, chosen.dtype)
         except FileExistsError:
             if piece:  # the others' tiles and these are being put together by another run
                 return None
             raise
         bands = 0, chosen.tiling.n_bands
-        skipped, kept = _fill(crew, task, chosen, target, keeper, bands, clock, progress)
-        if grid.empty is not None and not target.grid.is_plane:
-            target.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
-        target.finish()
+        skipped, kept = _fill(workers, task, chosen, output, checkpoint, bands, clock, progress)
+        if grid.empty is not None and not output.grid.is_plane:
+            output.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
+        output.finish()
         no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
         done = task.pairs - skipped.window - skipped.beam - no_data
         if done == 0:
@@ -174,7 +183,7 @@ def backproject(
         measured = None
         exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
-            measured = _measure_error(task, grid, target.data)
+            measured = _measure_error(task, grid, output.data)
             clock.lap("check")
         plan = chosen.plan.describe(chosen.method)
         if kept:
@@ -192,19 +201,19 @@ def backproject(
                 "no data": no_data,
             },
             seconds=clock.seconds,
-            device=" + ".join(crew.names),
+            device=" + ".join(workers.names),
         )
         middle = task.raw.n_rows // 2
-        image = target.image(
-            job=keeper.mark if keeper and keeper.pieces else None,
+        image = output.image(
+            job=checkpoint.mark if checkpoint and checkpoint.tiles else None,
             gain=float(task.row_weight.sum() * task.sample_weight.sum()),
             frequency=float(np.median(task.antennas.frequency)),
             tx=task.raw.tx[middle],
             rx=task.raw.rx[middle],
             report=report,
         )
-        if keeper:
-            keeper.done()
+        if checkpoint:
+            checkpoint.done()
         if measured is not None and measured > tolerance:
             raise ToleranceMissed(tolerance, measured, image)
         return image
@@ -229,73 +238,73 @@ def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
     return i, n
 
 
-def _crew(
-    task: Task, method: str, tolerance: float, device: Any, cluster: Any, max_bytes: float | None
-) -> tuple[Crew, Choice]:
+def _open_workers(
+    task: FocusingTask, method: str, tolerance: float, device: Any, cluster: Any, max_bytes: float | None
+) -> tuple[WorkerPool, MethodChoice]:
     """Who makes the image, and how: one plan for all of them."""
     if cluster is not None:
-        from .run.dask_workers import Cluster, have_lanes
+        from .run.dask_workers import DaskWorkers, have_lanes
 
         chosen = choose(task, method, tolerance, have_lanes(cluster, device))
-        return Cluster(cluster, task, chosen, device, max_bytes), chosen
+        return DaskWorkers(cluster, task, chosen, device, max_bytes), chosen
     devices = open_devices(device)
     budgets = [min(budget(d, max_bytes), d.info.memory) for d in devices]
     lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
     chosen = choose(task, method, tolerance, lanes, float64)
     engines = [chosen.on(d, task) for d in devices]
-    return Local(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
+    return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
 
 
 def _fill(
-    crew: Crew,
-    task: Task,
-    chosen: Choice,
-    target: Target | None,
-    keeper: Keeper | None,
+    workers: WorkerPool,
+    task: FocusingTask,
+    chosen: MethodChoice,
+    output: ImageOutput | None,
+    checkpoint: Checkpoint | None,
     bands: Run,
     clock: Clock,
     progress: Progress | None,
 ) -> tuple[Skipped, int]:
-    """Some bands, into `target` or only into files: (pairs skipped, bands that were in files)."""
+    """Some bands, into `output` or only into files: (pairs skipped, bands that were in files)."""
     tiling, n_rows = chosen.tiling, task.raw.n_rows
     there, skipped = [], Skipped()
-    for run, values, missed in keeper.found(*bands) if keeper else ():
-        if target is not None:
-            target.flat[extent(tiling, *run)] = values
+    for run, values, missed in checkpoint.found(*bands) if checkpoint else ():
+        if output is not None:
+            output.flat[extent(tiling, *run)] = values
         there.append(run)
         skipped += missed
     todo = gaps(there, *bands)
     total = n_rows * sum(pixels_in(tiling, *run) for run in todo)
-    said = -1
+    reported = -1
 
-    def tick(done: int) -> None:
-        nonlocal said
-        if progress and done != said:
+    def on_progress(done: int) -> None:
+        nonlocal reported
+        if progress and done != reported:
             progress("backproject", done, total)
-            said = done
+            reported = done
 
-    def flat_for(first: int, last: int) -> Any:
-        return Strip(tiling, first, last, chosen.dtype) if target is None else target.flat
+    def output_for(first: int, last: int) -> Any:
+        return BandBuffer(tiling, first, last, chosen.dtype) if output is None else output.flat
 
     pixels = total / max(n_rows, 1)
-    most = pixels / (BLOCKS_EACH * crew.size) if crew.size > 1 else pixels
-    if keeper and keeper.resume is not False:
-        most = min(most, max(pixels / MOST_FILES, crew.least_pixels))
+    most = pixels / (BLOCKS_EACH * workers.size) if workers.size > 1 else pixels
+    if checkpoint and checkpoint.resume is not False:
+        most = min(most, max(pixels / MOST_FILES, workers.least_pixels))
     clock.lap("files")
     made = []
-    with closing(crew.work(crew.blocks(todo, most, chosen.unit), flat_for, clock, tick)) as work:
+    with closing(workers.work(workers.blocks(todo, most, chosen.unit), output_for, clock, on_progress)) as work:
         for first, last, flat, missed in work:
             made.append((first, last))
             skipped += missed
-            if keeper:
-                keeper.keep(first, last, flat, missed)
+            if checkpoint:
+                checkpoint.keep(first, last, flat, missed)
                 clock.lap("files")
     if gaps(there + made, *bands):
         raise RuntimeError(f"bands {gaps(there + made, *bands)} were left out; please report this")
     return skipped, sum(b - a for a, b in there)
 
 
-def _measure_error(task: Task, grid: ImageGrid, data: Any) -> float:
+def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum, as the contract defines it."""
     from ..reference.backproject import backproject as exact
 

@@ -21,7 +21,7 @@ from .factorized import plan as factorized_plan
 from .factorized.factorized import Factorized
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
-from .focusing_task import Engine, Task
+from .focusing_task import Engine, FocusingTask
 from .tiling import GridTiling
 
 METHODS = ("auto", "direct", "factorized")
@@ -34,7 +34,7 @@ SMALL = 3e7  # pairs below which looking for sub-apertures takes longer than the
 
 
 @dataclass(frozen=True, eq=False)
-class Choice:
+class MethodChoice:
     """A method, its plan and tiling for one task, and what makes its engine on a device.
 
     engine           called as engine(device, task, plan, tiling)
@@ -59,13 +59,13 @@ class Choice:
         """Bands that share work: cutting between them costs time."""
         return int(self.plan.factors[0]) if self.method == "factorized" and self.tiling.grid.is_plane else 1
 
-    def on(self, device: Device, task: Task) -> Engine:
+    def on(self, device: Device, task: FocusingTask) -> Engine:
         """The engine on one device."""
         made: Engine = self.engine(device, task, self.plan, self.tiling)
         return made
 
 
-def choose(task: Task, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> Choice:
+def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> MethodChoice:
     """The cheapest way to `tolerance` among `method`, or among all for "auto".
 
     lanes    the devices work on vectors of pixels, as CPUs do
@@ -91,21 +91,21 @@ class _Float32:
     what is left of it for plans.
     """
 
-    def __init__(self, task: Task, tolerance: float) -> None:
+    def __init__(self, task: FocusingTask, tolerance: float) -> None:
         strongest = float(profile_energy.row_norms(task).max()) / np.sqrt(task.raw.n_samples)
         if 0 < strongest < TINY:
             raise ValueError(
                 f"samples times weights reach {strongest:.1e}; complex64 loses digits below {TINY:.0e}: scale the "
                 f"samples up, or ask for a tolerance below {LEAST_TOLERANCE:.0e}, which is met in complex128"
             )
-        self.task, self.tolerance, self.seen = task, tolerance, profile_energy.seen(task)
-        self.near = max(1.0, self.seen.near if self.seen.near > 1.25 else 1.0)
+        self.task, self.tolerance, self.energy = task, tolerance, profile_energy.estimate(task)
+        self.near = max(1.0, self.energy.near_pixels if self.energy.near_pixels > 1.25 else 1.0)
         self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
-            self.seen.whole - self.near, 0.0
+            self.energy.whole_profile - self.near, 0.0
         )
         self.inner = (tolerance - self.rounding) / self.near
 
-    def direct(self, lanes: bool) -> Choice:
+    def direct(self, lanes: bool) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best in complex64."""
         self._must_round_less("in complex64", self._best())
         try:
@@ -114,7 +114,7 @@ class _Float32:
             raise refused.restated(self.tolerance, self._best()) from None
         return self._offer("direct", made, direct_method.Direct)
 
-    def factorized(self, lanes: bool) -> Choice:
+    def factorized(self, lanes: bool) -> MethodChoice:
         """With sub-apertures. ToleranceUnreachable says why not, but names no best."""
         self._must_round_less("with sub-apertures", None)
         try:
@@ -133,15 +133,16 @@ class _Float32:
 
     def _must_round_less(self, how: str, best: float | None) -> None:
         if self.rounding > ROUNDING * self.tolerance:
-            dark = f"these pixels are {20 * np.log10(self.seen.whole):.0f} dB darker than what else is in the same rows"
+            ratio = 20 * np.log10(self.energy.whole_profile)
+            dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
             raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
 
-    def _offer(self, name: str, made: tuple[Any, GridTiling], engine: Any) -> Choice:
+    def _offer(self, name: str, made: tuple[Any, GridTiling], engine: Any) -> MethodChoice:
         error = min(self.near * made[0].predicted_error + self.rounding, self.tolerance)
-        return Choice(name, *made, engine, error, made[0].cost)
+        return MethodChoice(name, *made, engine, error, made[0].cost)
 
 
-def _straight(task: Task, tolerance: float, lanes: bool, float64: bool) -> Choice:
+def _straight(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
     """By the direct method, in complex64 if that can, else in complex128 if the devices can."""
     if tolerance >= LEAST_TOLERANCE:
         try:
@@ -155,7 +156,7 @@ def _straight(task: Task, tolerance: float, lanes: bool, float64: bool) -> Choic
     return _precise(task, tolerance)
 
 
-def _merged(task: Task, tolerance: float, lanes: bool, float64: bool) -> Choice:
+def _merged(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
     """With sub-apertures, which only complex64 has. Where they cannot, the best that they can takes a search."""
     try:
         if tolerance < LEAST_TOLERANCE:
@@ -191,9 +192,9 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
     return middle if middle < best and met(middle) else best
 
 
-def _precise(task: Task, tolerance: float) -> Choice:
+def _precise(task: FocusingTask, tolerance: float) -> MethodChoice:
     """In float64."""
     plan, tiling = float64_plan.make_plan(task, tolerance)
-    return Choice(
-        "direct", plan, tiling, float64_direct.Precise, plan.predicted_error, FLOAT64 * plan.cost / task.grid.size
+    return MethodChoice(
+        "direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, FLOAT64 * plan.cost / task.grid.size
     )

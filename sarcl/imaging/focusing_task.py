@@ -25,7 +25,7 @@ SKIPS = ("range window", "beam", "zero weight", "no data")
 
 
 @dataclass(frozen=True, eq=False)
-class Task:
+class FocusingTask:
     """One image to be made, whatever the method and the device.
 
     raw            its rows; those of weight 0 are gone where they are skipped
@@ -100,12 +100,12 @@ class Engine(Protocol):
         ...
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
-        """Write the pixels of bands first ... last - 1 to their places in `flat` (Target.flat).
+        """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
 
         budget  bytes on the device, all in all
-        tick    called as tick(rows_done): how many of the task's rows these bands have had so far
+        on_progress    called as on_progress(rows_done): how many of the task's rows these bands have had so far
         Returns the number of (row, pixel) pairs that were skipped.
         """
         ...
@@ -165,7 +165,7 @@ def make_task(
     wrap: bool,
     skip: bool | Collection[Skip],
     beam: BeamCone | None = None,
-) -> Task:
+) -> FocusingTask:
     """What the options of `backproject` make of the data; ValueError for those that do not fit."""
     if not raw.compressed:
         raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
@@ -178,7 +178,9 @@ def make_task(
         toward = None if toward is None else toward[used]
     if "no data" not in skips:
         grid = grid.filled()
-    return Task(raw, grid, antennas_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips))
+    return FocusingTask(
+        raw, grid, antennas_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips)
+    )
 
 
 def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -> tuple[np.ndarray, np.ndarray]:

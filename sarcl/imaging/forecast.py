@@ -24,9 +24,9 @@ from ..opencl import memory_budget
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
 from . import profile_energy
-from .choose_method import METHODS, Choice, choose
+from .choose_method import METHODS, MethodChoice, choose
 from .factorized.plan import FactorPlan, moving_cost
-from .focusing_task import BeamCone, Skip, Task, make_task
+from .focusing_task import BeamCone, FocusingTask, Skip, make_task
 
 PROBE = 0.03  # s a probe of a device takes at least
 MOST_BANDS = 2**16  # of which blocks are listed: what the first takes shows in these
@@ -98,21 +98,21 @@ def plan(
     )
 
 
-def _work(task: Task, chosen: Choice) -> float:
+def _work(task: FocusingTask, chosen: MethodChoice) -> float:
     """What a row costs: pixels to be made, of tiles that reach beyond the grid too, times the cost of each."""
     tiling, plan, rows = chosen.tiling, chosen.plan, task.raw.n_rows
     pixels = float(tiling.pixels(0, tiling.n_bands))
     if not isinstance(plan, FactorPlan):
         return pixels * chosen.cost
     # the plan counts tiles as if they filled the grid
-    sources = [rows, *(len(level.thinning.nodes) for level in plan.levels)]
+    sources = [rows, *(len(level.decimation.nodes) for level in plan.levels)]
     extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
     for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
         if tiling.grid.is_plane:
             tiles = float(-(-tiling.n_bands // factor) * -(-tiling.across // factor))
         else:
             tiles = pixels / tiling.per_tile / factor**2
-        moved = moving_cost(2 * level.reach, plan.between.taps, level.thinning.filter.shape[1])
+        moved = moving_cost(2 * level.reach, plan.between.taps, level.decimation.filter.shape[1])
         extra += max(tiles - task.grid.size / level.side**2, 0.0) * n * moved
     return task.grid.size * chosen.cost + extra / rows
 
@@ -123,7 +123,7 @@ def _rate(devices: list[Device]) -> float:
 
 
 def _cheaper(
-    task: Task, method: str, tolerance: float, lanes: bool, float64: bool, chosen: Choice, seconds: float
+    task: FocusingTask, method: str, tolerance: float, lanes: bool, float64: bool, chosen: MethodChoice, seconds: float
 ) -> tuple[float, float] | None:
     """The plan of the smallest error that costs noticeably less."""
     for factor in (2, 3, 10, 30):
@@ -137,7 +137,7 @@ def _cheaper(
     return None
 
 
-def _bytes(task: Task, chosen: Choice, device: Device, budget: float) -> float:
+def _bytes(task: FocusingTask, chosen: MethodChoice, device: Device, budget: float) -> float:
     """What a device holds at a time; its budget is kept."""
     tiling = copy.copy(chosen.tiling)
     tiling.n_bands = min(tiling.n_bands, MOST_BANDS)

@@ -1,4 +1,7 @@
-"""How much of the rows' energy the pixels see: errors scale with the first, a tolerance with the second."""
+"""Ratio of the energy in the range profiles to the energy at the pixels.
+
+Interpolation and rounding errors are proportional to the former; the tolerance is relative to the latter.
+"""
 
 from __future__ import annotations
 
@@ -10,41 +13,41 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..numerics.interpolation_float64 import kernel
 from ..opencl import fft
-from .focusing_task import Task
+from .focusing_task import FocusingTask
 
 ROWS, PIXELS, MOST = 16, 256, 2**18
 ALL = 2**28  # samples up to which every row is looked at
 TAPS, FINER, TERMS = 12, 4.0, 6  # of a kernel that errs by 1e-11
 
 
-_norms: WeakKeyDictionary[Task, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
-_seen: WeakKeyDictionary[Task, Energy] = WeakKeyDictionary()
+_norms: WeakKeyDictionary[FocusingTask, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
+_known: WeakKeyDictionary[FocusingTask, ProfileEnergy] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True)
-class Energy:
+class ProfileEnergy:
     """Root mean square of range profiles, relative to that at the pixels themselves.
 
-    near    around the pixels' places: interpolation errs in proportion to it
-    whole   over whole profiles: rounding of transforms errs in proportion to it
+    near_pixels    over the samples around each pixel's range: errors of interpolation are proportional to it
+    whole_profile  over all samples: rounding errors of the transforms are proportional to it
     """
 
-    near: float
-    whole: float
+    near_pixels: float
+    whole_profile: float
 
 
-def seen(task: Task) -> Energy:
+def estimate(task: FocusingTask) -> ProfileEnergy:
     """Estimate from 256 pixels in 16 rows spread over the data and in the 16 brightest, exact to 1e-11 of an amplitude.
 
-    Energy(1, 1) where no pixel sees anything.
+    ProfileEnergy(1, 1) where no pixel sees anything.
     """
-    if task not in _seen:
-        _seen[task] = _look(task)
-    return _seen[task]
+    if task not in _known:
+        _known[task] = _estimate(task)
+    return _known[task]
 
 
-def _look(task: Task) -> Energy:
-    """As `seen`, anew."""
+def _estimate(task: FocusingTask) -> ProfileEnergy:
+    """As `estimate`, anew."""
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
     count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
@@ -67,12 +70,12 @@ def _look(task: Task) -> Energy:
         lit += stands_for[row] * int(inside.sum()) / raw.n_rows
     whole = lit * float(((bright / scale) ** 2).sum())
     if whole == 0 or near == 0:
-        return Energy(1.0, 1.0)
+        return ProfileEnergy(1.0, 1.0)
     floor = 1e-20 * whole  # every pixel of every row at an exact null: no more can be told
-    return Energy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
+    return ProfileEnergy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
 
 
-def row_norms(task: Task) -> np.ndarray:
+def row_norms(task: FocusingTask) -> np.ndarray:
     """Norm of the samples of each row as they are weighed, (n_rows,) float64.
 
     Of more than 2^28 samples (2 GiB), every n-th row alone is read, and stands for those up to the next.
@@ -94,14 +97,14 @@ def row_norms(task: Task) -> np.ndarray:
     return _norms[task]
 
 
-def share(task: Task) -> float:
+def share(task: FocusingTask) -> float:
     """Share of (row, pixel) pairs in the row's range window and beam, estimated from 64 rows and 256 pixels."""
     _, x = task.grid.sample(PIXELS, seed=1)
     rows = np.unique(np.linspace(0, task.raw.n_rows - 1, 64).astype(int))
     return float(np.mean([_delays(task, x, int(row))[1].mean() for row in rows]))
 
 
-def _delays(task: Task, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
+def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
     """Delays of points, m (m, 3), in turns of a row's window, and whether the row sees them."""
     raw = task.raw
     half = sum(np.linalg.norm(x - end[row], axis=1) for end in (raw.tx, raw.rx)) / 2

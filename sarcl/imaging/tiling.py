@@ -171,12 +171,12 @@ Run = tuple[int, int]  # bands first ... last - 1
 
 
 def row_shape(grid: ImageGrid) -> tuple[int, ...]:
-    """Shape of one entry of Target.flat: a row of a plane, or one listed point."""
+    """Shape of one entry of ImageOutput.flat: a row of a plane, or one listed point."""
     return tuple(grid.shape[1:]) if grid.is_plane else ()
 
 
 def extent(tiling: GridTiling, first: int, last: int) -> slice:
-    """Where bands first ... last - 1 lie in Target.flat."""
+    """Where bands first ... last - 1 lie in ImageOutput.flat."""
     step, end = (tiling.high, tiling.grid.shape[0]) if tiling.grid.is_plane else (tiling.LISTED_BAND, tiling.grid.size)
     return slice(first * step, min(last * step, end))
 

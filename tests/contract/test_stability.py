@@ -20,8 +20,8 @@ SLOW = pytest.mark.slow
 @pytest.fixture
 def sights(monkeypatch):
     """What factorised runs found their rows to see of their largest tiles (_tile_coverage.py)."""
-    seen, look = [], _tile_coverage.look
-    monkeypatch.setattr(factorized, "look", lambda *a: seen.append(look(*a)) or seen[-1])
+    seen, coverage_of = [], _tile_coverage.coverage_of
+    monkeypatch.setattr(factorized, "coverage_of", lambda *a: seen.append(coverage_of(*a)) or seen[-1])
     return seen
 
 
@@ -145,9 +145,9 @@ def test_sub_apertures_on_both_sides_of_a_window_that_moves(sights):
     raw = replace(raw, reference_range=raw.reference_range + np.linspace(-30, 30, 400))
     grid = sarcl.ImageGrid.plane(shape=(150, 1100), spacing=0.25)
     image = sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized", check=False)
-    (sight,) = sights
-    merged = [rows for rows, some in zip(sight.left_out, sight.merged, strict=True) if some]
-    assert sight.directly and any(rows is not None and rows.any() for rows in merged)
+    (coverage,) = sights
+    merged = [rows for rows, some in zip(coverage.left_out, coverage.merged, strict=True) if some]
+    assert coverage.directly and any(rows is not None and rows.any() for rows in merged)
     crossed = np.flatnonzero(np.abs(grid.positions[..., 0]) > 94)  # by the edge, at 137 +- 43 m on the ground
     for among in (None, crossed):
         assert image_error(image, raw, most=200, among=among, exact=quick_sum) <= image.report.predicted_error <= 1e-2
@@ -165,7 +165,7 @@ def test_a_pixel_exactly_on_the_windows_edge_falls_to_either_side(sights, method
     samples = np.broadcast_to(plain.samples[:1], plain.samples.shape)
     raw = replace(plain, samples=samples, reference_range=np.linalg.norm(plain.tx - point, axis=1) - half)
     image = sarcl.backproject(raw, grid, tolerance=1e-2, method=method, check=False)
-    assert [sight.merged.any() for sight in sights] == [True] * (method == "factorized")
+    assert [coverage.merged.any() for coverage in sights] == [True] * (method == "factorized")
     each = exact(raw[:1], point[None], wrap=True)[0][0]
     rows_in = image.data[edge] / each  # each row adds the same, or nothing
     assert abs(rows_in - np.clip(rows_in.real, 0, n)) <= 1e-2 * n

@@ -264,8 +264,8 @@ PLANTED = {
         "sarcl.imaging.factorized.plan.make_plan",
         lambda: sarcl.backproject(SMOOTH, PLANE, tolerance=1e-2),
     ),
-    "sub-apertures, thinning": (
-        "sarcl.imaging.factorized.plan.thinned",
+    "sub-apertures, decimation": (
+        "sarcl.imaging.factorized.plan.decimated",
         lambda: sarcl.plan(SMOOTH, PLANE, tolerance=1e-2),
     ),
     "shadows": (

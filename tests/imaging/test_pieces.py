@@ -23,7 +23,7 @@ from sarcl.imaging.choose_method import choose
 from sarcl.imaging.focusing_task import Skipped, make_task
 from sarcl.imaging.run import checkpoint, tile_files
 from sarcl.imaging.run._fingerprint import job, mark
-from sarcl.imaging.run.image_output import Strip, Target
+from sarcl.imaging.run.image_output import BandBuffer, ImageOutput
 from sarcl.imaging.tiling import count, extent
 from sarcl.io import output_paths
 
@@ -190,13 +190,13 @@ def found(raw, path):
     """Runs of bands in the files beside an image, read and checked."""
     task, chosen = make_task(raw, GRID, None, None, False, True), planned(raw)
     described = job(task, chosen.method, 1e-3, chosen.plan, chosen.tiling, chosen.dtype)
-    files = tile_files.Pieces(tile_files.folder_of(path), described, chosen.tiling, chosen.dtype)
+    files = tile_files.TileStore(tile_files.folder_of(path), described, chosen.tiling, chosen.dtype)
     return [run for run, _, _ in files.found(0, chosen.tiling.n_bands)]
 
 
 def test_tile_files_name_why_pairs_were_skipped(raw, tmp_path):
     tiling, skipped = planned(raw).tiling, Skipped(window=2**70, beam=3)
-    files = tile_files.Pieces(tmp_path / "image.h5.parts", {}, tiling, np.complex64)
+    files = tile_files.TileStore(tmp_path / "image.h5.parts", {}, tiling, np.complex64)
     files.save(0, 1, [np.zeros((count(tiling, 0, 1) // 301, 301), np.complex64)], skipped)
     (path,) = tiles(tmp_path)
     assert b'"skipped": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
@@ -245,7 +245,7 @@ def test_a_full_disk_costs_the_files_but_not_the_image(raw, whole, tmp_path, mon
     def full(*_):
         raise OSError(errno.ENOSPC, "No space left on device")
 
-    monkeypatch.setattr(tile_files.Pieces, "save", full)
+    monkeypatch.setattr(tile_files.TileStore, "save", full)
     monkeypatch.setattr(checkpoint, "PERIOD", 0.0)
     image = sarcl.backproject(raw, GRID, out=tmp_path / "image.h5", max_bytes=SMALL)
     assert np.array_equal(image.data[...], whole.data)
@@ -698,17 +698,17 @@ def test_a_band_larger_than_memory_is_made_in_parts(device, grid, tmp_path):
 
 
 def test_a_strip_takes_what_the_whole_image_would(raw):
-    """Each band written into a Strip of its own is what stands there in the image."""
+    """Each band written into a BandBuffer of its own is what stands there in the image."""
     from contextlib import ExitStack
 
     task = make_task(raw, GRID, None, None, False, True)
     tiling = choose(task, "auto", 1e-3).tiling
     rng = np.random.default_rng(0)
     with ExitStack() as stack:
-        target = Target(GRID, None, stack)
+        target = ImageOutput(GRID, None, stack)
         for first, last in ((0, 2), (2, 3), (3, tiling.n_bands)):
             values = rng.standard_normal(tiling.pixels(first, last)).astype(np.complex64)
-            strip = Strip(tiling, first, last, np.complex64)
+            strip = BandBuffer(tiling, first, last, np.complex64)
             for flat in (strip, target.flat):
                 tiling.place(values, first, last, tiling.bands(first, last)[1], flat)
             assert np.array_equal(strip.values, target.flat[extent(tiling, first, last)])

@@ -12,7 +12,7 @@ from helpers.precise_cases import decimal_image, error, focus, task_of
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
-from sarcl.imaging.float64.direct import Precise
+from sarcl.imaging.float64.direct import DirectFloat64
 from sarcl.imaging.float64.plan import WIDE, make_plan
 from sarcl.numerics import interpolation_float64
 from sarcl.opencl.choose_device import open_device
@@ -120,7 +120,7 @@ def test_memory_limit_does_not_change_the_image(double, budget):
 def test_progress_counts_rows_up_to_all_of_them(double):
     raw = noise_history(n_rows=200)
     task = task_of(raw, sarcl.ImageGrid.plane(shape=(40, 300), spacing=0.03))
-    engine = Precise(double, task, *make_plan(task, 1e-7))
+    engine = DirectFloat64(double, task, *make_plan(task, 1e-7))
     for budget in (1e5, 1e8):
         for first, last in engine.blocks(budget):
             calls = []

@@ -13,14 +13,14 @@ from ...numerics import range_profiles
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
-from ..focusing_task import Skipped, Task, working_bytes
+from ..focusing_task import FocusingTask, Skipped, working_bytes
 from ..tiling import GridTiling, place_tiles
 from . import line_plan
 from .line_plan import LinePlan
-from .tile_kernels import CHUNK, pass_of
+from .tile_kernels import CHUNK, kernel_of
 
 
-def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay; ValueError names the best there is
@@ -56,12 +56,12 @@ class Direct:
 
     dtype = np.complex64
 
-    def __init__(self, device: Device, task: Task, plan: Plan | LinePlan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: GridTiling) -> None:
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         bistatic = task.antennas.rx is not None
         beam = task.antennas.beam is not None
-        self.kernels = pass_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
+        self.kernels = kernel_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
         # making a row's profile anew for every block costs as much as this many pixels, ten times over
         self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
@@ -109,7 +109,7 @@ class Direct:
         return max(1, int(self._shares(nbytes)[1] / (planes * self.tiling.per_tile)))
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling = self.tiling
@@ -123,7 +123,7 @@ class Direct:
             stop = min(start + most, tiles.n_tiles)
 
             def rows_done(rows: float, start: int = start, stop: int = stop) -> None:
-                tick((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
+                on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
             image, missed = self.add_up(_some(tiles, start, stop), budget, clock, rows_done)
             if whole and tiling.grid.is_plane:
@@ -145,7 +145,7 @@ class Direct:
         return ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).astype(np.complex64)
 
     def add_up(
-        self, tiles: Tiles, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> tuple[Any, np.ndarray]:
         """All rows into these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
         device, raw, kernels = self.device, self.task.raw, self.kernels
@@ -175,7 +175,7 @@ class Direct:
                     device.finish()
             device.finish()
             clock.lap("backproject")
-            tick(stop)
+            on_progress(stop)
         return image, on.skipped()
 
 

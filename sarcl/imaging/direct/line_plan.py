@@ -112,14 +112,14 @@ def steps(grid: ImageGrid) -> np.ndarray:
 
 
 @dataclass(frozen=True, eq=False)
-class Look:
+class SampledDirections:
     """How sampled pulses see sampled tiles: directions along a pixel's steps, m (tiles, n, 2 antennas, 2), and 1/m."""
 
     along: np.ndarray
     inverse: np.ndarray
 
     @classmethod
-    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray | None, axes: np.ndarray) -> Look:
+    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray | None, axes: np.ndarray) -> SampledDirections:
         ends = np.stack([tx, tx if rx is None else rx], axis=1)
         d = ends - points[:, None, None, :]
         inverse = 1 / np.maximum(np.linalg.norm(d, axis=-1), 1e-3)
@@ -190,8 +190,8 @@ def choose(
         rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
         rx = None if antennas.rx is None else antennas.rx[rows]
         points = outline(grid)
-        look = Look.at(points, antennas.tx[rows], rx, steps(grid))
-        rest = look.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
+        directions = SampledDirections.at(points, antennas.tx[rows], rx, steps(grid))
+        rest = directions.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
         kappa = 2 * highest / SPEED_OF_LIGHT
         turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
         off = 1.1 * moved(rest)
@@ -205,7 +205,7 @@ def choose(
             continue
         fixed += 2 * np.pi * turn + error_bounds.sum_rounding(group, n_samples)
         misplaced = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
-        cells = look.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells a pixel
+        cells = directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells a pixel
         for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
             size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
             if cells * 1.2 >= fine or size > LOCAL_BYTES:

@@ -25,7 +25,7 @@ VECTORS = 4  # vectors of pixels a work-item of the gathering kernel
 Pulses = tuple[Any, int, int]
 
 
-class GatherPass:
+class GatherKernel:
     """Any tiles, each pixel by interpolation of its own: kernels/backproject.cl."""
 
     chunk, least_rows = CHUNK, 1
@@ -43,15 +43,15 @@ class GatherPass:
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
 
-    def ready(self, tiles: Tiles, skip: int) -> Placed:
+    def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
         device = self.device
         parts = [float_pairs.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
-        return Placed(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
+        return TilesOnDevice(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
 
     def add(
-        self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
-        image: Any,
+        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
+        offset: int, image: Any,
     ) -> None:  # fmt: skip
         """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
@@ -70,7 +70,7 @@ class GatherPass:
         )  # fmt: skip
 
 
-class LinePass:
+class LineKernel:
     """Square tiles of a plane, a line at a time: kernels/backproject_lines.cl."""
 
     def __init__(
@@ -89,13 +89,15 @@ class LinePass:
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
         self.limits = [np.float32(v) for v in (plan.limit_turn, plan.limit_place, plan.limit_step)]
 
-    def ready(self, tiles: Tiles, skip: int) -> Placed:
+    def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
-        return Placed(self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam)
+        return TilesOnDevice(
+            self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
+        )
 
     def add(
-        self, on: Placed, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int, offset: int,
-        image: Any,
+        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
+        offset: int, image: Any,
     ) -> None:  # fmt: skip
         """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
@@ -113,7 +115,7 @@ class LinePass:
         )  # fmt: skip
 
 
-class Placed:
+class TilesOnDevice:
     """Tiles on the device: buffers of a pass, and counts a tile: of pulses that miss it, and of those that do not
     light it where there is a beam.
     """
@@ -129,9 +131,9 @@ class Placed:
         return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
 
 
-def pass_of(device: Device, plan: Plan | LinePlan, tiling: GridTiling, **how: bool) -> GatherPass | LinePass:
+def kernel_of(device: Device, plan: Plan | LinePlan, tiling: GridTiling, **how: bool) -> GatherKernel | LineKernel:
     """The pass that a plan means; how: bistatic, wrap, local, beam."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)
-        return LinePass(device, plan, tiling, **how)
-    return GatherPass(device, plan, tiling, **how)
+        return LineKernel(device, plan, tiling, **how)
+    return GatherKernel(device, plan, tiling, **how)

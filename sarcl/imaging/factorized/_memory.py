@@ -22,7 +22,7 @@ Part = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
-class Room:
+class MemoryPlan:
     """The sizes that a plan's pieces have on one device.
 
     strides        complex samples of a tile's profile, by level; source_stride of a row's own
@@ -146,7 +146,7 @@ class Room:
 
     def tile_bytes(self, level: int) -> float:
         """Of a tile of a lower level: its profiles, and how those above it are moved to it."""
-        records = 4 * (2 + 2 * self.plan.between.taps) * len(self.plan.levels[level - 1].thinning.nodes)
+        records = 4 * (2 + 2 * self.plan.between.taps) * len(self.plan.levels[level - 1].decimation.nodes)
         return float(self.plan.levels[level].n_bytes(self.strides[level]) + records)
 
     @property

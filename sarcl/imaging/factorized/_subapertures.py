@@ -57,7 +57,7 @@ def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
 
 
 @dataclass(frozen=True, eq=False)
-class Thinning:
+class Decimation:
     """From a track to every `thin`-th of its positions: the nodes, and how pulses are spread over them.
 
     nodes   the thinned Track
@@ -73,7 +73,7 @@ class Thinning:
     error: float
 
 
-def thinned(track: Track, thin: int, taps: int, oversample: float) -> Thinning:
+def decimated(track: Track, thin: int, taps: int, oversample: float) -> Decimation:
     """Every `thin`-th position of each run, and beyond its ends as many as the filter of `taps` needs."""
     runs, parts, first = [], [], 0
     blocks: list[np.ndarray] = []
@@ -101,7 +101,7 @@ def thinned(track: Track, thin: int, taps: int, oversample: float) -> Thinning:
         tuple(runs),
     )
     error = interpolation.line_interpolator(taps, oversample).error
-    return Thinning(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
+    return Decimation(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
 
 
 def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -142,7 +142,7 @@ def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
 
 
 def filter_error(
-    track: Track, made: Thinning, centers: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
+    track: Track, made: Decimation, centers: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
 ) -> float:
     """Largest error of what the nodes make of a pulse, at points `radius` from each of `centers`, m (m, 3).
 
@@ -169,7 +169,7 @@ def filter_error(
     return worst
 
 
-def _roughest(track: Track, made: Thinning, center: np.ndarray, most: int = 1024) -> np.ndarray:
+def _roughest(track: Track, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
     """Pulses to which directions from `center` leave the line between the nodes about them the most."""
     first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
     way = ((np.arange(len(track)) - np.repeat(first, count)) / made.thin)[:, None]

@@ -16,7 +16,7 @@ MORE = 1.5  # as many rows as a tile needs, at most, are added to it directly so
 
 
 @dataclass(frozen=True, eq=False)
-class Sight:
+class TileCoverage:
     """What becomes of the pairs of rows and largest tiles (tops).
 
     merged    (n tops,) bool: tops into which rows are merged
@@ -31,7 +31,9 @@ class Sight:
     missed: np.ndarray
 
 
-def look(a: Antennas, tree: Tree, tiling: GridTiling, radius: float, line_of: np.ndarray, least: float) -> Sight:
+def coverage_of(
+    a: Antennas, tree: Tree, tiling: GridTiling, radius: float, line_of: np.ndarray, least: float
+) -> TileCoverage:
     """How rows see tops of `radius` m.
 
     A row that sees every point of a top, in its range window and its beam, can be merged; one that sees none has no
@@ -44,7 +46,7 @@ def look(a: Antennas, tree: Tree, tiling: GridTiling, radius: float, line_of: np
     left_out: list[Any] = [None] * n
     missed = np.zeros((2, tree.leaves.n_tiles), np.int64)
     if a.wrap and a.beam is None:
-        return Sight(merged, left_out, [], missed)
+        return TileCoverage(merged, left_out, [], missed)
     reach = radius * (1 + 1e-6)
     partly: dict[int, np.ndarray] = {}
     reasons: dict[int, np.ndarray] = {}
@@ -78,7 +80,7 @@ def look(a: Antennas, tree: Tree, tiling: GridTiling, radius: float, line_of: np
     for i, why in reasons.items():
         low, high = tree.leaves_of(i)
         missed[:, low:high] = why.sum(axis=1)[:, None]
-    return Sight(merged, left_out, directly, missed)
+    return TileCoverage(merged, left_out, directly, missed)
 
 
 def _shared(partly: dict[int, np.ndarray], line_of: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
@@ -97,7 +99,7 @@ def _shared(partly: dict[int, np.ndarray], line_of: np.ndarray) -> Iterator[tupl
         yield tops, rows
 
 
-def alike(
+def same_coverage(
     rows: list[np.ndarray | None], low: int, high: int, most: int
 ) -> Iterator[tuple[int, int, np.ndarray | None]]:
     """Tops low ... high - 1 in runs of up to `most` that leave out the same rows: (first, how many, these rows)."""

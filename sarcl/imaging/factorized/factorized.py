@@ -22,11 +22,11 @@ from ...numerics import range_profiles
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..direct.direct import Direct
-from ..direct.tile_kernels import Placed, pass_of
-from ..focusing_task import Skipped, Task
+from ..direct.tile_kernels import TilesOnDevice, kernel_of
+from ..focusing_task import FocusingTask, Skipped
 from ..tiling import GridTiling
-from ._memory import Room
-from ._tile_coverage import Sight, alike, look, without
+from ._memory import MemoryPlan
+from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from ._tile_tree import Tree, tree_of
 from .plan import GUARD, FactorPlan, Level, leaf_antennas
 
@@ -41,7 +41,7 @@ class _Descent:
     image: Any
     centers: list[Any]
     parents: list[Any]
-    ready: Placed
+    ready: TilesOnDevice
 
 
 class Factorized:
@@ -49,7 +49,7 @@ class Factorized:
 
     dtype = np.complex64
 
-    def __init__(self, device: Device, task: Task, plan: FactorPlan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: FactorPlan, tiling: GridTiling) -> None:
         self.device, self.plan, self.tiling = device, plan, tiling
         self.whole = self.task = task
         if (plan.order != np.arange(len(plan.order))).any():
@@ -70,7 +70,7 @@ class Factorized:
                 "TAPS": made.taps,
                 "TERMS": made.table.shape[-1],
                 "FROM_CENTRE": int(i == 0),
-                "NODES": level.thinning.filter.shape[1],
+                "NODES": level.decimation.filter.shape[1],
             }
             self.merges.append(
                 (
@@ -78,15 +78,15 @@ class Factorized:
                     device.kernel("merge_subapertures.cl", "merge", **macros),
                 )
             )
-        self.leaves = pass_of(device, plan.leaf, tiling, bistatic=bistatic, wrap=False, local=True, beam=False)
+        self.leaves = kernel_of(device, plan.leaf, tiling, bistatic=bistatic, wrap=False, local=True, beam=False)
         self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
-        self.filters = [device.upload(v.thinning.filter) for v in plan.levels]
-        self.blocks_of = [device.upload(v.thinning.blocks) for v in plan.levels]
+        self.filters = [device.upload(v.decimation.filter) for v in plan.levels]
+        self.blocks_of = [device.upload(v.decimation.blocks) for v in plan.levels]
         self.sample_weight = task.sample_weight * range_profiles.correction(plan.first, task.raw.n_samples, plan.length)
         # nodes of each level as the kernels want them, about the scene's centre
         self.nodes = []
         for v in plan.levels:
-            antennas = leaf_antennas(v.thinning.nodes)
+            antennas = leaf_antennas(v.decimation.nodes)
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas.tx), self.lanes)
             self.nodes.append((device.upload(packed), packed.shape[2], len(antennas.tx)))
         self.strides = [self._stride(v) for v in plan.levels]
@@ -95,7 +95,7 @@ class Factorized:
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
         self.pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
         self.source_stride = plan.length + 2 * self.pad
-        self.room = Room(
+        self.memory = MemoryPlan(
             plan, tiling, task.raw.n_rows, self.strides, self.source_stride, self.nodes[-1][1], self.leaves.components,
             device.info.max_alloc, device.is_cpu,
         )  # fmt: skip
@@ -106,12 +106,12 @@ class Factorized:
         return -(-(2 * level.reach + 1) // whole) * whole
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs of bands to be made with nbytes on the device; see `Room.blocks`."""
-        return self.room.blocks(nbytes)
+        """Runs of bands to be made with nbytes on the device; see `MemoryPlan.blocks`."""
+        return self.memory.blocks(nbytes)
 
     def working(self, nbytes: float) -> float:
         """See focusing_task.Engine."""
-        return min(self.room.working(nbytes), nbytes)
+        return min(self.memory.working(nbytes), nbytes)
 
     @property
     def least_pixels(self) -> float:
@@ -119,29 +119,29 @@ class Factorized:
         return 1000.0 * self.plan.length
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
         skipped, done, of = Skipped(), 0, tiling.pixels(first, last)
 
         def part_of(pixels: int) -> Callable[[float], None]:
-            return lambda rows: tick((done * n_rows + rows * pixels) / of)
+            return lambda rows: on_progress((done * n_rows + rows * pixels) / of)
 
         if not tiling.grid.is_plane:
             tree = tree_of(tiling, first, last, self.plan.factors)
             n = len(tree.centers[0])
-            sight, sizes = self._look(_top_of(tree.centers[0]), first, last), tiling.tile_sizes(first, last)
+            coverage, sizes = self._coverage(_top_of(tree.centers[0]), first, last), tiling.tile_sizes(first, last)
             values, most = (
                 np.empty((tree.leaves.n_tiles, tiling.per_tile), np.complex64),
-                max(1, self.room.most(budget)),
+                max(1, self.memory.most(budget)),
             )
             for low in range(0, n, most):
                 tops = np.arange(low, min(low + most, n))
                 at = slice(*(tree.leaves_of(t)[i] for i, t in enumerate(tops[[0, -1]])))
                 pixels = (at.stop - at.start) * tiling.per_tile
                 some = _some_of(tree, low, tops[-1] + 1)
-                image, missed = self._sums(some, _seen(sight, tops), budget, clock, part_of(pixels))
+                image, missed = self._sums(some, _seen(coverage, tops), budget, clock, part_of(pixels))
                 sums = self.device.download(image, np.empty((4, pixels), np.float32))
                 values[at] = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(-1, tiling.per_tile)
                 skipped += Skipped.of_tiles(missed, sizes[at])
@@ -151,14 +151,14 @@ class Factorized:
             return skipped
         factor, lines = self.plan.factors[0], (0, 0)
         wide = -(-tiling.across // factor)
-        for a, b, left, right in self.room.parts(first, last, budget):
+        for a, b, left, right in self.memory.parts(first, last, budget):
             before, lines = lines, (a // factor, -(-b // factor))
             if lines != before:
-                sight = self._look(_top_of(self._centers(*lines)), a, b)
+                coverage = self._coverage(_top_of(self._centers(*lines)), a, b)
             part = _columns(tiling, left, right)
             tree, pixels = tree_of(part, a, b, self.plan.factors), part.pixels(a, b)
             down, over = np.arange(lines[1] - lines[0]), np.arange(left // factor, -(-right // factor))
-            seen = _seen(sight, (down[:, None] * wide + over).ravel())
+            seen = _seen(coverage, (down[:, None] * wide + over).ravel())
             image, missed = self._sums(tree, seen, budget, clock, part_of(pixels))
             made = part.download(self.device, image, a, b, tree.slot)
             at = slice(left * tiling.wide, left * tiling.wide + made.shape[1])
@@ -169,7 +169,7 @@ class Factorized:
         return skipped
 
     def _sums(
-        self, tree: Tree, sight: Sight, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, tree: Tree, coverage: TileCoverage, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> tuple[Any, np.ndarray]:
         """Sums of the leaves' pixels (4, pixels), on the device, and rows left out of each (2, n leaves)."""
         device, leaves, n_rows = self.device, tree.leaves, self.task.raw.n_rows
@@ -179,21 +179,21 @@ class Factorized:
         count = np.array([[reason in self.whole.skips] for reason in ("range window", "beam")])
         n_tops = len(tree.centers[0])
         each = [b - a for a, b in map(tree.leaves_of, range(n_tops))]
-        missed = np.repeat(sight.missed, each, axis=1) * count
+        missed = np.repeat(coverage.missed, each, axis=1) * count
         clock.lap("prepare")
         # directly first: the sums are put in place, and what is merged is added to them
-        for tops, rows in sight.directly:
+        for tops, rows in coverage.directly:
             picked, skipped = self._add_directly(down, tops, rows, budget / 2, clock)
             missed[:, picked] += skipped
-        step, within, below = self.room.at_once(tree, budget)
-        edges = np.flatnonzero(np.diff(np.concatenate([[False], sight.merged, [False]])))
+        step, within, below = self.memory.at_once(tree, budget)
+        edges = np.flatnonzero(np.diff(np.concatenate([[False], coverage.merged, [False]])))
         for low, high in edges.reshape(-1, 2).tolist():
             gathered = device.zeros(8 * (high - low) * self.nodes[0][2] * self.strides[0])
 
             def rows_done(rows: float, low: int = low, high: int = high) -> None:
-                tick((low * n_rows + (high - low) * rows / 2) / n_tops)
+                on_progress((low * n_rows + (high - low) * rows / 2) / n_tops)
 
-            self._gather(down, low, high, sight.left_out, gathered, budget, clock, rows_done)
+            self._gather(down, low, high, coverage.left_out, gathered, budget, clock, rows_done)
             queued = 0.0
             for top in range(low, high, step):
                 self._descend(down, 0, top, min(top + step, high), gathered, low, within)
@@ -203,7 +203,7 @@ class Factorized:
                     queued = 0.0
             device.finish()
             clock.lap("backproject")
-        tick(n_rows)
+        on_progress(n_rows)
         return image, missed
 
     def _centers(self, low: int, high: int) -> np.ndarray:
@@ -215,16 +215,16 @@ class Factorized:
         columns = (np.arange(-(-tiling.across // factor)) + 0.5) * factor * tiling.wide
         return np.asarray(tiling.grid.at(rows[:, None], columns).reshape(-1, 3) - tiling.center)
 
-    def _look(self, tree: Tree, first: int, last: int) -> Sight:
+    def _coverage(self, tree: Tree, first: int, last: int) -> TileCoverage:
         """How rows see tiles of the first level of bands first ... last - 1, whole lines of them in a plane."""
         plan, factor = self.plan, self.plan.factors[0]
         if self.tiling.grid.is_plane:
             line_of = np.repeat(range(first // factor, -(-last // factor)), -(-self.tiling.across // factor))
         else:
-            line_of = np.repeat(range(first, last), [self.room.tops(b, b + 1) for b in range(first, last)])
+            line_of = np.repeat(range(first, last), [self.memory.tops(b, b + 1) for b in range(first, last)])
         # merging costs the same for any number of rows
         least = self.task.raw.n_rows * plan.cost / plan.edge.cost
-        return look(self.antennas, tree, self.tiling, plan.levels[0].radius, line_of, least)
+        return coverage_of(self.antennas, tree, self.tiling, plan.levels[0].radius, line_of, least)
 
     def _add_directly(
         self, down: _Descent, tops: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
@@ -253,7 +253,7 @@ class Factorized:
 
     def _gather(
         self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
-        clock: Clock, tick: Callable[[float], None],
+        clock: Clock, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
         """First level: profiles of all pulses become those of nodes about the largest tiles low ... high - 1.
 
@@ -265,8 +265,8 @@ class Factorized:
         shifts, merge = self.merges[0]
         tops, centers = len(down.tree.centers[0]), down.centers[0]
         nowhere = device.upload(np.zeros(tops, np.int32))
-        blocks, n_shift = level.thinning.blocks, 2 + 2 * plan.first.taps
-        rows = self.room.rows(budget)
+        blocks, n_shift = level.decimation.blocks, 2 + 2 * plan.first.taps
+        rows = self.memory.rows(budget)
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
             weights = task.row_weight[start:stop, None] * self.sample_weight
@@ -282,7 +282,7 @@ class Factorized:
             step = max(1, int(min(budget / 8, device.info.max_alloc) / (4 * n_shift * used)))
             records = device.empty(4 * n_shift * used * min(step, high - low))
             kept = []  # a buffer on a CPU is the host's memory: it must last until it has been used
-            for tile, count, without_rows in alike(left_out, low, high, step):
+            for tile, count, without_rows in same_coverage(left_out, low, high, step):
                 seen = cut if without_rows is None else without(cut, without_rows[start:stop])
                 if len(seen) == 0:
                     continue
@@ -300,7 +300,7 @@ class Factorized:
                 )  # fmt: skip
             device.finish()
             clock.lap("backproject")
-            tick(stop)
+            on_progress(stop)
 
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))
@@ -314,7 +314,7 @@ class Factorized:
         pulse, n, used = self.nodes[level]
         if level == len(plan.levels) - 1:
             stride = self.strides[level]
-            for begin, end in _runs(low, high, within / self.room.constants):
+            for begin, end in _runs(low, high, within / self.memory.constants):
                 self.leaves.add(
                     down.ready, begin, end, self.nodes[level], source, stride, plan.levels[level].reach,
                     (begin - first) * used * stride, down.image,
@@ -327,7 +327,7 @@ class Factorized:
         nodes, stride = self.nodes[level + 1][2], self.strides[level + 1]
         children = tree.children[level]
         whole = int(children[low]), int(children[high])
-        for begin, end in _runs(*whole, within / self.room.tile_bytes(level + 1)):
+        for begin, end in _runs(*whole, within / self.memory.tile_bytes(level + 1)):
             made = device.zeros(8 * (end - begin) * nodes * stride)
             records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
             device.run(
@@ -339,7 +339,7 @@ class Factorized:
             device.run(
                 merge, (self._spans(level + 1), end - begin), None,
                 source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
-                self.blocks_of[level + 1], len(below.thinning.blocks), self.filters[level + 1], below.reach, begin,
+                self.blocks_of[level + 1], len(below.decimation.blocks), self.filters[level + 1], below.reach, begin,
                 begin, nodes, stride, made,
             )  # fmt: skip
             self._descend(down, level + 1, begin, end, made, begin, within)
@@ -385,12 +385,12 @@ def _picked(tiles: Tiles, which: np.ndarray) -> Tiles:
     return Tiles(tiles.per_tile, tiles.references[which], tiles.radius[which], tiles.tile_offsets(which), tiles.shared)
 
 
-def _seen(sight: Sight, tops: np.ndarray) -> Sight:
-    """What `sight` says of these tops: the same rows are added directly, whichever neighbours are made with them."""
-    place = np.full(len(sight.merged), -1)
+def _seen(coverage: TileCoverage, tops: np.ndarray) -> TileCoverage:
+    """What `coverage` says of these tops: the same rows are added directly, whichever neighbours are made with them."""
+    place = np.full(len(coverage.merged), -1)
     place[tops] = np.arange(len(tops))
-    directly = [(mine[mine >= 0], rows) for mine, rows in ((place[t], rows) for t, rows in sight.directly)]
-    return Sight(
-        sight.merged[tops], [sight.left_out[i] for i in tops], [d for d in directly if len(d[0])],
-        sight.missed[:, tops],
+    directly = [(mine[mine >= 0], rows) for mine, rows in ((place[t], rows) for t, rows in coverage.directly)]
+    return TileCoverage(
+        coverage.merged[tops], [coverage.left_out[i] for i in tops], [d for d in directly if len(d[0])],
+        coverage.missed[:, tops],
     )  # fmt: skip

@@ -18,9 +18,9 @@ from ...opencl import fft
 from ..direct import line_plan
 from ..direct.line_plan import LinePlan, LineTiling
 from ..direct.tile_kernels import CHUNK
-from ..focusing_task import Task
+from ..focusing_task import FocusingTask
 from ..tiling import GridTiling
-from ._subapertures import Thinning, Track, chains, filter_error, rate, runs_of, thinned
+from ._subapertures import Decimation, Track, chains, decimated, filter_error, rate, runs_of
 from ._tile_tree import spread_of, tree_of
 
 # Relative costs as in line_plan.py, measured on PoCL: of a tap and of a node for a sample moved to a new tile, and of a
@@ -41,11 +41,11 @@ class Level:
     side: int
     radius: float
     reach: int  # samples of a profile on each side of the tile's centre
-    thinning: Thinning
+    decimation: Decimation
 
     def n_bytes(self, stride: int) -> int:
         """Bytes of a tile's profiles of `stride` samples."""
-        return 8 * stride * len(self.thinning.nodes)
+        return 8 * stride * len(self.decimation.nodes)
 
 
 @dataclass(frozen=True, eq=False)
@@ -74,7 +74,7 @@ class FactorPlan:
             "method": method,
             "tiles": " > ".join(str(level.side) for level in self.levels),
             "pulses a tile": " > ".join(
-                str(n) for n in [len(self.order), *(len(v.thinning.nodes) for v in self.levels)]
+                str(n) for n in [len(self.order), *(len(v.decimation.nodes) for v in self.levels)]
             ),
             "taps": self.between.taps,
             "profile samples": self.length,
@@ -82,7 +82,7 @@ class FactorPlan:
         }
 
 
-def make_plan(task: Task, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay
@@ -114,7 +114,7 @@ def _spacing(taps: int, error: float) -> float | None:
 class _Case:
     """One task at one tolerance: what candidates share."""
 
-    def __init__(self, task: Task, track: Track, order: np.ndarray, tolerance: float, lines: bool) -> None:
+    def __init__(self, task: FocusingTask, track: Track, order: np.ndarray, tolerance: float, lines: bool) -> None:
         grid = task.grid
         self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
         self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
@@ -199,17 +199,17 @@ class _Case:
         tiling = LineTiling(grid, chain[-1]) if self.lines else GridTiling(grid, chain[-1])
         factors = tuple(side // chain[-1] for side in chain)
         radii = self._radii(tiling, factors)
-        thinnings: list[Thinning] = []
+        decimations: list[Decimation] = []
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
         for radius, thin in zip(radii, thins, strict=True):
             while True:
-                thinned_out = thinned(source, thin, nodes, fine)
+                thinned_out = decimated(source, thin, nodes, fine)
                 worst = filter_error(source, thinned_out, self.points, radius, self.highest, self.axes)
                 if worst <= 1.3 * share or thin <= 2:
                     break
                 thin = max(2, int(thin * 0.75))
-            error += worst + (between.error if thinnings else 0.0)
-            thinnings.append(thinned_out)
+            error += worst + (between.error if decimations else 0.0)
+            decimations.append(thinned_out)
             source = thinned_out.nodes
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
@@ -224,8 +224,8 @@ class _Case:
             reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
         if self.task.wrap and reach[-1] + 4 * GUARD > length:
             return "the largest tiles are wider than the period in which ranges repeat"
-        levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], thinnings, strict=True))
-        sources = [raw.n_rows, *(len(v.thinning.nodes) for v in levels)]
+        levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], decimations, strict=True))
+        sources = [raw.n_rows, *(len(v.decimation.nodes) for v in levels)]
         cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * PROFILE * spacing * raw.n_samples
         for v, n in zip(levels, sources, strict=False):
             cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, nodes)

@@ -13,23 +13,23 @@ from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
 from ...opencl.device import Device
 from ...opencl.device_list import devices
-from ..focusing_task import Skipped, Task, working_bytes
+from ..focusing_task import FocusingTask, Skipped, working_bytes
 from ..tiling import GridTiling
 from ._pulse_records import packed
-from .plan import CHUNK, Plan
+from .plan import CHUNK, Float64Plan
 
 N_CONST = 16  # of kernels/backproject_float64.cl
 PIXEL_BYTES = 56  # positions, totals and their errors
 LARGEST = 1e290  # of a profile: sums of any number of such rows still fit in complex128
 
 
-class Precise:
+class DirectFloat64:
     """The loops over row blocks and tiles; see focusing_task.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
     least_pixels = np.inf
 
-    def __init__(self, device: Device, task: Task, plan: Plan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: GridTiling) -> None:
         if not device.info.fp64:
             raise ValueError(_no_float64(device))
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
@@ -73,7 +73,7 @@ class Precise:
         return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
 
     def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
@@ -86,7 +86,7 @@ class Precise:
             run = slice(i * len(positions) // runs, (i + 1) * len(positions) // runs)
 
             def part(rows_done: float, i: int = i) -> None:
-                tick((i * raw.n_rows + rows_done) / runs)
+                on_progress((i * raw.n_rows + rows_done) / runs)
 
             made, missed[:, run] = self._tiles(positions[run], budget, clock, part)
             np.put_along_axis(values[run], lanes[run], made, axis=1)
@@ -95,7 +95,7 @@ class Precise:
         return Skipped.of_tiles(missed, tiling.tile_sizes(first, last))
 
     def _tiles(
-        self, positions: np.ndarray, budget: float, clock: Clock, tick: Callable[[float], None]
+        self, positions: np.ndarray, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (n_tiles, per_tile) at positions, m (n_tiles, per_tile, 3), and rows left out of each (2, n_tiles)."""
         device, raw, plan, n_tiles = self.device, self.task.raw, self.plan, len(positions)
@@ -134,7 +134,7 @@ class Precise:
                 )  # fmt: skip
             device.finish()
             clock.lap("backproject")
-            tick(stop)
+            on_progress(stop)
         sums = device.download(image, np.empty((4, pixels)))
         made = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(positions.shape[:2])
         return made, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)

@@ -15,8 +15,8 @@ from ...numerics import error_bounds_float64, interpolation_float64
 from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
 from .. import profile_energy
-from ..focusing_task import Task
-from ..profile_energy import Energy
+from ..focusing_task import FocusingTask
+from ..profile_energy import ProfileEnergy
 from ..tiling import GridTiling
 
 CHUNK = 64  # rows added plainly before the compensated total; blocks of rows are multiples of it
@@ -31,7 +31,7 @@ ORDER_COST = {2: -0.05, 3: 0.0, 4: 0.1, 0: 0.5, WIDE: 4.0}
 
 
 @dataclass(frozen=True, eq=False)
-class Plan:
+class Float64Plan:
     """How an image is computed: kernel and profile length, points a tile, order of the range series.
 
     order         2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
@@ -45,7 +45,7 @@ class Plan:
     order: int
     predicted_error: float
     cost: float
-    next_cheaper: Plan | None = None
+    next_cheaper: Float64Plan | None = None
 
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
@@ -77,7 +77,7 @@ class Plan:
         }
 
 
-def make_plan(task: Task, tolerance: float) -> tuple[Plan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, GridTiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
     ToleranceUnreachable names the best tolerance there is; ValueError for paths that are too long (`too_long`).
@@ -86,22 +86,23 @@ def make_plan(task: Task, tolerance: float) -> tuple[Plan, GridTiling]:
     if long:
         raise ValueError(long)
     tilings = {side**2: GridTiling(task.grid, side) for side in SIDES}
-    seen = profile_energy.seen(task)
-    plans = sorted(_plans(task, tilings, seen), key=lambda p: p.cost)
+    energy = profile_energy.estimate(task)
+    plans = sorted(_plans(task, tilings, energy), key=lambda p: p.cost)
     good = next((p for p in plans if p.predicted_error <= tolerance), None)
     if good is None:
-        dark = f": these pixels are {20 * np.log10(seen.near):.0f} dB darker than what lies beside them in their rows"
+        ratio = 20 * np.log10(energy.near_pixels)
+        dark = f": these pixels are {ratio:.0f} dB darker than what lies beside them in their rows"
         raise ToleranceUnreachable(
             tolerance, rounded_up(min(p.predicted_error for p in plans)), "float64 range profiles",
-            how=f"in complex128{dark if seen.near > 10 else ''}",
+            how=f"in complex128{dark if energy.near_pixels > 10 else ''}",
         )  # fmt: skip
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
-    named = Plan(good.kernel, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other)
+    named = Float64Plan(good.kernel, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other)
     return named, tilings[named.per_tile]
 
 
-def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator[Plan]:
+def _plans(task: FocusingTask, tilings: dict[int, GridTiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:
     """Every plan there is. Memory plays no part: neither plan nor image depends on it."""
     raw, grid = task.raw, task.grid
     frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())
@@ -109,7 +110,7 @@ def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
     cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
     # errors scale with the rows' energy, a tolerance with what pixels see of it: in these data, and at rare nulls
-    dark = max(seen.near, error_bounds_float64.darkness(float(cells)))
+    dark = max(energy.near_pixels, error_bounds_float64.darkness(float(cells)))
     ranges = [
         (
             error_bounds_float64.range_error(tiling.radius, distance, frequency, order),
@@ -129,15 +130,16 @@ def _plans(task: Task, tilings: dict[int, GridTiling], seen: Energy) -> Iterator
                 continue
             kernel = interpolation_float64.cheapest_kernel(taps, float(oversample))
             fixed = dark * kernel.error
-            fixed += max(seen.whole, dark) * error_bounds_float64.sum_rounding(CHUNK, length, kernel.edge_gain)
+            rounding = error_bounds_float64.sum_rounding(CHUNK, length, kernel.edge_gain)
+            fixed += max(energy.whole_profile, dark) * rounding
             profile = SAMPLE_COST * length * (1 + length / 65536)
             for error, extra, per_tile, order in ranges:
                 if np.isfinite(error):
                     pairs = grid.size * (PAIR_COST + TAP_COST * taps + extra)
-                    yield Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
+                    yield Float64Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
 
 
-def too_long(task: Task) -> str | None:
+def too_long(task: FocusingTask) -> str | None:
     """What is wrong with paths whose cycles pairs of float64 cannot split into whole ones and the rest; None: nothing.
 
     No tolerance is met in complex128 then.

@@ -23,7 +23,7 @@ from ...numerics.windows import Window
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import DeviceChoice
-from ..focusing_task import Task, make_task
+from ..focusing_task import FocusingTask, make_task
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
 DEFOCUS = np.pi / 2  # rad at the grid's border that is warned of
@@ -133,7 +133,7 @@ def polar_format(
     return image
 
 
-def _weighted(task: Task, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
+def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
     """Samples of some rows, times weights, their phase about the grid's centre: complex64."""
     raw, rows = task.raw, slice(start, stop)
     made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
@@ -153,7 +153,7 @@ def _weighted(task: Task, waves: Waves, start: int, stop: int, tolerance: float)
     return made.astype(np.complex64)
 
 
-def _warn(task: Task, waves: Waves, bent: Curvature) -> None:
+def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
     """What of the grid is blurred, or repeats what lies elsewhere."""
     if bent.defocus > DEFOCUS:
         text = (
@@ -186,7 +186,7 @@ def _describe(bent: Curvature) -> dict[str, str]:
     }
 
 
-def _measure_error(task: Task, grid: ImageGrid, waves: Waves, data: np.ndarray) -> float:
+def _measure_error(task: FocusingTask, grid: ImageGrid, waves: Waves, data: np.ndarray) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum."""
     from ...reference.polar_format import polar_format as exact
 

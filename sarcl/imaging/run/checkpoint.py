@@ -14,11 +14,11 @@ from ...io import output_paths, sarcl_hdf5
 from ...io.hdf5 import BLOCK_BYTES
 from ...model import store
 from ...model.image import Image
-from ..choose_method import Choice
-from ..focusing_task import Skipped, Task
+from ..choose_method import MethodChoice
+from ..focusing_task import FocusingTask, Skipped
 from ..tiling import Run, extent, row_shape
 from . import _fingerprint
-from .tile_files import Pieces, discard, folder_of, gaps
+from .tile_files import TileStore, discard, folder_of, gaps
 
 log = logging.getLogger(__name__)
 
@@ -27,13 +27,13 @@ WORTH = 60.0  # s of work that are kept when a run fails or is interrupted, unle
 
 
 def _parts(flat: Any, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
-    """Rows `at` of Target.flat or of a Strip, of row_bytes each, some at a time: they may lie in a file."""
+    """Rows `at` of ImageOutput.flat or of a BandBuffer, of row_bytes each, some at a time: they may lie in a file."""
     step = max(1, BLOCK_BYTES // row_bytes)
     for start in range(at.start, at.stop, step):
         yield flat[start : min(start + step, at.stop)]
 
 
-class Keeper:
+class Checkpoint:
     """Keeps the finished tiles of image `path`, by the rule of `resume`.
 
     True   always, whatever ends the run
@@ -45,10 +45,12 @@ class Keeper:
     Used as a context manager, an exception ends the run.
     """
 
-    def __init__(self, path: Any, task: Task, chosen: Choice, tolerance: float, resume: bool | None) -> None:
+    def __init__(
+        self, path: Any, task: FocusingTask, chosen: MethodChoice, tolerance: float, resume: bool | None
+    ) -> None:
         self.path, self.task, self.chosen, self.tolerance = path, task, chosen, tolerance
         self.folder, self.resume = folder_of(path), resume
-        self.pieces: Pieces | None = None
+        self.tiles: TileStore | None = None
         self.begun = time.monotonic()
         self.fresh = True
         self._waiting: list[tuple[int, int, Skipped]] = []
@@ -62,7 +64,7 @@ class Keeper:
     @property
     def mark(self) -> str | None:
         """The job's fingerprint, where it was needed."""
-        return self.pieces.mark if self.pieces else None
+        return self.tiles.mark if self.tiles else None
 
     def finished(self) -> Image | None:
         """The image, where this very job has made it already."""
@@ -74,24 +76,24 @@ class Keeper:
 
     def complete(self) -> bool:
         """Every band has a file."""
-        return self.pieces is not None and not gaps(self.pieces.runs(), 0, self.chosen.tiling.n_bands)
+        return self.tiles is not None and not gaps(self.tiles.runs(), 0, self.chosen.tiling.n_bands)
 
     def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
-        """Tiles of earlier runs; see Pieces.found."""
-        if self.pieces is not None:
-            yield from self.pieces.found(first, last)
+        """Tiles of earlier runs; see TileStore.found."""
+        if self.tiles is not None:
+            yield from self.tiles.found(first, last)
 
     def keep(self, first: int, last: int, flat: Any, skipped: Skipped) -> None:
-        """Bands first ... last - 1 are finished in `flat` (Target.flat, or a Strip of just them)."""
+        """Bands first ... last - 1 are finished in `flat` (ImageOutput.flat, or a BandBuffer of just them)."""
         if self.resume is False:
             return
         self._waiting.append((first, last, skipped))
-        if self.pieces is None and time.monotonic() - self.begun < PERIOD:
+        if self.tiles is None and time.monotonic() - self.begun < PERIOD:
             return
         try:
-            pieces = self.pieces or self._open()
+            tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
-                pieces.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b), self._row_bytes), n)
+                tiles.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b), self._row_bytes), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise
@@ -101,26 +103,26 @@ class Keeper:
 
     def done(self) -> None:
         """The image is complete."""
-        if self.pieces is not None:
-            self.pieces.clear()
+        if self.tiles is not None:
+            self.tiles.clear()
 
-    def __enter__(self) -> Keeper:
+    def __enter__(self) -> Checkpoint:
         return self
 
     def __exit__(self, kind: Any, *_: Any) -> None:
-        if kind is None or self.pieces is None:
+        if kind is None or self.tiles is None:
             return
         if self.resume or not self.fresh or time.monotonic() - self.begun >= WORTH:
             log.warning("finished tiles are kept in %s; the same call again goes on from there", self.folder)
         else:
-            self.pieces.clear()
+            self.tiles.clear()
 
-    def _open(self) -> Pieces:
+    def _open(self) -> TileStore:
         self.fresh = not self.folder.exists()
         chosen = self.chosen
         job = _fingerprint.job(self.task, chosen.method, self.tolerance, chosen.plan, chosen.tiling, chosen.dtype)
         try:
-            self.pieces = Pieces(self.folder, job, chosen.tiling, chosen.dtype)
+            self.tiles = TileStore(self.folder, job, chosen.tiling, chosen.dtype)
         except FileNotFoundError:  # another run has just completed the image and taken the folder away
-            self.pieces = Pieces(self.folder, job, chosen.tiling, chosen.dtype)
-        return self.pieces
+            self.tiles = TileStore(self.folder, job, chosen.tiling, chosen.dtype)
+        return self.tiles

@@ -21,52 +21,54 @@ from ...model.lazy_rows import Picked, Stacked
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
-from ..choose_method import Choice
-from ..focusing_task import Engine, Skipped, Task
+from ..choose_method import MethodChoice
+from ..focusing_task import Engine, FocusingTask, Skipped
 from ..tiling import Run, count, extent
-from .image_output import Strip
-from .workers import Done, FlatFor, cut
+from .image_output import BandBuffer
+from .workers import FinishedBlock, OutputFor, cut
 
 
 @dataclass(frozen=True, eq=False)
-class Order:
+class WorkerTask:
     """What every worker is told once: the task, the plan, which device to take, how much of its memory."""
 
-    task: Task
-    chosen: Choice
+    task: FocusingTask
+    chosen: MethodChoice
     device: Any
     max_bytes: float | None
     name: str
 
 
-class Cluster:
-    """The workers of a distributed.Client: see workers.Crew."""
+class DaskWorkers:
+    """The workers of a distributed.Client: see workers.WorkerPool."""
 
     least_pixels = 0.0
 
-    def __init__(self, client: Any, task: Task, chosen: Choice, device: Any, max_bytes: float | None) -> None:
+    def __init__(
+        self, client: Any, task: FocusingTask, chosen: MethodChoice, device: Any, max_bytes: float | None
+    ) -> None:
         self.client, self.tiling, self.n_rows = client, chosen.tiling, task.raw.n_rows
         self.places = _places(client)
         self.size = len(self.places)
         self.names: list[str] = []
         raw = replace(task.raw, samples=portable(task.raw.samples))
-        self.order = Order(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
+        self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
 
     def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """See Crew."""
+        """See WorkerPool."""
         return cut(self.tiling, todo, most, set(), unit)
 
     def work(
-        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
-    ) -> Generator[Done, None, None]:
-        """See Crew; progress is reported block by block."""
+        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
+    ) -> Generator[FinishedBlock, None, None]:
+        """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
-        tick(0)
+        on_progress(0)
         if not blocks:
             return
-        order = self.client.scatter(self.order, broadcast=True, hash=False)
-        futures = self.client.map(_make, blocks, order=order, places=self.places, pure=False)
+        worker_task = self.client.scatter(self.worker_task, broadcast=True, hash=False)
+        futures = self.client.map(_make, blocks, worker_task=worker_task, places=self.places, pure=False)
         run_of = dict(zip((f.key for f in futures), blocks, strict=True))
         pairs = 0
         try:
@@ -75,11 +77,11 @@ class Cluster:
                 values, skipped, name = future.result()
                 future.release()
                 self.names = sorted({*self.names, name})
-                flat = flat_for(first, last)
+                flat = output_for(first, last)
                 flat[extent(self.tiling, first, last)] = values
                 clock.lap("backproject")
                 pairs += self.n_rows * count(self.tiling, first, last)
-                tick(pairs)
+                on_progress(pairs)
                 yield first, last, flat, skipped
         finally:
             self.client.cancel(futures)
@@ -163,19 +165,19 @@ def _width(choice: Any, place: int) -> int:
         return _open(choice, place).info.vector_width
 
 
-def _make(run: Run, *, order: Order, places: dict[str, int]) -> tuple[np.ndarray, Skipped, str]:
+def _make(run: Run, *, worker_task: WorkerTask, places: dict[str, int]) -> tuple[np.ndarray, Skipped, str]:
     """In a worker: pixels of a run of bands, pairs skipped, and the device's name."""
     global _engine
     from distributed import get_worker
 
     with _lock:
-        if _engine is None or _engine[0] != order.name:
-            device = _open(order.device, places.get(get_worker().address, 0))
-            _engine = order.name, order.chosen.on(device, order.task), device
+        if _engine is None or _engine[0] != worker_task.name:
+            device = _open(worker_task.device, places.get(get_worker().address, 0))
+            _engine = worker_task.name, worker_task.chosen.on(device, worker_task.task), device
         _, engine, device = _engine
-        budget = min(memory_budget.budget(device, order.max_bytes), device.info.memory)
-        strip, skipped = Strip(order.chosen.tiling, *run, order.chosen.dtype), Skipped()
+        budget = min(memory_budget.budget(device, worker_task.max_bytes), device.info.memory)
+        strip, skipped = BandBuffer(worker_task.chosen.tiling, *run, worker_task.chosen.dtype), Skipped()
         ends = {last for _, last in engine.blocks(budget)}
-        for first, last in cut(order.chosen.tiling, [run], float("inf"), ends):
+        for first, last in cut(worker_task.chosen.tiling, [run], float("inf"), ends):
             skipped += engine.fill(first, last, strip, budget, Clock(), lambda _: None)
         return strip.values, skipped, device.info.name

@@ -16,7 +16,7 @@ from ...model.image_grid import ImageGrid
 from ..tiling import GridTiling, extent, row_shape
 
 
-class Target:
+class ImageOutput:
     """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
 
     def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
@@ -59,8 +59,8 @@ class Target:
         return Image(self.data, self.grid, **fields)
 
 
-class Strip:
-    """The pixels of some bands alone, written as if they were Target.flat: where no whole image is at hand."""
+class BandBuffer:
+    """The pixels of some bands alone, written as if they were ImageOutput.flat: where no whole image is at hand."""
 
     def __init__(self, tiling: GridTiling, first: int, last: int, dtype: Any) -> None:
         at = extent(tiling, first, last)

@@ -37,7 +37,7 @@ def folder_of(path: Any) -> Path:
     return Path(os.path.realpath(os.fspath(path)) + ".parts")
 
 
-class Pieces:
+class TileStore:
     """The tiles in files of one job. Made, `folder` exists and is this job's own.
 
     ValueError where it holds another job's tiles; raises OSError where nothing can be made there.

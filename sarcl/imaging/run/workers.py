@@ -13,12 +13,12 @@ from ...base.stage_timer import Clock
 from ..focusing_task import Engine, Skipped
 from ..tiling import GridTiling, Run, count
 
-Done = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
-FlatFor = Callable[[int, int], Any]  # where the pixels of a run go
+FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
+OutputFor = Callable[[int, int], Any]  # where the pixels of a run go
 BLOCKS_EACH = 4  # blocks a worker, so that none waits long for the slowest
 
 
-class Crew(Protocol):
+class WorkerPool(Protocol):
     """Those who focus the tiles of one task.
 
     size          how many blocks they work on at once
@@ -40,11 +40,11 @@ class Crew(Protocol):
         ...
 
     def work(
-        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
-    ) -> Generator[Done, None, None]:
-        """Focus all blocks, each into flat_for(first, last); yields each as it is done, in any order.
+        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
+    ) -> Generator[FinishedBlock, None, None]:
+        """Focus all blocks, each into output_for(first, last); yields each as it is done, in any order.
 
-        tick  called from the caller's thread with the (row, pixel) pairs done so far
+        on_progress  called from the caller's thread with the (row, pixel) pairs done so far
         """
         ...
 
@@ -65,8 +65,8 @@ def cut(tiling: GridTiling, todo: list[Run], most: float, ends: set[int], unit: 
     return blocks
 
 
-class Local:
-    """Engines of this process, each on its own device: see Crew."""
+class LocalWorkers:
+    """Engines of this process, each on its own device: see WorkerPool."""
 
     def __init__(self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int) -> None:
         self.engines, self.budgets, self.names, self.n_rows = engines, budgets, names, n_rows
@@ -74,50 +74,57 @@ class Local:
         self.least_pixels = max(float(engine.least_pixels) for engine in engines)
 
     def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """See Crew; each block is one that every engine can take."""
+        """See WorkerPool; each block is one that every engine can take."""
         each = zip(self.engines, self.budgets, strict=True)
         ends = {last for engine, budget in each for _, last in engine.blocks(budget)}
         return cut(self.engines[0].tiling, todo, most, ends, unit)
 
     def work(
-        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
-    ) -> Generator[Done, None, None]:
-        """See Crew."""
+        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
+    ) -> Generator[FinishedBlock, None, None]:
+        """See WorkerPool."""
         if self.size > 1:
-            yield from self._together(blocks, flat_for, clock, tick)
+            yield from self._together(blocks, output_for, clock, on_progress)
             return
         before = 0
-        tick(0)
+        on_progress(0)
         for first, last in blocks:
-            done, before = self._one(0, first, last, flat_for, clock, before, tick)
-            tick(before)
+            done, before = self._one(0, first, last, output_for, clock, before, on_progress)
+            on_progress(before)
             yield done
 
     def _one(
-        self, k: int, first: int, last: int, flat_for: FlatFor, clock: Clock, before: int, tick: Callable[[int], None]
-    ) -> tuple[Done, int]:
+        self,
+        k: int,
+        first: int,
+        last: int,
+        output_for: OutputFor,
+        clock: Clock,
+        before: int,
+        on_progress: Callable[[int], None],
+    ) -> tuple[FinishedBlock, int]:
         """One block by engine k, and the pairs done after it."""
-        flat, pixels = flat_for(first, last), count(self.engines[k].tiling, first, last)
+        flat, pixels = output_for(first, last), count(self.engines[k].tiling, first, last)
 
         def rows_done(rows: float) -> None:
-            tick(before + int(min(rows, self.n_rows) * pixels))
+            on_progress(before + int(min(rows, self.n_rows) * pixels))
 
         skipped = self.engines[k].fill(first, last, flat, self.budgets[k], clock, rows_done)
         return (first, last, flat, skipped), before + self.n_rows * pixels
 
     def _together(
-        self, blocks: list[Run], flat_for: FlatFor, clock: Clock, tick: Callable[[int], None]
-    ) -> Generator[Done, None, None]:
+        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
+    ) -> Generator[FinishedBlock, None, None]:
         """One thread a device; the caller's thread reports progress and hands on what is done."""
         waiting: queue.SimpleQueue[Run] = queue.SimpleQueue()
         for block in blocks:
             waiting.put(block)
-        finished: queue.SimpleQueue[Done | BaseException] = queue.SimpleQueue()
+        finished: queue.SimpleQueue[FinishedBlock | BaseException] = queue.SimpleQueue()
         stop = threading.Event()
         pairs = [0] * self.size  # each thread writes its own
 
         def run(k: int) -> None:
-            def own_tick(done: int) -> None:
+            def own_progress(done: int) -> None:
                 if stop.is_set():
                     raise _Stop
                 pairs[k] = done
@@ -129,7 +136,7 @@ class Local:
                         first, last = waiting.get_nowait()
                     except queue.Empty:
                         return
-                    done, pairs[k] = self._one(k, first, last, flat_for, own_clock, pairs[k], own_tick)
+                    done, pairs[k] = self._one(k, first, last, output_for, own_clock, pairs[k], own_progress)
                     finished.put(done)
             except _Stop:
                 pass
@@ -137,7 +144,7 @@ class Local:
                 finished.put(exc)
 
         threads = [threading.Thread(target=run, args=(k,), daemon=True) for k in range(self.size)]
-        tick(0)
+        on_progress(0)
         for thread in threads:
             thread.start()
         try:
@@ -146,13 +153,13 @@ class Local:
                 try:
                     done = finished.get(timeout=0.1)
                 except queue.Empty:
-                    tick(sum(pairs))
+                    on_progress(sum(pairs))
                     continue
                 if isinstance(done, BaseException):
                     raise done
                 left -= 1
                 clock.lap("backproject")
-                tick(sum(pairs))
+                on_progress(sum(pairs))
                 yield done
         finally:
             stop.set()
