@@ -6,7 +6,6 @@ docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py meas
 from __future__ import annotations
 
 import functools
-from collections.abc import Iterator
 from dataclasses import dataclass
 
 import numpy as np
@@ -15,6 +14,7 @@ from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
 
 MARGIN = 1.06  # of errors that are taken on a grid of frequencies and places
+OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 # Polynomial terms of each half (even, odd) of a tap's weight: enough that the fit errs less than the kernel.
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
@@ -143,24 +143,44 @@ def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     return (waves * kernel).sum(axis=(-1, -2))
 
 
-def _interpolators(n_samples: int, carrier: float) -> Iterator[tuple[Interpolator, int]]:
-    """Every interpolator there is for rows of n_samples, and the profile length it needs."""
+@functools.lru_cache(maxsize=256)
+def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
+    """Taps, oversampling and profile length of every interpolator for rows of n_samples."""
     from ..opencl import fft
 
+    out = []
     for taps in TERMS:
-        for oversample in (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64):
+        for oversample in OVERSAMPLE:
             # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
             # and an even length puts delay 0 on a sample
             length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
             while not off_carrier(length, carrier):
                 length = 2 * fft.good_length(length // 2 + 1)
             if length <= max(LONGEST, 2 * n_samples * taps):
-                yield interpolator(taps, float(oversample)), length
+                out.append((taps, float(oversample), length))
+    return tuple(out)
 
 
+def lower_bound(taps: int, oversample: float) -> float:
+    """A lower bound on the error of `interpolator`, known before its table: most candidates need no table.
+
+    The kernel's transform at the first alias of the band's edge, over that at the edge itself: of the hat
+    (nu/(1 - nu))^2 with nu = 1/(2 oversample), of a Kaiser-Bessel kernel s/sinh(s), s = pi taps sqrt(1 - 1/oversample).
+    """
+    if taps == 2:
+        return float(1 / (2 * oversample - 1) ** 2)
+    s = np.pi * taps * np.sqrt(1 - 1 / oversample)
+    return float(s / np.sinh(s))
+
+
+@functools.lru_cache(maxsize=256)
 def least_error(n_samples: int, carrier: float = 0.0) -> float:
     """The smallest error that `choose_interpolator` can meet, for rows of n_samples."""
-    return min(made.error for made, _ in _interpolators(n_samples, carrier))
+    least = np.inf
+    for bound, taps, oversample in sorted((lower_bound(t, s), t, s) for t, s, _ in _candidates(n_samples, carrier)):
+        if bound < least:
+            least = min(least, interpolator(taps, oversample).error)
+    return least
 
 
 @functools.lru_cache(maxsize=4096)
@@ -177,17 +197,19 @@ def choose_interpolator(
     The choice never depends on memory, so that results do not.
     ToleranceUnreachable names the smallest error there is when none is small enough.
     """
-    best: tuple[float, Interpolator, int] | None = None
-    least = np.inf
-    for made, length in _interpolators(n_samples, carrier):
-        least = min(least, made.error)
+
+    def cost(candidate: tuple[int, float, int]) -> float:
         # in contributions: half of one per sample and doubling for the FFT, and what long rows lose to caches
-        cost = pairs_per_row * TAP_COST[made.taps] + length * (0.5 * np.log2(length) + length / 4000)
-        if made.error <= error and (best is None or cost < best[0]):
-            best = cost, made, length
-    if best is None:
-        raise ToleranceUnreachable(error, rounded_up(least), "interpolation of float32 range profiles")
-    return best[1], best[2], best[0] / pairs_per_row
+        taps, _, length = candidate
+        return float(pairs_per_row * TAP_COST[taps] + length * (0.5 * np.log2(length) + length / 4000))
+
+    for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
+        if lower_bound(taps, oversample) <= error:
+            made = interpolator(taps, oversample)
+            if made.error <= error:
+                return made, length, cost((taps, oversample, length)) / pairs_per_row
+    least = rounded_up(least_error(n_samples, carrier))
+    raise ToleranceUnreachable(error, least, "interpolation of float32 range profiles")
 
 
 def off_carrier(length: int, carrier: float) -> bool:

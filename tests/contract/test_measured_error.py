@@ -44,10 +44,16 @@ def too_small(monkeypatch):
     """Interpolators that err a thousand times more than they say."""
     honest = interpolation.interpolator
     monkeypatch.setattr(interpolation, "interpolator", lambda *a: replace(honest(*a), error=honest(*a).error / 1000))
+    monkeypatch.setattr(interpolation, "lower_bound", lambda taps, oversample: 0.0)
     monkeypatch.setattr(line_plan, "choose", lambda *a, **k: None)
-    interpolation.choose_interpolator.cache_clear()
+    clear_choices()
     yield
+    clear_choices()
+
+
+def clear_choices():
     interpolation.choose_interpolator.cache_clear()
+    interpolation.least_error.cache_clear()
 
 
 def test_a_tolerance_that_was_missed_is_an_error_that_keeps_the_image(too_small, tmp_path):

@@ -41,6 +41,25 @@ def test_more_taps_and_finer_profiles_err_less():
     assert interpolator(2, 8.0).error < interpolator(2, 4.0).error
 
 
+@pytest.mark.parametrize("taps", interpolation.TERMS)
+def test_the_lower_bound_of_an_interpolation_error_is_below_it_and_close(taps):
+    for oversample in interpolation.OVERSAMPLE:
+        bound, error = interpolation.lower_bound(taps, oversample), interpolator(taps, float(oversample)).error
+        assert bound <= error <= 5 * bound
+
+
+@pytest.mark.parametrize("n_samples, carrier", [(1, 0.0), (100, 0.0), (3000, 1024.0), (2**19, 0.0)])
+def test_the_choice_is_the_cheapest_of_all_interpolators(n_samples, carrier):
+    every = [(interpolator(t, s), length) for t, s, length in interpolation._candidates(n_samples, carrier)]
+    least = min(made.error for made, _ in every)
+    assert interpolation.least_error(n_samples, carrier) == least
+    for error in (least, 1e-6, 1e-4, 1e-2, 0.4):
+        made, length, cost = interpolation.choose_interpolator(error, n_samples, 1e5, carrier)
+        able = [(m.taps, n) for m, n in every if m.error <= error]
+        costs = [1e5 * interpolation.TAP_COST[taps] + n * (0.5 * np.log2(n) + n / 4000) for taps, n in able]
+        assert (made, length) in every and cost * 1e5 == pytest.approx(min(costs))
+
+
 @pytest.mark.parametrize("distance", [20.0, 300.0, 1e4])
 @pytest.mark.parametrize("order", [2, 3])
 def test_series_error_bounds_the_exact_difference(distance, order):
