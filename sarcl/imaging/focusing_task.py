@@ -15,7 +15,7 @@ from ..base.validation import array, converted, finite, number
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.plan import skips as known_skips
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
 from .tiling import GridTiling
 
@@ -38,7 +38,7 @@ class FocusingTask:
 
     raw: PhaseHistory
     grid: ImageGrid
-    antennas: Antennas
+    antennas: PulseGeometry
     sample_weight: np.ndarray
     row_weight: np.ndarray
     wrap: bool
@@ -213,12 +213,12 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
 
 def antennas_of(
     raw: PhaseHistory, wrap: bool, beam: np.ndarray | None = None, beam_angle: float = 2 * np.pi
-) -> Antennas:
+) -> PulseGeometry:
     """The geometry of every row; the carrier is the frequency of sample n_samples//2; beam as of `beam_of`."""
-    half = np.full(raw.n_rows, 1e30) if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
-    return Antennas(
+    half = np.full(raw.n_rows, UNLIMITED) if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
+    return PulseGeometry(
         tx=raw.tx,
-        rx=None if raw.is_monostatic else raw.rx,
+        rx=raw.rx,
         reference_range=raw.reference_range,
         frequency=raw.frequency + raw.n_samples // 2 * raw.frequency_step,
         frequency_step=raw.frequency_step,

@@ -10,7 +10,7 @@ For other folders:
     nufft2d                 two-dimensional nonuniform FFT of type 1
     plan                    the cheapest plan that meets a tolerance, and its predicted error
     polynomials             Lagrange polynomials, Chebyshev nodes
-    pulse_geometry          antennas per pulse, as kernels/geometry.clh reads them
+    pulse_geometry          antenna positions per pulse, as kernels/geometry.clh reads them
     range_profiles          samples in frequency to oversampled range profiles and back
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
     windows                 windows over frequency and over the aperture

@@ -1,8 +1,11 @@
-"""Antennas per pulse as kernels/geometry.clh reads them: extended precision here, pairs of float32 there."""
+"""Antenna positions per pulse, and the records of them that kernels/geometry.clh reads.
+
+Lengths are computed in extended precision here, and handed over as pairs of float32.
+"""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -10,50 +13,78 @@ import numpy as np
 from ..base import float_pairs
 from ..base.constants import SPEED_OF_LIGHT
 
+UNLIMITED = 1e30  # m: a limit of a range window that no range reaches and that float32 holds
+PER_PULSE = ("reference_range", "frequency", "frequency_step", "near", "far")
+
 
 @dataclass(frozen=True, eq=False)
-class Antennas:
-    """Antenna positions, m (n, 3), of n rows, and what they mean at the scene's centre.
+class PulseGeometry:
+    """Positions of transmitter and receiver at each of n pulses, and how the range profiles of these pulses lie.
 
-    rx is None where it equals tx. reference_range m, frequency (of zero phase slope) and frequency_step Hz,
-    near and far (range window about the reference, m): each (n,). wrap: profiles repeat instead.
-    beam, unit vectors (n, 3), and beam_angle, rad: only points no more than half the angle off a row's direction, as
-    its transmitter sees them, have a part in it; None: all have.
+    tx, rx           m (n, 3); a receiver that has the transmitter's positions is stored as `tx` itself
+    reference_range  m (n,), range of zero phase
+    frequency        Hz (n,), at which the phase along a profile has no slope;  frequency_step  Hz (n,), of its samples
+    near, far        m (n,), range window about the reference range; default no limits
+    wrap             range profiles repeat beyond the window
+    beam             unit vectors (n, 3), and beam_angle, rad: only points within half the angle of a pulse's
+                     direction, as its transmitter sees them, contribute to it; None: all do
+    runs             (first, stop) of each run of consecutive pulses along which the antennas move smoothly, where known
     """
 
     tx: np.ndarray
-    rx: np.ndarray | None
-    reference_range: np.ndarray
-    frequency: np.ndarray
-    frequency_step: np.ndarray
-    near: np.ndarray
-    far: np.ndarray
+    rx: np.ndarray
+    reference_range: np.ndarray = field(default_factory=lambda: np.zeros(()))
+    frequency: np.ndarray = field(default_factory=lambda: np.zeros(()))
+    frequency_step: np.ndarray = field(default_factory=lambda: np.zeros(()))
+    near: np.ndarray = field(default_factory=lambda: np.full((), -UNLIMITED))
+    far: np.ndarray = field(default_factory=lambda: np.full((), UNLIMITED))
     wrap: bool = False
     beam: np.ndarray | None = None
     beam_angle: float = 2 * np.pi
+    runs: tuple[tuple[int, int], ...] = ()
 
-    def picked(self, rows: np.ndarray) -> Antennas:
-        """These rows, in this order."""
-        fields = ("tx", "rx", "reference_range", "frequency", "frequency_step", "near", "far", "beam")
-        whole = {name: getattr(self, name) for name in fields}
-        some: dict[str, Any] = {name: None if value is None else value[rows] for name, value in whole.items()}
-        return replace(self, **some)
+    def __post_init__(self) -> None:
+        if self.rx is not self.tx and np.array_equal(self.rx, self.tx):
+            object.__setattr__(self, "rx", self.tx)
+        for name in PER_PULSE:
+            object.__setattr__(self, name, np.broadcast_to(getattr(self, name), len(self.tx)))
+
+    def __len__(self) -> int:
+        return len(self.tx)
+
+    @property
+    def is_monostatic(self) -> bool:
+        """Whether the receiver stands where the transmitter does, at every pulse."""
+        return self.rx is self.tx
+
+    @property
+    def ends(self) -> list[np.ndarray]:
+        """Positions m (n, 3) of the transmitter, and of the receiver where they differ: the distinct ends of paths."""
+        return [self.tx] if self.is_monostatic else [self.tx, self.rx]
+
+    def picked(self, rows: np.ndarray) -> PulseGeometry:
+        """The pulses `rows`, in this order. What remains of `runs` is not known."""
+        some: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("tx", *PER_PULSE)}
+        some["rx"] = some["tx"] if self.is_monostatic else self.rx[rows]
+        return replace(self, **some, beam=None if self.beam is None else self.beam[rows], runs=())
+
+    def half_path(self, point: np.ndarray) -> np.ndarray:
+        """Half the two-way path of every pulse to a point (3,), m (n,)."""
+        return np.asarray(sum(np.linalg.norm(end - point, axis=1) for end in self.ends) / len(self.ends))
 
     def distance(self, bounds: np.ndarray) -> float:
         """Smallest distance of any antenna from a box (2, 3), m; 0 inside it."""
-        ends = [self.tx] if self.rx is None else [self.tx, self.rx]
-        return min(float(np.linalg.norm(e - np.clip(e, *bounds), axis=1).min()) for e in ends)
+        return min(float(np.linalg.norm(e - np.clip(e, *bounds), axis=1).min()) for e in self.ends)
 
     def depth(self, point: np.ndarray) -> np.ndarray:
-        """How far inside its range window every row sees a point, m (n,); negative outside."""
-        ends = [self.tx] if self.rx is None else [self.tx, self.rx]
-        delta = sum(np.linalg.norm(e - point, axis=1) for e in ends) / len(ends) - self.reference_range
+        """Distance of a point (3,) from the nearer limit of each pulse's range window, m (n,); negative outside."""
+        delta = self.half_path(point) - self.reference_range
         return np.asarray(np.minimum(delta - self.near, self.far - delta))
 
     def beam_depth(self, points: np.ndarray, rows: Any = slice(None)) -> np.ndarray:
-        """How far inside the beam the transmitters of `rows` see points, m (3,) or (n, 3); negative outside.
+        """Distance of points, m (3,) or (n, 3), from the surface of the beams of pulses `rows`; negative outside.
 
-        The distance to the cone's surface, at its tip to the tip.
+        Behind the transmitter it is the distance from the cone's tip.
         """
         assert self.beam is not None
         d, half = points - self.tx[rows], self.beam_angle / 2
@@ -64,9 +95,9 @@ class Antennas:
         return np.asarray(np.where(ahead, inside, np.copysign(np.hypot(along, across), inside)))
 
     def packed(self, center: np.ndarray, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
-        """Per-pulse array (2, components, n) float32 of rows start ... stop - 1 for profiles of `length` samples.
+        """Records (2, components, n) float32 of pulses start ... stop - 1 for range profiles of `length` samples.
 
-        n is rounded up to whole vectors of `lanes` by repeating the last row. Lengths are taken in extended
+        n is rounded up to whole vectors of `lanes` by repeating the last pulse. Lengths are taken in extended
         precision, so that only their small difference from the reference is ever rounded.
         """
         n = -(-(stop - start) // lanes) * lanes
@@ -75,7 +106,7 @@ class Antennas:
         tx = self.tx[rows].astype(np.longdouble) - c
         tx_length = np.sqrt((tx**2).sum(axis=1))
         rx, rx_length = tx, tx_length
-        if self.rx is not None:
+        if not self.is_monostatic:
             rx = self.rx[rows].astype(np.longdouble) - c
             rx_length = np.sqrt((rx**2).sum(axis=1))
         delta = (tx_length + rx_length) / 2 - self.reference_range[rows]  # longdouble, perhaps thousands of kilometres
@@ -84,12 +115,12 @@ class Antennas:
         place = delta * sigma
         if self.wrap:
             place = place - length * np.rint(place / length)
-        # a centre this far outside the window has no place in a profile; the window test is in metres
+        # positions this far outside a profile only have to stay finite: points outside the window are tested in metres
         place = np.clip(place, -(2.0**30), 2.0**30)
         turn = delta * kappa - np.rint(delta * kappa)
         near, far = self.near[rows] - delta, self.far[rows] - delta
         components = [*tx.T, tx_length, turn, place, kappa, sigma, near, far]
-        if self.rx is not None:
+        if not self.is_monostatic:
             components += [*rx.T, rx_length]
         if self.beam is not None:
             half = np.full(n, np.longdouble(self.beam_angle) / 2)

@@ -9,7 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
 from .antenna_weights import MOST_NODES
@@ -21,7 +21,7 @@ BRIGHTEST = 0.1  # of facets, whose power is left out of what errors are compare
 
 
 def over_band(
-    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: Antennas, polarizations: Sequence[str],
+    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: PulseGeometry, polarizations: Sequence[str],
     vertical: np.ndarray, center: float, bandwidth: float,
 ) -> dict[int, list[float]]:  # fmt: skip
     """Relative errors of interpolating amplitudes over f^power between 1, 2, ... Chebyshev nodes: {power: [n]}, powers
@@ -39,8 +39,8 @@ def over_band(
 
 
 def _errors(
-    part: Facets, antennas: Antennas, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray, center: float,
-    bandwidth: float,
+    part: Facets, antennas: PulseGeometry, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray,
+    center: float, bandwidth: float,
 ) -> dict[int, list[float]] | None:  # fmt: skip
     """None where no pulse sees anything."""
     cosines = np.cos(np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES)
@@ -49,7 +49,7 @@ def _errors(
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
     seen = False
     for pulse in np.unique(np.linspace(0, len(antennas.tx) - 1, n_pulses).astype(int)):
-        ends = antennas.tx[pulse], (antennas.tx if antennas.rx is None else antennas.rx)[pulse]
+        ends = antennas.tx[pulse], antennas.rx[pulse]
         made = part.amplitudes(*ends, band, polarizations, vertical)
         for power, errors in out.items():
             shaped = made / (band / center)[:, None, None] ** power

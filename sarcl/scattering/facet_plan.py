@@ -15,7 +15,7 @@ from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
 from ..numerics.polynomials import chebyshev, lagrange
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
 from ._frequency_nodes import over_band
@@ -68,8 +68,9 @@ def coherent(scene: Scene) -> np.ndarray:
 
 
 def plan_facets(
-    tolerance: float, scene: Scene, antennas: Antennas, center: float, bandwidth: float, polarizations: Sequence[str],
-    vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True, weights: BeamError | None = None,
+    tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
+    polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
+    weights: BeamError | None = None,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
 
@@ -129,7 +130,7 @@ def plan_facets(
     return best[1]
 
 
-def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:
+def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
     """Least distance of an antenna to a facet, m, or less: by the box of all, or by centroids where that is near."""
     distance = antennas.distance(bounds)
     if distance > float(np.linalg.norm(bounds[1] - bounds[0])):
@@ -137,8 +138,7 @@ def nearest(scene: Scene, antennas: Antennas, bounds: np.ndarray) -> float:
     from scipy.spatial import cKDTree
 
     tree = cKDTree(centroids(scene.triangles))
-    ends = [antennas.tx] if antennas.rx is None else [antennas.tx, antennas.rx]
-    away = min(float(tree.query(end)[0].min()) for end in ends)
+    away = min(float(tree.query(end)[0].min()) for end in antennas.ends)
     found = away - TO_CORNER * float(np.maximum.reduce(edges(scene.triangles)).max())
     if max(found, distance) <= 0:
         raise ValueError(

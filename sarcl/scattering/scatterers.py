@@ -11,7 +11,7 @@ import numpy as np
 from ..base import boxes, counter_rng
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.waveform import Waveform
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
@@ -50,7 +50,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    scene: Scene, waveform: Waveform, antennas: Antennas, *, shadows: bool | str, seed: int, skips: set[str],
+    scene: Scene, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, seed: int, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object],
 ) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
     """Facets that are cut already: moved, culled and lit, and pairs with pulses left out: reason -> count.
@@ -79,7 +79,8 @@ def facets_of(
     if shadows and keep.any():
         # by the surface without its random heights: facets moved along their normals would hide their neighbours
         light = lit(
-            scene.triangles, antennas.tx, antennas.rx, **terrain, two_sided=scene.two_sided, wanted=keep,
+            scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
+            two_sided=scene.two_sided, wanted=keep,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
             engine="embree" if shadows == "embree" else "opencl",
         )  # fmt: skip
@@ -101,18 +102,17 @@ def facets_of(
     ), left_out  # fmt: skip
 
 
-def _terrain(scene: Scene, antennas: Antennas) -> dict[str, Any]:
+def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
     """What `lit` wants to know of a scene's terrain, if it is whole. ValueError for an antenna under it."""
     on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
     if scene.heights is None or on is None:
         return {}
-    for name, ends in (("track", antennas.tx), ("receiver", antennas.rx)):
-        if ends is not None:
-            check_above(name, scene.heights, ends)
+    for name, positions in zip(("track", "receiver"), antennas.ends, strict=False):
+        check_above(name, scene.heights, positions)
     return {"heights": scene.heights, "on_heights": on}
 
 
-def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> float:
+def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: PulseGeometry) -> float:
     """How much a facet's lit share may err: a quarter, or more where facets are small beside a resolution cell.
 
     The bound on how far a shadow's edge moves (docs/theory/shadows.md) is several times what it moves: the edge is then
@@ -123,7 +123,7 @@ def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: Antennas) -> f
     return float(np.clip(4 * edge / typical, 0.25, 8.0)) if np.isfinite(edge) else 0.25
 
 
-def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> float:
+def resolution_edge(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> float:
     """Half the finer of range and cross-range resolution at the scene's centre, m. ValueError where there is none."""
     edge, standing = _half_cell(waveform, antennas, scene)
     if standing is not None:
@@ -136,11 +136,11 @@ def resolution_edge(waveform: Waveform, antennas: Antennas, scene: Scene) -> flo
     return edge
 
 
-def _half_cell(waveform: Waveform, antennas: Antennas, scene: Scene) -> tuple[float, int | None]:
+def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> tuple[float, int | None]:
     """Half the finer of range and cross-range resolution at the scene's centre, m, inf where nothing is resolved; and
     the pulse at which an antenna stands there, which resolves nothing either."""
     look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
-    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+    for ends in (antennas.tx, antennas.rx):
         distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)
         if not distance.all():
             return np.inf, int(np.argmin(distance))
@@ -152,7 +152,7 @@ def _half_cell(waveform: Waveform, antennas: Antennas, scene: Scene) -> tuple[fl
     return min(range_cell, cross_cell) / 2, None
 
 
-def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> np.ndarray:
+def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
     """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
 
     n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene.
@@ -160,7 +160,7 @@ def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: Antennas) -> 
     corners = boxes.box(centers)
     middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
     out = np.zeros(len(centers), bool)
-    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+    for ends in (antennas.tx, antennas.rx):
         look = ends - middle
         distance = np.linalg.norm(look, axis=1)
         if distance.min() <= radius:

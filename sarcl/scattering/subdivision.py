@@ -11,7 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
 from ..base.validation import number
 from ..model.waveform import Waveform
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
@@ -40,7 +40,7 @@ class Cut:
 
 
 def plan_cut(
-    scene: Scene, waveform: Waveform, antennas: Antennas, polarizations: Sequence[str], vertical: np.ndarray,
+    scene: Scene, waveform: Waveform, antennas: PulseGeometry, polarizations: Sequence[str], vertical: np.ndarray,
     max_edge: float | str | None, share: float, weights: BeamError,
 ) -> Cut:  # fmt: skip
     """How to cut a scene's facets within `share` of a tolerance.
@@ -87,7 +87,7 @@ def cut_facets(scene: Scene, plan: FacetPlan, finest: float) -> Scene:
     return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
 
-def crowding(scene: Scene, max_edge: float, antennas: Antennas, frequencies: np.ndarray) -> float:
+def crowding(scene: Scene, max_edge: float, antennas: PulseGeometry, frequencies: np.ndarray) -> float:
     """How much more the norm of cut facets is than that of uncut ones, were each added with a random phase; at least 1.
 
     Cutting a smooth facet makes edges whose echoes cancel again; what they err does not. From up to 200 facets at
@@ -106,7 +106,7 @@ def crowding(scene: Scene, max_edge: float, antennas: Antennas, frequencies: np.
         for i, part in enumerate((whole, cut)):
             centers = centroids(part.triangles)
             q = np.zeros_like(centers)
-            for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+            for ends in (antennas.tx, antennas.rx):
                 away = ends[row] - centers
                 q += away / np.linalg.norm(away, axis=1, keepdims=True)
             for f in frequencies:

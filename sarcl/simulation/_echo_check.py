@@ -8,15 +8,15 @@ from typing import Any
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import Beam
 from ..scattering.facets import Facets
 from ..scattering.scatterers import Points
 
 
 def measure_error(
-    points: Points | None, facets: Facets | None, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray,
-    samples: Any, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
+    points: Points | None, facets: Facets | None, antennas: PulseGeometry, frequencies: np.ndarray,
+    spectrum: np.ndarray, samples: Any, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
 ) -> float:  # fmt: skip
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of 16 where
     there are more than 20 000 facets, of 4 where there are more than 2 million.
@@ -49,7 +49,7 @@ def how_many(facets: Facets | None) -> int:
 
 def exact_samples(
     part: Points | Facets,
-    antennas: Antennas,
+    antennas: PulseGeometry,
     p: int,
     frequencies: np.ndarray,
     polarizations: Sequence[str],
@@ -61,8 +61,7 @@ def exact_samples(
     from ..reference.geometry import half_path
     from ..scene.triangles import centroids
 
-    tx = antennas.tx[p]
-    rx = tx if antennas.rx is None else antennas.rx[p]
+    tx, rx = antennas.tx[p], antennas.rx[p]
     places = part.positions if isinstance(part, Points) else centroids(part.triangles)
     away = np.linalg.norm(places - tx, axis=1), np.linalg.norm(places - rx, axis=1)
     delta = (away[0] + away[1]) / 2 - antennas.reference_range[p]

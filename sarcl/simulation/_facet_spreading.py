@@ -13,7 +13,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.stage_timer import Clock
 from ..numerics import range_profiles
 from ..numerics.plan import Plan
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weights import Beam
 from ..scattering.facet_plan import FacetPlan
@@ -31,14 +31,14 @@ class FacetSpreader:
     """Adds facets to the samples of every pulse by the cheapest plan that meets the tolerance."""
 
     def __init__(
-        self, device: Device, antennas: Antennas, bandwidth: float, frequencies: np.ndarray, tolerance: float,
+        self, device: Device, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray, tolerance: float,
         budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray, beam: Beam,
     ) -> None:  # fmt: skip
         self.device, self.antennas, self.frequencies, self.bandwidth = device, antennas, frequencies, bandwidth
         self.tolerance, self.budget, self.skip, self.facet_plan = tolerance, budget, skip, plan
         self.vertical, self.beam = vertical, beam
         # from one place what is sent as H and received as V equals what is sent as V and received as H
-        self.alike = {"VH": "HV"} if antennas.rx is None else {}
+        self.alike = {"VH": "HV"} if antennas.is_monostatic else {}
         self.wanted = [self.alike.get(name, name) for name in polarizations]
         self.made = [name for name in POLARIZATIONS if name in self.wanted]
 
@@ -94,7 +94,7 @@ class _Work:
         self.plan, self.tiles, self.order = plan_tiles(
             positions, self.center, of.antennas, of.bandwidth, n_samples, tolerance, least_tolerance=0.0
         )
-        plan, tiles, nodes, bistatic = self.plan, self.tiles, of.facet_plan.nodes, of.antennas.rx is not None
+        plan, tiles, nodes, bistatic = self.plan, self.tiles, of.facet_plan.nodes, not of.antennas.is_monostatic
         metal = all(np.isinf(m.conductivity) for m in part.materials)
         dispersive = not metal and bool(np.ptp(np.stack([part.roots(float(f)) for f in nodes]), axis=0).any())
         macros = {**plan.macros(bistatic), **of.beam.macros(len(nodes)), "TILE": tiles.per_tile, "METAL": int(metal)}

@@ -11,7 +11,7 @@ from ..base.boxes import box
 from ..base.stage_timer import Clock
 from ..numerics import range_profiles
 from ..numerics.plan import Plan
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weights import Beam
 from ..scattering.scatterers import Points
@@ -24,7 +24,7 @@ class Spreader:
     def __init__(
         self,
         device: Device,
-        antennas: Antennas,
+        antennas: PulseGeometry,
         bandwidth: float,
         n_samples: int,
         tolerance: float,
@@ -50,7 +50,7 @@ class Spreader:
         plan, tiles, order = plan_tiles(
             positions, center, self.antennas, self.bandwidth, self.n_samples, self.tolerance
         )
-        bistatic = self.antennas.rx is not None
+        bistatic = not self.antennas.is_monostatic
         device, lanes = self.device, self.device.info.vector_width
         channels = len(self.nodes)
         macros = {**plan.macros(bistatic), **self.beam.macros(channels), "TILE": tiles.per_tile}

@@ -22,7 +22,7 @@ from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics import plan
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
@@ -161,15 +161,14 @@ def echo(
             )  # fmt: skip
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, compressed)
-    rows = np.ones(len(tx))
-    antennas = Antennas(
+    antennas = PulseGeometry(
         tx=tx,
-        rx=None if receiver is None else rx,
+        rx=rx,
         reference_range=reference_range,
-        frequency=(frequency + n_samples // 2 * step) * rows,
-        frequency_step=step * rows,
-        near=near * rows,
-        far=far * rows,
+        frequency=np.full(len(tx), frequency + n_samples // 2 * step),
+        frequency_step=np.full(len(tx), step),
+        near=np.full(len(tx), near),
+        far=np.full(len(tx), far),
     )
     n = len(order.polarizations)
     with Target((len(tx), n, n_samples), out, order.budget, (near, far)) as target:
@@ -184,7 +183,7 @@ def echo(
             at = slice(start, min(start + target.pulses, len(tx)))
             block = target.block(start, at.stop)
             some = antennas.picked(np.arange(start, at.stop))
-            beam = work.weights.seen_from(some.tx, some.tx if some.rx is None else some.rx, at)
+            beam = work.weights.seen_from(some.tx, some.rx, at)
             work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start, beam)
             worst = max(worst, work.predicted_error)
             block *= spectrum.astype(np.complex64)

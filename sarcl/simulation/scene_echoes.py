@@ -14,7 +14,7 @@ from ..base.tolerances import reachable
 from ..model.waveform import Waveform
 from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.polynomials import chebyshev, lagrange
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weight_error import beam_error
 from ..scattering.antenna_weights import Beam, BeamError
@@ -71,7 +71,7 @@ class Work:
     facets: Facets | None
 
     def __init__(
-        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: Antennas, weights: Beam,
+        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry, weights: Beam,
         bands: Iterable[Band],
     ) -> None:  # fmt: skip
         """given  the scene as it came;  scene  with its random heights;  waveform  over the whole band
@@ -105,7 +105,7 @@ class Work:
         self.pairs = self.gated = self.behind = self.unlit = 0
         order.clock.lap("scene")
 
-    def _planned(self, scene: Scene, antennas: Antennas, bands: Iterable[Band]) -> Cut | None:
+    def _planned(self, scene: Scene, antennas: PulseGeometry, bands: Iterable[Band]) -> Cut | None:
         """How facets are cut, None where there are none. ToleranceUnreachable in the caller's own numbers."""
         order, bands = self.order, tuple(dict.fromkeys(bands))
 
@@ -121,7 +121,7 @@ class Work:
                 remedy = "let echo cut them (max_edge='auto')"
             raise refused.restated(order.tolerance, reachable(plan, above), remedy) from None
 
-    def _ready(self, given: Scene, scene: Scene, antennas: Antennas, planned: Cut) -> None:
+    def _ready(self, given: Scene, scene: Scene, antennas: PulseGeometry, planned: Cut) -> None:
         """Facets cut, culled and lit."""
         order = self.order
         self.facet_plan: FacetPlan
@@ -147,7 +147,7 @@ class Work:
         return sum(len(part) for part in (self.points, self.facets) if part is not None)
 
     def add(
-        self, antennas: Antennas, waveform: Waveform, frequencies: np.ndarray, samples: np.ndarray, total: int,
+        self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, samples: np.ndarray, total: int,
         first: int = 0, weights: Beam | None = None,
     ) -> None:  # fmt: skip
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
@@ -219,7 +219,7 @@ class Work:
         return how_many(self.facets)
 
     def exact(
-        self, antennas: Antennas, pulse: int, frequencies: np.ndarray, weights: Beam
+        self, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, weights: Beam
     ) -> tuple[np.ndarray, np.ndarray]:
         """Exact sums over scatterers (n_polarizations, n), and the power they have at random phases."""
         order, out = self.order, np.zeros((2, len(self.order.polarizations), len(frequencies)), np.complex128)
@@ -229,7 +229,7 @@ class Work:
         return out[0], out[1].real
 
     def measured(
-        self, antennas: Antennas, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any,
+        self, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any,
         check: bool | None,
     ) -> float | None:  # fmt: skip
         """Error of a channel's samples, where it is asked for, or costs next to nothing."""
@@ -277,7 +277,7 @@ def parts_of(scene: Scene) -> float:
 
 
 def plan_scene(
-    order: Order, scene: Scene, waveform: Waveform, antennas: Antennas, blur: BeamError, bands: Iterable[Band],
+    order: Order, scene: Scene, waveform: Waveform, antennas: PulseGeometry, blur: BeamError, bands: Iterable[Band],
     tolerance: float, max_edge: float | str | None,
 ) -> Cut | None:  # fmt: skip
     """How a scene's facets are cut for `tolerance`, None where there are none.

@@ -10,7 +10,7 @@ from ..base.boxes import box
 from ..base.morton import morton_order
 from ..numerics.error_bounds import U32
 from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
-from ..numerics.pulse_geometry import Antennas
+from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
 
@@ -35,8 +35,8 @@ class Band:
 
 
 def plan_tiles(
-    positions: np.ndarray, center: np.ndarray, antennas: Antennas, bandwidth: float, n_samples: int, tolerance: float,
-    least_tolerance: float = LEAST_TOLERANCE,
+    positions: np.ndarray, center: np.ndarray, antennas: PulseGeometry, bandwidth: float, n_samples: int,
+    tolerance: float, least_tolerance: float = LEAST_TOLERANCE,
 ) -> tuple[Plan, Tiles, np.ndarray]:  # fmt: skip
     """The cheapest plan for scatterers at positions, m (n, 3), about `center`, their tiles and their order in them."""
     order = morton_order(positions)

@@ -8,7 +8,7 @@ from helpers.kernel_probe import probe
 
 from sarcl.base import float_pairs
 from sarcl.numerics import interpolation
-from sarcl.numerics.pulse_geometry import Antennas
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.geometry import half_path
 from sarcl.reference.interp import interpolate
 
@@ -83,7 +83,7 @@ def test_half_path_keeps_a_tenth_of_a_nanometre_at_any_distance(device, monkeypa
     rx = tx + np.array([20.0, 5.0, 1.0])
     one = np.ones(1)
     reference = one * (np.linalg.norm(tx) + np.linalg.norm(rx)) / 2
-    antennas = Antennas(tx[None], rx[None], reference, one * 9.6e9, one, -one, one)
+    antennas = PulseGeometry(tx[None], rx[None], reference, one * 9.6e9, one, -one, one)
     packed = antennas.packed(np.zeros(3), 64, 0, 1, 1)
     body = (
         "point p; p.x = w_make(LOAD(i, x), LOAD(i, x + 3 * n)); p.y = w_make(LOAD(i, x + n), LOAD(i, x + 4 * n));"

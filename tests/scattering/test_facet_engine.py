@@ -9,7 +9,7 @@ from helpers.facet_cases import WET, plate, seen_from, still
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics import polynomials
-from sarcl.numerics.pulse_geometry import Antennas
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
 from sarcl.scattering import facet_plan
 from sarcl.scattering._frequency_nodes import over_band
@@ -200,7 +200,7 @@ def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edg
     corners = random.uniform(-30, 30, (800, 1, 3)) + random.uniform(-0.6, 0.6, (800, 3, 3)) * edge
     scene, fc = sarcl.Scene.facets(corners, material=material), 9.6e9
     track = still(*(seen_from(8e3, 0.8, a) for a in np.linspace(0, 0.05, 7)))
-    antennas = Antennas(track.positions, None, *(np.zeros(7) for _ in range(5)))
+    antennas = PulseGeometry(track.positions, track.positions)
     vertical, band = np.array([0.0, 0, 1]), bandwidth * fc
     mirror = facet_plan.coherent(scene)
     errors = over_band(scene, mirror, np.inf, np.inf, antennas, ["HH", "HV"], vertical, fc, band)

@@ -10,7 +10,7 @@ import pytest
 import sarcl
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.numerics.pulse_geometry import Antennas
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.facet import facet_amplitude
 from sarcl.scattering.mesh_quality import facet_error, speckle_contrast
 from sarcl.scattering.mesh_quality._adjacency import joints, uncut
@@ -27,8 +27,8 @@ ISOTROPIC = sarcl.Material(4.0, diagram="isotropic")
 def antennas(tx, rx=None, near=-1e9, far=1e9):
     tx = np.atleast_2d(np.asarray(tx, float))
     n = len(tx)
-    return Antennas(
-        tx=tx, rx=rx, reference_range=np.linalg.norm(tx, axis=1), frequency=np.full(n, 1e10),
+    return PulseGeometry(
+        tx=tx, rx=tx if rx is None else rx, reference_range=np.linalg.norm(tx, axis=1), frequency=np.full(n, 1e10),
         frequency_step=np.full(n, 1e6), near=np.full(n, near), far=np.full(n, far),
     )  # fmt: skip
 

@@ -7,7 +7,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.numerics.pulse_geometry import Antennas
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.echo import echo as exact_echo
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=2e-6)
@@ -218,8 +218,8 @@ def test_a_moving_receiver_is_enough_to_cut_facets_finely():
     still, moving = np.tile([8e3, 0, 6e3], (9, 1)), circle(n_pulses=9).positions
     one = np.ones(9)
     narrow = sarcl.Waveform.chirp(center=9.6e9, bandwidth=60e6, duration=1e-6)  # the cross-range cell is the finer
-    both = resolution_edge(narrow, Antennas(moving, None, one, one, one, -one, one), scene)
-    half = resolution_edge(narrow, Antennas(still, moving, one, one, one, -one, one), scene)
+    both = resolution_edge(narrow, PulseGeometry(moving, moving, one, one, one, -one, one), scene)
+    half = resolution_edge(narrow, PulseGeometry(still, moving, one, one, one, -one, one), scene)
     # one antenna turning makes half the angle
     assert half == pytest.approx(2 * both, rel=0.01)
 
@@ -298,8 +298,7 @@ def test_a_scene_that_shows_only_its_back_is_a_clear_statement():
 
 
 def test_antennas_inside_a_box_have_distance_zero():
-    one = np.ones(1)
-    inside = Antennas(np.zeros((1, 3)), None, one, one, one, -one, one)
+    inside = PulseGeometry(np.zeros((1, 3)), np.zeros((1, 3)))
     assert inside.distance(np.array([[-1.0] * 3, [1.0] * 3])) == 0
     assert inside.distance(np.array([[3.0, 0, 0], [4.0, 1, 1]])) == 3
 

@@ -59,7 +59,7 @@ class Direct:
     def __init__(self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: GridTiling) -> None:
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
-        bistatic = task.antennas.rx is not None
+        bistatic = not task.antennas.is_monostatic
         beam = task.antennas.beam is not None
         self.kernels = kernel_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)

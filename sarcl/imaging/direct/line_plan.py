@@ -13,7 +13,7 @@ from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
 from ...numerics import error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tiles import Tiles
 from ..tiling import GridTiling
 
@@ -119,8 +119,8 @@ class SampledDirections:
     inverse: np.ndarray
 
     @classmethod
-    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray | None, axes: np.ndarray) -> SampledDirections:
-        ends = np.stack([tx, tx if rx is None else rx], axis=1)
+    def at(cls, points: np.ndarray, tx: np.ndarray, rx: np.ndarray, axes: np.ndarray) -> SampledDirections:
+        ends = np.stack([tx, rx], axis=1)
         d = ends - points[:, None, None, :]
         inverse = 1 / np.maximum(np.linalg.norm(d, axis=-1), 1e-3)
         return cls(np.einsum("tnac,kc->tnak", d * inverse[..., None], axes), inverse)
@@ -165,7 +165,7 @@ def outline(grid: ImageGrid) -> np.ndarray:
 def choose(
     tolerance: float,
     grid: ImageGrid,
-    antennas: Antennas,
+    antennas: PulseGeometry,
     *,
     n_samples: int,
     bandwidth: float,
@@ -188,9 +188,8 @@ def choose(
             continue
         starts = sampled_groups(n_rows, group)
         rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
-        rx = None if antennas.rx is None else antennas.rx[rows]
         points = outline(grid)
-        directions = SampledDirections.at(points, antennas.tx[rows], rx, steps(grid))
+        directions = SampledDirections.at(points, antennas.tx[rows], antennas.rx[rows], steps(grid))
         rest = directions.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
         kappa = 2 * highest / SPEED_OF_LIGHT
         turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())

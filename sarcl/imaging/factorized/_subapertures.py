@@ -4,39 +4,16 @@ from __future__ import annotations
 
 import itertools
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 from ...numerics import interpolation
+from ...numerics.pulse_geometry import PulseGeometry
 
 GAP = 5.0  # a step of the track so many times longer than the median begins a new run
-
-
-@dataclass(frozen=True, eq=False)
-class Track:
-    """Antenna positions that change smoothly within each run, and the carriers of their rows.
-
-    tx, rx     m (n, 3); rx is None where it equals tx
-    frequency  Hz (n,), of zero phase slope; frequency_step Hz (n,)
-    runs       (first, last) of each run of consecutive rows
-    """
-
-    tx: np.ndarray
-    rx: np.ndarray | None
-    frequency: np.ndarray
-    frequency_step: np.ndarray
-    runs: tuple[tuple[int, int], ...]
-
-    def __len__(self) -> int:
-        return len(self.tx)
-
-    @property
-    def ends(self) -> list[np.ndarray]:
-        """Transmitters, and receivers where they differ."""
-        return [self.tx] if self.rx is None else [self.tx, self.rx]
 
 
 def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
@@ -60,20 +37,21 @@ def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
 class Decimation:
     """From a track to every `thin`-th of its positions: the nodes, and how pulses are spread over them.
 
-    nodes   the thinned Track
+    nodes   the positions that are kept, with the range to the origin as reference and no window: profiles at nodes
+            are made about tiles, whose centres are their reference
     blocks  (n_blocks, 4) int32: first pulse, pulses, first node, first row of the filter
     filter  (thin, taps) float32: weight of each of the nodes around a pulse at this fraction of the way
     error   of the filter, relative, at the oversampling it was made for
     """
 
-    nodes: Track
+    nodes: PulseGeometry
     thin: int
     blocks: np.ndarray
     filter: np.ndarray
     error: float
 
 
-def decimated(track: Track, thin: int, taps: int, oversample: float) -> Decimation:
+def decimated(track: PulseGeometry, thin: int, taps: int, oversample: float) -> Decimation:
     """Every `thin`-th position of each run, and beyond its ends as many as the filter of `taps` needs."""
     runs, parts, first = [], [], 0
     blocks: list[np.ndarray] = []
@@ -86,20 +64,22 @@ def decimated(track: Track, thin: int, taps: int, oversample: float) -> Decimati
         blocks.append(np.stack([begin + b * thin, np.minimum(thin, n - b * thin), first + b, 0 * b], axis=1))
         places = at * thin
         parts.append(_positions(track.tx[begin:end], places))
-        if track.rx is not None:
+        if not track.is_monostatic:
             rx_parts.append(_positions(track.rx[begin:end], places))
         rows += [begin] * len(at)
         runs.append((first, first + len(at)))
         first += len(at)
     z = np.arange(thin) / thin - 0.5
     weights = interpolation.least_squares_weights(taps, oversample, z)
-    nodes = Track(
-        np.concatenate(parts),
-        np.concatenate(rx_parts) if rx_parts else None,
-        track.frequency[rows],
-        track.frequency_step[rows],
-        tuple(runs),
+    tx = np.concatenate(parts)
+    nodes = PulseGeometry(
+        tx,
+        np.concatenate(rx_parts) if rx_parts else tx,
+        frequency=track.frequency[rows],
+        frequency_step=track.frequency_step[rows],
+        runs=tuple(runs),
     )
+    nodes = replace(nodes, reference_range=nodes.half_path(np.zeros(3)))
     error = interpolation.line_interpolator(taps, oversample).error
     return Decimation(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
 
@@ -119,7 +99,7 @@ def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
     return out
 
 
-def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
+def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> float:
     """Largest change, from one row to the next, of the range's gradient at points, m (n, 3): per row, no unit.
 
     axes  unit vectors (2, 3) of the plane that the points around lie in, or None for points anywhere
@@ -142,7 +122,12 @@ def rate(track: Track, points: np.ndarray, axes: np.ndarray | None) -> float:
 
 
 def filter_error(
-    track: Track, made: Decimation, centers: np.ndarray, radius: float, frequency: float, axes: np.ndarray | None
+    track: PulseGeometry,
+    made: Decimation,
+    centers: np.ndarray,
+    radius: float,
+    frequency: float,
+    axes: np.ndarray | None,
 ) -> float:
     """Largest error of what the nodes make of a pulse, at points `radius` from each of `centers`, m (m, 3).
 
@@ -169,7 +154,7 @@ def filter_error(
     return worst
 
 
-def _roughest(track: Track, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
+def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
     """Pulses to which directions from `center` leave the line between the nodes about them the most."""
     first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
     way = ((np.arange(len(track)) - np.repeat(first, count)) / made.thin)[:, None]
@@ -186,7 +171,9 @@ def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:
     return d / np.maximum(np.sqrt(np.einsum("ij,ij->i", d, d)), 1e-9)[:, None]
 
 
-def _phases(track: Track, rows: np.ndarray, points: np.ndarray, center: np.ndarray, frequency: float) -> np.ndarray:
+def _phases(
+    track: PulseGeometry, rows: np.ndarray, points: np.ndarray, center: np.ndarray, frequency: float
+) -> np.ndarray:
     """exp(j 2 pi f (tau(x) - tau(center))) of rows (...) at points (m, 3): (..., m)."""
     path = np.zeros((*rows.shape, len(points)))
     x = points - center

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ..tiling import GridTiling
 from ._tile_tree import Tree
 
@@ -32,7 +32,7 @@ class TileCoverage:
 
 
 def coverage_of(
-    a: Antennas, tree: Tree, tiling: GridTiling, radius: float, line_of: np.ndarray, least: float
+    a: PulseGeometry, tree: Tree, tiling: GridTiling, radius: float, line_of: np.ndarray, least: float
 ) -> TileCoverage:
     """How rows see tops of `radius` m.
 

@@ -28,7 +28,7 @@ from ..tiling import GridTiling
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from ._tile_tree import Tree, tree_of
-from .plan import GUARD, FactorPlan, Level, leaf_antennas
+from .plan import GUARD, FactorPlan, Level
 
 SPAN = 32  # vectors of a profile a work-item
 
@@ -59,7 +59,7 @@ class Factorized:
         self.antennas = self.task.antennas
         self.task = replace(self.task, antennas=replace(self.antennas, beam=None))
         self.lanes = device.info.vector_width
-        bistatic = task.antennas.rx is not None
+        bistatic = not task.antennas.is_monostatic
         self.merges = []
         for i, level in enumerate(plan.levels):
             made = plan.between if i else plan.first
@@ -86,9 +86,9 @@ class Factorized:
         # nodes of each level as the kernels want them, about the scene's centre
         self.nodes = []
         for v in plan.levels:
-            antennas = leaf_antennas(v.decimation.nodes)
-            packed = antennas.packed(tiling.center, plan.length, 0, len(antennas.tx), self.lanes)
-            self.nodes.append((device.upload(packed), packed.shape[2], len(antennas.tx)))
+            antennas = v.decimation.nodes
+            packed = antennas.packed(tiling.center, plan.length, 0, len(antennas), self.lanes)
+            self.nodes.append((device.upload(packed), packed.shape[2], len(antennas)))
         self.strides = [self._stride(v) for v in plan.levels]
         # a tile that lies in the window may reach beyond it with what its profiles have to spare
         top = plan.levels[0]

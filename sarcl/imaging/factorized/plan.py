@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Iterator
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -13,14 +13,14 @@ from ...base.errors import ToleranceUnreachable
 from ...numerics import error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.plan import ORDER_COST, RANGE_COST, Plan, cheapest
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl import fft
 from ..direct import line_plan
 from ..direct.line_plan import LinePlan, LineTiling
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
 from ..tiling import GridTiling
-from ._subapertures import Decimation, Track, chains, decimated, filter_error, rate, runs_of
+from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
 from ._tile_tree import spread_of, tree_of
 
 # Relative costs as in line_plan.py, measured on PoCL: of a tap and of a node for a sample moved to a new tile, and of a
@@ -89,9 +89,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     ToleranceUnreachable where sub-apertures cannot meet it: it says why, but no best tolerance, which takes a search.
     """
     order, runs = runs_of(task.raw)
-    a = task.antennas
-    rx = None if a.rx is None else a.rx[order]
-    track = Track(a.tx[order], rx, a.frequency[order], a.frequency_step[order], tuple(runs))
+    track = replace(task.antennas.picked(order), runs=tuple(runs))
     reason = ""
     for lines in (True, False) if lanes and task.grid.is_plane else (False,):  # near an antenna lines bend too much
         case = _Case(task, track, order, tolerance, lines)
@@ -114,7 +112,9 @@ def _spacing(taps: int, error: float) -> float | None:
 class _Case:
     """One task at one tolerance: what candidates share."""
 
-    def __init__(self, task: FocusingTask, track: Track, order: np.ndarray, tolerance: float, lines: bool) -> None:
+    def __init__(
+        self, task: FocusingTask, track: PulseGeometry, order: np.ndarray, tolerance: float, lines: bool
+    ) -> None:
         grid = task.grid
         self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
         self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
@@ -243,7 +243,7 @@ class _Case:
         return spread_of(tree, tree.leaves.radius)
 
     def _leaf(
-        self, tolerance: float, nodes: Track, source: tuple[Interpolator, int], tiling: GridTiling
+        self, tolerance: float, nodes: PulseGeometry, source: tuple[Interpolator, int], tiling: GridTiling
     ) -> LinePlan | Plan | None:
         """How leaves become pixels within a tolerance."""
         raw, n_samples = self.task.raw, self.task.raw.n_samples
@@ -251,7 +251,7 @@ class _Case:
             return None
         if self.lines:
             return line_plan.choose(
-                tolerance, self.task.grid, leaf_antennas(nodes), n_samples=n_samples, bandwidth=self.bandwidth,
+                tolerance, self.task.grid, nodes, n_samples=n_samples, bandwidth=self.bandwidth,
                 highest=self.highest, source=source, sides=(tiling.side,),
             )  # fmt: skip
         best = None
@@ -287,10 +287,3 @@ class _Case:
 def moving_cost(samples: float, taps: int, nodes: int) -> float:
     """Cost of a pulse moved to a new tile and spread over nodes."""
     return samples * (taps * MOVE_TAP + nodes * MOVE_NODE) + SHIFT
-
-
-def leaf_antennas(nodes: Track) -> Antennas:
-    """Nodes as antennas about whose tiles profiles already stand: no reference range, no window."""
-    far = np.full(len(nodes), 1e30)
-    reference = sum(np.linalg.norm(e, axis=1) for e in nodes.ends) / len(nodes.ends)
-    return Antennas(nodes.tx, nodes.rx, reference, nodes.frequency, nodes.frequency_step, -far, far)

@@ -7,10 +7,10 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 from ...numerics.double_double import exact_product, exact_sum, quotient
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 
 
-def packed(raw: PhaseHistory, antennas: Antennas, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
+def packed(raw: PhaseHistory, antennas: PulseGeometry, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
     """Per-pulse array (components, n) of rows start ... stop - 1 for profiles of `length` samples.
 
     kernels/backproject_float64.cl has their order.
@@ -28,7 +28,7 @@ def packed(raw: PhaseHistory, antennas: Antennas, length: int, start: int, stop:
     sigma = quotient(exact_product(float(length), step), SPEED_OF_LIGHT / 2)
     limit = quotient((np.full(n, SPEED_OF_LIGHT / 4), np.zeros(n)), step)
     components = [*raw.tx[rows].T, raw.reference_range[rows], *kappa, *sigma, *limit]
-    if antennas.rx is not None:
+    if not antennas.is_monostatic:
         components += list(antennas.rx[rows].T)
     if antennas.beam is not None:
         half = np.full(n, antennas.beam_angle / 2)

@@ -35,7 +35,7 @@ class DirectFloat64:
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         self.skip = int("range window" in task.skips) + 2 * int("beam" in task.skips)
-        macros = plan.macros(task.antennas.rx is not None, task.wrap, task.antennas.beam is not None)
+        macros = plan.macros(not task.antennas.is_monostatic, task.wrap, task.antennas.beam is not None)
         self.constants = device.kernel("backproject_float64.cl", "tile_constants", **macros)
         self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)

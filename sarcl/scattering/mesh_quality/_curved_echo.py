@@ -17,7 +17,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.material import Material
 from ...scene.scene import Scene
 from ...scene.triangles import centroids
@@ -50,10 +50,10 @@ class Sums:
     cost: int
 
 
-def sums(scene: Scene, b: Bulge, antennas: Antennas, row: int, frequency: float) -> Sums:
+def sums(scene: Scene, b: Bulge, antennas: PulseGeometry, row: int, frequency: float) -> Sums:
     """Sums over a scene's facets, with `b` of the same facets, at one row of the antennas and a frequency, Hz."""
     centers, n = centroids(scene.triangles), int(b.surface.max()) + 1
-    ends = [antennas.tx[row]] if antennas.rx is None else [antennas.tx[row], antennas.rx[row]]
+    ends = [positions[row] for positions in antennas.ends]
     path, look, cosines = np.full(len(centers), -float(antennas.reference_range[row])), np.zeros_like(centers), []
     for end in ends:
         away = end - centers

@@ -15,7 +15,7 @@ import numpy as np
 from ...base import constants, validation
 from ...base.boxes import box
 from ...model.waveform import Waveform
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.scene import Scene
 from ...scene.triangles import edges
 from ..facet_plan import coherent
@@ -81,14 +81,14 @@ class Fineness:
         ]
 
 
-def judge(scene: Scene, antennas: Antennas, waveform: Waveform) -> Fineness:
+def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Fineness:
     """What a scene's facets change in the echoes of the curved surfaces they stand for. TypeError names what is none.
 
     Facets count as far as they reflect like mirrors, face the antennas, and lie in their beam and range window; shadows
     are left out. Give facets as they came, before random heights (`Scene.realized`) hide curves; cutting does not.
     """
     for name, value, kind in zip(
-        ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, Antennas, Waveform), strict=True
+        ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, PulseGeometry, Waveform), strict=True
     ):
         validation.instance(name, value, kind)
     turns = 4 * np.pi * (waveform.center + waveform.bandwidth / 2) / constants.SPEED_OF_LIGHT  # rad/m
@@ -127,7 +127,7 @@ def _curved(scene: Scene) -> tuple[Scene, Bulge]:
     return scene, bulges(scene.triangles, scene.two_sided, j)
 
 
-def _looks(scene: Scene, b: Bulge, antennas: Antennas, waveform: Waveform) -> list[tuple[Sums, float]]:
+def _looks(scene: Scene, b: Bulge, antennas: PulseGeometry, waveform: Waveform) -> list[tuple[Sums, float]]:
     """Sums at pulses and frequencies spread over track and band, and what radar cross section, m^2, 1 m^4 is in them,
     times how strong the frequency is in the waveform."""
     out, cost = [], 0

@@ -24,7 +24,7 @@ import numpy as np
 from ...base import constants, validation
 from ...base.boxes import box
 from ...model.waveform import Waveform
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.material import COHERENT
 from ...scene.scene import Scene
 from ...scene.triangles import edges, normals
@@ -71,13 +71,13 @@ class Speckle:
         ]
 
 
-def judge(scene: Scene, antennas: Antennas, waveform: Waveform) -> Speckle:
+def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
     """Of a scene's facets as echo adds them up, once they are cut: rough ones, and those that random heights move.
 
     An antenna at the scene's centre and forward scattering resolve nothing to be judged. TypeError: not a scene.
     """
     for name, value, kind in zip(
-        ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, Antennas, Waveform), strict=True
+        ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, PulseGeometry, Waveform), strict=True
     ):
         validation.instance(name, value, kind)
     look = _looks(antennas, scene.center)
@@ -92,10 +92,10 @@ def judge(scene: Scene, antennas: Antennas, waveform: Waveform) -> Speckle:
     return _contrast(scene.triangles[some], rayleigh[some], look, waveform) if some.any() else Speckle()
 
 
-def _looks(antennas: Antennas, center: np.ndarray) -> np.ndarray | None:
+def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
     """(u_T + u_R)/2 at a point (n, 3), the gradient of half the path; None where it says nothing."""
     out = np.zeros_like(antennas.tx)
-    for ends in (antennas.tx, antennas.tx if antennas.rx is None else antennas.rx):
+    for ends in (antennas.tx, antennas.rx):
         distance = np.linalg.norm(ends - center, axis=1, keepdims=True)
         if not distance.all():
             return None

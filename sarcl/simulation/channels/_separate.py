@@ -8,7 +8,7 @@ import numpy as np
 
 from ...arrays.channels import Channel, Sampling
 from ...model.waveform import Waveform
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ..scene_echoes import Work, band_of
 from ..spreading import Band
 from .channel_rows import Rows, antennas_of
@@ -116,10 +116,11 @@ def during(sent: list[Channel], start: int, n: int) -> list[tuple[Channel, slice
     return out
 
 
-def run(work: Work, antennas: Antennas, band: Waveform, frequencies: np.ndarray, first: int, total: int) -> np.ndarray:
+def run(
+    work: Work, antennas: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, total: int
+) -> np.ndarray:
     """Echoes of antennas at pulses from `first` on, (n, n_polarizations, n_samples)."""
-    rx = antennas.tx if antennas.rx is None else antennas.rx
-    beam = work.weights.seen_from(antennas.tx, rx, slice(first, first + len(antennas.tx)))
+    beam = work.weights.seen_from(antennas.tx, antennas.rx, slice(first, first + len(antennas.tx)))
     made = np.zeros((len(antennas.tx), len(work.order.polarizations), len(frequencies)), np.complex64)
     work.add(antennas, band, frequencies, made, total, first, beam)
     return made

@@ -16,7 +16,7 @@ from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.plan import LEAST_TOLERANCE
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import Beam
 from ...scene.scene import Scene
 from .. import echo_sampling
@@ -83,7 +83,7 @@ def array_echo(
 
 
 def _way(
-    layout: Layout, scene: Scene, given: Scene, whole: Waveform, everywhere: Antennas, weights: Beam, order: Order
+    layout: Layout, scene: Scene, given: Scene, whole: Waveform, everywhere: PulseGeometry, weights: Beam, order: Order
 ) -> tuple[Apart | Between, Work]:
     """The cheaper way to make the samples whose plan keeps the tolerance, and the scene made ready for it."""
     between = _between(layout, scene, weights, order)
@@ -139,7 +139,7 @@ def _measured(work: Work, layout: Layout, samples: Target) -> float:
             antennas = antennas_of(
                 rows.sides.senders(channel.offset), rx[:, 0], reference[:, 0], float(f[0]), grid, layout.window, 1
             )
-            beam = work.weights.seen_from(antennas.tx, antennas.tx if antennas.rx is None else antennas.rx, slice(None))
+            beam = work.weights.seen_from(antennas.tx, antennas.rx, slice(None))
             weight = rows.array.weights[sender] if rows.separated else channel.weight
             factor = weight * layout.spectrum(channel, f) * work.weights.factor(f)
             values, powers = work.exact(antennas, pulse, f, beam)

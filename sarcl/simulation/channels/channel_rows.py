@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays.channels import Channel, Sampling
 from ...model.antenna_array import AntennaArray
 from ...model.trajectory import Trajectory
-from ...numerics.pulse_geometry import Antennas
+from ...numerics.pulse_geometry import PulseGeometry
 from .. import echo_sampling
 
 CHANNELS = ("simultaneous", "separated")
@@ -120,12 +120,12 @@ class Rows:
 def antennas_of(
     tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, frequency: float, grid: Sampling,
     window: tuple[float, float], n: int | None = None,
-) -> Antennas:  # fmt: skip
+) -> PulseGeometry:  # fmt: skip
     """Antennas of pulses whose samples begin at `frequency`, Hz, n of them."""
     rows, n = np.ones(len(tx)), grid.n if n is None else n
-    return Antennas(
+    return PulseGeometry(
         tx=tx,
-        rx=None if np.array_equal(tx, rx) else rx,
+        rx=rx,
         reference_range=reference_range,
         frequency=(frequency + n // 2 * grid.step) * rows,
         frequency_step=grid.step * rows,
