@@ -10,7 +10,7 @@ import numpy as np
 
 from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import reachable, rounded_up
-from ..numerics import error_bounds
+from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.plan import LEAST_TOLERANCE
 from ..opencl.device import Device
@@ -25,12 +25,9 @@ from .focusing_task import Engine, FocusingTask
 from .tiling import GridTiling
 
 METHODS = ("auto", "direct", "factorized")
-WORTH = 0.8  # of the direct method's cost, below which sub-apertures are taken
-FLOAT64 = 1.3  # cost of sarcl/imaging/float64/plan.py's unit
 TINY = 1e-35  # of samples, below which pixels come near complex64's smallest numbers
 ROUNDING = 0.5  # of a tolerance: the most that rounding of what pixels do not see may take
 MOST_TOLERANCE = 0.99  # that is looked for
-SMALL = 3e7  # pairs below which looking for sub-apertures takes longer than they save
 
 
 @dataclass(frozen=True, eq=False)
@@ -75,13 +72,13 @@ def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True
     if method == "factorized":
         return _merged(task, tolerance, lanes, float64)
     straight = _straight(task, tolerance, lanes, float64)
-    if method == "direct" or straight.dtype != np.complex64 or task.pairs < SMALL:
+    if method == "direct" or straight.dtype != np.complex64 or task.pairs < cost_model.SEARCH_PAYS:
         return straight
     try:
         fewer = _Float32(task, tolerance).factorized(lanes)
     except ToleranceUnreachable:
         return straight
-    return fewer if fewer.cost < WORTH * straight.cost else straight
+    return fewer if fewer.cost < cost_model.MERGING_PAYS * straight.cost else straight
 
 
 class _Float32:
@@ -195,6 +192,5 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
 def _precise(task: FocusingTask, tolerance: float) -> MethodChoice:
     """In float64."""
     plan, tiling = float64_plan.make_plan(task, tolerance)
-    return MethodChoice(
-        "direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, FLOAT64 * plan.cost / task.grid.size
-    )
+    cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
+    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, cost)

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    cost_model              measured costs by which plans are compared
     double_double           double-double arithmetic: sums, products and quotients with their rounding errors
     error_bounds            error bounds of the float32 kernels
     error_bounds_float64    error bounds of the float64 kernels
@@ -17,6 +18,7 @@ For other folders:
 """
 
 __all__ = [
+    "cost_model",
     "double_double",
     "error_bounds",
     "error_bounds_float64",

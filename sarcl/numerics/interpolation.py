@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
+from . import cost_model
 
 MARGIN = 1.06  # of errors that are taken on a grid of frequencies and places
 OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
@@ -20,8 +21,6 @@ LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
 # The same for lines of pixels, whose weights are not deconvolved.
 LINE_TERMS = {2: 2, 4: 3, 6: 4, 8: 5}
-# Relative cost of one contribution with so many taps, measured on PoCL (bench/backproject.py).
-TAP_COST = {2: 1.0, 4: 1.5, 6: 1.9, 8: 2.45}
 
 
 @dataclass(frozen=True, eq=False)
@@ -199,9 +198,8 @@ def choose_interpolator(
     """
 
     def cost(candidate: tuple[int, float, int]) -> float:
-        # in contributions: half of one per sample and doubling for the FFT, and what long rows lose to caches
         taps, _, length = candidate
-        return float(pairs_per_row * TAP_COST[taps] + length * (0.5 * np.log2(length) + length / 4000))
+        return pairs_per_row * cost_model.TAPS[taps] + cost_model.profile(length)
 
     for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
         if lower_bound(taps, oversample) <= error:

@@ -14,6 +14,7 @@ from ..base.text import size_text
 from ..base.tolerances import rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
+from . import cost_model
 from .error_bounds import U32, sum_rounding
 from .interpolation import TERMS, Interpolator, interpolator
 from .plan import LEAST_TOLERANCE
@@ -21,8 +22,6 @@ from .plan import LEAST_TOLERANCE
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 MOST_COUNTED = 2**20  # samples whose crowding is looked at
 CELLS = 64, 8  # a side of a tile on CPUs, where it stays in a cache, and on GPUs, where many must be at work
-# Work of a sample, of each of its taps, and of a cell's FFT, measured on PoCL: only their ratios matter.
-SAMPLE_COST, TAP_COST, CELL_COST = 30.0, 0.9, 1.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,7 +71,8 @@ def make_plan(
             rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
             error = crowding * (2 * kernel.error + kernel.error**2) + rounding
             least = min(least, error)
-            cost = len(turns) * n_samples * (SAMPLE_COST + TAP_COST * taps**2) + CELL_COST * cells * np.log2(cells)
+            cost = len(turns) * n_samples * (cost_model.GRID_SAMPLE + cost_model.GRID_TAP * taps**2)
+            cost += cost_model.GRID_CELL * cells * np.log2(cells)
             if error <= tolerance and (best is None or cost < best.cost):
                 best = GridPlan(kernel, (length[0], length[1]), crowding, error, cost)
     if best is None or tolerance < LEAST_TOLERANCE:

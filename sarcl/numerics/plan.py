@@ -11,16 +11,11 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
-from . import error_bounds, interpolation
+from . import cost_model, error_bounds, interpolation
 from .interpolation import Interpolator
 
 LEAST_TOLERANCE = 1e-6  # of complex64 results
 
-# Relative cost of a contribution in the range modes of kernels/range_phase.clh and by order of the series, and of a
-# tile's constants, measured on PoCL (bench/backproject.py).
-RANGE_COST = {0: 1.0, 1: 1.5, 2: 2.2}
-ORDER_COST = {2: 1.0, 3: 1.05, 0: 1.33}
-TILE_COST = 20.0
 FIXED = 0.8  # of a tolerance: the most that ranges and sums may take of it, the rest is for interpolation
 PROFILES = "float32 range profiles"
 
@@ -91,7 +86,7 @@ def cheapest(
     best: tuple[float, Plan] | None = None
     steps = carrier_steps(carrier, n_samples, bandwidth)
     for per_tile, radius in tiles:
-        for mode, range_cost in RANGE_COST.items():
+        for mode, range_cost in cost_model.RANGE_MODE.items():
             for order in (2, 3, 0) if mode < 2 else (0,):
                 fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
                 fixed += error_bounds.sum_rounding(chunk, n_samples)
@@ -106,8 +101,8 @@ def cheapest(
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 if mode == 0 and radius * sigma > 2**20:
                     continue  # places in a tile would not fit float32
-                cost += range_cost - 1 + TILE_COST / per_tile
-                cost += ORDER_COST[order] - 1 if mode < 2 else 0.0
+                cost += range_cost - 1 + cost_model.TILE / per_tile
+                cost += cost_model.SERIES[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
                     best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error, cost)
     if best is None or tolerance < least_tolerance:

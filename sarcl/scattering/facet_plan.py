@@ -14,6 +14,7 @@ import numpy as np
 from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
+from ..numerics import cost_model
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
@@ -25,8 +26,6 @@ GIGAHERTZ = 1e9  # amplitudes are over f in GHz: so they keep away from float32'
 LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
 SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
-# Relative cost of a facet and pulse: of direction, place and polarisations; of its integral at a frequency; of a tap
-FACET, NODE, TAP = 1.0, 0.6, 0.12
 TO_CORNER = 2 / 3  # from a centroid to the farthest corner, of the longest edge
 
 
@@ -101,7 +100,8 @@ def plan_facets(
                 error = fixed + weights.with_phase(n, band[power])
                 least = min(least, error)
                 if error <= SHARE * tolerance:
-                    cost = count * (FACET + n * (NODE + 4 * TAP * len(polarizations)))
+                    per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(polarizations)
+                    cost = count * (cost_model.FACET + n * per_node)
                     if best is None or cost < best[0]:
                         best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power)
         elif count <= MOST_FACETS:

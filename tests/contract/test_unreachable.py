@@ -278,7 +278,8 @@ PLANTED = {
 @pytest.mark.parametrize("name", PLANTED)
 def test_a_bug_is_not_taken_for_a_refusal(name, monkeypatch):
     where, make = PLANTED[name]
-    monkeypatch.setattr("sarcl.imaging.choose_method.SMALL", 0.0)  # sub-apertures are looked for in small images too
+    # sub-apertures are looked for in small images too
+    monkeypatch.setattr("sarcl.numerics.cost_model.SEARCH_PAYS", 0.0)
     make()
     monkeypatch.setattr(where, broken)
     with pytest.raises(ValueError, match=BUG) as caught:

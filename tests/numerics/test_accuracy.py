@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl.base import constants
-from sarcl.numerics import error_bounds, interpolation, range_profiles
+from sarcl.numerics import cost_model, error_bounds, interpolation, range_profiles
 from sarcl.numerics.interpolation import interpolator
 
 
@@ -56,7 +56,7 @@ def test_the_choice_is_the_cheapest_of_all_interpolators(n_samples, carrier):
     for error in (least, 1e-6, 1e-4, 1e-2, 0.4):
         made, length, cost = interpolation.choose_interpolator(error, n_samples, 1e5, carrier)
         able = [(m.taps, n) for m, n in every if m.error <= error]
-        costs = [1e5 * interpolation.TAP_COST[taps] + n * (0.5 * np.log2(n) + n / 4000) for taps, n in able]
+        costs = [1e5 * cost_model.TAPS[taps] + cost_model.profile(n) for taps, n in able]
         assert (made, length) in every and cost * 1e5 == pytest.approx(min(costs))
 
 

@@ -11,7 +11,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
-from ...numerics import error_bounds, interpolation
+from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tiles import Tiles
@@ -21,10 +21,6 @@ LOCAL_BYTES = 60_000  # of local memory a group of pulses may take
 SIDES = (64, 32, 16)
 FINES = (1, 2, 4, 8)
 GROUP_SIZES = (16, 8, 4)
-
-# Relative cost of a contribution, in contributions of the gathering kernel with the hat, measured on PoCL: of a tap of
-# a line; of a sample of a line's profile; of a line's weights; of a (tile, pulse); of a pixel of a group
-TAP, SAMPLE, LINE, PULSE, GROUPS = 0.045, 1.2, 1.0, 30.0, 0.4
 
 
 def components(beam: bool) -> int:
@@ -215,16 +211,16 @@ def choose(
             if error > 0.9 * tolerance:
                 continue
             vectors = fine * (1.3 * side + 8)
-            per_pair = (
-                taps * TAP * (1.8 if slope else 1) + (SAMPLE * vectors + LINE * side + PULSE) / side**2 + GROUPS / group
-            )
+            per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
+            per_tap = taps * cost_model.LINE_TAP * (cost_model.LINE_SLOPE if slope else 1)
+            per_pair = per_tap + per_tile / side**2 + cost_model.LINE_GROUP / group
             if source is None:
-                reads = grid.size * SAMPLE * vectors / side**2
+                reads = grid.size * cost_model.LINE_SAMPLE * vectors / side**2
                 try:
                     made, length, cost = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
                 except ToleranceUnreachable:  # other lines may leave more to the interpolator
                     continue
-                per_pair += (cost - interpolation.TAP_COST[2]) * reads / grid.size
+                per_pair += (cost - cost_model.TAPS[2]) * reads / grid.size
             else:
                 made, length = source
                 if made.error > tolerance - error:

@@ -10,9 +10,9 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
-from ...numerics import error_bounds, interpolation
+from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
-from ...numerics.plan import ORDER_COST, RANGE_COST, Plan, cheapest
+from ...numerics.plan import Plan, cheapest
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl import fft
 from ..direct import line_plan
@@ -23,10 +23,6 @@ from ..tiling import GridTiling
 from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
 from ._tile_tree import spread_of, tree_of
 
-# Relative costs as in line_plan.py, measured on PoCL: of a tap and of a node for a sample moved to a new tile, and of a
-# (tile, pulse) that is moved; and of a sample of a profile
-MOVE_TAP, MOVE_NODE, SHIFT, PROFILE = 0.052, 0.017, 10.0, 6.0
-LEAF_COST = {64: 0.35, 32: 0.45, 16: 0.8}  # of a contribution to a leaf of that side, about
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)
 TRIES = 8  # candidates worked out in full
@@ -126,7 +122,7 @@ class _Case:
             self.points = line_plan.outline(grid)
             assert grid.spacing is not None
             pixel, self.largest = float(np.hypot(*grid.spacing)), max(grid.shape)
-            self.leaves = {side: side / 2 * pixel for side in (LEAF_COST if lines else (32, 16))}
+            self.leaves = {side: side / 2 * pixel for side in (cost_model.LEAF if lines else (32, 16))}
         else:
             low, high = grid.bounds
             signs = np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
@@ -181,8 +177,9 @@ class _Case:
             thins.append(thin)
             total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, nodes)
             sources, spaced = sources / thin + nodes, spaced * thin
-        leaf = LEAF_COST[chain[-1]] if self.lines else interpolation.TAP_COST[taps] + 0.1
-        return total + size * sources * leaf + n_rows * PROFILE * spacing * self.task.raw.n_samples, thins
+        leaf = cost_model.LEAF[chain[-1]] if self.lines else cost_model.TAPS[taps] + cost_model.LEAF_PIXELS
+        total += size * sources * leaf
+        return total + n_rows * cost_model.MERGED_PROFILE * spacing * self.task.raw.n_samples, thins
 
     def build(
         self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, thins: list[int], share: float
@@ -226,7 +223,7 @@ class _Case:
             return "the largest tiles are wider than the period in which ranges repeat"
         levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], decimations, strict=True))
         sources = [raw.n_rows, *(len(v.decimation.nodes) for v in levels)]
-        cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * PROFILE * spacing * raw.n_samples
+        cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * cost_model.MERGED_PROFILE * spacing * raw.n_samples
         for v, n in zip(levels, sources, strict=False):
             cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, nodes)
         return FactorPlan(
@@ -261,7 +258,7 @@ class _Case:
                     tiling.radius, self.distance, self.highest, self.bandwidth, mode, order
                 )
                 error += error_bounds.sum_rounding(CHUNK, raw.n_samples) + source[0].error
-                cost = interpolation.TAP_COST[source[0].taps] + RANGE_COST[mode] + ORDER_COST[order] - 2
+                cost = cost_model.TAPS[source[0].taps] + cost_model.RANGE_MODE[mode] + cost_model.SERIES[order] - 2
                 if error <= tolerance and (best is None or cost < best.cost):
                     best = Plan(*source, tiling.per_tile, mode, order, error, cost)
         return best
@@ -286,4 +283,4 @@ class _Case:
 
 def moving_cost(samples: float, taps: int, nodes: int) -> float:
     """Cost of a pulse moved to a new tile and spread over nodes."""
-    return samples * (taps * MOVE_TAP + nodes * MOVE_NODE) + SHIFT
+    return samples * (taps * cost_model.MOVE_TAP + nodes * cost_model.MOVE_NODE) + cost_model.MOVE_PULSE

@@ -11,7 +11,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import rounded_up
-from ...numerics import error_bounds_float64, interpolation_float64
+from ...numerics import cost_model, error_bounds_float64, interpolation_float64
 from ...numerics.interpolation_float64 import Kernel
 from ...opencl import fft
 from .. import profile_energy
@@ -23,11 +23,6 @@ CHUNK = 64  # rows added plainly before the compensated total; blocks of rows ar
 SIDES = (16, 8)  # of tiles, pixels
 MOST_TURNS = 2.0**44  # of a path; places among samples, up to 32 a turn, still count below 2^51
 WIDE = -1  # the order of plans that compute every path in pairs of float64
-
-# Cost in ns of a contribution with no taps, of a tap, by order of the series; of what a tile's points share; of a
-# profile's sample. Measured on PoCL, two cores; only their ratios matter.
-PAIR_COST, TAP_COST, TILE_COST, SAMPLE_COST = 1.15, 0.23, 38.0, 10.0
-ORDER_COST = {2: -0.05, 3: 0.0, 4: 0.1, 0: 0.5, WIDE: 4.0}
 
 
 @dataclass(frozen=True, eq=False)
@@ -114,12 +109,12 @@ def _plans(task: FocusingTask, tilings: dict[int, GridTiling], energy: ProfileEn
     ranges = [
         (
             error_bounds_float64.range_error(tiling.radius, distance, frequency, order),
-            cost + TILE_COST / per_tile,
+            cost + cost_model.FLOAT64_TILE / per_tile,
             per_tile,
             order,
         )
         for per_tile, tiling in tilings.items()
-        for order, cost in ORDER_COST.items()
+        for order, cost in cost_model.FLOAT64_SERIES.items()
     ]
     for taps in interpolation_float64.TAPS:
         for oversample in interpolation_float64.OVERSAMPLE:
@@ -132,10 +127,10 @@ def _plans(task: FocusingTask, tilings: dict[int, GridTiling], energy: ProfileEn
             fixed = dark * kernel.error
             rounding = error_bounds_float64.sum_rounding(CHUNK, length, kernel.edge_gain)
             fixed += max(energy.whole_profile, dark) * rounding
-            profile = SAMPLE_COST * length * (1 + length / 65536)
+            profile = cost_model.float64_profile(length)
             for error, extra, per_tile, order in ranges:
                 if np.isfinite(error):
-                    pairs = grid.size * (PAIR_COST + TAP_COST * taps + extra)
+                    pairs = grid.size * (cost_model.FLOAT64_PAIR + cost_model.FLOAT64_TAP * taps + extra)
                     yield Float64Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
 
 

@@ -12,6 +12,7 @@ import numpy as np
 from ...arrays.channels import Channel
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
+from ...numerics import cost_model
 from ...scattering.antenna_weights import Beam
 from ...scene.scene import Scene
 from ..scene_echoes import Work, band_of
@@ -21,10 +22,6 @@ from ._response_samples import Views
 from ._separate import Layout, during, run
 from .channel_rows import antennas_of
 
-# us on two cores (PoCL): of a pulse in a run of the engines, a sample of its band, a scatterer in it; of a sample of a
-# channel that is interpolated
-RUN, SAMPLE, SCATTERER, CHANNEL = 15.0, 0.03, 0.003, 0.05
-WORTHWHILE = 0.7  # of what the channels cost apart
 SHARE = 0.3  # of the tolerance, for what is interpolated
 FAR = 0.02  # of the distance: no array larger than this is looked at
 GRAZING = 0.3  # of the tolerance: facets that face some elements alone are about (array/distance)^1.5 of the echo
@@ -72,10 +69,11 @@ class Between:
 
     def _most(self, scatterers: int) -> float:
         """Places that cost no more than every channel apart."""
-        layout, fixed = self.layout, RUN + SCATTERER * scatterers
+        layout, fixed = self.layout, cost_model.CHANNEL_RUN + cost_model.CHANNEL_SCATTERER * scatterers
         width = min(layout.grid.width, layout.grid.n)
-        saved = layout.runs * (WORTHWHILE * (fixed + SAMPLE * width) - CHANNEL * width)
-        return saved / (len(layout.rows.sides.tx) * (fixed + SAMPLE * layout.grid.n))
+        sample, between = cost_model.CHANNEL_SAMPLE, cost_model.CHANNEL_INTERPOLATED
+        saved = layout.runs * (cost_model.INTERPOLATION_PAYS * (fixed + sample * width) - between * width)
+        return saved / (len(layout.rows.sides.tx) * (fixed + sample * layout.grid.n))
 
     def pays(self, scatterers: int) -> bool:
         """Whether this is quicker than every channel apart."""

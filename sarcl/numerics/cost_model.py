@@ -1,0 +1,75 @@
+"""Costs by which plans are compared: one table of measured constants.
+
+Only ratios matter within a group, since every plan is compared with plans of the same group. All were measured on PoCL,
+on two cores of an AMD EPYC processor with AVX-512; the date is that of the commit that brought the numbers.
+To measure them again: `python -m sarcl bench` for images, bench/echo.py for echoes, with one constant's work varied.
+
+The unit "contribution" is one row at one pixel, or one scatterer in one row, with two taps and ranges in float32.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+# Range profiles in float32, in contributions (2026-11-21).
+TAPS = {2: 1.0, 4: 1.5, 6: 1.9, 8: 2.45}  # per contribution, by number of taps
+RANGE_MODE = {0: 1.0, 1: 1.5, 2: 2.2}  # per contribution, by range mode of kernels/range_phase.clh
+SERIES = {2: 1.0, 3: 1.05, 0: 1.33}  # per contribution, by order of the range series; 0: exact root
+TILE = 20.0  # per tile and row: constants that the tile's points share
+
+# Backprojection by lines of pixels (kernels/backproject_lines.cl), in contributions (2026-11-21).
+LINE_TAP = 0.045  # per contribution and tap of a line
+LINE_SLOPE = 1.8  # factor on LINE_TAP where the curvature moves pixels' positions too
+LINE_SAMPLE = 1.2  # per sample of a line's profile
+LINE_WEIGHTS = 1.0  # per line and pulse: weights of its taps
+LINE_PULSE = 30.0  # per tile and pulse
+LINE_GROUP = 0.4  # per pixel and group of pulses
+
+# Merging of sub-apertures, in contributions (2026-11-21).
+MOVE_TAP, MOVE_NODE = 0.052, 0.017  # per sample that is moved to a new tile: per tap, per node that it is spread over
+MOVE_PULSE = 10.0  # per tile and pulse that is moved
+MERGED_PROFILE = 6.0  # per sample of a range profile
+LEAF = {64: 0.35, 32: 0.45, 16: 0.8}  # per contribution to a leaf tile computed by lines, by its side in pixels
+LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on top of its taps
+
+# Choice of a method (2026-11-21).
+MERGING_PAYS = 0.8  # share of the direct method's cost below which sub-apertures are taken
+SEARCH_PAYS = 3e7  # pairs of row and pixel below which planning sub-apertures takes longer than they save
+FLOAT64_UNIT = 1.3  # contributions per ns of the next group
+
+# Backprojection in float64, in ns (2026-11-21).
+FLOAT64_PAIR = 1.15  # per contribution without taps
+FLOAT64_TAP = 0.23  # per contribution and tap
+FLOAT64_SERIES = {2: -0.05, 3: 0.0, 4: 0.1, 0: 0.5, -1: 4.0}  # per contribution, by order; 0: exact, -1: double-double
+FLOAT64_TILE = 38.0  # per tile and row
+FLOAT64_SAMPLE = 10.0  # per sample of a range profile
+
+# Two-dimensional nonuniform FFT (kernels/nufft2d.cl), in steps of a cell's FFT (2026-11-22).
+GRID_SAMPLE = 30.0  # per sample
+GRID_TAP = 0.9  # per sample and cell that it is spread over
+GRID_CELL = 1.0  # per cell and doubling of their number
+
+# Echoes of facets, per facet and pulse, in units of the first (2026-11-21).
+FACET = 1.0  # direction, position and polarisations
+FACET_NODE = 0.6  # per frequency node: the integral over the facet
+FACET_TAP = 0.12  # per frequency node, polarisation and tap
+
+# Channels of an array, in us (2026-11-22).
+CHANNEL_RUN = 15.0  # per pulse of one transmitter and receiver position
+CHANNEL_SAMPLE = 0.03  # per sample of that pulse's band
+CHANNEL_SCATTERER = 0.003  # per scatterer in that pulse
+CHANNEL_INTERPOLATED = 0.05  # per sample of an interpolated channel
+INTERPOLATION_PAYS = 0.7  # share of the cost of separate channels below which interpolation is taken
+
+
+def profile(length: int) -> float:
+    """Contributions per range profile of `length` samples: half of one per sample and doubling for the FFT.
+
+    The second term is what long rows lose to caches.
+    """
+    return float(length * (0.5 * np.log2(length) + length / 4000))
+
+
+def float64_profile(length: int) -> float:
+    """As `profile`, in float64: ns."""
+    return FLOAT64_SAMPLE * length * (1 + length / 65536)
