@@ -75,14 +75,14 @@ def test_parts_are_all_leaves_once_and_fit(raw):
         for nbytes in (least, 1.5 * least, 4 * least, 20 * least, 1e9):
             seen = np.zeros((tiling.n_bands, tiling.across), int)
             for first, last in engine.blocks(nbytes):
-                for a, b, left, right in engine.room.parts(first, last, nbytes):
+                for a, b, left, right in engine.memory.parts(first, last, nbytes):
                     seen[a:b, left:right] += 1
                     assert left % engine.plan.factors[0] == 0
                     pixels = (b - a) * (right - left) * tiling.per_tile
-                    assert engine.room.n_bytes(engine.room.tops(a, b, right - left), pixels) <= nbytes / 2
+                    assert engine.memory.n_bytes(engine.memory.tops(a, b, right - left), pixels) <= nbytes / 2
             assert (seen == 1).all()
-        assert len(list(engine.room.parts(0, tiling.n_bands, least))) > 4
-        assert list(engine.room.parts(0, tiling.n_bands, 1e9)) == [(0, tiling.n_bands, 0, tiling.across)]
+        assert len(list(engine.memory.parts(0, tiling.n_bands, least))) > 4
+        assert list(engine.memory.parts(0, tiling.n_bands, 1e9)) == [(0, tiling.n_bands, 0, tiling.across)]
 
 
 @pytest.mark.parametrize("grid", [WIDE, LISTED], ids=["wide", "listed"])

@@ -176,6 +176,6 @@ def test_profiles_of_nodes_are_those_of_the_twin(device):
     made, sigma = plan.levels[0], 2 * raw.frequency_step[0] * plan.length / SPEED_OF_LIGHT
     m = np.arange(2 * made.reach + 1) - made.reach
     center = tree_of(tiling, 0, tiling.n_bands, plan.factors).centers[0][low] + tiling.center
-    wanted = merge(raw, center, m / sigma, made.thinning.blocks, made.thinning.filter, got.shape[1])
+    wanted = merge(raw, center, m / sigma, made.decimation.blocks, made.decimation.filter, got.shape[1])
     error = got[low - first][:, : len(m)] - wanted
     assert np.linalg.norm(error) <= 1e-3 * np.linalg.norm(wanted)

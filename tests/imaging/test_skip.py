@@ -178,7 +178,7 @@ def looked_at(chosen, task):
     """How the factorised method sees a whole task."""
     engine = chosen.on(open_device(), task)
     last = chosen.tiling.n_bands
-    return engine._look(tree_of(chosen.tiling, 0, last, chosen.plan.factors), 0, last)
+    return engine._coverage(tree_of(chosen.tiling, 0, last, chosen.plan.factors), 0, last)
 
 
 @pytest.mark.parametrize("listed", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["plane", "points"])
