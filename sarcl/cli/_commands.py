@@ -86,7 +86,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
     _expect(job, [output], (".h5", ".hdf5"), [args.scenario])
     _expect(job, images, (".png", ".h5", ".hdf5"), [args.scenario, output])
-    _check_floor(args.floor_db)
+    _check_scale(args)
     grid = scenario.build_grid() if scenario.grid is not None else None
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
@@ -109,7 +109,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         _focus(
             lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
             images,
-            args.floor_db,
+            args,
             job,
         )
     return 0
@@ -127,7 +127,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         if getattr(args, name) and all(Path(p).suffix.lower() == ".png" for p in outputs):
             raise ValueError(f"--{name} keeps tiles beside an image in a file; give -o IMAGE.h5")
     _expect(job, outputs, (".png", ".h5", ".hdf5"), [*args.raw, *([args.grid] if args.grid else [])])
-    _check_floor(args.floor_db)
+    _check_scale(args)
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
     raw = read(args.raw if len(args.raw) > 1 else args.raw[0], autofocus=args.autofocus)
@@ -153,7 +153,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
             raw, grid, **how, out=out, device=devices, progress=job.progress,
             tile=args.tile, resume=args.resume,
         ),
-        outputs, args.floor_db, job,
+        outputs, args, job,
     )  # fmt: skip
     return 0
 
@@ -280,10 +280,11 @@ def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...], inputs: list[
         raise ValueError(f"outputs {', '.join(paths)} name one file twice")
 
 
-def _check_floor(floor_db: float) -> None:
-    """Refuse, before the work, a floor that no picture can have."""
-    if not floor_db < 0:
-        raise ValueError(f"--floor-db is {floor_db:g}; it counts down from the brightest pixel: give e.g. -50")
+def _check_scale(args: argparse.Namespace) -> None:
+    """Refuse, before the work, grey levels that no picture can have."""
+    from ..figures.decibels import check_scale
+
+    check_scale(args.floor_db, args.top_db, args.percentile, ("--floor-db", "--top-db", "--percentile"))
 
 
 def _grid_options(args: argparse.Namespace) -> dict[str, Any]:
@@ -321,8 +322,10 @@ def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
     return compress(raw)
 
 
-def _focus(make: Callable[[str | None], Image | None], outputs: list[str], floor_db: float, job: Job) -> None:
-    """Make the image, in the first .h5 of `outputs` where there is one, and write the rest."""
+def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args: argparse.Namespace, job: Job) -> None:
+    """Make the image, in the first .h5 of `outputs` where there is one, and write the other outputs."""
+    from ..figures.decibels import write_png
+
     file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
     image = make(file)
     if image is None:
@@ -330,9 +333,14 @@ def _focus(make: Callable[[str | None], Image | None], outputs: list[str], floor
         return
     _say_report("focus", image.report, job)
     for path in outputs:
-        if path != file:
-            image.save(path, floor_db=floor_db)
-        job.say(f"wrote {path}")
+        scale = ""
+        if Path(path).suffix.lower() == ".png":
+            picture = image.show(args.floor_db, top_db=args.top_db, percentile=args.percentile)
+            write_png(picture, path)
+            scale = f". {picture.info['caption']}"
+        elif path != file:
+            image.save(path)
+        job.say(f"wrote {path}{scale}")
 
 
 def _say_report(what: str, report: Report | None, job: Job) -> None:

@@ -89,9 +89,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
     )
     p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
     p.add_argument("--dry-run", action="store_true", help="say what the echoes will take, and write nothing")
-    p.add_argument(
-        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
-    )
+    _picture(p)
 
 
 def _focus(p: argparse.ArgumentParser) -> None:
@@ -140,8 +138,19 @@ def _focus(p: argparse.ArgumentParser) -> None:
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
     rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
-    p.add_argument(
-        "--floor-db", type=float, default=-50.0, help="black in a .png, dB under the brightest (default -50)"
+    _picture(p)
+
+
+def _picture(p: argparse.ArgumentParser) -> None:
+    grey = p.add_argument_group("grey levels of a .png", "its caption says what white and black are")
+    grey.add_argument("--floor-db", type=float, default=-50.0, metavar="DB", help="black, dB below white (default -50)")
+    white = grey.add_mutually_exclusive_group()
+    white.add_argument("--top-db", type=float, metavar="DB", help="white, dB of a unit point in focus")
+    white.add_argument(
+        "--percentile",
+        type=float,
+        metavar="P",
+        help="white: this percentile of the scene's pixels (default 99.5; 100: the brightest pixel)",
     )
 
 

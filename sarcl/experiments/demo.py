@@ -26,7 +26,7 @@ DISTANCE = 10e3  # m
 EXTENT = 50.0  # m of the picture's side
 TOLERANCE = 1e-2
 WINDOW: Window = ("taylor", 35, 5)  # side lobes would fill the shadows
-FLOOR_DB = -45.0
+FLOOR_DB, PERCENTILE = -40.0, 99.9  # black, dB below white; white, per cent of the pixels
 
 
 @dataclass(frozen=True)
@@ -115,7 +115,7 @@ def run(
     clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
     band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
     title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
-    image.save(picture, floor_db=FLOOR_DB, title=title)
+    image.save(picture, floor_db=FLOOR_DB, percentile=PERCENTILE, title=title)
     raw.save(raw_file)
     clock.lap("write", f"{picture}, {raw_file.name}")
     say(f"device  {opened.info.name}, {opened.info.platform}")

@@ -1,7 +1,8 @@
-"""The paper a picture is drawn on: frame, axes with round ticks, title."""
+"""Frame, axes with round ticks, title and caption of a picture, drawn with Pillow."""
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import numpy as np
@@ -10,13 +11,15 @@ PAPER, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
 
 
 class Sheet:
-    """White paper with a frame of (width, height) pixels for the data, axes about it and a title over it.
+    """White background with a frame of (width, height) pixels for the data, axes, a title above and a caption below.
 
     across, up   (label, value at the low edge, value at the high edge, least tick step) of the two axes
-    side         room right of the frame, in units of the font's size
+    side         space right of the frame, in units of the font size
     """
 
-    def __init__(self, width: int, height: int, across: Any, up: Any, title: str | None, side: float) -> None:
+    def __init__(
+        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str
+    ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
         self.unit = u = int(np.clip(round(max(width, height) / 40), 15, 40))
@@ -29,11 +32,18 @@ class Sheet:
         left = round(2 * self.tick + widest + 2.2 * u)
         top = round(2.6 * u if title else 1.2 * u)
         self.frame = (left, top, left + width, top + height)
-        size = (left + width + round(side * u), top + height + round(3.7 * u))
+        small: Any = ImageFont.load_default(round(0.85 * u))
+        room = width + round(side * u) + left - u
+        lines = wrapped(caption, room, small.getlength)
+        below = top + height + round(3.9 * u)
+        size = (left + width + round(side * u), below + round((1.2 * len(lines) + 0.4) * u))
         self.image = Image.new("RGB", size, PAPER)
-        self.image.info["frame"] = self.frame
+        self.image.info |= {"frame": self.frame, "caption": caption}
         self.draw = ImageDraw.Draw(self.image)
+        for i, line in enumerate(lines):
+            self.draw.text((0.5 * u, below + round(1.2 * i * u)), line, INK, small, anchor="lt")
         if title:
+            self.image.info["title"] = title
             # The font that comes with Pillow has one dash.
             title = " ".join(str(title).split()).translate(dict.fromkeys(map(ord, "‐‑‒–—−"), "-"))
             room = size[0] - left - 0.5 * u
@@ -88,6 +98,18 @@ class Sheet:
         w = self.line
         left, top, right, bottom = frame
         self.draw.rectangle((left - w, top - w, right + w - 1, bottom + w - 1), outline=INK, width=w)
+
+
+def wrapped(text: str, room: float, length: Callable[[str], float]) -> list[str]:
+    """Lines of `text` of at most `room` pixels each, broken between words; `length` measures a line, pixels."""
+    lines = [""]
+    for word in text.split():
+        joined = f"{lines[-1]} {word}".strip()
+        if lines[-1] and length(joined) > room:
+            lines.append(word)
+        else:
+            lines[-1] = joined
+    return lines
 
 
 def image_axis(

@@ -1,4 +1,4 @@
-"""Pictures of decibels, with Pillow and nothing else: grey images with axes and a scale, and line plots."""
+"""Pictures of decibels, drawn with Pillow alone: grey images with axes and a scale, and line plots."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base import validation
+from ..base.version import __version__
 from .axes import INK, Sheet, image_axis, number, ticks_between
 
 if TYPE_CHECKING:
@@ -15,6 +16,10 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # shorter side over longer side at least: a strip any thinner shows nothing
 CURVE = (22, 82, 148)
+PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
+# Levels below, dB. The median of speckle lies 8 dB below its 99th percentile, and up to 20 dB where there are shadows;
+# the median of the side lobes of a point, over 64 x 64 resolution cells without a taper, 41 dB.
+FILLED, FAINTEST, OBJECT = 25.0, 40.0, 30.0
 
 
 def picture(
@@ -23,21 +28,31 @@ def picture(
     floor_db: float = -50.0,
     title: str | None = None,
     *,
+    top_db: float | None = None,
+    percentile: float | None = None,
+    zero: str | None = None,
     origin: tuple[float, float] = (0.0, 0.0),
     names: tuple[str, str] = ("y", "x"),
 ) -> Picture:
     """Draw decibels (rows, columns) in grey, or as a line where there is one row or one column.
 
-    db        dB, real; row 0 is drawn at the bottom; -inf is nothing
-    spacing   (row, column) m; None: axes count pixels
-    origin    (row, column) coordinates, m, of pixel [rows//2, columns//2]; names  what they are called
-    floor_db  black, in dB below the brightest pixel, which is white; negative
+    db          dB, real; row 0 is drawn at the bottom; -inf means no signal
+    spacing     (row, column) m; None: axes count pixels
+    floor_db    level of black, in dB below white; negative
+    top_db      level of white, in dB; None: taken from the data, see `white_level`
+    percentile  per cent of the pixels of the scene that are no brighter than white, above 0 to 100; None: 99.5.
+                100 makes the brightest pixel white. Not to be given together with top_db
+    zero        what 0 dB stands for, for the caption
+    origin      (row, column) coordinates, m, of pixel [rows//2, columns//2];  names: the names of these coordinates
 
-    Returns a PIL.Image; its info["frame"] is the box (left, top, right, bottom) in which the data are drawn.
-    Small images are enlarged, by a whole factor along an axis where the spacings allow it. Large ones are
-    reduced by averaging power, which keeps the brightness of speckle; white is then the brightest average.
-    ValueError when db has not two axes, is empty, holds NaN or +Inf (first index named), floor_db is not
-    negative or a spacing not positive.
+    Returns a PIL.Image. A caption under the axes says what white and black are. Entries of its `info`: "frame", the
+    box (left, top, right, bottom) in which the data are drawn; "caption"; "top_db" and "floor_db", the level of white
+    and, relative to that, of black, dB.
+    Small images are enlarged, by a whole factor along an axis where the spacings allow it. Large ones are reduced by
+    averaging power, which keeps the brightness of speckle; levels are then those of the averages. A line plot is
+    relative to its maximum, or to top_db.
+    ValueError when db has not two axes, is empty, holds NaN or +Inf (first index named), a spacing is not positive, or
+    where `check_scale` refuses the levels.
     """
     db = np.asarray(db)
     if db.ndim != 2 or db.size == 0:
@@ -46,24 +61,71 @@ def picture(
         raise ValueError(f"db has type {db.dtype}, wanted real decibels: 20 log10 of a modulus")
     if not (db < np.inf).all():
         at = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
-        raise ValueError(f"db[{at[0]}, {at[1]}] is {db[at]}; decibels are finite, or -inf for nothing")
-    floor_db = validation.number("floor_db", floor_db)
-    if not floor_db < 0:
-        raise ValueError(f"floor_db is {floor_db:g}; it counts down from the brightest pixel: give e.g. -50")
+        raise ValueError(f"db[{at[0]}, {at[1]}] is {db[at]}; decibels are finite, or -inf for no signal")
+    check_scale(floor_db, top_db, percentile)
     if spacing is not None:
         dy, dx = spacing if np.ndim(spacing) else (spacing, spacing)
         spacing = validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)
-    if 1 in db.shape and db.size > 1:
-        return _line_plot(db, (spacing, origin, names), floor_db, title)
-    return _grey_image(db, (spacing, origin, names), floor_db, title)
+    draw = _line_plot if 1 in db.shape and db.size > 1 else _grey_image
+    return draw(db, (spacing, origin, names), floor_db, top_db, percentile, title, zero)
+
+
+def check_scale(
+    floor_db: float, top_db: float | None, percentile: float | None, names: tuple[str, str, str] | None = None
+) -> None:
+    """ValueError, with the names of the options, for levels that no picture can have.
+
+    floor_db must be negative, top_db finite, percentile above 0 and at most 100; top_db and percentile exclude each
+    other.
+    """
+    floor_name, top_name, percentile_name = names or ("floor_db", "top_db", "percentile")
+    if not validation.number(floor_name, floor_db) < 0:
+        raise ValueError(f"{floor_name} is {floor_db:g}; black is that many dB below white: give e.g. -50")
+    if top_db is not None:
+        validation.number(top_name, top_db)
+        if percentile is not None:
+            raise ValueError(f"{top_name} and {percentile_name} both set the level of white; give one of them")
+    if percentile is not None and not validation.number(percentile_name, percentile, above=0) <= 100:
+        raise ValueError(
+            f"{percentile_name} is {percentile:g}; give at most 100, which makes the brightest pixel white"
+        )
+
+
+def white_level(db: np.ndarray, percentile: float | None = None) -> float:
+    """Level of white, dB: a percentile of the pixels of the scene. -inf where no pixel has a signal.
+
+    A scene fills the picture where half of all pixels lie within FILLED dB of percentile 99.5, and that within
+    FAINTEST dB of the brightest pixel: all pixels with a signal then count, and a few bright points in the scene are
+    clipped. Otherwise a point or an object stands in front of (almost) nothing: only pixels within OBJECT dB of the
+    brightest count, so that neither side lobes nor the noise of the numbers set the level. Of fewer than 200 pixels
+    none is clipped by the default.
+    """
+    signal = db[db > -np.inf]
+    if not signal.size:
+        return -np.inf
+    middle, high = np.percentile(signal, (50, PERCENTILE))
+    peak = signal.max()
+    if middle < high - FILLED or high < peak - FAINTEST:
+        signal = signal[signal >= peak - OBJECT]
+    return float(np.percentile(signal, PERCENTILE if percentile is None else percentile, method="higher"))
 
 
 def write_png(picture: Picture, path: Any) -> None:
-    """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises."""
+    """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises.
+
+    The file's text entries hold what the picture's `info` does: Title, Description (the caption), top_db, floor_db.
+    """
+    from PIL.PngImagePlugin import PngInfo
+
     from ..io import output_paths
 
+    text = PngInfo()
+    text.add_text("Software", f"sarcl {__version__}")
+    for key, name in (("title", "Title"), ("caption", "Description"), ("top_db", "top_db"), ("floor_db", "floor_db")):
+        if key in picture.info:
+            text.add_text(name, f"{picture.info[key]}")
     with output_paths.atomic(path) as part:
-        picture.save(part, format="PNG")
+        picture.save(part, format="PNG", pnginfo=text)
 
 
 def drawn_shape(shape: tuple[int, int], spacing: tuple[float, float] | None) -> tuple[int, int]:
@@ -82,21 +144,26 @@ def _whole(old: int, wanted: float) -> int:
     return near if abs(near - wanted) <= 0.01 * wanted + 1 else round(wanted)
 
 
-def grey_levels(db: np.ndarray, floor_db: float, shape: tuple[int, int]) -> np.ndarray:
-    """Decibels (rows, columns) as grey levels, uint8 of `shape`, row 0 last; 255 the brightest, 0 the floor.
-
-    An axis that grows by a whole factor repeats its pixels; any other is resampled by averaging power.
-    """
+def resampled(db: np.ndarray, shape: tuple[int, int]) -> np.ndarray:
+    """Decibels (rows, columns) averaged in power to `shape`; unchanged where both axes grow by a whole factor."""
     top = float(db.max())
+    if not any(new % old for new, old in zip(shape, db.shape, strict=True)):
+        return db
     if top == -np.inf:
+        return np.full(shape, top)
+    with np.errstate(divide="ignore"):
+        return np.asarray(top + 10 * np.log10(_average_power(db, top, shape)))
+
+
+def grey_levels(db: np.ndarray, top_db: float, floor_db: float, shape: tuple[int, int]) -> np.ndarray:
+    """Decibels (rows, columns) as grey levels, uint8 of `shape`, row 0 last: 255 from top_db up, 0 from
+    top_db + floor_db down, in even steps between.
+
+    `shape` is a whole multiple of the rows and columns, which are repeated. top_db -inf (no signal) makes all black.
+    """
+    if top_db == -np.inf:
         return np.zeros(shape, np.uint8)
-    if any(new % old for new, old in zip(shape, db.shape, strict=True)):
-        with np.errstate(divide="ignore"):
-            relative = 10 * np.log10(_average_power(db, top, shape))
-        relative -= relative.max()
-    else:
-        relative = np.asarray(db, np.float64) - top
-    level = np.clip(np.rint(255 - 255 / floor_db * relative), 0, 255).astype(np.uint8)
+    level = np.clip(np.rint(255 - 255 / floor_db * (np.asarray(db, np.float64) - top_db)), 0, 255).astype(np.uint8)
     for axis in (0, 1):
         level = np.repeat(level, shape[axis] // level.shape[axis], axis=axis)
     return level[::-1]
@@ -126,7 +193,10 @@ def _means(power: np.ndarray, n: int) -> np.ndarray:
     return sums / np.diff(edge)
 
 
-def _grey_image(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, title: str | None) -> Picture:
+def _grey_image(
+    db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, top_db: float | None, percentile: float | None,
+    title: str | None, zero: str | None,
+) -> Picture:  # fmt: skip
     from PIL import Image
 
     height, width = drawn_shape(db.shape, axes[0])
@@ -136,9 +206,13 @@ def _grey_image(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, tit
         up = (up[0] + ", stretched", *up[1:])
     elif 1 / ratio < THINNEST:
         across = (across[0] + ", stretched", *across[1:])
-    sheet = Sheet(width, height, across, up, title, 7.0)
+    drawn = resampled(db, (height, width))
+    white = white_level(drawn, percentile) if top_db is None else float(top_db)
+    how = "given" if top_db is not None else _percentile_text(percentile)
+    levels = grey_levels(drawn, white, floor_db, (height, width))
+    caption = _caption(white, how, float(drawn.max()), floor_db, zero)
+    sheet = Sheet(width, height, across, up, title, 7.0, caption)
     left, top, right, bottom = sheet.frame
-    levels = grey_levels(db, floor_db, (height, width))
     sheet.image.paste(Image.fromarray(levels), (left, top))
     sheet.axes()
 
@@ -147,33 +221,63 @@ def _grey_image(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, tit
     ramp = np.rint(np.linspace(255, 0, height)).astype(np.uint8)
     sheet.image.paste(Image.fromarray(np.repeat(ramp[:, None], x1 - x0, axis=1)), (x0, top))
     sheet.box((x0, top, x1, bottom))
-    step, ticks = ticks_between(floor_db, 0.0, height / (3.6 * u))
+    highest = white if np.isfinite(white) else 0.0
+    step, ticks = ticks_between(highest + floor_db, highest, height / (3.6 * u))
     for tick in ticks:
-        y = top + round(tick / floor_db * (height - 1))
+        y = top + round((tick - highest) / floor_db * (height - 1))
         sheet.draw.line([(x1, y), (x1 + sheet.tick, y)], fill=INK, width=line)
         text = number(tick, step) + (" dB" if tick == ticks[-1] else "")
         sheet.draw.text((x1 + 2 * sheet.tick, y), text, INK, sheet.font, anchor="lm")
+    sheet.image.info |= {"top_db": white, "floor_db": float(floor_db)}
     return sheet.image
 
 
-def _line_plot(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, title: str | None) -> Picture:
+def _percentile_text(percentile: float | None) -> str:
+    value = PERCENTILE if percentile is None else percentile
+    return "the brightest pixel" if value == 100 else f"percentile {value:g} of the scene"
+
+
+def _caption(white: float, how: str, peak: float, floor_db: float, zero: str | None) -> str:
+    """What white, black and 0 dB are, in words."""
+    if peak == -np.inf:
+        return "No pixel has a signal."
+    above = peak - white
+    clipped = f"; the brightest pixel is {above:.1f} dB above" if above >= 0.05 else ""
+    unit = f" 0 dB: {zero}." if zero else ""
+    return f"White: {_decibels(white)} ({how}{clipped}). Black: {_decibels(white + floor_db)}.{unit}"
+
+
+def _decibels(value: float) -> str:
+    return f"{round(value, 1) + 0.0:.1f} dB"
+
+
+def _line_plot(
+    db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, top_db: float | None, percentile: float | None,
+    title: str | None, zero: str | None,
+) -> Picture:  # fmt: skip
     from PIL import Image, ImageDraw
 
     along = int(db.shape[0] > 1)  # 1: one column, drawn along its rows
     axis = image_axis(db.size, 1 - along, *axes)
     width, height, fine = 960, 540, 4  # the curve is drawn four times finer, for a smooth edge
-    sheet = Sheet(width, height, axis, ("relative to the maximum (dB)", floor_db, -0.04 * floor_db, 0.0), title, 1.5)
-    sheet.axes(grid=True)
     values = db.ravel()[None, :]
     if values.shape[1] > 10 * width:
         with np.errstate(divide="ignore"):
-            values = 10 * np.log10(_average_power(values, max(float(values.max()), -1e300), (1, 10 * width)))
+            highest = max(float(values.max()), -1e300)
+            values = highest + 10 * np.log10(_average_power(values, highest, (1, 10 * width)))
     peak = float(values.max())
-    relative = np.full(values.size, 2 * floor_db) if peak == -np.inf else values[0] - peak
+    white, name = (peak, "the maximum") if top_db is None else (float(top_db), _decibels(top_db))
+    caption = "No sample has a signal." if peak == -np.inf else f"Maximum: {_decibels(peak)}."
+    if zero and peak > -np.inf:
+        caption += f" 0 dB: {zero}."
+    up = (f"relative to {name} (dB)", floor_db, -0.04 * floor_db, 0.0)
+    sheet = Sheet(width, height, axis, up, title, 1.5, caption)
+    sheet.axes(grid=True)
+    relative = np.full(values.size, 2 * floor_db) if peak == -np.inf else values[0] - white
     n = len(relative)
     x = (np.arange(n) + 0.5) / n * width * fine
     low, high = floor_db, -0.04 * floor_db
-    y = (high - np.maximum(relative, 2 * floor_db)) / (high - low) * height * fine
+    y = (high - np.clip(relative, 2 * floor_db, 2 * high)) / (high - low) * height * fine
     curve = Image.new("L", (width * fine, height * fine))
     draw = ImageDraw.Draw(curve)
     points = list(zip(x.tolist(), y.tolist(), strict=True))
@@ -182,4 +286,5 @@ def _line_plot(db: np.ndarray, axes: tuple[Any, Any, Any], floor_db: float, titl
         for px, py in points:
             draw.ellipse((px - 14, py - 14, px + 14, py + 14), fill=255)
     sheet.image.paste(CURVE, sheet.frame[:2], curve.reduce(fine))
+    sheet.image.info |= {"top_db": white, "floor_db": float(floor_db)}
     return sheet.image

@@ -116,23 +116,44 @@ class Image:
         )
         return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
 
-    def show(self, floor_db: float = -50.0) -> PIL.Image.Image:
-        """The picture as a PIL.Image, grey in dB from the brightest pixel down to floor_db."""
-        return self._picture(floor_db)
+    def show(
+        self, floor_db: float = -50.0, *, top_db: float | None = None, percentile: float | None = None
+    ) -> PIL.Image.Image:
+        """The picture as a PIL.Image, grey in dB, with axes, a scale, and a caption that says what white and black are.
+
+        floor_db    black, in dB below white
+        top_db      white, dB, where a unit point in focus has 0 dB; None: from the data, by percentile
+        percentile  per cent of the pixels of the scene that are no brighter than white; None: 99.5, so that a few
+                    bright points do not darken a scene; 100: white is the brightest pixel. Which pixels count:
+                    `sarcl.figures.decibels.white_level`. Either top_db or percentile may be given
+
+        ValueError where the image has not two axes, or for levels that no picture can have.
+        """
+        return self._picture(floor_db, top_db, percentile)
 
     def _repr_png_(self) -> bytes | None:
         return self._picture(-50.0)._repr_png_()
 
-    def save(self, path: PathLike, *, floor_db: float = -50.0, title: str | None = None) -> None:
-        """Write "name.png" (grey, dB, with axes) or "name.h5" (lossless; `sarcl.read` opens it).
+    def save(
+        self,
+        path: PathLike,
+        *,
+        floor_db: float = -50.0,
+        title: str | None = None,
+        top_db: float | None = None,
+        percentile: float | None = None,
+    ) -> None:
+        """Write "name.png" (the picture of `show`) or "name.h5" (lossless; `sarcl.read` opens it).
 
+        floor_db, top_db, percentile  of a picture, as in `show`; the PNG's text entries top_db, floor_db and
+                                      Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
         """
         suffix = Path(path).suffix.lower()
         if suffix == ".png":
             from ..figures.decibels import write_png
 
-            write_png(self._picture(floor_db, title), path)
+            write_png(self._picture(floor_db, top_db, percentile, title), path)
         elif suffix in (".h5", ".hdf5"):
             with sarcl_hdf5.ImageWriter(path, sarcl_hdf5.fields_of(self.grid), self.data.dtype) as out:
                 for a, b in hdf5.blocks(out.data):
@@ -141,7 +162,9 @@ class Image:
         else:
             raise ValueError(f"image path {str(path)!r} ends in {suffix!r}; choose '.png' or '.h5'")
 
-    def _picture(self, floor_db: float, title: str | None = None) -> PIL.Image.Image:
+    def _picture(
+        self, floor_db: float, top_db: float | None = None, percentile: float | None = None, title: str | None = None
+    ) -> PIL.Image.Image:
         from ..figures.decibels import picture
 
         if len(self.grid.shape) != 2:
@@ -150,13 +173,14 @@ class Image:
         grid = self.grid
         if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
             origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
-            # axes along the scene's own carry its coordinates; others the distance along themselves
+            # Axes along the scene's own carry its coordinates; other axes carry the distance along themselves.
             along = np.eye(3)[1], np.eye(3)[0]
             if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
                 names = ("along y_axis", "along x_axis")
         return picture(
-            self.decibels(), spacing=grid.spacing, floor_db=floor_db, title=title, origin=origin, names=names
-        )
+            self.decibels(), grid.spacing, floor_db, title, top_db=top_db, percentile=percentile,
+            zero="a unit point in focus", origin=origin, names=names,
+        )  # fmt: skip
 
 
 def image_fields(image: Image) -> dict[str, Any]:

@@ -109,6 +109,7 @@ def test_negative_numbers_are_numbers_however_they_are_written():
         ["focus", "raw.h5", "--max-bytes", "lots"],
         ["focus", "raw.h5", "--max-bytes", "-1"],
         ["focus", "raw.h5", "--center", "1", "2"],
+        ["focus", "raw.h5", "--top-db", "0", "--percentile", "99"],
         ["nonsense"],
         [],
     ],
@@ -208,6 +209,16 @@ def test_an_output_that_would_replace_an_input_or_another_output_is_refused(raw_
 
 def test_a_floor_that_no_picture_can_have_is_refused_before_the_work(raw_file, capsys, no_work):
     assert "--floor-db is 50" in refused(capsys, "focus", raw_file, "--floor-db", "50")
+    assert "--percentile is 200" in refused(capsys, "focus", raw_file, "--percentile", "200")
+
+
+def test_grey_levels_are_chosen_and_printed(raw_file, here, capsys):
+    from PIL import Image
+
+    assert parser.main(["focus", str(raw_file), "--shape", "32", "32", "--floor-db", "-30", "--top-db", "-6"]) == 0
+    with Image.open(here / "raw.png") as saved:
+        assert f"wrote raw.png. {saved.text['Description']}\n" in capsys.readouterr().out
+        assert "White: -6.0 dB (given" in saved.text["Description"] and "Black: -36.0 dB" in saved.text["Description"]
 
 
 def test_an_unknown_toml_key_is_named_with_its_line(here, capsys, no_work):

@@ -30,10 +30,81 @@ def test_row_0_is_drawn_at_the_bottom_and_column_0_at_the_left():
     assert at.max(axis=0).tolist() == [rows - 1, 2 * columns // 5 - 1]
 
 
-def test_grey_is_linear_in_db_from_the_floor_to_the_brightest_pixel():
-    db = np.array([[0.0, -10, -20, -40, -50, -70, -np.inf]]) + 33
-    levels = decibels.grey_levels(np.vstack([db, db]), -50, (2, 7))
-    assert levels[0].tolist() == [255, 204, 153, 51, 0, 0, 0]
+def test_grey_is_linear_in_db_from_black_to_white():
+    db = np.array([[6.0, 0.0, -10, -20, -40, -50, -70, -np.inf]]) + 33
+    levels = decibels.grey_levels(np.vstack([db, db]), 33.0, -50, (2, 8))
+    assert levels[0].tolist() == [255, 255, 204, 153, 51, 0, 0, 0]
+
+
+# The level of white ----------------------------------------------------------------------------------------
+
+
+def point(window=np.sinc, n=256):
+    """A point at -3 dB in the middle, 4 pixels a resolution cell."""
+    x = (np.arange(n) - n // 2) / 4
+    return 20 * np.log10(np.maximum(np.abs(np.outer(window(x), window(x))), 1e-12)) - 3
+
+
+@pytest.mark.parametrize("points_db", [5, 20, 38])
+def test_a_few_bright_points_do_not_darken_a_scene(points_db):
+    scene = speckle((300, 300))
+    alone = decibels.white_level(scene)
+    assert alone == pytest.approx(np.percentile(scene, 99.5), abs=0.01)
+    scene[[20, 20, 21, 150], [30, 31, 30, 200]] = alone + points_db
+    assert decibels.white_level(scene) == pytest.approx(alone, abs=0.1)
+
+
+def tapered(x):
+    """Response of a Hann taper."""
+    return np.sinc(x) + np.sinc(x - 1) / 2 + np.sinc(x + 1) / 2
+
+
+@pytest.mark.parametrize("window", [np.sinc, tapered])
+def test_the_side_lobes_of_a_point_do_not_set_the_level(window):
+    assert -6 < decibels.white_level(point(window)) <= -3
+
+
+def test_faint_noise_does_not_set_the_level_of_a_point():
+    assert -6 < decibels.white_level(np.maximum(point(), speckle((256, 256)) - 70)) <= -3
+
+
+def test_shadows_and_empty_corners_leave_the_level_of_a_scene():
+    scene = speckle((300, 300))
+    alone = decibels.white_level(scene)
+    scene[:140] -= 30
+    assert decibels.white_level(scene) == pytest.approx(alone, abs=1.0)  # 0.5 % of all pixels is 1 % of the lit ones
+    scene[:140] = -np.inf
+    assert decibels.white_level(scene) == pytest.approx(alone, abs=0.1)
+
+
+def test_what_has_no_scene_has_a_level_all_the_same():
+    lone = np.full((200, 200), -np.inf)
+    assert decibels.white_level(lone) == -np.inf
+    lone[3, 4] = -12.0
+    assert decibels.white_level(lone) == -12.0
+    assert decibels.white_level(np.full((200, 200), 4.0)) == 4.0
+
+
+def test_white_is_what_is_asked_for_and_said():
+    db = speckle((100, 100))
+    for options, white, words in (
+        ({"percentile": 100}, db.max(), "(the brightest pixel)"),
+        ({"percentile": 50}, np.median(db), "percentile 50 of the scene; the brightest pixel is"),
+        ({"top_db": -2.5}, -2.5, "White: -2.5 dB (given"),
+        ({}, decibels.white_level(db), "percentile 99.5 of the scene"),
+    ):
+        made = decibels.picture(db, floor_db=-30, zero="a unit point", **options)
+        assert made.info["top_db"] == pytest.approx(white, abs=0.01) and made.info["floor_db"] == -30
+        assert words in made.info["caption"] and made.info["caption"].endswith("0 dB: a unit point.")
+        assert (data_of(made) == 255).mean() == pytest.approx((db >= white).mean(), abs=0.01)
+    assert decibels.picture(np.full((3, 4), -np.inf)).info["caption"] == "No pixel has a signal."
+
+
+def test_a_caption_is_broken_into_lines_that_fit():
+    words = "White: 0.0 dB (percentile 99.5 of the scene). Black: -50.0 dB."
+    lines = axes.wrapped(words, 20, len)
+    assert " ".join(lines) == words and all(len(line) <= 20 for line in lines)
+    assert axes.wrapped("unbreakable", 3, len) == ["unbreakable"]
 
 
 def test_small_images_grow_by_a_whole_factor_to_500_pixels():
@@ -66,7 +137,9 @@ def test_a_long_strip_is_stretched_to_be_seen_and_says_so():
 
 def test_large_images_are_reduced_by_averaging_power():
     db = speckle((4900, 1000))
-    levels = decibels.grey_levels(db, -40, decibels.drawn_shape(db.shape, None)).astype(float)
+    shape = decibels.drawn_shape(db.shape, None)
+    drawn = decibels.resampled(db, shape)
+    levels = decibels.grey_levels(drawn, drawn.max(), -40, shape).astype(float)
     assert levels.shape == (1634, 334)
     shown = -40 * (1 - levels / 255)
     shown = 10 ** (shown / 10)
@@ -148,6 +221,14 @@ def test_a_profile_is_a_line_that_peaks_where_the_data_do(shape, spacing):
     assert highest[0] / (bottom - top) == pytest.approx(0.04 / 1.04, abs=0.01)
 
 
+def test_a_profile_is_relative_to_its_maximum_or_to_the_level_given():
+    profile = np.array([[-3.0, -20, -50, -70]])
+    made = decibels.picture(profile, (1, 0.1))
+    assert made.info["top_db"] == -3.0 and made.info["caption"] == "Maximum: -3.0 dB."
+    given = decibels.picture(profile, (1, 0.1), top_db=10.0)
+    assert given.info["top_db"] == 10.0 and given.info["caption"] == made.info["caption"]
+
+
 @pytest.mark.parametrize("n", [2, 3, 50_000])
 @pytest.mark.parametrize("value", [-np.inf, 0.0])
 def test_profiles_of_any_length_and_of_nothing_are_drawn(n, value):
@@ -165,7 +246,10 @@ def test_an_image_shows_and_saves_its_picture(tmp_path):
     image = sarcl.Image(data, grid)
     image.save(tmp_path / "a.png", title="a")
     with Image.open(tmp_path / "a.png") as saved:
-        assert saved.format == "PNG" and saved.size == image._picture(-50, "a").size
+        assert saved.format == "PNG" and saved.size == image._picture(-50, title="a").size
+        assert saved.text["Title"] == "a" and saved.text["Software"] == f"sarcl {sarcl.__version__}"
+        assert saved.text["Description"] == image.show().info["caption"]
+        assert float(saved.text["top_db"]) == pytest.approx(20 * np.log10(23)) and saved.text["floor_db"] == "-50.0"
     assert [p.name for p in tmp_path.iterdir()] == ["a.png"]
     assert image.show(floor_db=-30).size[0] > 300
 
@@ -191,6 +275,10 @@ def test_a_picture_that_cannot_be_written_leaves_nothing(tmp_path):
         (np.zeros((2, 2)), {"floor_db": 20}, "give e.g. -50"),
         (np.zeros((2, 2)), {"floor_db": np.nan}, "floor_db is nan"),
         (np.zeros((2, 2)), {"spacing": (0.1, 0)}, r"spacing\[1\] is 0"),
+        (np.zeros((2, 2)), {"top_db": np.inf}, "top_db is inf"),
+        (np.zeros((2, 2)), {"percentile": 0}, "percentile is 0"),
+        (np.zeros((2, 2)), {"percentile": 101}, "percentile is 101; give at most 100"),
+        (np.zeros((2, 2)), {"top_db": 0.0, "percentile": 99}, "top_db and percentile both set the level of white"),
     ],
 )
 def test_what_cannot_be_drawn_is_refused(db, options, words):
