@@ -18,7 +18,7 @@ class Sheet:
     """
 
     def __init__(
-        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str
+        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str = ""
     ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
@@ -33,8 +33,8 @@ class Sheet:
         top = round(2.6 * u if title else 1.2 * u)
         self.frame = (left, top, left + width, top + height)
         small: Any = ImageFont.load_default(round(0.85 * u))
-        room = width + round(side * u) + left - u
-        lines = wrapped(caption, room, small.getlength)
+        small_room: float = width + round(side * u) + left - u
+        lines = wrapped(caption, small_room, small.getlength)
         below = top + height + round(3.9 * u)
         size = (left + width + round(side * u), below + round((1.2 * len(lines) + 0.4) * u))
         self.image = Image.new("RGB", size, PAPER)

@@ -103,7 +103,7 @@ def picture(
     db = np.asarray(db, np.float64)
     wide, high = WIDTH - LEFT - 10, HEIGHT - BOTTOM - TOP
     place = f'x="{LEFT}" y="{TOP}" width="{wide}" height="{high}" preserveAspectRatio="none"'
-    out = [f'<image {place} href="{_png(grey_levels(db, floor_db, db.shape))}"/>', _axes(x, y, False)]
+    out = [f'<image {place} href="{_png(grey_levels(db, float(db.max()), floor_db, db.shape))}"/>', _axes(x, y, False)]
     if box is not None:
         (left, right), (low, top) = (v.tolist() for v in _at([-box[0], box[0]], [-box[1], box[1]], x, y))
         out.append(
