@@ -1,4 +1,4 @@
-"""A progress bar for verbs: `echo(..., progress=Bar())`.
+"""A progress bar for verbs, drawn by tqdm: `echo(..., progress=Bar())`.
 
 Verbs call progress(stage, done, total), with done = 0 when a stage starts and done = total when it ends.
 """
@@ -8,34 +8,26 @@ from __future__ import annotations
 import os
 import sys
 import time
-from collections.abc import Callable
 from typing import Any, TextIO
 
-DELAY = 1.0  # s; shorter stages draw nothing
-PERIOD = 0.1  # s between drawings
-WIDTH = 24
+DELAY = 1.0  # s; a shorter stage draws nothing, and tqdm is not imported for it
+FORMAT = "{desc} {percentage:3.0f}% |{bar:24}| {rate_fmt}, {remaining} left"
 
 
 class Bar:
-    """Draws the running stage on stderr, with rate and time left, once it has lasted a second.
+    """Shows the running stage with its rate and the time left, once the stage has lasted a second.
 
-    stream  where to draw, default sys.stderr; nothing is drawn unless it is a terminal
-    clock   seconds, default time.monotonic
+    A line on stderr where that is a terminal, a widget in a notebook, nothing elsewhere. The line is removed when the
+    stage ends and when the `with` block ends, however it ends. A lost terminal does not stop the work.
 
-    The line is wiped when a stage ends and when the `with` block ends, however it ends. Drawing happens in
-    the caller's thread and never raises: a lost terminal must not cost a result.
+    stream  where the line is drawn if it is a terminal; None: sys.stderr
     """
 
-    def __init__(self, stream: TextIO | None = None, clock: Callable[[], float] = time.monotonic) -> None:
-        self.stream = sys.stderr if stream is None else stream
-        self.clock = clock
-        self.stage: str | None = None
-        self.start = self.drawn = 0.0
-        self.visible = False
-        try:
-            self.on = self.stream.isatty() and os.environ.get("TERM") != "dumb"
-        except (AttributeError, ValueError):  # no stderr (pythonw), or a closed one
-            self.on = False
+    def __init__(self, stream: TextIO | None = None) -> None:
+        self._stream = stream
+        self._stage: str | None = None
+        self._start = 0.0
+        self._line: Any = None
 
     def __enter__(self) -> Bar:
         return self
@@ -45,67 +37,30 @@ class Bar:
 
     def __call__(self, stage: str, done: int, total: int) -> None:
         """One report of a verb."""
-        if not self.on:
-            return
-        now = self.clock()
-        if stage != self.stage or done <= 0:
+        if stage != self._stage or done <= 0:
             self.wipe()
-            self.stage, self.start, self.drawn = stage, now, now
+            self._stage, self._start = stage, time.monotonic()
         if done >= total:
             self.wipe()
-            self.stage = None
-        elif now - self.start >= DELAY and now - self.drawn >= PERIOD and done > 0:
-            self.drawn = now
-            self._write("\r" + line(stage, done, total, now - self.start)[: self._columns() - 1] + "\x1b[K")
-            self.visible = True
+            self._stage = None
+        elif self._line is not None:
+            self._line.update(done - self._line.n)
+        elif done > 0 and time.monotonic() - self._start >= DELAY:
+            self._line = _line(stage, done, total, self._stream)
 
     def wipe(self) -> None:
-        """Leave the terminal's line empty."""
-        if self.visible:
-            self._write("\r\x1b[K")
-            self.visible = False
-
-    def _columns(self) -> int:
-        try:
-            # some terminals do not know their width and say 0
-            return max(os.get_terminal_size(self.stream.fileno()).columns or 80, 2)
-        except (OSError, ValueError, AttributeError):
-            return 80
-
-    def _write(self, text: str) -> None:
-        try:
-            self.stream.write(text)
-            self.stream.flush()
-        except (OSError, ValueError):
-            self.on = False
+        """Remove the line; the next report of a stage that still runs draws it again."""
+        if self._line is not None:
+            self._line.close()
+            self._line = None
 
 
-def line(stage: str, done: int, total: int, seconds: float) -> str:
-    """The text of a bar: "backproject  ######------  50%  1.2 k/s  8 s left"."""
-    part = min(done / total, 1.0)
-    full = int(part * WIDTH)
-    rate = done / seconds
-    left = (total - done) / rate
-    bar = "#" * full + "-" * (WIDTH - full)
-    return f"{stage}  {bar} {100 * part:3.0f}%  {rate_text(rate)}  {time_text(left)} left"
+def _line(stage: str, done: int, total: int, stream: TextIO | None) -> Any:
+    from tqdm.auto import tqdm
 
-
-def rate_text(rate: float) -> str:
-    """A rate in steps a second, or a minute where it is slow: "850/s", "1.2 k/s", "7.5/min"."""
-    if rate < 0.5:
-        return f"{60 * rate:.3g}/min"
-    for unit in ("", " k", " M"):
-        if rate < 999.5:
-            return f"{rate:.3g}{unit}/s"
-        rate /= 1000
-    return f"{rate:.4g} G/s"
-
-
-def time_text(seconds: float) -> str:
-    """A duration as a person says it: "8 s", "3 min 20 s", "2 h 05 min"."""
-    whole = round(seconds)
-    if whole < 60:
-        return f"{whole} s"
-    if whole < 3600:
-        return f"{whole // 60} min {whole % 60:02d} s"
-    return f"{whole // 3600} h {whole % 3600 // 60:02d} min"
+    stream = sys.stderr if stream is None else stream
+    quiet = stream is None or stream.closed or os.environ.get("TERM") == "dumb"
+    return tqdm(
+        desc=stage, initial=done, total=total, file=stream, disable=True if quiet else None, leave=False, miniters=1,
+        dynamic_ncols=True, unit="", unit_scale=True, bar_format=FORMAT,
+    )  # fmt: skip

@@ -25,6 +25,17 @@ def duration(seconds: float) -> str:
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
 
 
+def rate_text(rate: float) -> str:
+    """A rate as text a person reads, per second or, where it is slow, per minute: "850/s", "1.2 k/s", "7.5/min"."""
+    if rate < 0.5:
+        return f"{60 * rate:.3g}/min"
+    for unit in ("", " k", " M"):
+        if rate < 999.5:
+            return f"{rate:.3g}{unit}/s"
+        rate /= 1000
+    return f"{rate:.4g} G/s"
+
+
 def unknown(key: str, known: list[str], what: str) -> str:
     from difflib import get_close_matches
 

@@ -1,4 +1,4 @@
-"""One run of a command: its lines, its bar, the files it is going to write, and Ctrl-C that is not lost."""
+"""One run of a command: its printed lines, progress bar, output files, and its interruption by Ctrl-C."""
 
 from __future__ import annotations
 

@@ -143,7 +143,7 @@ def _rate(result: PhaseHistory | Image, unit: str) -> str:
     report = result.report
     if report is None:
         return ""
-    from ..base.progress import rate_text
+    from ..base.text import rate_text
 
     error = report.predicted_error if report.measured_error is None else report.measured_error
     kind = "predicted" if report.measured_error is None else "measured"

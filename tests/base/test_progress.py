@@ -1,15 +1,13 @@
-"""The progress bar: drawn on terminals only, for what lasts, and never in the way."""
+"""The progress bar: drawn on terminals and in notebooks only, for stages that last, and never in the way."""
 
 import io
+import subprocess
+import sys
 
 import pytest
 
-from sarcl.base.progress import Bar, line, rate_text, time_text
-
-
-@pytest.fixture(autouse=True)
-def a_terminal_that_can_erase_a_line(monkeypatch):
-    monkeypatch.setenv("TERM", "xterm")
+from sarcl.base import progress
+from sarcl.base.progress import Bar
 
 
 class Terminal(io.StringIO):
@@ -17,130 +15,120 @@ class Terminal(io.StringIO):
         return True
 
 
-class Clock:
-    now = 0.0
-
-    def __call__(self):
-        return self.now
-
-
 @pytest.fixture
-def clock():
-    return Clock()
+def terminal(monkeypatch):
+    """A terminal that can erase a line; stages are drawn from their first step."""
+    stream = Terminal()
+    monkeypatch.setenv("TERM", "xterm")
+    monkeypatch.setattr(progress, "DELAY", 0.0)
+    return stream
 
 
-def work(bar, clock, seconds, steps=100, stage="backproject"):
-    bar(stage, 0, steps)
-    for done in range(1, steps + 1):
-        clock.now += seconds / steps
+def work(bar, steps=100, stage="backproject"):
+    for done in range(steps + 1):
         bar(stage, done, steps)
 
 
 def screen(text):
     """What a terminal's last line shows after `text`."""
-    for part in text.split("\r"):
-        shown = part.replace("\x1b[K", "")
-    return shown
+    return text.split("\r")[-1].replace("\x1b[K", "").strip()
 
 
-def test_a_stage_shorter_than_a_second_draws_nothing(clock):
-    out = Terminal()
-    work(Bar(out, clock), clock, 0.9)
-    assert out.getvalue() == ""
+def test_a_stage_shorter_than_a_second_draws_nothing(terminal, monkeypatch):
+    monkeypatch.setattr(progress, "DELAY", 1.0)
+    work(Bar(terminal))
+    assert terminal.getvalue() == ""
 
 
-def test_a_longer_stage_shows_part_rate_and_time_left(clock):
-    out = Terminal()
-    bar = Bar(out, clock)
+def test_a_longer_stage_shows_its_part_rate_and_time_left(terminal):
+    bar = Bar(terminal)
     bar("backproject", 0, 1000)
-    clock.now = 2.0
     bar("backproject", 500, 1000)
-    shown = screen(out.getvalue())
-    assert shown.startswith("backproject  ############------------  50%")
-    assert "250/s" in shown and "2 s left" in shown
+    shown = screen(terminal.getvalue())
+    assert shown.startswith("backproject  50% |############") and "/s" in shown and shown.endswith(" left")
 
 
-def test_the_line_is_empty_when_a_stage_has_ended(clock):
-    out = Terminal()
-    work(Bar(out, clock), clock, 5)
-    assert out.getvalue() and screen(out.getvalue()) == ""
+@pytest.mark.parametrize("end", [lambda bar: bar("echo", 10, 10), lambda bar: bar("image", 0, 10), Bar.wipe])
+def test_the_line_is_empty_when_a_stage_ends_the_next_begins_or_text_is_printed(terminal, end):
+    bar = Bar(terminal)
+    bar("echo", 0, 10)
+    bar("echo", 5, 10)
+    assert screen(terminal.getvalue())
+    end(bar)
+    assert screen(terminal.getvalue()) == ""
 
 
-def test_a_stage_that_never_ends_is_wiped_when_the_next_begins(clock):
-    out = Terminal()
-    bar = Bar(out, clock)
-    bar("profiles", 0, 10)
-    clock.now = 3.0
-    bar("profiles", 5, 10)
-    bar("backproject", 0, 10)
-    assert screen(out.getvalue()) == ""
+def test_a_stage_goes_on_after_its_line_was_wiped(terminal):
+    bar = Bar(terminal)
+    bar("echo", 0, 10)
+    bar("echo", 5, 10)
+    bar.wipe()
+    bar("echo", 6, 10)
+    assert screen(terminal.getvalue()).startswith("echo  60%")
 
 
-def test_ctrl_c_leaves_the_line_empty(clock):
-    out = Terminal()
-    with pytest.raises(KeyboardInterrupt), Bar(out, clock) as bar:
+def test_ctrl_c_leaves_the_line_empty(terminal):
+    with pytest.raises(KeyboardInterrupt), Bar(terminal) as bar:
         bar("echo", 0, 10)
-        clock.now = 3.0
         bar("echo", 5, 10)
-        assert screen(out.getvalue()) != ""
+        assert screen(terminal.getvalue())
         raise KeyboardInterrupt
-    assert screen(out.getvalue()) == ""
+    assert screen(terminal.getvalue()) == ""
 
 
-def test_nothing_is_drawn_where_stderr_is_no_terminal(clock):
-    out = io.StringIO()
-    work(Bar(out, clock), clock, 5)
-    assert out.getvalue() == ""
+def test_many_steps_are_drawn_rarely(terminal):
+    work(Bar(terminal), steps=10_000)
+    assert terminal.getvalue().count("left") <= 20  # ten a second
 
 
-def test_it_draws_at_most_ten_times_a_second(clock):
-    out = Terminal()
-    work(Bar(out, clock), clock, 5, steps=10_000)
-    assert 30 <= out.getvalue().count("left") <= 41
+@pytest.mark.parametrize("stream", [io.StringIO(), None])
+def test_nothing_is_drawn_where_stderr_is_no_terminal(terminal, monkeypatch, stream):
+    monkeypatch.setattr(sys, "stderr", stream)
+    work(Bar())
+    assert stream is None or stream.getvalue() == ""
 
 
-def test_a_lost_terminal_costs_no_result(clock):
+def test_nothing_is_drawn_on_a_terminal_that_cannot_erase_a_line(terminal, monkeypatch):
+    monkeypatch.setenv("TERM", "dumb")
+    work(Bar(terminal))
+    assert terminal.getvalue() == ""
+
+
+def test_a_lost_terminal_costs_no_result(terminal):
     class Lost(Terminal):
         def write(self, text):
-            raise OSError("gone")
+            raise OSError(5, "Input/output error")
 
-    work(Bar(Lost(), clock), clock, 5)
+    work(Bar(Lost()))
     closed = Terminal()
     closed.close()
-    work(Bar(closed, clock), clock, 5)
+    work(Bar(closed))
 
 
 @pytest.mark.parametrize("total", [0, 1])
-def test_stages_of_no_or_one_step_are_fine(clock, total):
-    bar = Bar(Terminal(), clock)
+def test_stages_of_no_or_one_step_are_fine(terminal, total):
+    bar = Bar(terminal)
     bar("echo", 0, total)
-    clock.now = 9.0
     bar("echo", total, total)
+    assert screen(terminal.getvalue()) == ""
 
 
-def test_time_left_is_what_the_rate_so_far_says():
-    assert line("echo", 1, 4, 10.0).endswith("30 s left")
+def test_notebooks_are_left_to_tqdm(terminal, monkeypatch):
+    """tqdm.auto draws a widget in a notebook, where `disable=None` does not ask for a terminal."""
+    import tqdm.auto
+
+    made = []
+    monkeypatch.setattr(tqdm.auto, "tqdm", lambda **options: made.append(options))
+    bar = Bar()
+    bar("echo", 0, 10)
+    bar("echo", 4, 10)
+    assert made[0]["disable"] is None and (made[0]["desc"], made[0]["initial"], made[0]["total"]) == ("echo", 4, 10)
 
 
-@pytest.mark.parametrize(
-    ("rate", "text"),
-    [
-        (0.1, "6/min"),
-        (0.5, "0.5/s"),
-        (850, "850/s"),
-        (999.9, "1 k/s"),
-        (1234, "1.23 k/s"),
-        (5.5e6, "5.5 M/s"),
-        (2e9, "2 G/s"),
-    ],
-)
-def test_rates_are_in_units_a_person_reads(rate, text):
-    assert rate_text(rate) == text
-
-
-@pytest.mark.parametrize(
-    ("seconds", "text"),
-    [(0, "0 s"), (59.4, "59 s"), (59.6, "1 min 00 s"), (200, "3 min 20 s"), (7500, "2 h 05 min")],
-)
-def test_durations_are_in_units_a_person_reads(seconds, text):
-    assert time_text(seconds) == text
+def test_short_stages_do_not_import_tqdm():
+    code = (
+        "import sys; from sarcl.base.progress import Bar; bar = Bar()\n"
+        "for i in range(11): bar('echo', i, 10)\n"
+        "sys.exit('tqdm' in sys.modules)"
+    )
+    assert subprocess.run([sys.executable, "-c", code]).returncode == 0

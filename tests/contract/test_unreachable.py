@@ -361,7 +361,6 @@ MAY_CATCH = {
     "model/store.py": "h5py's reader of damaged files",
     "cli/_job.py": "signals outside the main thread",
     "imaging/run/tile_files.py": "text that is no JSON",
-    "base/progress.py": "a terminal that is closed",
     "scenario/_schema.py": "the file and line are put before a message, which is raised again",
     "imaging/run/image_output.py": "numpy's sizes that overflow",
     "scene/terrain.py": "what is not three things",
