@@ -48,7 +48,7 @@ def devices(args: argparse.Namespace, job: Job) -> int:
     from ..opencl import device_list
     from ..opencl.choose_device import NoDeviceError, open_devices
 
-    found = device_list.devices()
+    found = device_list.tried_again()
     works = any(d.works for d in found)
     try:
         print(device_table(found, [d.info.index for d in open_devices(None)]))

@@ -4,12 +4,13 @@ For other folders:
 
     choose_device  the device that is used: as asked for, as SARCL_DEVICE says, or the best one that works
     device         an open device: its programs, each built once, its buffers and its queue
-    device_list    OpenCL devices of this machine, each tried with a small kernel
+    device_list    OpenCL devices of this machine, tried with a small kernel before they are used
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
     memory_budget  bytes that a computation may take on a device
 
 For this folder alone:
 
+    _trial_record  devices that passed their trial, on disk
     _programs      kernel files as one text each, and the care that every build of a program needs
 """
 

@@ -7,7 +7,7 @@ import os
 from typing import Any
 
 from .device import Device, DeviceChoice
-from .device_list import DeviceInfo, devices, probe
+from .device_list import DeviceInfo, devices, listed, tried
 
 REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
 
@@ -28,19 +28,19 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
     source = "device"
     if choice is None:
         choice, source = os.environ.get("SARCL_DEVICE") or None, "SARCL_DEVICE"
-    working = [(info, raw) for info, raw in probe() if info.works]
-    if not working:
-        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
-    if choice is not None and not (source == "SARCL_DEVICE" and str(choice).strip().lower() == "all"):
-        names = [n for n in str(choice).split(",") if n.strip()] if source == "SARCL_DEVICE" else [choice]
-        each = ([(i, raw) for i, raw in working if _matches(i, name)] for name in names)
-        matching = next((found for found in each if found), [])
-        if not matching:
-            raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
-        working = matching
+    names = [choice]
+    if source == "SARCL_DEVICE":
+        text = str(choice or "all").strip()
+        names = [""] if text.lower() == "all" else [name for name in text.split(",") if name.strip()]
     order = {"gpu": 0, "accelerator": 1, "cpu": 2}
-    best = min((i for i, _ in working), key=lambda i: (order[i.kind], -i.units, i.index))
-    return _open(best.index)
+    for name in names:  # a device is tried when its turn comes: drivers that nobody asked for are left alone
+        matching = [info for info, _ in listed() if _matches(info, name)]
+        for info in sorted(matching, key=lambda i: (order[i.kind], -i.units, i.index)):
+            if tried(info.index).works:
+                return _open(info.index)
+    if not any(info.works for info in devices()):
+        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
+    raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
 
 
 def _matches(info: DeviceInfo, choice: Any) -> bool:
@@ -86,5 +86,4 @@ def split_choice(choice: Any) -> list[Any]:
 
 @functools.cache
 def _open(index: int) -> Device:
-    info, raw = probe()[index]
-    return Device(info, raw)
+    return Device(tried(index), listed()[index][1])

@@ -1,22 +1,24 @@
-"""OpenCL devices of this machine, each tried with a small kernel."""
+"""OpenCL devices of this machine, tried with a small kernel before they are used: drivers list devices that fail."""
 
 from __future__ import annotations
 
 import functools
-from dataclasses import dataclass
+import hashlib
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ..base.text import first_line
+from . import _trial_record
 from ._programs import quiet
 
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """What is known of one OpenCL device after a trial build.
+    """One OpenCL device.
 
-    index, platform, name, kind   as listed; kind is "gpu", "cpu" or "accelerator"
+    index, platform, name, kind   as the driver lists them; kind is "gpu", "cpu" or "accelerator"
     works, why                    True when a trial kernel built and gave the right numbers, else the reason
     fp64                          a float64 kernel built and gave the right numbers
     vector_width                  lanes a work-item computes: 1 on GPUs, 8 on CPUs
@@ -39,27 +41,76 @@ class DeviceInfo:
 
 
 def devices() -> tuple[DeviceInfo, ...]:
-    """Every OpenCL device that is listed, tried once a process; empty where there is no platform."""
-    return tuple(info for info, _ in probe())
+    """Every OpenCL device of this machine with the result of its trial; empty where there is no OpenCL platform.
+
+    A trial that succeeds is recorded in the user's cache folder (sarcl/devices.json) with the versions of driver and
+    platform; later processes do not repeat it. A device that fails is tried again in each process, and `sarcl devices`
+    tries every device again.
+    """
+    return tuple(tried(info.index) for info, _ in listed())
+
+
+def tried_again() -> tuple[DeviceInfo, ...]:
+    """`devices()` after a new trial of every device, whatever is recorded."""
+    _trial_record.clear()
+    tried.cache_clear()
+    return devices()
 
 
 @functools.cache
-def probe() -> tuple[tuple[DeviceInfo, Any], ...]:
+def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
+    """Every device of every platform before its trial (works is False), with pyopencl's handle."""
     import pyopencl
 
     try:
         platforms = pyopencl.get_platforms()
     except pyopencl.Error:  # the loader knows no platform
         return ()
+    kinds = {pyopencl.device_type.GPU: "gpu", pyopencl.device_type.CPU: "cpu"}
     found: list[tuple[DeviceInfo, Any]] = []
     for platform in platforms:
         try:
-            listed = platform.get_devices()
+            handles = platform.get_devices()
         except pyopencl.Error:
             continue
-        for device in listed:
-            found.append((_try_device(len(found), platform, device), device))
+        for handle in handles:
+            kind = next((name for flag, name in kinds.items() if handle.type & flag), "accelerator")
+            info = DeviceInfo(
+                index=len(found),
+                platform=platform.name.strip(),
+                name=handle.name.strip(),
+                kind=kind,
+                works=False,
+                why="not tried",
+                fp64=False,
+                vector_width=8 if kind == "cpu" else 1,
+                memory=handle.global_mem_size,
+                max_alloc=handle.max_mem_alloc_size,
+                units=handle.max_compute_units,
+                driver=handle.driver_version.strip(),
+            )
+            found.append((info, handle))
     return tuple(found)
+
+
+@functools.cache
+def tried(index: int) -> DeviceInfo:
+    """Device `index` with the result of its trial: the recorded one, or that of a trial now."""
+    info, handle = listed()[index]
+    fp64 = _trial_record.find(key := _key(info, handle))
+    if fp64 is None:
+        why = _trial(handle, np.float32)
+        if why:
+            return replace(info, why=why)
+        fp64 = bool(handle.double_fp_config) and not _trial(handle, np.float64)
+        _trial_record.keep(key, fp64)
+    return replace(info, works=True, why="", fp64=fp64)
+
+
+def _key(info: DeviceInfo, handle: Any) -> str:
+    """What the result of a trial depends on: the device, both versions and the kernel of the trial."""
+    kernel = hashlib.sha256(_TRIAL.encode()).hexdigest()[:16]
+    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {handle.platform.version}, trial {kernel}"
 
 
 _TRIAL = """
@@ -73,41 +124,21 @@ __kernel void trial(__global number *x) { size_t i = get_global_id(0); x[i] = sq
 """
 
 
-def _try_device(index: int, platform: Any, device: Any) -> DeviceInfo:
-    """Build and run a kernel in float32 and float64: enumeration proves nothing."""
+def _trial(handle: Any, dtype: Any) -> str:
+    """Build and run a kernel on numbers of `dtype`: what went wrong, or nothing."""
     import pyopencl
 
-    def trial(dtype: Any) -> str:
-        try:
-            context = pyopencl.Context([device])
-            queue = pyopencl.CommandQueue(context)
-            x = np.arange(1, 9, dtype=dtype) ** 2
-            with quiet():
-                program = pyopencl.Program(context, _TRIAL).build([f"-DFP64={int(dtype is np.float64)}"])
-            buffer = pyopencl.Buffer(context, pyopencl.mem_flags.COPY_HOST_PTR, hostbuf=x)
-            program.trial(queue, x.shape, None, buffer)
-            out = np.empty_like(x)
-            pyopencl.enqueue_copy(queue, out, buffer)
-        except Exception as exc:
-            return first_line(exc)
-        wanted = np.arange(1, 9) + np.arange(8)
-        return "" if np.allclose(out, wanted) else f"a trial kernel gave {out.tolist()}, not {wanted.tolist()}"
-
-    kinds = {pyopencl.device_type.GPU: "gpu", pyopencl.device_type.CPU: "cpu"}
-    kind = next((name for flag, name in kinds.items() if device.type & flag), "accelerator")
-    why = trial(np.float32)
-    fp64 = not why and bool(device.double_fp_config) and not trial(np.float64)
-    return DeviceInfo(
-        index=index,
-        platform=platform.name.strip(),
-        name=device.name.strip(),
-        kind=kind,
-        works=not why,
-        why=why,
-        fp64=fp64,
-        vector_width=8 if kind == "cpu" else 1,
-        memory=device.global_mem_size,
-        max_alloc=device.max_mem_alloc_size,
-        units=device.max_compute_units,
-        driver=device.driver_version.strip(),
-    )
+    try:
+        context = pyopencl.Context([handle])
+        queue = pyopencl.CommandQueue(context)
+        x = np.arange(1, 9, dtype=dtype) ** 2
+        with quiet():
+            program = pyopencl.Program(context, _TRIAL).build([f"-DFP64={int(dtype is np.float64)}"])
+        buffer = pyopencl.Buffer(context, pyopencl.mem_flags.COPY_HOST_PTR, hostbuf=x)
+        program.trial(queue, x.shape, None, buffer)
+        out = np.empty_like(x)
+        pyopencl.enqueue_copy(queue, out, buffer)
+    except Exception as exc:
+        return first_line(exc)
+    wanted = np.arange(1, 9) + np.arange(8)
+    return "" if np.allclose(out, wanted) else f"a trial kernel gave {out.tolist()}, not {wanted.tolist()}"

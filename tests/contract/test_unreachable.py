@@ -351,6 +351,7 @@ MAY_CATCH = {
     "bench/_peers.py": "text that is no JSON",
     "bench/_quiet.py": "/proc/stat of a system that has none",
     "base/validation.py": "what numpy, float and int say of input",
+    "opencl/_trial_record.py": "text that is no JSON",
     "opencl/device_list.py": "a driver's trial: whatever it raises, the device does not work",
     "cli/parser.py": "text of a command line; the last resort of a program",
     "simulation/echo_output.py": "numpy's sizes that overflow; a system that does not say its memory",
