@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from typing import Any, Literal
@@ -95,11 +96,7 @@ class Material:
     @property
     def solid_angle(self) -> float:
         """Integral of D cos over the hemisphere, sr: pi for an isotropic diagram; 1 where there is none."""
-        if self.diagram in COHERENT:
-            return 1.0
-        nodes, weights = np.polynomial.legendre.leggauss(200)
-        delta, weights = (nodes + 1) * np.pi / 4, weights * np.pi / 4
-        return float(2 * np.pi * (weights * self.lobe(delta) * np.cos(delta) * np.sin(delta)).sum())
+        return 1.0 if self.diagram in COHERENT else _solid_angle(self)
 
     def permittivity(self, frequency: ArrayLike) -> Any:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
@@ -120,6 +117,15 @@ class Material:
 # a name of MATERIALS, or the amplitude reflectivity of a perfect conductor; one for all facets, or one for each
 MaterialLike = Material | str | float
 FacetMaterials = MaterialLike | Sequence[MaterialLike] | Sequence[Sequence[MaterialLike]] | np.ndarray
+
+
+@functools.lru_cache(maxsize=1024)
+def _solid_angle(material: Material) -> float:
+    """`Material.solid_angle` by Gauss's rule, to 1e-13: kept, since kernels' arguments ask for it per frequency."""
+    nodes, weights = np.polynomial.legendre.leggauss(48)
+    end = min(np.pi / 2, 7 * (material.width or np.inf))  # beyond, exp(-(d/width)^2) is below 1e-21
+    delta = (nodes + 1) * end / 2
+    return float(np.pi * end / 2 * (weights * material.lobe(delta) * np.sin(2 * delta)).sum())
 
 
 def _number(name: str, value: Any, inf: bool) -> float:

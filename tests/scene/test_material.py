@@ -4,9 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from scipy.integrate import quad
 
 import sarcl
-from sarcl.scene.material import DIAGRAMS, MATERIALS, METAL, merge, resolve
+from sarcl.scene.material import DIAGRAMS, MATERIALS, METAL, Material, merge, resolve
 
 EPS0 = 8.8541878128e-12
 TOLERANCE = {"float64": 1e-12, "three figures": 5e-3}  # the table is written to three figures
@@ -36,6 +37,19 @@ def test_roughness_is_none_without_a_diagram_and_total_with_one():
         wanted = 0 if diagram in ("smooth", "sinc") else np.inf
         assert sarcl.Material(3, diagram=diagram, width=width).height == wanted
         assert sarcl.Material(3, height=0.01, diagram=diagram, width=width).height == 0.01
+
+
+@pytest.mark.parametrize("width", [1e-6, 1e-3, 0.2, 1.0, 50.0])
+def test_the_solid_angle_of_a_lobe_is_the_integral_of_its_power(width):
+    def integral(material, end):
+        return quad(lambda d: 2 * np.pi * material.lobe(d) * np.cos(d) * np.sin(d), 0, end, epsabs=0)[0]
+
+    lobe = Material(diagram="exp", width=width)
+    assert lobe.solid_angle == pytest.approx(integral(lobe, min(np.pi / 2, 8 * width)), rel=1e-9)
+    for diagram in set(DIAGRAMS) - {"smooth", "sinc", "exp"}:
+        material = Material(diagram=diagram)
+        assert material.solid_angle == pytest.approx(integral(material, np.pi / 2), rel=1e-12)
+    assert Material(diagram="sinc", height=0.01).solid_angle == Material().solid_angle == 1
 
 
 def test_equal_materials_are_one_key():
