@@ -179,7 +179,7 @@ def make_task(
     if "no data" not in skips:
         grid = grid.filled()
     return FocusingTask(
-        raw, grid, antennas_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips)
+        raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips)
     )
 
 
@@ -211,20 +211,12 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
     return window_weights(window, raw.n_samples), rows
 
 
-def antennas_of(
+def geometry_of(
     raw: PhaseHistory, wrap: bool, beam: np.ndarray | None = None, beam_angle: float = 2 * np.pi
 ) -> PulseGeometry:
     """The geometry of every row; the carrier is the frequency of sample n_samples//2; beam as of `beam_of`."""
-    half = np.full(raw.n_rows, UNLIMITED) if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
-    return PulseGeometry(
-        tx=raw.tx,
-        rx=raw.rx,
-        reference_range=raw.reference_range,
-        frequency=raw.frequency + raw.n_samples // 2 * raw.frequency_step,
-        frequency_step=raw.frequency_step,
-        near=-half,
-        far=half,
-        wrap=wrap,
-        beam=beam,
-        beam_angle=beam_angle,
-    )
+    half = UNLIMITED if wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step)
+    return PulseGeometry.sampled(
+        raw.tx, raw.rx, raw.reference_range, first=raw.frequency, step=raw.frequency_step, n_samples=raw.n_samples,
+        near=-half, far=half, wrap=wrap, beam=beam, beam_angle=beam_angle,
+    )  # fmt: skip

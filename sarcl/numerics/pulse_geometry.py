@@ -49,6 +49,18 @@ class PulseGeometry:
         for name in PER_PULSE:
             object.__setattr__(self, name, np.broadcast_to(getattr(self, name), len(self.tx)))
 
+    @classmethod
+    def sampled(
+        cls, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, *, first: Any, step: Any, n_samples: int,
+        near: Any, far: Any, **others: Any,
+    ) -> PulseGeometry:  # fmt: skip
+        """Geometry of pulses that have n_samples samples in frequency, from `first` on and `step` apart, Hz.
+
+        first, step, near, far: (n,), or the same for all pulses
+        """
+        frequency, step = np.asarray(first + n_samples // 2 * step), np.asarray(step)
+        return cls(tx, rx, reference_range, frequency, step, np.asarray(near), np.asarray(far), **others)
+
     def __len__(self) -> int:
         return len(self.tx)
 

@@ -16,7 +16,7 @@ from ..base.errors import NothingSeen
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
-from .antenna_weights import MOST_NODES, Beam, BeamError
+from .antenna_weights import MOST_NODES, AntennaWeights, WeightError
 from .facets import Facets
 
 SAFETY = 2.0  # these are samples (a facet's corner, by which its weight is judged, lies twice as far off as its area)
@@ -26,12 +26,12 @@ PATTERN = 1e-6  # rms of what float32 patterns err of their peak, with room: 1e-
 STEP = 1e-4  # rad, of the differences that stand for derivatives
 
 
-def beam_error(
-    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray
-) -> BeamError:
+def weight_error(
+    beam: AntennaWeights, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray
+) -> WeightError:
     """Errors for a scene. NothingSeen where it is out of the beam."""
-    if not beam.weighs:
-        return BeamError()
+    if not beam.is_needed:
+        return WeightError()
     for pulses, many in ((PULSES, 1), (16 * PULSES, 4)):  # look closer before saying that nothing is lit
         found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
         if found is not None:
@@ -40,9 +40,9 @@ def beam_error(
 
 
 def _sampled(
-    beam: Beam, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray, n_pulses: int,
-    many: int,
-) -> BeamError | None:  # fmt: skip
+    beam: AntennaWeights, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray,
+    n_pulses: int, many: int,
+) -> WeightError | None:  # fmt: skip
     """None where all weights are 0."""
     random = np.random.default_rng(0)
     where, facets, share = _places(scene, random, many)
@@ -54,11 +54,11 @@ def _sampled(
     left = np.zeros(MOST_NODES + 1)
     cosines = np.cos(np.pi * (np.arange(2 * MOST_NODES + 1) + 0.5) / (2 * MOST_NODES + 1))
     band = waveform.center + waveform.bandwidth / 2 * cosines
-    for pulse in np.unique(np.linspace(0, len(beam.tx) - 1, n_pulses).astype(int)):
+    for pulse in np.unique(np.linspace(0, len(beam.geometry) - 1, n_pulses).astype(int)):
         power = np.empty(len(places))
         power[n_facets:] = point_power[some] * point_share
         if n_facets:
-            ends = beam.tx[pulse], beam.rx[pulse]
+            ends = beam.geometry.tx[pulse], beam.geometry.rx[pulse]
             made = facets.amplitudes(*ends, np.array([waveform.center]), polarizations, vertical)[0]
             power[:n_facets] = share * (np.abs(made) ** 2).sum(axis=1)
         weight = beam.weights(places, int(pulse), waveform.center)
@@ -67,9 +67,9 @@ def _sampled(
         seen += float(lit.sum())
         # an error of one of two equal patterns is multiplied by the other
         blurred += (
-            float((power * np.abs(weight) * beam.peak).sum()) if beam.alike else float(power.sum()) * beam.peak**2
+            float((power * np.abs(weight) * beam.peak).sum()) if beam.is_two_way else float(power.sum()) * beam.peak**2
         )
-        away = np.linalg.norm(places - beam.tx[pulse], axis=1)
+        away = np.linalg.norm(places - beam.geometry.tx[pulse], axis=1)
         slope = np.zeros(len(places))
         for axis in range(3):
             step = np.zeros((len(places), 3))
@@ -77,7 +77,7 @@ def _sampled(
             slope += np.abs((beam.weights(places + step, int(pulse), waveform.center) - weight) / STEP) ** 2
         floor += float((power * slope).sum())
         bent += float((power * slope / away**2)[:n_facets].sum())
-        if beam.varies:
+        if beam.varies_over_band:
             values = np.stack([beam.weights(places, int(pulse), f) for f in band.tolist()])
             order = np.arange(len(band))
             angles = np.outer(order, np.arccos(cosines))
@@ -87,8 +87,10 @@ def _sampled(
     if not seen:
         return None
     dim = max(1.0, beam.peak * float(np.sqrt(total / seen)))
-    rounding = len(beam.ways) * PATTERN * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + 5e-7
-    return BeamError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
+    rounding = (
+        len(beam.patterns) * PATTERN * float(np.sqrt(blurred / seen)) + ANGLE * float(np.sqrt(floor / seen)) + 5e-7
+    )
+    return WeightError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
 
 
 def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, Facets, np.ndarray]:
@@ -112,12 +114,12 @@ def _drawn(size: np.ndarray, n: int, most: int, random: np.random.Generator) -> 
     return some, 1 / (most * chance[some])
 
 
-def _unlit(beam: Beam, scene: Scene) -> str:
+def _unlit(beam: AntennaWeights, scene: Scene) -> str:
     """That the scene is out of the beam, and by how much."""
     assert beam.axes is not None
     boresights = beam.axes[0][:, :, 0]
     middle = box(np.concatenate([scene.positions, centroids(scene.triangles)])).mean(axis=0)
-    off = np.arccos(np.clip((_unit(middle - beam.tx) * boresights).sum(axis=1), -1, 1))
+    off = np.arccos(np.clip((_unit(middle - beam.geometry.tx) * boresights).sum(axis=1), -1, 1))
     best = int(np.argmin(off))
     return (
         f"the scene is wholly out of the beam: its centre is never less than {np.degrees(off[best]):.3g} deg off the "

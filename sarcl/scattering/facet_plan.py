@@ -20,7 +20,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
 from ._frequency_nodes import over_band
-from .antenna_weights import MOST_NODES, BeamError
+from .antenna_weights import MOST_NODES, WeightError
 
 GIGAHERTZ = 1e9  # amplitudes are over f in GHz: so they keep away from float32's smallest numbers
 LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
@@ -69,7 +69,7 @@ def coherent(scene: Scene) -> np.ndarray:
 def plan_facets(
     tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
     polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
-    weights: BeamError | None = None,
+    weights: WeightError | None = None,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
 
@@ -82,7 +82,7 @@ def plan_facets(
     top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
     bounds = box(scene.triangles.reshape(-1, 3))
     distance = nearest(scene, antennas, bounds)
-    weights = weights or BeamError()
+    weights = weights or WeightError()
     best: tuple[float, FacetPlan] | None = None
     least, edge, fine = np.inf, min(top, finest), False
     while True:
@@ -90,7 +90,7 @@ def plan_facets(
         count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
         fixed = _rounding(edge, highest) + weights.rounding
         if mirror.any():
-            fixed += _spherical(corner, distance, highest) + weights.steepness * corner
+            fixed += _spherical(corner, distance, highest) + weights.gradient * corner
         if fixed < SHARE * tolerance and count <= MOST_FACETS:
             fine = True
             band = over_band(

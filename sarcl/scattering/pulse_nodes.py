@@ -14,7 +14,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..numerics.polynomials import lagrange_shares
 from ..scene.triangles import centroids, edges
 from ._frequency_nodes import typical_power
-from .antenna_weights import Beam
+from .antenna_weights import AntennaWeights
 from .facets import Facets
 
 ORDER = 4  # knots a cubic goes through
@@ -67,13 +67,18 @@ def spaced(n_pulses: int, spacing: int, error: float = 0.0) -> Knots:
 
 
 def plan_knots(
-    part: Facets, beam: Beam, polarizations: Sequence[str], vertical: np.ndarray, frequency: float, tolerance: float
+    part: Facets,
+    beam: AntennaWeights,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
+    frequency: float,
+    tolerance: float,
 ) -> Knots:
     """The widest knots that err by no more than `tolerance`, relative to facets at random phases.
 
     frequency  the highest, Hz. Mirrors are kept from flashing between knots whatever the samples say.
     """
-    n_pulses = len(beam.tx)
+    n_pulses = len(beam.geometry)
     if len(part) * n_pulses < WORTH:
         return every(n_pulses)
     some = np.random.default_rng(0).permutation(len(part))[:FACETS]
@@ -91,26 +96,31 @@ def plan_knots(
     return every(n_pulses)
 
 
-def _turning(beam: Beam, places: np.ndarray, spacing: int) -> float:
+def _turning(beam: AntennaWeights, places: np.ndarray, spacing: int) -> float:
     """How much u_t + u_r turns over so many pulses at most, rad, as places' middle and farthest ends see it."""
     most = 0.0
-    for place in (places.mean(axis=0), places[np.argmin(np.linalg.norm(places - beam.tx[0], axis=1))]):
-        look = _unit(beam.tx - place) + _unit(beam.rx - place)
+    for place in (places.mean(axis=0), places[np.argmin(np.linalg.norm(places - beam.geometry.tx[0], axis=1))]):
+        look = _unit(beam.geometry.tx - place) + _unit(beam.geometry.rx - place)
         most = max(most, float(np.linalg.norm(look[spacing:] - look[:-spacing], axis=1).max()))
     return most
 
 
 def _between(
-    part: Facets, beam: Beam, polarizations: Sequence[str], vertical: np.ndarray, frequency: float, knots: Knots
+    part: Facets,
+    beam: AntennaWeights,
+    polarizations: Sequence[str],
+    vertical: np.ndarray,
+    frequency: float,
+    knots: Knots,
 ) -> float:
     """Relative error of amplitudes a quarter, a half and three quarters on from knots here and there."""
-    n_pulses, places = len(beam.tx), centroids(part.triangles)
+    n_pulses, places = len(beam.geometry), centroids(part.triangles)
     wrong = right = 0.0
     made: dict[int, np.ndarray] = {}
 
     def at(pulse: int) -> np.ndarray:
         if pulse not in made:
-            ends = beam.tx[pulse], beam.rx[pulse]
+            ends = beam.geometry.tx[pulse], beam.geometry.rx[pulse]
             sent = part.amplitudes(*ends, np.array([frequency]), polarizations, vertical)[0]
             made[pulse] = sent * beam.weights(places, pulse, frequency)[:, None]
         return made[pulse]

@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
-from .antenna_weights import BeamError
+from .antenna_weights import WeightError
 from .facet_plan import FacetPlan, coherent, plan_facets
 from .scatterers import resolution_edge
 
@@ -41,7 +41,7 @@ class Cut:
 
 def plan_cut(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, polarizations: Sequence[str], vertical: np.ndarray,
-    max_edge: float | str | None, share: float, weights: BeamError,
+    max_edge: float | str | None, share: float, weights: WeightError,
 ) -> Cut:  # fmt: skip
     """How to cut a scene's facets within `share` of a tolerance.
 

@@ -9,14 +9,14 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..numerics.pulse_geometry import PulseGeometry
-from ..scattering.antenna_weights import Beam
+from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import Facets
 from ..scattering.scatterers import Points
 
 
 def measure_error(
     points: Points | None, facets: Facets | None, antennas: PulseGeometry, frequencies: np.ndarray,
-    spectrum: np.ndarray, samples: Any, polarizations: Sequence[str], vertical: np.ndarray, beam: Beam,
+    spectrum: np.ndarray, samples: Any, polarizations: Sequence[str], vertical: np.ndarray, beam: AntennaWeights,
 ) -> float:  # fmt: skip
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of 16 where
     there are more than 20 000 facets, of 4 where there are more than 2 million.
@@ -54,7 +54,7 @@ def exact_samples(
     frequencies: np.ndarray,
     polarizations: Sequence[str],
     vertical: np.ndarray,
-    beam: Beam,
+    beam: AntennaWeights,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and the power they have at random phases."""
     from ..reference.echo import echo as exact

@@ -15,7 +15,7 @@ from ..numerics import range_profiles
 from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
-from ..scattering.antenna_weights import Beam
+from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, Facets
 from ..scattering.pulse_nodes import Knots, plan_knots
@@ -32,7 +32,8 @@ class FacetSpreader:
 
     def __init__(
         self, device: Device, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray, tolerance: float,
-        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray, beam: Beam,
+        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray,
+        beam: AntennaWeights,
     ) -> None:  # fmt: skip
         self.device, self.antennas, self.frequencies, self.bandwidth = device, antennas, frequencies, bandwidth
         self.tolerance, self.budget, self.skip, self.facet_plan = tolerance, budget, skip, plan
@@ -147,7 +148,7 @@ class _Work:
         knot_constants, n_knots = constants, n
         if self.knots.spacing > 1:  # what a knot does not see in its window a pulse beside it may
             _, knot_constants, n_knots = self._constants(at, False)
-        axes, knot_axes = (device.upload(self.of.beam.turned(rows)) for rows in (np.arange(start, stop), at))
+        axes, knot_axes = (device.upload(self.of.beam.packed_axes(rows)) for rows in (np.arange(start, stop), at))
         seen = device.upload(span.share[self.order])
         later = seen if span.later is span.share else device.upload(span.later[self.order])
         moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))

@@ -13,7 +13,7 @@ from ..numerics import range_profiles
 from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
-from ..scattering.antenna_weights import Beam
+from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from .spreading import plan_tiles, splits, terms
 
@@ -30,7 +30,7 @@ class Spreader:
         tolerance: float,
         budget: float,
         skip: bool,
-        beam: Beam,
+        beam: AntennaWeights,
         basis: np.ndarray,
         nodes: np.ndarray,
     ) -> None:
@@ -87,7 +87,7 @@ class Spreader:
                 constants_kernel, (n // lanes, tiles.n_tiles), None,
                 pulse, references, radius, n, tiles.n_tiles, 0, int(self.skip), constants,
             )  # fmt: skip
-            axes = device.upload(self.beam.turned(np.arange(start, stop)))
+            axes = device.upload(self.beam.packed_axes(np.arange(start, stop)))
             device.run(
                 kernel, (used, parts), (1, 1) if device.is_cpu else None,
                 pulse, n, used, constants, references, tiles.n_tiles, offsets, tiles.offsets.shape[1], planes,

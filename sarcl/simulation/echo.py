@@ -151,7 +151,7 @@ def echo(
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     reference_range = echo_sampling.half_path(tx, rx, point)
     given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
-    weights = antenna_weights.beam_of(antenna, radar, track, receiver, waveform, scene.center)
+    weights = antenna_weights.weights_of(antenna, radar, track, receiver, waveform, scene.center)
     if array is not None:
         instance("array", array, AntennaArray)
         if not is_single(array):
@@ -161,14 +161,8 @@ def echo(
             )  # fmt: skip
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, compressed)
-    antennas = PulseGeometry(
-        tx=tx,
-        rx=rx,
-        reference_range=reference_range,
-        frequency=np.full(len(tx), frequency + n_samples // 2 * step),
-        frequency_step=np.full(len(tx), step),
-        near=np.full(len(tx), near),
-        far=np.full(len(tx), far),
+    antennas = PulseGeometry.sampled(
+        tx, rx, reference_range, first=frequency, step=step, n_samples=n_samples, near=near, far=far
     )
     n = len(order.polarizations)
     with Target((len(tx), n, n_samples), out, order.budget, (near, far)) as target:
@@ -183,8 +177,7 @@ def echo(
             at = slice(start, min(start + target.pulses, len(tx)))
             block = target.block(start, at.stop)
             some = antennas.picked(np.arange(start, at.stop))
-            beam = work.weights.seen_from(some.tx, some.rx, at)
-            work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start, beam)
+            work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start)
             worst = max(worst, work.predicted_error)
             block *= spectrum.astype(np.complex64)
             target.keep(start, block)

@@ -16,8 +16,8 @@ from ..numerics.plan import LEAST_TOLERANCE, PROFILES
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
-from ..scattering.antenna_weight_error import beam_error
-from ..scattering.antenna_weights import Beam, BeamError
+from ..scattering.antenna_weight_error import weight_error
+from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facet_plan import MOST_FACETS, FacetPlan
 from ..scattering.facets import Facets
 from ..scattering.mesh_quality import facet_error, speckle_contrast
@@ -71,8 +71,8 @@ class Work:
     facets: Facets | None
 
     def __init__(
-        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry, weights: Beam,
-        bands: Iterable[Band],
+        self, order: Order, given: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry,
+        weights: AntennaWeights, bands: Iterable[Band],
     ) -> None:  # fmt: skip
         """given  the scene as it came;  scene  with its random heights;  waveform  over the whole band
         bands  of all samples that will be asked for: whether the tolerance can be met is known before the work starts
@@ -81,10 +81,10 @@ class Work:
         """
         self.order, self.waveform = order, waveform
         self.share = order.tolerance / parts_of(scene)
-        self.blur: BeamError = beam_error(weights, scene, waveform, order.polarizations, order.vertical)
+        self.blur: WeightError = weight_error(weights, scene, waveform, order.polarizations, order.vertical)
         planned = self._planned(scene, antennas, bands)
         if "out of beam" in order.skips:
-            weights = weights.within(UNSEEN * self.share / self.blur.dim, waveform)
+            weights = weights.culled(UNSEEN * self.share / self.blur.peak_to_rms, waveform)
         self.weights, self.n_pulses = weights, len(antennas.tx)
         self.points, self.skipped = points_of(scene, order.skips, self.n_pulses)
         self.facets, self.judged = None, dict[str, Any]()
@@ -100,7 +100,7 @@ class Work:
             raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
         if self.points is not None:
             bounded(self.points.largest() * weights.peak)
-            weights.clear_of(self.points.positions)
+            weights.check_clearance(self.points.positions)
         self.plans: list[tuple[float, dict[str, Any]]] = []
         self.pairs = self.gated = self.behind = self.unlit = 0
         order.clock.lap("scene")
@@ -148,15 +148,15 @@ class Work:
 
     def add(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, samples: np.ndarray, total: int,
-        first: int = 0, weights: Beam | None = None,
+        first: int = 0,
     ) -> None:  # fmt: skip
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
 
         antennas  of n pulses of the track from `first` on, at the channel's place;  waveform  of the channel
-        weights   of these pulses, default those of all;  total  pairs of scatterer, pulse and channel, for progress
+        total     pairs of scatterer, pulse and channel, for progress
         """
         order, clock, done = self.order, self.order.clock, self.pairs
-        weights = self.weights if weights is None else weights
+        weights = self.weights.at(antennas, slice(first, first + len(antennas)))
         facets = self.facets
         if facets is not None and len(samples) < self.n_pulses:
             facets = facets.between(first, first + len(samples))
@@ -219,7 +219,7 @@ class Work:
         return how_many(self.facets)
 
     def exact(
-        self, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, weights: Beam
+        self, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, weights: AntennaWeights
     ) -> tuple[np.ndarray, np.ndarray]:
         """Exact sums over scatterers (n_polarizations, n), and the power they have at random phases."""
         order, out = self.order, np.zeros((2, len(self.order.polarizations), len(frequencies)), np.complex128)
@@ -277,7 +277,7 @@ def parts_of(scene: Scene) -> float:
 
 
 def plan_scene(
-    order: Order, scene: Scene, waveform: Waveform, antennas: PulseGeometry, blur: BeamError, bands: Iterable[Band],
+    order: Order, scene: Scene, waveform: Waveform, antennas: PulseGeometry, blur: WeightError, bands: Iterable[Band],
     tolerance: float, max_edge: float | str | None,
 ) -> Cut | None:  # fmt: skip
     """How a scene's facets are cut for `tolerance`, None where there are none.

@@ -245,11 +245,11 @@ def interpolated(verb=sarcl.echo):
 
 
 PLANTED = {
-    "interpolated channels": ("sarcl.simulation.channels._interpolated.Between.fill", interpolated),
+    "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_echoes.plan_scene", interpolated),
     "a scene made ready": ("sarcl.simulation.scene_echoes.Work.__init__", interpolated),
     "forecast of echoes": (
-        "sarcl.simulation.channels._interpolated.Between.fill",
+        "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(sarcl.plan_echo),
     ),
     "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW, PLANE)),
@@ -315,7 +315,7 @@ def test_what_progress_raises_comes_out_of_interpolated_channels():
 def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_any_work(monkeypatch):
     assert "places" in interpolated().report.plan
     from sarcl.simulation import scene_echoes
-    from sarcl.simulation.channels._interpolated import Between
+    from sarcl.simulation.channels._interpolated import InterpolatedChannels
 
     plan = scene_echoes.plan_scene
 
@@ -325,7 +325,7 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
         return plan(order, *rest)
 
     monkeypatch.setattr(scene_echoes, "plan_scene", tight)
-    monkeypatch.setattr(Between, "fill", broken)
+    monkeypatch.setattr(InterpolatedChannels, "fill", broken)
     assert "places" not in interpolated().report.plan
 
 

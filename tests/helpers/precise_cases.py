@@ -10,14 +10,14 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging.float64.direct import DirectFloat64
 from sarcl.imaging.float64.plan import make_plan
-from sarcl.imaging.focusing_task import FocusingTask, Skipped, antennas_of, beam_of
+from sarcl.imaging.focusing_task import FocusingTask, Skipped, beam_of, geometry_of
 
 
 def task_of(raw, grid, *, wrap=False, skips=("range window", "beam"), samples=None, rows=None, beam=None):
     samples = np.ones(raw.n_samples) if samples is None else samples
     rows = np.ones(raw.n_rows) if rows is None else rows
     toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0))
-    return FocusingTask(raw, grid, antennas_of(raw, wrap, toward, angle), samples, rows, wrap, frozenset(skips))
+    return FocusingTask(raw, grid, geometry_of(raw, wrap, toward, angle), samples, rows, wrap, frozenset(skips))
 
 
 def focus(raw, grid, tolerance, device, *, budget=2.0**28, plan=None, **options):

@@ -11,7 +11,7 @@ from helpers.cases import noise_history
 
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64._pulse_records import packed
-from sarcl.imaging.focusing_task import antennas_of
+from sarcl.imaging.focusing_task import geometry_of
 from sarcl.numerics import error_bounds_float64, interpolation_float64
 from sarcl.opencl import _programs, fft
 from sarcl.reference.interp import interpolate
@@ -155,7 +155,7 @@ def test_pulses_are_packed_in_pairs_that_are_exact_to_100_bits():
     random = np.random.default_rng(3)
     raw = noise_history(n_rows=5, n_samples=33)
     raw = replace(raw, frequency=random.uniform(1e9, 1e11, 5), frequency_step=random.uniform(1e5, 1e7, 5))
-    made = packed(raw, antennas_of(raw, False), 66, 0, 5, 8)
+    made = packed(raw, geometry_of(raw, False), 66, 0, 5, 8)
     assert made.shape == (10, 8) and np.array_equal(made[:3, :5], raw.tx.T)
     getcontext().prec = 50
     c = Decimal(SPEED_OF_LIGHT)

@@ -10,7 +10,7 @@ import sarcl
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.model.antenna_array import AntennaArray
-from sarcl.simulation.channels._chebyshev_positions import places_of
+from sarcl.simulation.channels._chebyshev_positions import choose_positions
 
 WINDOW = (-3.7, 3.7)
 
@@ -79,7 +79,7 @@ def test_places_are_two_a_turn_and_a_few():
     elements = np.stack([np.zeros(900), np.linspace(-1, 1, 900), np.zeros(900)], axis=1)
     for span in (0.1, 1.0, 10.0, 100.0):
         for allowed in (1e-2, 1e-6):
-            found = places_of(elements, lambda d, s=span: np.exp(-1j * np.pi * s * d[:, 1:2]), allowed)
+            found = choose_positions(elements, lambda d, s=span: np.exp(-1j * np.pi * s * d[:, 1:2]), allowed)
             order = np.pi * span
             tail = (1.5 * np.log(10 / allowed)) ** (2 / 3) * max(1.0, order) ** (1 / 3)
             assert 2 * span <= len(found) <= order + tail + 2
@@ -92,7 +92,7 @@ def test_a_plane_array_is_a_grid_of_places_along_its_own_axes():
     y, z = np.meshgrid(np.arange(-15, 16) * 0.1, np.arange(-10, 11) * 0.1, indexing="ij")
     turned = np.stack([0 * y, (y + z) / 2**0.5, (y - z) / 2**0.5], axis=-1).reshape(-1, 3)
     for elements in (np.stack([0 * y, y, z], axis=-1).reshape(-1, 3), turned):
-        found = places_of(elements, lambda d: np.exp(-2j * np.pi * d @ np.array([[0.0], [0.1], [0.2]])), 1e-3)
+        found = choose_positions(elements, lambda d: np.exp(-2j * np.pi * d @ np.array([[0.0], [0.1], [0.2]])), 1e-3)
         assert len(found) <= 48 < len(elements) and found.error <= 1e-3
 
 
@@ -295,21 +295,21 @@ def test_a_search_for_places_that_cannot_pay_is_short_and_small():
     array, chirp = line(2500, spacing=1.0, step=0.0), sarcl.Waveform.chirp(center=F0, bandwidth=1e6, duration=1e-6)
     scene = sarcl.Scene.points([[0.0, -1e4, 0], [0, 1e4, 0]])
     track = sarcl.Trajectory(np.arange(2), [[-5e5, 0, 0], [-5e5, 10, 0]])
-    from sarcl.scattering.antenna_weights import beam_of
-    from sarcl.simulation.channels._response_samples import Views
-    from sarcl.simulation.channels.channel_rows import Sides
+    from sarcl.scattering.antenna_weights import weights_of
+    from sarcl.simulation.channels._response_samples import ResponseSamples
+    from sarcl.simulation.channels.channel_rows import ChannelRows
 
-    sides = Sides.of(track, None)
-    beam = beam_of(None, None, track, None, chirp, scene.center)
-    views = Views(sides, scene, beam, F0, array.positions, np.zeros((1, 3)))
+    rows = ChannelRows(array, track, None, scene.center, "simultaneous", "reference", ("HH",))
+    weights = weights_of(None, None, track, None, chirp, scene.center)
+    responses = ResponseSamples(rows, scene, weights, F0, array.positions, np.zeros((1, 3)))
     calls = []
 
     def counted(places):
         calls.append(len(places))
-        return views.sending(places)
+        return responses.tx_response(places)
 
     start = time.perf_counter()
-    found = places_of(array.positions, counted, 1e-3, most=200.0)
+    found = choose_positions(array.positions, counted, 1e-3, most=200.0)
     assert found.basis is None and max(calls) <= 400 and time.perf_counter() - start < 60
 
 

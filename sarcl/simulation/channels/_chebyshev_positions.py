@@ -1,11 +1,11 @@
-"""Few places of an array stand for all its elements: what lies between two places is interpolated.
+"""Chebyshev positions in an array: echoes computed there are interpolated to all elements.
 
-Less the path to the scene's centre, an echo heard from an element turns as little over the array as the scene is wide:
+Without the path to the scene's centre, the phase of an echo changes as little over the array as the scene is small:
 
     psi(d, x) = |T + d - x| - |T + d - c|,    exp(-j 2 pi f psi(d, x)/c) = sum_m L_m(d) exp(-j 2 pi f psi(d_m, x)/c)
 
-with L_m Lagrange's polynomials along the array's axes, d_m Chebyshev's places on them. How much that errs is computed
-at the elements themselves, for the responses of _response_samples.py.
+with L_m Lagrange's polynomials along the array's axes and d_m Chebyshev nodes on them. The interpolation error is
+computed at the elements themselves, for the responses of _response_samples.py.
 """
 
 from __future__ import annotations
@@ -16,19 +16,20 @@ from itertools import product
 
 import numpy as np
 
-SAFETY = 1.5  # pulses between those looked at
-ELEMENTS = 1000  # at most looked at
-BLOCK = 64  # elements at a time
-FLAT = 1e-9  # of an array's extent: what is no wider than this is a line, or a plane
+SAFETY = 1.5  # factor on the error, which is sampled at some pulses only
+ELEMENTS = 1000  # elements at most at which errors are computed
+BLOCK = 64  # elements per array operation: bounds the memory
+FLAT = 1e-9  # fraction of an array's extent below which it counts as a line, or a plane
 
-Response = Callable[[np.ndarray], np.ndarray]  # at places, m (n, 3): complex (n, k), see `_response_samples.Views`
+Response = Callable[[np.ndarray], np.ndarray]  # at positions, m (n, 3): complex (n, k), see _response_samples.py
 
 
 @dataclass(frozen=True, eq=False)
-class Places:
-    """Places, m (m, 3), and how each element, (n,), is made of them: basis (n, m), or None: they are the elements.
+class Positions:
+    """Positions in an array, m (m, 3), and the interpolation from them to its n elements.
 
-    error  relative
+    basis  Lagrange's polynomials at the elements (n, m); None: the positions are the elements
+    error  largest interpolation error, relative
     """
 
     at: np.ndarray
@@ -37,19 +38,22 @@ class Places:
 
     @property
     def growth(self) -> float:
-        """By how much errors at the places may grow at an element."""
+        """Largest factor by which errors at the positions grow at an element: the Lebesgue constant."""
         return 1.0 if self.basis is None else float(np.abs(self.basis).sum(axis=1).max())
 
     def __len__(self) -> int:
         return len(self.at)
 
 
-def places_of(elements: np.ndarray, response: Response, allowed: float, most: float = np.inf, least: int = 1) -> Places:
-    """The fewest places for elements, m (n, 3), whose error is at most `allowed`; else the elements themselves.
+def choose_positions(
+    elements: np.ndarray, response: Response, allowed: float, most: float = np.inf, least: int = 1
+) -> Positions:
+    """The fewest positions from which elements, m (n, 3), are interpolated with an error of at most `allowed`.
 
-    most  so many places do not pay;  least  places along an axis that is not flat
+    Where that takes more than `most` positions, these are the elements themselves.
+    least  positions along each axis in which the array extends
     """
-    best = Places(elements)
+    best = Positions(elements)
     if len(elements) == 1 or allowed <= 0:
         return best
     middle = (elements.min(axis=0) + elements.max(axis=0)) / 2
@@ -67,44 +71,44 @@ def places_of(elements: np.ndarray, response: Response, allowed: float, most: fl
 
 
 class _Grid:
-    """Chebyshev's places on a grid along axes (3, 3) about a centre, for elements at `along` (n, 3), within +-half."""
+    """Chebyshev nodes on a grid along axes (3, 3) about a centre, for elements at `along` (n, 3), within +-half."""
 
     def __init__(
         self, along: np.ndarray, half: np.ndarray, centre: np.ndarray, axes: np.ndarray, response: Response
     ) -> None:
         self.along, self.half, self.centre, self.axes, self.response = along, half, centre, axes, response
 
-    def fewest(self, elements: np.ndarray, allowed: float, fewer_than: float, least: int) -> Places | None:
-        """The fewest places that do, or None where these are not fewer than asked."""
-        wide = np.flatnonzero(self.half)
-        counts, some = [1, 1, 1], _some(self.along)
-        for axis in wide.tolist():  # each alone
+    def fewest(self, elements: np.ndarray, allowed: float, fewer_than: float, least: int) -> Positions | None:
+        """The fewest positions that keep the error, or None where that takes `fewer_than` or more."""
+        extended = np.flatnonzero(self.half)
+        counts, some = [1, 1, 1], _sampled(self.along)
+        for axis in extended.tolist():  # each axis by itself
 
-            def do(count: int, axis: int = axis) -> bool:
+            def suffices(count: int, axis: int = axis) -> bool:
                 alone = [count if i == axis else 1 for i in range(3)]
                 line = np.zeros((max(32, 4 * count), 3))
                 line[:, axis] = np.linspace(-self.half[axis], self.half[axis], len(line))
-                return self._error(alone, line, self.centre + line @ self.axes) <= allowed / (2 * len(wide))
+                return self._error(alone, line, self.centre + line @ self.axes) <= allowed / (2 * len(extended))
 
             few, counts[axis] = least - 1, least
-            while not do(counts[axis]):
+            while not suffices(counts[axis]):
                 few, counts[axis] = counts[axis], 2 * counts[axis]
                 if few >= fewer_than - 1:
                     return None
             while counts[axis] - few > 1:
                 middle = (few + counts[axis]) // 2
-                few, counts[axis] = (few, middle) if do(middle) else (middle, counts[axis])
+                few, counts[axis] = (few, middle) if suffices(middle) else (middle, counts[axis])
         while int(np.prod(counts)) < fewer_than:
             error = self._error(counts, self.along[some], elements[some])
             if error <= allowed:
                 at, basis = self.made(counts, self.along)
-                return Places(self.centre + at @ self.axes, basis, error)
-            for axis in wide.tolist():
+                return Positions(self.centre + at @ self.axes, basis, error)
+            for axis in extended.tolist():
                 counts[axis] += 1
         return None
 
     def _error(self, counts: list[int], along: np.ndarray, elements: np.ndarray) -> float:
-        """The largest there is at elements, m (n, 3)."""
+        """Largest interpolation error at elements, m (n, 3), that lie at `along` (n, 3)."""
         at, basis = self.made(counts, along)
         there = self.response(self.centre + at @ self.axes)
         worst = 0.0
@@ -114,7 +118,7 @@ class _Grid:
         return SAFETY * worst
 
     def made(self, counts: list[int], along: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """Places (m, 3) along the axes, and Lagrange's polynomials of these at `along` (n, 3): (n, m)."""
+        """Positions (m, 3) along the axes, and their Lagrange polynomials at `along` (n, 3): (n, m)."""
         nodes, parts = [], []
         for i, n in enumerate(counts):
             angle, order = np.pi * (np.arange(n) + 0.5) / n, np.arange(n)
@@ -127,8 +131,8 @@ class _Grid:
         return np.array(list(product(*nodes))), basis
 
 
-def _some(along: np.ndarray) -> np.ndarray:
-    """Up to ELEMENTS of them, those farthest out among them."""
+def _sampled(along: np.ndarray) -> np.ndarray:
+    """Indices of up to ELEMENTS elements, with the outermost along each axis among them."""
     if len(along) <= ELEMENTS:
         return np.arange(len(along))
     ends = [i for axis in range(3) for i in (along[:, axis].argmin(), along[:, axis].argmax())]

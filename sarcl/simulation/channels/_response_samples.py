@@ -1,7 +1,7 @@
-"""How echoes of a scene change from place to place of an array: turns of their phase, gains of antennas, and distance.
+"""How the echoes of a scene change from position to position in an array: by phase, antenna gain and distance.
 
-Only the scene's outermost places are looked at, whose turns are largest, and where gains or spreading count some of its
-scatterers; at pulses spread along the track, and at those where the array turns echoes most.
+Phases are computed for the outermost points of the scene's box, where they change most; where gains or spreading count,
+also for some of its scatterers. The pulses are spread along the track, and include those at which phases change most.
 """
 
 from __future__ import annotations
@@ -13,101 +13,101 @@ import numpy as np
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.antenna_pattern import pattern_gain
-from ...scattering.antenna_weights import Beam
+from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
 from ...scene.triangles import centroids
-from .channel_rows import Sides
+from .channel_rows import ChannelRows
 
-PULSES, SCATTERERS = 33, 32  # looked at
-BLOCK = 256  # pulses at a time
+PULSES, SCATTERERS = 33, 32  # largest numbers of pulses and of scatterers that responses are sampled at
+BLOCK = 256  # pulses per array operation: bounds the memory
 
-Stand = Callable[..., np.ndarray]
+ToScene = Callable[..., np.ndarray]  # ChannelRows.tx_positions or rx_positions
 
 
-class Views:
-    """Responses (m, k) of a scene at places of an array, m (m, 3): `sending`, `hearing` or both at the `same` place.
+class ResponseSamples:
+    """Responses (m, k) of a scene at m positions in an array: of transmitters, of receivers, or of elements as both.
 
-    Of k pairs of pulse and place in the scene, each less the path to the scene's centre; relative to the root mean
-    square of echoes where gains count, else of modulus 1. top  highest frequency, Hz
+    A response holds k pairs of pulse and point in the scene, each without the path to the scene's centre. Where weights
+    count, responses are relative to the root mean square of the echoes; else their modulus is 1.
     """
 
     def __init__(
-        self, sides: Sides, scene: Scene, weights: Beam, top: float, senders: np.ndarray, heard: np.ndarray
-    ) -> None:
-        self.sides, self.weights, self.top, self.center = sides, weights, top, scene.center
+        self, rows: ChannelRows, scene: Scene, weights: AntennaWeights, highest: float, transmitters: np.ndarray,
+        receivers: np.ndarray,
+    ) -> None:  # fmt: skip
+        """highest  frequency, Hz;  transmitters, receivers  positions of the elements in the array, m (n, 3)."""
+        self.rows, self.weights, self.highest, self.center = rows, weights, highest, scene.center
         off = corners(scene.bounds) - self.center
-        self.outer = np.concatenate([off, np.diag(off[-1]), -np.diag(off[-1])])  # the middles of faces too: the nearest
+        self.outer = np.concatenate([off, np.diag(off[-1]), -np.diag(off[-1])])  # face centres too: they may be nearest
         self.off = self.outer
-        if weights.weighs:
+        if weights.is_needed:
             every = np.concatenate([scene.positions, centroids(scene.triangles)]) - self.center
             some = np.random.default_rng(0).choice(len(every), min(len(every), SCATTERERS), replace=False)
             self.off = np.concatenate([self.outer, every[some]])
-        self.tx_pulses = self._telling(sides.senders, senders)
-        self.rx_pulses = self._telling(sides.receivers, heard)
+        self.tx_pulses = self._sampled_pulses(rows.tx_positions, transmitters)
+        self.rx_pulses = self._sampled_pulses(rows.rx_positions, receivers)
         self.levels = 1.0, 1.0
-        if weights.weighs:
-            self.levels = self._levels(senders.mean(axis=0), heard.mean(axis=0))
+        if weights.is_needed:
+            self.levels = self._levels(transmitters.mean(axis=0), receivers.mean(axis=0))
 
-    def sending(self, places: np.ndarray) -> np.ndarray:
-        """Of senders."""
-        return self._response(0, self.sides.senders, places, self.tx_pulses) / self.levels[0]
+    def tx_response(self, elements: np.ndarray) -> np.ndarray:
+        """Response (m, k) of transmitters at elements, m (m, 3)."""
+        return self._response(0, self.rows.tx_positions, elements, self.tx_pulses) / self.levels[0]
 
-    def hearing(self, places: np.ndarray) -> np.ndarray:
-        """Of receivers."""
-        return self._response(1, self.sides.receivers, places, self.rx_pulses) / self.levels[1]
+    def rx_response(self, elements: np.ndarray) -> np.ndarray:
+        """Response (m, k) of receivers at elements, m (m, 3)."""
+        return self._response(1, self.rows.rx_positions, elements, self.rx_pulses) / self.levels[1]
 
-    def same(self, places: np.ndarray) -> np.ndarray:
-        """Of elements that hear what they send."""
+    def two_way_response(self, elements: np.ndarray) -> np.ndarray:
+        """Response (m, k) of elements, m (m, 3), that each receive what they transmit."""
         at = np.union1d(self.tx_pulses, self.rx_pulses)
-        both = self._response(0, self.sides.senders, places, at) * self._response(1, self.sides.receivers, places, at)
-        return both / self.levels[0]
+        sent = self._response(0, self.rows.tx_positions, elements, at)
+        return sent * self._response(1, self.rows.rx_positions, elements, at) / self.levels[0]
 
-    def _telling(self, stand: Stand, places: np.ndarray) -> np.ndarray:
-        """Pulses spread along the track, and those at which the array's box turns echoes most."""
-        box = corners(np.stack([places.min(axis=0), places.max(axis=0)]))
-        box = np.concatenate([box, box.mean(axis=0)[None]])  # and its middle: turns may be alike at both ends
-        n = len(self.sides.tx)
-        turns = np.zeros(n)
+    def _sampled_pulses(self, to_scene: ToScene, elements: np.ndarray) -> np.ndarray:
+        """Pulses spread along the track, and those at which phases differ most between points, over the array's box."""
+        box = corners(np.stack([elements.min(axis=0), elements.max(axis=0)]))
+        box = np.concatenate([box, box.mean(axis=0)[None]])  # with its centre: phases may be equal at opposite corners
+        n = len(self.rows.track)
+        change = np.zeros(n)
         for start in range(0, n, BLOCK):
             here = slice(start, min(start + BLOCK, n))
-            turns[here] = np.ptp(self._turns(stand(box, here), self.outer), axis=1).max(axis=-1)
-        return np.unique(np.concatenate([np.linspace(0, n - 1, PULSES).astype(int), np.argsort(turns)[-PULSES // 4 :]]))
+            change[here] = np.ptp(self._cycles(to_scene(box, here), self.outer), axis=1).max(axis=-1)
+        most = np.argsort(change)[-PULSES // 4 :]
+        return np.unique(np.concatenate([np.linspace(0, n - 1, PULSES).astype(int), most]))
 
-    def _turns(self, ends: np.ndarray, off: np.ndarray) -> np.ndarray:
-        """Turns of the phase (n, m, k) from antennas, m (n, m, 3), to places off the centre, m (k, 3)."""
+    def _cycles(self, ends: np.ndarray, off: np.ndarray) -> np.ndarray:
+        """Phases, cycles (n, m, k), of paths from antennas, m (n, m, 3), to points off the centre, m (k, 3)."""
         d = ends - self.center
         # |d - x| - |d| without cancellation
         total = np.linalg.norm(d[..., None, :] - off, axis=-1) + np.linalg.norm(d, axis=-1)[..., None]
-        return np.asarray(self.top / SPEED_OF_LIGHT * ((off**2).sum(axis=1) - 2 * d @ off.T) / total)
+        return np.asarray(self.highest / SPEED_OF_LIGHT * ((off**2).sum(axis=1) - 2 * d @ off.T) / total)
 
-    def _response(self, side: int, stand: Stand, places: np.ndarray, at: np.ndarray) -> np.ndarray:
-        ends = stand(places, at)
-        made = np.exp(-2j * np.pi * self._turns(ends, self.off))
-        if self.weights.weighs:
+    def _response(self, side: int, to_scene: ToScene, elements: np.ndarray, at: np.ndarray) -> np.ndarray:
+        ends = to_scene(elements, at)
+        made = np.exp(-2j * np.pi * self._cycles(ends, self.off))
+        if self.weights.is_needed:
             for i, pulse in enumerate(at.tolist()):
                 made[i] *= self._gain(side, ends[i], pulse)
-        return np.asarray(np.moveaxis(made, 1, 0).reshape(len(places), -1))
+        return np.asarray(np.moveaxis(made, 1, 0).reshape(len(elements), -1))
 
     def _gain(self, side: int, ends: np.ndarray, pulse: int) -> np.ndarray:
-        """Weights of one antenna, m (m, 3), towards the places (m, k)."""
-        beam, look = self.weights, self.center + self.off - ends[:, None]
+        """Weights (m, k) of one antenna at positions `ends`, m (m, 3), towards the points; side  0: tx, 1: rx."""
+        weights, look = self.weights, self.center + self.off - ends[:, None]
         out = np.ones(look.shape[:2], np.complex128)
-        antenna = None if beam.pair is None else beam.pair[side]
-        if antenna is not None and beam.axes is not None:
-            out *= pattern_gain(antenna, (look @ beam.axes[side][pulse]).reshape(-1, 3), self.top).reshape(out.shape)
-        if beam.radar is not None:
-            out *= beam.range / np.linalg.norm(look, axis=-1)
+        antenna = None if weights.pair is None else weights.pair[side]
+        if antenna is not None and weights.axes is not None:
+            toward = (look @ weights.axes[side][pulse]).reshape(-1, 3)
+            out *= pattern_gain(antenna, toward, self.highest).reshape(out.shape)
+        if weights.radar is not None:
+            out *= weights.range / np.linalg.norm(look, axis=-1)
         return out
 
-    def _levels(self, sender: np.ndarray, heard: np.ndarray) -> tuple[float, float]:
-        """What errors of a sender's and of a receiver's response are relative to: the other side's multiplies them."""
+    def _levels(self, transmitter: np.ndarray, receiver: np.ndarray) -> tuple[float, float]:
+        """Levels that errors of the tx and of the rx response are relative to: the other response multiplies them."""
         at = np.union1d(self.tx_pulses, self.rx_pulses)
-        sent = np.abs(self._response(0, self.sides.senders, sender[None], at))
-        back = np.abs(self._response(1, self.sides.receivers, heard[None], at))
-        inside = np.ones((len(at), len(self.off)), bool)
-        inside[:, : len(self.outer)] = False  # scatterers alone
-        both = (
-            float(np.sqrt(np.mean((sent * back).reshape(inside.shape)[inside].reshape(-1) ** 2)))
-            or np.finfo(float).tiny
-        )
+        sent = np.abs(self._response(0, self.rows.tx_positions, transmitter[None], at))
+        back = np.abs(self._response(1, self.rows.rx_positions, receiver[None], at))
+        scatterers = (sent * back).reshape(len(at), len(self.off))[:, len(self.outer) :]
+        both = float(np.sqrt(np.mean(scatterers.reshape(-1) ** 2))) or np.finfo(float).tiny
         return both / float(back.max()), both / float(sent.max())

@@ -1,4 +1,4 @@
-"""What an array's channels are to become, and the plain way there: every channel by a run of its own."""
+"""Layout of an array's channels in its samples, and their echoes computed channel by channel."""
 
 from __future__ import annotations
 
@@ -11,51 +11,67 @@ from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
 from ..scene_echoes import Work, band_of
 from ..spreading import Band
-from .channel_rows import Rows, antennas_of
+from .channel_rows import ChannelRows
 
 
 @dataclass(frozen=True, eq=False)
-class Layout:
-    """What is asked of an array: its rows, the channels sent, their frequencies, the range window (near, far), m."""
+class ChannelLayout:
+    """Rows and samples of an array's channels: rows, channels, frequencies, range window (near, far), m."""
 
-    rows: Rows
+    rows: ChannelRows
     sent: list[Channel]
     grid: Sampling
     window: tuple[float, float]
     waveform: Waveform
     compressed: bool
 
+    @property
+    def frequencies(self) -> np.ndarray:
+        """Frequencies of the samples of all channels, Hz (grid.n,)."""
+        return np.asarray(self.grid.frequency + self.grid.step * np.arange(self.grid.n))
+
     def samples(self, channel: Channel) -> tuple[slice, np.ndarray]:
-        """A channel's samples in its rows, and their frequencies, Hz."""
+        """Which samples of its rows belong to a channel, and their frequencies, Hz."""
         if self.rows.separated:
             own = self.grid.of(channel.carrier)
             return slice(0, own.n), own.frequency + own.step * np.arange(own.n)
         part = self.grid.part(channel.carrier)
-        return part, self.grid.frequency + self.grid.step * np.arange(self.grid.n)[part]
+        return part, self.frequencies[part]
 
     def spectrum(self, channel: Channel, frequencies: np.ndarray) -> np.ndarray:
-        """Of what a channel sends, after its own filter if compressed, at frequencies, Hz (n,)."""
+        """Spectrum of a channel's pulse at frequencies, Hz (n,), after its matched filter if compressed."""
         pulse = replace(self.waveform, center=channel.carrier).pulse_spectrum(frequencies)
         return np.asarray(np.abs(pulse) ** 2 if self.compressed else pulse)
 
     def band(self, frequencies: np.ndarray) -> Band:
-        """Of a run of the engines at frequencies, Hz (n,)."""
+        """Band of echoes that are computed at frequencies, Hz (n,)."""
         n, step = len(frequencies), self.grid.step
         return Band(n, n * step, float(frequencies[0]) + n // 2 * step)
 
+    def geometry(
+        self, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, frequencies: np.ndarray,
+        window: tuple[float, float] | None = None,
+    ) -> PulseGeometry:  # fmt: skip
+        """Geometry of echoes between tx and rx, m (n, 3), at frequencies, Hz; window  (near, far), default `window`."""
+        near, far = self.window if window is None else window
+        return PulseGeometry.sampled(
+            tx, rx, reference_range, first=float(frequencies[0]), step=self.grid.step, n_samples=len(frequencies),
+            near=near, far=far,
+        )  # fmt: skip
+
     def shape(self, n_pulses: int) -> tuple[int, ...]:
-        """Of samples: (pulses, senders, receivers, polarizations, samples)."""
+        """Shape of the samples: (pulses, transmitters, receivers, polarizations, samples)."""
         n = self.grid.width if self.rows.separated else self.grid.n
         return n_pulses, *self.rows.shape[1:], len(self.rows.polarizations), n
 
     @property
     def runs(self) -> int:
-        """Pulses of all channels at all receivers."""
-        return sum(c.stop - c.first for c in self.sent) * self.rows.hearing
+        """Number of (pulse, channel, receiver): so many range profiles take part when each is computed by itself."""
+        return sum(c.stop - c.first for c in self.sent) * self.rows.n_receivers
 
     @property
     def overlap(self) -> float:
-        """Channels that are added up on one sample, at most."""
+        """Largest number of channels that are summed in one sample."""
         if self.rows.separated:
             return 1.0
         counts: dict[int, np.ndarray] = {}
@@ -64,50 +80,48 @@ class Layout:
         return max(1.0, *(float(count.max()) for count in counts.values()))
 
 
-class Apart:
-    """Every channel at every receiver by a run of its own, over its own band."""
+class SeparateChannels:
+    """Echoes of every channel at every receiver, each computed by itself over its own band."""
 
-    def __init__(self, layout: Layout) -> None:
+    def __init__(self, layout: ChannelLayout) -> None:
         self.layout, self.runs = layout, layout.runs
 
     @property
     def bands(self) -> list[Band]:
-        """Of every run."""
+        """Band of each channel."""
         made = [self.layout.samples(channel)[1] for channel in self.layout.sent]
         return [self.layout.band(frequencies) for frequencies in made]
 
     def pulses(self, budget: float) -> int:
-        """Pulses to be filled at a time: all, the engines keep to the budget."""
-        return len(self.layout.rows.sides.tx)
+        """Pulses per call of `fill`: all of them, since each computation keeps to the memory budget by itself."""
+        return len(self.layout.rows.track)
 
     def fill(self, work: Work, samples: np.ndarray, start: int, total: int) -> float:
-        """Add to samples (n, senders, receivers, n_polarizations, n_samples), zeros, of n pulses from `start` on.
+        """Add echoes to samples (n, transmitters, receivers, n_polarizations, n_samples), zeros, from pulse `start` on.
 
-        total  pairs of scatterer and run, for progress. Returns the predicted error.
+        total  pairs of scatterer and range profile, for progress. Returns the predicted error.
         """
         layout, rows, worst = self.layout, self.layout.rows, 0.0
-        for channel, at, here in during(layout.sent, start, len(samples)):
+        for channel, at, here in active_channels(layout.sent, start, len(samples)):
             part, frequencies = layout.samples(channel)
             spectrum = (layout.spectrum(channel, frequencies) * work.weights.factor(frequencies)).astype(np.complex64)
             band = band_of(layout.waveform, channel.carrier, len(frequencies) * layout.grid.step)
-            tx = rows.sides.senders(channel.offset, at)
+            tx = rows.tx_positions(channel.offset, at)
             _, rx, reference = rows.ends(channel.offset, at)
-            for j in range(rows.hearing):
-                antennas = antennas_of(
-                    tx, rx[:, j], reference[:, j], float(frequencies[0]), layout.grid, layout.window, len(frequencies)
-                )
-                made = run(work, antennas, band, frequencies, at.start, total)
+            for j in range(rows.n_receivers):
+                geometry = layout.geometry(tx, rx[:, j], reference[:, j], frequencies)
+                echoes = echoes_of(work, geometry, band, frequencies, at.start, total)
                 worst = max(worst, work.predicted_error)
-                rows.put(samples[here], channel, slice(j, j + 1), part, (made * spectrum)[:, None])
+                rows.add(samples[here], channel, slice(j, j + 1), part, (echoes * spectrum)[:, None])
         return worst
 
     def describe(self) -> dict[str, int]:
-        """For a report."""
+        """Words and numbers for a report: none."""
         return {}
 
 
-def during(sent: list[Channel], start: int, n: int) -> list[tuple[Channel, slice, slice]]:
-    """Channels sent at pulses start ... start + n - 1: which of the pulses, and which of these."""
+def active_channels(sent: list[Channel], start: int, n: int) -> list[tuple[Channel, slice, slice]]:
+    """Channels sent at some of the n pulses from `start` on, with those pulses counted from 0 and from `start`."""
     out = []
     for channel in sent:
         first, stop = max(channel.first, start), min(channel.stop, start + n)
@@ -116,11 +130,10 @@ def during(sent: list[Channel], start: int, n: int) -> list[tuple[Channel, slice
     return out
 
 
-def run(
-    work: Work, antennas: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, total: int
+def echoes_of(
+    work: Work, geometry: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, total: int
 ) -> np.ndarray:
-    """Echoes of antennas at pulses from `first` on, (n, n_polarizations, n_samples)."""
-    beam = work.weights.seen_from(antennas.tx, antennas.rx, slice(first, first + len(antennas.tx)))
-    made = np.zeros((len(antennas.tx), len(work.order.polarizations), len(frequencies)), np.complex64)
-    work.add(antennas, band, frequencies, made, total, first, beam)
-    return made
+    """Echoes (n, n_polarizations, n_samples) of the scene at n pulses from `first` on, without the pulse's spectrum."""
+    out = np.zeros((len(geometry), len(work.order.polarizations), len(frequencies)), np.complex64)
+    work.add(geometry, band, frequencies, out, total, first)
+    return out

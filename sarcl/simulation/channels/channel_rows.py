@@ -1,8 +1,7 @@
-"""Rows of an array's echoes: whose antennas, at which element, with which reference."""
+"""Rows of the phase history of an array: antenna positions of every channel, pulse by pulse, and reference ranges."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -17,99 +16,89 @@ CHANNELS = ("simultaneous", "separated")
 RECEIVE = ("reference", "own", "all")
 
 
-@dataclass(frozen=True, eq=False)
-class Sides:
-    """Antennas of every pulse, and what their arrays' elements are off them.
+class ChannelRows:
+    """Rows of an array's echoes: (pulse, receiver) where channels are summed, else (pulse, transmitter, receiver).
 
-    tx, rx  m (n, 3);  turn_tx, turn_rx  from the arrays' axes to the scene's (n, 3, 3), or None: the same
+    track      positions of the arrays' reference points at n pulses, and attitudes (n, 3, 3) of the transmitting and
+               of the receiving array; an attitude of None means that its axes are the scene's
+    receivers  positions of the receiving elements in the array, m (n_elements, 3); with receive="own" each channel has
+               its own instead: see `receivers_of`
     """
 
-    tx: np.ndarray
-    rx: np.ndarray
-    turn_tx: np.ndarray | None
-    turn_rx: np.ndarray | None
-
-    @classmethod
-    def of(cls, track: Trajectory, receiver: Trajectory | None) -> Sides:
-        """Of tracks: arrays turn with their attitude."""
-        back = track if receiver is None else receiver
-        return cls(track.positions, echo_sampling.receiver_positions(track, receiver), track.attitude, back.attitude)
-
-    def senders(self, places: np.ndarray, at: Any = slice(None)) -> np.ndarray:
-        """Where elements at `places`, m (..., 3), stand at pulses `at`, (n, ..., 3)."""
-        return _stand(self.tx, self.turn_tx, places, at)
-
-    def receivers(self, places: np.ndarray, at: Any = slice(None)) -> np.ndarray:
-        """The same on the receiving side."""
-        return _stand(self.rx, self.turn_rx, places, at)
-
-
-class Rows:
-    """Rows of an array's echoes: (pulse, receiver) where channels are added up, else (pulse, sender, receiver)."""
-
     def __init__(
-        self, array: AntennaArray, sides: Sides, point: np.ndarray, channels: str, receive: str, polarizations: Any
-    ) -> None:
-        self.array, self.sides, self.point, self.receive = array, sides, point, receive
+        self, array: AntennaArray, track: Trajectory, receiver: Trajectory | None, point: np.ndarray, channels: str,
+        receive: str, polarizations: Any,
+    ) -> None:  # fmt: skip
+        """point  the reference point, m (3,);  channels, receive: arguments of `sarcl.echo`."""
+        self.array, self.point, self.receive = array, point, receive
         self.separated, self.polarizations = channels == "separated", polarizations
-        self.heard = array.positions if receive == "all" else np.zeros((1, 3))
+        self.track = PulseGeometry(track.positions, echo_sampling.receiver_positions(track, receiver))
+        self.attitudes = track.attitude, (track if receiver is None else receiver).attitude
+        self.receivers = array.positions if receive == "all" else np.zeros((1, 3))
 
     @property
     def shape(self) -> tuple[int, int, int]:
-        """Pulses, senders, receivers of each."""
-        return len(self.sides.tx), self.array.n if self.separated else 1, len(self.heard)
+        """Numbers of pulses, of transmitters per pulse, and of receivers per transmitter."""
+        return len(self.track), self.array.n if self.separated else 1, len(self.receivers)
 
     @property
-    def hearing(self) -> int:
-        """Receivers of a channel."""
-        return 1 if self.receive == "own" else len(self.heard)
+    def n_receivers(self) -> int:
+        """Number of receivers of each channel."""
+        return 1 if self.receive == "own" else len(self.receivers)
 
-    def receivers(self, sender: np.ndarray) -> np.ndarray:
-        """Places of what hears a channel sent from `sender`, m (n, 3)."""
-        return sender[None] if self.receive == "own" else self.heard
+    def receivers_of(self, transmitter: np.ndarray) -> np.ndarray:
+        """Positions in the array of the receivers of a channel that is sent from `transmitter` (3,), m (n, 3)."""
+        return transmitter[None] if self.receive == "own" else self.receivers
+
+    def tx_positions(self, elements: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+        """Positions in the scene of transmitting elements, m (..., 3) in the array, at n pulses `at`: (n, ..., 3)."""
+        return _in_scene(self.track.tx, self.attitudes[0], elements, at)
+
+    def rx_positions(self, elements: np.ndarray, at: Any = slice(None)) -> np.ndarray:
+        """Positions in the scene of receiving elements, m (..., 3) in the array, at n pulses `at`: (n, ..., 3)."""
+        return _in_scene(self.track.rx, self.attitudes[1], elements, at)
 
     def ends(
-        self, sender: np.ndarray, at: Any = slice(None), which: slice = slice(None)
+        self, transmitter: np.ndarray, at: Any = slice(None), which: slice = slice(None)
     ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Antennas of a channel's rows at pulses `at` and some receivers.
+        """Antenna positions that the rows of a channel state, at n pulses `at` and for the receivers `which`.
 
-        Returns tx (n, 3) and rx (n, receivers, 3), m, and reference ranges (n, receivers).
+        Returns tx (n, 3) and rx (n, receivers, 3), m, and reference ranges (n, receivers), m.
         """
-        tx = self.sides.senders(sender, at) if self.separated else self.sides.tx[at]
-        rx = self.sides.receivers(self.receivers(sender)[which], at)
+        tx = self.tx_positions(transmitter, at) if self.separated else self.track.tx[at]
+        rx = self.rx_positions(self.receivers_of(transmitter)[which], at)
         return tx, rx, echo_sampling.half_path(tx[:, None], rx, self.point)
 
-    def put(self, samples: np.ndarray, channel: Channel, receivers: slice, part: slice, made: np.ndarray) -> None:
-        """Add a channel at some receivers, (n, receivers, n_polarizations, width), to samples of its pulses.
+    def add(self, samples: np.ndarray, channel: Channel, receivers: slice, part: slice, echoes: np.ndarray) -> None:
+        """Add echoes of a channel (n, receivers, n_polarizations, width) to samples of the pulses it is sent at.
 
-        samples  (n, senders, receivers, n_polarizations, n_samples)
+        samples  (n, transmitters, receivers, n_polarizations, n_samples);  part  the channel's samples among these
         """
         if not self.separated:
-            samples[:, 0, receivers, :, part] += np.complex64(channel.weight) * made
+            samples[:, 0, receivers, :, part] += np.complex64(channel.weight) * echoes
             return
         for element in channel.elements.tolist():
-            samples[:, element, receivers] = np.complex64(self.array.weights[element]) * made
+            samples[:, element, receivers] = np.complex64(self.array.weights[element]) * echoes
 
-    def geometry(self, center: float, sampling: Sampling, track: Trajectory, back: Trajectory) -> dict[str, Any]:
-        """What a PhaseHistory holds of every row."""
-        pulses, senders, receivers = self.shape
-        n, names = pulses * senders * receivers, self.polarizations
-        places = self.array.positions
-        tx = self.sides.senders(places)[:, :, None] if self.separated else self.sides.tx[:, None, None]
+    def fields(self, center: float, sampling: Sampling, track: Trajectory, back: Trajectory) -> dict[str, Any]:
+        """Fields of the PhaseHistory, one entry per row; center  Hz, of the waveform;  back  the receiver's track."""
+        pulses, transmitters, receivers = self.shape
+        n, names = pulses * transmitters * receivers, self.polarizations
+        elements = self.array.positions
+        tx = self.tx_positions(elements)[:, :, None] if self.separated else self.track.tx[:, None, None]
         own = self.receive == "own"
-        rx = self.sides.receivers(places)[:, :, None] if own else self.sides.receivers(self.heard)[:, None]
+        rx = self.rx_positions(elements)[:, :, None] if own else self.rx_positions(self.receivers)[:, None]
         reference = np.broadcast_to(echo_sampling.half_path(tx, rx, self.point), self.shape)
         tx, rx = (np.broadcast_to(ends, (*self.shape, 3)) for ends in (tx, rx))
         frequency = np.full(self.shape, sampling.frequency)
         if self.separated:
             offsets = np.stack([self.array.offsets_at(p) for p in range(pulses)])
             frequency[:] = (center + offsets - (sampling.width - 1) / 2 * sampling.step)[:, :, None]
-        pulse, sender_of, receiver_of = (i.ravel() for i in np.indices(self.shape))
+        pulse, tx_channel, rx_channel = (i.ravel() for i in np.indices(self.shape))
         out: dict[str, Any] = {
             "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
             "reference_range": reference.reshape(n), "time": track.times[pulse],
-            "tx_channel": sender_of if self.separated else None,
-            "rx_channel": sender_of if self.receive == "own" else receiver_of,
+            "tx_channel": tx_channel if self.separated else None, "rx_channel": tx_channel if own else rx_channel,
         }  # fmt: skip
         for name, velocities in (("tx_velocity", track.velocities), ("rx_velocity", back.velocities)):
             out[name] = None if velocities is None else velocities[pulse]
@@ -117,23 +106,7 @@ class Rows:
         return {**every, "polarization": np.tile(names, n), "frequency_step": sampling.step}
 
 
-def antennas_of(
-    tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, frequency: float, grid: Sampling,
-    window: tuple[float, float], n: int | None = None,
-) -> PulseGeometry:  # fmt: skip
-    """Antennas of pulses whose samples begin at `frequency`, Hz, n of them."""
-    rows, n = np.ones(len(tx)), grid.n if n is None else n
-    return PulseGeometry(
-        tx=tx,
-        rx=rx,
-        reference_range=reference_range,
-        frequency=(frequency + n // 2 * grid.step) * rows,
-        frequency_step=grid.step * rows,
-        near=window[0] * rows,
-        far=window[1] * rows,
-    )
-
-
-def _stand(ends: np.ndarray, turn: np.ndarray | None, places: np.ndarray, at: Any) -> np.ndarray:
-    spread = ends[at].reshape(-1, *(1,) * (places.ndim - 1), 3)
-    return np.asarray(spread + (places if turn is None else np.einsum("nij,...j->n...i", turn[at], places)))
+def _in_scene(centers: np.ndarray, attitude: np.ndarray | None, elements: np.ndarray, at: Any) -> np.ndarray:
+    spread = centers[at].reshape(-1, *(1,) * (elements.ndim - 1), 3)
+    turned = elements if attitude is None else np.einsum("nij,...j->n...i", attitude[at], elements)
+    return np.asarray(spread + turned)
