@@ -30,8 +30,7 @@ from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
-from .tiling import Run, extent
-from .tiling import count as pixels_in
+from .tiling import Run
 
 if TYPE_CHECKING:
     import distributed
@@ -164,15 +163,13 @@ def backproject(
             if not checkpoint.complete():
                 return None
         try:
-            output = ImageOutput(grid, out, stack, chosen.dtype)
+            output = ImageOutput(grid, chosen.tiling, out, stack, chosen.dtype)
         except FileExistsError:
             if piece:  # the others' tiles and these are being put together by another run
                 return None
             raise
         bands = 0, chosen.tiling.n_bands
         skipped, kept = _fill(workers, task, chosen, output, checkpoint, bands, clock, progress)
-        if grid.empty is not None and not output.grid.is_plane:
-            output.flat[grid.empty.ravel()] = 0  # where they are not skipped, they were focused
         output.finish()
         no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
         done = task.pairs - skipped.window - skipped.beam - no_data
@@ -270,11 +267,11 @@ def _fill(
     there, skipped = [], Skipped()
     for run, values, missed in checkpoint.found(*bands) if checkpoint else ():
         if output is not None:
-            output.flat[extent(tiling, *run)] = values
+            output.flat[tiling.extent(*run)] = values
         there.append(run)
         skipped += missed
     todo = gaps(there, *bands)
-    total = n_rows * sum(pixels_in(tiling, *run) for run in todo)
+    total = n_rows * sum(tiling.count(*run) for run in todo)
     reported = -1
 
     def on_progress(done: int) -> None:

@@ -22,7 +22,7 @@ from .factorized.factorized import Factorized
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
 from .focusing_task import Engine, FocusingTask
-from .tiling import GridTiling
+from .tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
 TINY = 1e-35  # of samples, below which pixels come near complex64's smallest numbers
@@ -41,7 +41,7 @@ class MethodChoice:
 
     method: str
     plan: Any
-    tiling: GridTiling
+    tiling: Tiling
     engine: Any
     predicted_error: float
     cost: float
@@ -54,7 +54,7 @@ class MethodChoice:
     @property
     def unit(self) -> int:
         """Bands that share work: cutting between them costs time."""
-        return int(self.plan.factors[0]) if self.method == "factorized" and self.tiling.grid.is_plane else 1
+        return self.tiling.root_bands(self.plan.factors[0]) if self.method == "factorized" else 1
 
     def on(self, device: Device, task: FocusingTask) -> Engine:
         """The engine on one device."""
@@ -134,7 +134,7 @@ class _Float32:
             dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
             raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
 
-    def _offer(self, name: str, made: tuple[Any, GridTiling], engine: Any) -> MethodChoice:
+    def _offer(self, name: str, made: tuple[Any, Tiling], engine: Any) -> MethodChoice:
         error = min(self.near * made[0].predicted_error + self.rounding, self.tolerance)
         return MethodChoice(name, *made, engine, error, made[0].cost)
 

@@ -17,7 +17,7 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
-from .tiling import GridTiling
+from .tiling import Tiling
 
 Skip = Literal["range window", "beam", "zero weight", "no data"]
 BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and where it is centred
@@ -88,7 +88,7 @@ class Engine(Protocol):
     """
 
     plan: Any
-    tiling: GridTiling
+    tiling: Tiling
     dtype: Any
     least_pixels: float
 
@@ -115,7 +115,7 @@ class Engine(Protocol):
         ...
 
 
-def working_bytes(tiling: GridTiling, run: tuple[int, int], length: int, nbytes: float) -> float:
+def working_bytes(tiling: Tiling, run: tuple[int, int], length: int, nbytes: float) -> float:
     """Estimated bytes that a direct engine takes for a run of bands: sums and values of the pixels, and the range
     profiles, of `length` samples, of 256 rows; nbytes at most."""
     return min(24.0 * tiling.pixels(*run) + 8.0 * length * 256, nbytes)

@@ -108,10 +108,7 @@ def _work(task: FocusingTask, chosen: MethodChoice) -> float:
     sources = [rows, *(len(level.decimation.nodes) for level in plan.levels)]
     extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
     for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
-        if tiling.grid.is_plane:
-            tiles = float(-(-tiling.n_bands // factor) * -(-tiling.across // factor))
-        else:
-            tiles = pixels / tiling.per_tile / factor**2
+        tiles = float(tiling.n_roots(0, tiling.n_bands, factor))
         moved = moving_cost(2 * level.reach, plan.between.taps, level.decimation.filter.shape[1])
         extra += max(tiles - task.grid.size / level.side**2, 0.0) * n * moved
     return task.grid.size * chosen.cost + extra / rows

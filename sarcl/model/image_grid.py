@@ -151,14 +151,18 @@ class ImageGrid:
         random = np.random.default_rng(seed)
         if self.size > MOST_NUMBERED:  # none is likely to be picked twice
             index = tuple(random.integers(0, n, most) for n in self.shape)
-            return index, self.at(*index)
+            return index, self.positions_of(index)
         if self.empty is None:
             picked = np.sort(random.choice(self.size, min(most, self.size), replace=False))
         else:
             cells = np.flatnonzero(~self.empty)
             picked = cells[np.sort(random.choice(len(cells), min(most, len(cells)), replace=False))]
         index = np.unravel_index(picked, self.shape)
-        return index, self.at(*index) if self.listed is None else self.listed[index]
+        return index, self.positions_of(index)
+
+    def positions_of(self, index: tuple[np.ndarray, ...]) -> NDArray[np.float64]:
+        """Positions, m (..., 3), of the pixels at whole indices into an image."""
+        return self.at(*index) if self.listed is None else self.listed[index]
 
     @property
     def normal(self) -> NDArray[np.float64]:

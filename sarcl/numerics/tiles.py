@@ -30,6 +30,10 @@ class Tiles:
     def n_tiles(self) -> int:
         return len(self.references)
 
+    def picked(self, tiles: np.ndarray) -> Tiles:
+        """These tiles only."""
+        return Tiles(self.per_tile, self.references[tiles], self.radius[tiles], self.tile_offsets(tiles), self.shared)
+
     def tile_offsets(self, tiles: np.ndarray) -> np.ndarray:
         """Offsets of these tiles only, (6, n_points)."""
         if self.shared:

@@ -80,8 +80,7 @@ def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:
     chosen = np.argpartition(flat, flat.size - count)[flat.size - count :]
     chosen = chosen[flat[chosen] > 0]
     chosen = chosen[np.argsort(-flat[chosen], kind="stable")]
-    index = np.unravel_index(chosen, grid.shape)
-    return np.asarray(grid.at(*index) if grid.listed is None else grid.listed[index])
+    return np.asarray(grid.positions_of(np.unravel_index(chosen, grid.shape)))
 
 
 def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: float, most: int) -> np.ndarray:

@@ -16,6 +16,7 @@ import sarcl
 from sarcl.imaging import choose_method
 from sarcl.imaging.factorized._memory import MemoryPlan
 from sarcl.imaging.focusing_task import make_task
+from sarcl.imaging.tiling import Part
 from sarcl.opencl.choose_device import open_device
 
 WIDE = sarcl.ImageGrid.plane(shape=(150, 1700), spacing=0.25)
@@ -78,8 +79,9 @@ def test_parts_are_all_leaves_once_and_fit(raw):
                 for a, b, left, right in engine.memory.parts(first, last, nbytes):
                     seen[a:b, left:right] += 1
                     assert left % engine.plan.factors[0] == 0
-                    pixels = (b - a) * (right - left) * tiling.per_tile
-                    assert engine.memory.n_bytes(engine.memory.tops(a, b, right - left), pixels) <= nbytes / 2
+                    size = tiling.part_size(Part(a, b, left, right), engine.plan.factors[0])
+                    assert size[1] == (b - a) * (right - left) * tiling.per_tile
+                    assert engine.memory.n_bytes(*size) <= nbytes / 2
             assert (seen == 1).all()
         assert len(list(engine.memory.parts(0, tiling.n_bands, least))) > 4
         assert list(engine.memory.parts(0, tiling.n_bands, 1e9)) == [(0, tiling.n_bands, 0, tiling.across)]

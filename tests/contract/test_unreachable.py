@@ -164,7 +164,7 @@ def test_why_no_sub_apertures_are_tried_is_true():
     for raw, grid, why in (
         (few, PLANE, "the aperture has 3 pulses; at least 4"),
         (wild, PLANE, "neighbouring pulses see the smallest tiles, of .* m radius, from directions that differ"),
-        (SMOOTH, LISTED, "neighbouring pulses see the smallest tiles of listed points, of .* m radius"),
+        (SMOOTH, LISTED, "neighbouring pulses see the smallest tiles, of .* m radius"),
     ):
         with pytest.raises(ToleranceUnreachable, match=why) as caught:
             sarcl.backproject(raw, grid, tolerance=1e-2, method="factorized")

@@ -13,7 +13,7 @@ from helpers.cases import image_error, noise_history
 import sarcl
 from sarcl.imaging.direct.direct import Direct
 from sarcl.imaging.run.workers import cut
-from sarcl.imaging.tiling import GridTiling, count
+from sarcl.imaging.tiling import PlaneTiling
 from sarcl.opencl.choose_device import open_device, open_devices
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
@@ -195,7 +195,7 @@ def test_bad_lists_of_devices_say_what_is_wrong(raw):
 
 
 def test_blocks_are_all_bands_cut_where_they_must_be():
-    tiling = GridTiling(GRID, 32)
+    tiling = PlaneTiling(GRID, 32)
     whole = (0, tiling.n_bands)
     for todo in ([whole], [(0, 3), (5, 6), (8, tiling.n_bands)], []):
         held = [b for a, c in todo for b in range(a, c)]
@@ -204,7 +204,7 @@ def test_blocks_are_all_bands_cut_where_they_must_be():
                 blocks = cut(tiling, todo, most, ends)
                 assert [b for a, c in blocks for b in range(a, c)] == held
                 assert not any(a < end < c for a, c in blocks for end in ends)
-                assert all(count(tiling, a, c) <= 1.5 * max(most, 32 * 301) for a, c in blocks)
+                assert all(tiling.count(a, c) <= 1.5 * max(most, 32 * 301) for a, c in blocks)
                 coarse = cut(tiling, todo, most, ends, unit=4)
                 assert [b for a, c in coarse for b in range(a, c)] == held
                 assert {a for a, _ in coarse} <= {a for a, _ in todo} | ends | set(range(0, tiling.n_bands, 4))

@@ -155,7 +155,6 @@ def test_tolerances_below_complex64_name_the_method_that_meets_them():
 def test_profiles_of_nodes_are_those_of_the_twin(device):
     from sarcl.base.constants import SPEED_OF_LIGHT
     from sarcl.base.stage_timer import Clock
-    from sarcl.imaging.factorized._tile_tree import tree_of
     from sarcl.imaging.factorized.factorized import Factorized
     from sarcl.reference.merge import merge
 
@@ -175,7 +174,7 @@ def test_profiles_of_nodes_are_those_of_the_twin(device):
     _, low, first, got = next(s for s in seen if s[0] == 0)
     made, sigma = plan.levels[0], 2 * raw.frequency_step[0] * plan.length / SPEED_OF_LIGHT
     m = np.arange(2 * made.reach + 1) - made.reach
-    center = tree_of(tiling, 0, tiling.n_bands, plan.factors).centers[0][low] + tiling.center
+    center = tiling.tree(0, tiling.n_bands, plan.factors).centers[0][low] + tiling.center
     wanted = merge(raw, center, m / sigma, made.decimation.blocks, made.decimation.filter, got.shape[1])
     error = got[low - first][:, : len(m)] - wanted
     assert np.linalg.norm(error) <= 1e-3 * np.linalg.norm(wanted)

@@ -24,7 +24,6 @@ from sarcl.imaging.focusing_task import Skipped, make_task
 from sarcl.imaging.run import checkpoint, tile_files
 from sarcl.imaging.run._fingerprint import job, mark
 from sarcl.imaging.run.image_output import BandBuffer, ImageOutput
-from sarcl.imaging.tiling import count, extent
 from sarcl.io import output_paths
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
@@ -166,7 +165,7 @@ def test_a_run_that_was_stopped_goes_on_and_makes_no_tile_twice(raw, whole, tmp_
     path = tmp_path / "image.h5"
     half_done(raw, path)
     tiling, runs = planned(raw).tiling, found(raw, path)
-    left = GRID.size - sum(count(tiling, *run) for run in runs)
+    left = GRID.size - sum(tiling.count(*run) for run in runs)
     assert 0.3 * GRID.size < left < 0.7 * GRID.size and not path.exists()
     calls = []
     image = sarcl.backproject(raw, GRID, out=path, progress=lambda *a: calls.append(a))
@@ -197,7 +196,7 @@ def found(raw, path):
 def test_tile_files_name_why_pairs_were_skipped(raw, tmp_path):
     tiling, skipped = planned(raw).tiling, Skipped(window=2**70, beam=3)
     files = tile_files.TileStore(tmp_path / "image.h5.parts", {}, tiling, np.complex64)
-    files.save(0, 1, [np.zeros((count(tiling, 0, 1) // 301, 301), np.complex64)], skipped)
+    files.save(0, 1, [np.zeros((tiling.count(0, 1) // 301, 301), np.complex64)], skipped)
     (path,) = tiles(tmp_path)
     assert b'"skipped": {"window": 1180591620717411303424, "beam": 3}' in path.read_bytes()
     assert [(run, n) for run, _, n in files.found(0, tiling.n_bands)] == [((0, 1), skipped)]
@@ -705,13 +704,13 @@ def test_a_strip_takes_what_the_whole_image_would(raw):
     tiling = choose(task, "auto", 1e-3).tiling
     rng = np.random.default_rng(0)
     with ExitStack() as stack:
-        target = ImageOutput(GRID, None, stack)
+        target = ImageOutput(GRID, tiling, None, stack)
         for first, last in ((0, 2), (2, 3), (3, tiling.n_bands)):
             values = rng.standard_normal(tiling.pixels(first, last)).astype(np.complex64)
             strip = BandBuffer(tiling, first, last, np.complex64)
             for flat in (strip, target.flat):
-                tiling.place(values, first, last, tiling.bands(first, last)[1], flat)
-            assert np.array_equal(strip.values, target.flat[extent(tiling, first, last)])
+                tiling.place(values, (first, last), 0, tiling.bands(first, last)[1], flat)
+            assert np.array_equal(strip.values, target.flat[tiling.extent(first, last)])
 
 
 # ---- command line

@@ -13,9 +13,8 @@ import sarcl
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging import choose_method
 from sarcl.imaging.direct import direct
-from sarcl.imaging.factorized._tile_tree import tree_of
 from sarcl.imaging.focusing_task import SKIPS, Skipped, make_task
-from sarcl.imaging.tiling import GridTiling
+from sarcl.imaging.tiling import PointTiling
 from sarcl.model.image_grid import ImageGrid
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact
@@ -177,8 +176,8 @@ BROADSIDE = (0.7, 0.0, -0.714)
 def looked_at(chosen, task):
     """How the factorised method sees a whole task."""
     engine = chosen.on(open_device(), task)
-    last = chosen.tiling.n_bands
-    return engine._coverage(tree_of(chosen.tiling, 0, last, chosen.plan.factors), 0, last)
+    parts = engine.memory.parts(0, chosen.tiling.n_bands, 1e12)
+    return engine._coverage(next(chosen.tiling.sections(parts, chosen.plan.factors)).roots)
 
 
 @pytest.mark.parametrize("listed", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["plane", "points"])
@@ -327,7 +326,7 @@ def test_every_reason_at_once(device):
 
 def test_bands_without_any_data(monkeypatch):
     # bands of 64 points: some hold none, the first among them
-    monkeypatch.setattr(GridTiling, "LISTED_BAND", 64)
+    monkeypatch.setattr(PointTiling, "LISTED_BAND", 64)
     raw = noise_history(n_rows=10)
     positions = np.random.default_rng(2).uniform(-3, 3, (500, 3))
     positions[:150] = positions[200:330] = np.nan

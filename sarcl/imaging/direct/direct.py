@@ -14,13 +14,13 @@ from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..focusing_task import FocusingTask, Skipped, working_bytes
-from ..tiling import GridTiling, place_tiles
+from ..tiling import Tiling, tiling_of
 from . import line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, kernel_of
 
 
-def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay; ValueError names the best there is
@@ -28,13 +28,13 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
     lined = None
-    if lanes and grid.is_plane:
+    if line_plan.possible(grid, lanes):
         lined = line_plan.choose(
             tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
         )
     if lined is not None and lined.cost < 0.9:  # no other plan costs less
         return lined, line_plan.LineTiling(grid, lined.side)
-    tilings = {side**2: GridTiling(grid, side) for side in (32, 16, 8)}
+    tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
         tolerance,
         [(n, tiling.radius) for n, tiling in tilings.items()],
@@ -56,7 +56,7 @@ class Direct:
 
     dtype = np.complex64
 
-    def __init__(self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: Tiling) -> None:
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         bistatic = not task.antennas.is_monostatic
@@ -72,16 +72,7 @@ class Direct:
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs of bands whose accumulators fit in their share of nbytes; a band that is alone may be larger."""
-        most, tiling = self._tiles_at_once(nbytes) * self.tiling.per_tile, self.tiling
-        if tiling.grid.is_plane:  # all bands are alike
-            step = max(1, most // tiling.pixels(0, 1))
-            return [(a, min(a + step, tiling.n_bands)) for a in range(0, tiling.n_bands, step)]
-        blocks, first = [], 0
-        for band in range(tiling.n_bands):
-            if band > first and tiling.pixels(first, band + 1) > most:
-                blocks.append((first, band))
-                first = band
-        return [*blocks, (first, tiling.n_bands)]
+        return self.tiling.blocks(self._tiles_at_once(nbytes) * self.tiling.per_tile)
 
     def working(self, nbytes: float) -> float:
         """See focusing_task.Engine."""
@@ -105,8 +96,8 @@ class Direct:
 
     def _tiles_at_once(self, nbytes: float) -> int:
         """Tiles whose accumulators, and offsets where each tile has its own, fit in the pixels' share of nbytes."""
-        planes = 16 if self.tiling.grid.is_plane else 16 + 24
-        return max(1, int(self._shares(nbytes)[1] / (planes * self.tiling.per_tile)))
+        pixel_bytes = 16 + self.tiling.offset_bytes
+        return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
@@ -115,10 +106,7 @@ class Direct:
         tiling = self.tiling
         tiles, orders = tiling.bands(first, last)
         most = self._tiles_at_once(budget)
-        skipped, values = Skipped(), np.empty(0, np.complex64)
-        whole = last - first > 1 or tiles.n_tiles <= most
-        if not tiling.grid.is_plane:
-            values = np.empty(tiling.pixels(first, last), np.complex64)
+        skipped = Skipped()
         for start in range(0, tiles.n_tiles, most):
             stop = min(start + most, tiles.n_tiles)
 
@@ -126,23 +114,10 @@ class Direct:
                 on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
             image, missed = self.add_up(_some(tiles, start, stop), budget, clock, rows_done)
-            if whole and tiling.grid.is_plane:
-                rows = tiling.download(self.device, image, first, last, None)
-                flat[first * tiling.high : first * tiling.high + len(rows)] = rows
-            elif len(values):
-                values[start * tiles.per_tile : stop * tiles.per_tile] = self._values(image, stop - start)
-            else:
-                place_tiles(tiling, self._values(image, stop - start), first, start, stop, flat)
+            tiling.place_sums(self.device, image, (first, last), (start, stop), orders, flat)
             skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
-        if len(values):
-            tiling.place(values, first, last, orders, flat)
         clock.lap("write")
         return skipped
-
-    def _values(self, image: Any, n_tiles: int) -> np.ndarray:
-        """Pixels of compensated sums on the device, tile by tile."""
-        sums = self.device.download(image, np.empty((4, n_tiles * self.tiling.per_tile), np.float32))
-        return ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).astype(np.complex64)
 
     def add_up(
         self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]

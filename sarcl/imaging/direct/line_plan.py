@@ -15,7 +15,7 @@ from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tiles import Tiles
-from ..tiling import GridTiling
+from ..tiling import PlaneTiling, outline
 
 LOCAL_BYTES = 60_000  # of local memory a group of pulses may take
 SIDES = (64, 32, 16)
@@ -82,23 +82,25 @@ class LinePlan:
         }
 
 
-class LineTiling(GridTiling):
+class LineTiling(PlaneTiling):
     """Square tiles of a plane about one of their pixels, (side/2, side/2), so that offsets are whole pixels."""
 
     def __init__(self, grid: ImageGrid, side: int) -> None:
         super().__init__(grid, side)
-        self.high = self.wide = side
-        rows, columns = grid.shape
-        self.n_bands, self.across = -(-rows // side), -(-columns // side)
-        assert grid.spacing is not None
-        self._radius = side / 2 * float(np.hypot(*grid.spacing))
+        self._cut(side, side)
+        self.radius = side / 2 * self.pixel
 
     def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
         half = self.side // 2
         columns = np.arange(self.across) * self.side + half
         references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
-        radius = np.full(self.across, self._radius)
+        radius = np.full(self.across, self.radius)
         return Tiles(self.per_tile, references, radius, np.zeros((6, 0), np.float32), shared=True), None
+
+
+def possible(grid: ImageGrid, lanes: bool) -> bool:
+    """Whether lines pay: pixels lie on lines, and the devices work on vectors of pixels."""
+    return lanes and grid.is_plane
 
 
 def steps(grid: ImageGrid) -> np.ndarray:
@@ -149,13 +151,6 @@ def sampled_groups(n_rows: int, group: int, most: int = 24) -> np.ndarray:
     """First rows of up to `most` groups spread over all rows."""
     starts = np.arange(0, max(n_rows - group, 0) + 1, group)
     return starts[np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).astype(int))]
-
-
-def outline(grid: ImageGrid) -> np.ndarray:
-    """Centre, corners and middles of the edges of a plane, m (9, 3)."""
-    rows, columns = grid.shape
-    i, j = np.meshgrid([0, rows // 2, rows - 1], [0, columns // 2, columns - 1], indexing="ij")
-    return grid.at(i.ravel(), j.ravel())
 
 
 def choose(

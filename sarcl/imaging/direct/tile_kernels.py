@@ -14,7 +14,7 @@ from ...base import float_pairs
 from ...numerics.plan import Plan
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
-from ..tiling import GridTiling
+from ..tiling import Tiling
 from . import line_plan
 from .line_plan import LinePlan, LineTiling, steps
 
@@ -31,7 +31,7 @@ class GatherKernel:
     chunk, least_rows = CHUNK, 1
 
     def __init__(
-        self, device: Device, plan: Plan, tiling: GridTiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool
+        self, device: Device, plan: Plan, tiling: Tiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool
     ) -> None:
         self.device, self.beam = device, beam
         self.lanes = device.info.vector_width
@@ -131,7 +131,7 @@ class TilesOnDevice:
         return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
 
 
-def kernel_of(device: Device, plan: Plan | LinePlan, tiling: GridTiling, **how: bool) -> GatherKernel | LineKernel:
+def kernel_of(device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: bool) -> GatherKernel | LineKernel:
     """The pass that a plan means; how: bistatic, wrap, local, beam."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)

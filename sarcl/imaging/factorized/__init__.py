@@ -10,7 +10,6 @@ For this folder alone:
     _memory          blocks within a memory limit
     _subapertures    runs of pulses, decimated level by level
     _tile_coverage   which rows see which of the largest tiles
-    _tile_tree       the quadtree of tiles
 """
 
 __all__ = ["factorized", "plan"]

@@ -8,17 +8,13 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import text
-from ..tiling import GridTiling
-from ._tile_tree import Tree
+from ..tile_tree import Tree
+from ..tiling import Part, Tiling
 from .plan import FactorPlan
 
 ROWS = 256  # rows a block of the first level
 AT_ONCE = 16e6  # bytes of profiles below the first level at a time on a CPU: they stay in its caches
 PIXEL_BYTES = 24  # a pixel: its sums, and its value where it is fetched
-OFFSET_BYTES = 24  # of a listed point besides
-
-# bands first ... last - 1 and leaves left ... right - 1 across, of a plane
-Part = tuple[int, int, int, int]
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,7 +27,7 @@ class MemoryPlan:
     """
 
     plan: FactorPlan
-    tiling: GridTiling
+    tiling: Tiling
     n_rows: int
     strides: list[int]
     source_stride: int
@@ -47,7 +43,7 @@ class MemoryPlan:
         is too little for one tile.
         """
         tiling = self.tiling
-        high, least = self.plan.factors[0] if tiling.grid.is_plane else 1, self._least()
+        high, least = tiling.root_bands(self.plan.factors[0]), self._least()
         if nbytes < least:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profiles of 16 rows, and a tile of "
@@ -66,12 +62,7 @@ class MemoryPlan:
     def working(self, nbytes: float) -> float:
         """Bytes that `Factorized.fill` takes for the first block, about, when it is given nbytes."""
         first, last = self.blocks(nbytes)[0]
-        if self.tiling.grid.is_plane:
-            a, b, left, right = next(self.parts(first, last, nbytes))
-            tops, pixels = self.tops(a, b, right - left), (b - a) * (right - left) * self.tiling.per_tile
-        else:
-            tops = min(self.tops(first, last), self.most(nbytes))
-            pixels = min(self.tiling.pixels(first, last), tops * self.plan.factors[0] ** 2 * self.tiling.per_tile)
+        tops, pixels = self.tiling.part_size(next(self.parts(first, last, nbytes)), self.plan.factors[0])
         rows = min(self.rows(nbytes), self.n_rows)
         return self.n_bytes(tops, pixels) + 8.0 * self.source_stride * rows + 2 * min(AT_ONCE, nbytes / 8)
 
@@ -79,56 +70,37 @@ class MemoryPlan:
         """Rows a block of the first level."""
         return max(16, min(ROWS, int(nbytes / 16 // (8 * self.source_stride)) // 16 * 16))
 
-    def tops(self, first: int, last: int, across: int | None = None) -> int:
-        """Tiles of the first level in bands first ... last - 1, of a plane `across` leaves wide."""
-        tiling, factor = self.tiling, self.plan.factors[0]
-        if tiling.grid.is_plane:
-            return (-(-last // factor) - first // factor) * -(-(across or tiling.across) // factor)
-        return sum(-(-tiling.pixels(b, b + 1) // tiling.per_tile // factor**2) for b in range(first, last))
-
     def n_bytes(self, tops: int, pixels: int) -> float:
         """Of the first level's profiles, and pixels."""
-        each = PIXEL_BYTES + (0 if self.tiling.grid.is_plane else OFFSET_BYTES)
+        each = PIXEL_BYTES + self.tiling.offset_bytes
         return float(tops) * self.plan.levels[0].n_bytes(self.strides[0]) + float(each) * pixels
 
     def _fits(self, first: int, last: int, nbytes: float) -> bool:
         """These bands can be made in one."""
-        tops, pixels = self.tops(first, last), self.tiling.pixels(first, last)
+        tops, pixels = self.tiling.n_roots(first, last, self.plan.factors[0]), self.tiling.pixels(first, last)
         largest = max(self.n_bytes(tops, 0), 16.0 * pixels)
         return self.n_bytes(tops, pixels) <= nbytes / 2 and largest <= self.max_alloc
 
     def most(self, nbytes: float, bands: int = 0) -> int:
         """Tiles of the first level at a time, cut to so many bands of a plane; 0 where not even one fits."""
-        factor, plane = self.plan.factors[0], self.tiling.grid.is_plane
-        pixels = (min(factor, self.tiling.across) if plane else factor) * (bands or factor) * self.tiling.per_tile
+        factor = self.plan.factors[0]
+        pixels = self.tiling.root_leaves(factor, bands or factor) * self.tiling.per_tile
         alloc = self.max_alloc / max(self.n_bytes(1, 0), 16.0 * pixels)
         return int(min(nbytes / 2 / self.n_bytes(1, pixels), alloc))
 
     def _least(self) -> float:
         """The least bytes that do: for 16 rows, and for a tile of the first level, of a plane cut to one band."""
-        factor, plane = self.plan.factors[0], self.tiling.grid.is_plane
-        pixels = (min(factor, self.tiling.across) if plane else factor**2) * self.tiling.per_tile
+        pixels = self.tiling.root_leaves(self.plan.factors[0], 1) * self.tiling.per_tile
         return max(8.0 * 16 * 8 * self.source_stride, 2 * self.n_bytes(1, pixels))
 
     def parts(self, first: int, last: int, nbytes: float) -> Iterator[Part]:
-        """Bands first ... last - 1 of a plane in parts that fit: runs of tiles of the first level, or one of them cut.
+        """Bands first ... last - 1 in parts that fit: runs of roots, or one of them cut."""
 
-        Such a tile's profiles are the same whichever of its bands are made from them.
-        """
-        across, factor = self.tiling.across, self.plan.factors[0]
-        if self._fits(first, last, nbytes):
-            yield first, last, 0, across
-            return
-        while first < last:
-            end = bands = min((first // factor + 1) * factor, last)
-            bands -= first
-            while bands > 1 and not self.most(nbytes, bands):
-                bands = -(-bands // 2)
-            width = factor * max(1, self.most(nbytes, bands))
-            for a in range(first, end, bands):
-                for left in range(0, across, width):
-                    yield a, min(a + bands, end), left, min(left + width, across)
-            first = end
+        def most(bands: int) -> int:
+            return self.most(nbytes, bands)
+
+        whole = self._fits(first, last, nbytes)
+        return self.tiling.parts((first, last), self.plan.factors[0], most, whole)
 
     def at_once(self, tree: Tree, budget: float) -> tuple[int, float, float]:
         """How the levels below the first are made: so many tiles of the first at a time, each of so many bytes.

@@ -9,20 +9,19 @@ from typing import Any
 import numpy as np
 
 from ...numerics.pulse_geometry import PulseGeometry
-from ..tiling import GridTiling
-from ._tile_tree import Tree
+from ..tiling import Roots
 
-MORE = 1.5  # as many rows as a tile needs, at most, are added to it directly so that neighbours share their profiles
+MORE = 1.5  # rows added directly to a root, relative to those it needs: neighbouring roots share range profiles
 
 
 @dataclass(frozen=True, eq=False)
 class TileCoverage:
-    """What becomes of the pairs of rows and largest tiles (tops).
+    """What becomes of the pairs of rows and roots (the largest tiles).
 
-    merged    (n tops,) bool: tops into which rows are merged
-    left_out  by top: the rows that are not, bool (n_rows,), or None where all are
-    directly  (tops, rows): rows that are added to these tops by the direct method instead, indices; rows None: all
-    missed    (2, n leaves): rows that neither sees, outside their range window, and outside their beam
+    merged    (n roots,) bool: roots into which rows are merged
+    left_out  for each root: the rows that are not merged, bool (n_rows,), or None where all are
+    directly  (roots, rows): rows that are added to these roots by the direct method instead, indices; rows None: all
+    missed    (2, n roots): rows that add nothing to a root, outside their range window, and outside their beam
     """
 
     merged: np.ndarray
@@ -30,33 +29,39 @@ class TileCoverage:
     directly: list[tuple[np.ndarray, np.ndarray | None]]
     missed: np.ndarray
 
+    def of(self, roots: np.ndarray) -> TileCoverage:
+        """The coverage of these roots: the same rows are added directly, whichever neighbours are made with them."""
+        place = np.full(len(self.merged), -1)
+        place[roots] = np.arange(len(roots))
+        directly = [(mine[mine >= 0], rows) for mine, rows in ((place[r], rows) for r, rows in self.directly)]
+        return TileCoverage(
+            self.merged[roots], [self.left_out[i] for i in roots], [d for d in directly if len(d[0])],
+            self.missed[:, roots],
+        )  # fmt: skip
 
-def coverage_of(
-    a: PulseGeometry, tree: Tree, tiling: GridTiling, radius: float, line_of: np.ndarray, least: float
-) -> TileCoverage:
-    """How rows see tops of `radius` m.
 
-    A row that sees every point of a top, in its range window and its beam, can be merged; one that sees none has no
-    part in it; one that sees some is added directly. Below `least` rows that can be merged, all are added directly.
+def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: float, least: float) -> TileCoverage:
+    """Coverage by rows of roots of `radius` m about the scene's centre, m (3,).
 
-    line_of  (n tops,): tops next to one another share direct rows if this is the same; a matter of the tiling alone
+    A row that sees every point of a root, in its range window and its beam, can be merged. One that sees none adds
+    nothing. One that sees some is added directly. Where fewer than `least` rows can be merged, all are added directly.
     """
-    n = len(tree.centers[0])
+    n = len(roots.centers)
     merged = np.ones(n, bool)
     left_out: list[Any] = [None] * n
-    missed = np.zeros((2, tree.leaves.n_tiles), np.int64)
+    missed = np.zeros((2, n), np.int64)
     if a.wrap and a.beam is None:
         return TileCoverage(merged, left_out, [], missed)
     reach = radius * (1 + 1e-6)
     partly: dict[int, np.ndarray] = {}
     reasons: dict[int, np.ndarray] = {}
-    whole_tops = []
-    for i, center in enumerate(tree.centers[0] + tiling.center):
-        depth = a.depth(center)
+    all_rows = []
+    for i, place in enumerate(roots.centers + center):
+        depth = a.depth(place)
         outside, whole = depth < -reach, depth >= reach
         unlit = np.zeros_like(outside)
         if a.beam is not None:
-            depth = a.beam_depth(center)
+            depth = a.beam_depth(place)
             unlit = ~outside & (depth < -reach)
             whole &= depth >= reach
         if whole.all():
@@ -64,45 +69,44 @@ def coverage_of(
         some = ~(whole | outside | unlit)
         if some.any() and whole.sum() < least:
             merged[i] = False
-            whole_tops.append(i)
+            all_rows.append(i)
             continue
         merged[i], left_out[i], reasons[i] = whole.any(), ~whole, np.stack([outside, unlit])
         if some.any():
             partly[i] = some
     directly: list[tuple[np.ndarray, np.ndarray | None]] = []
-    if whole_tops:
-        directly.append((np.array(whole_tops), None))
-    for tops, rows in _shared(partly, line_of):
-        directly.append((np.array(tops), np.flatnonzero(rows)))
-        for i in tops:
+    if all_rows:
+        directly.append((np.array(all_rows), None))
+    for some_roots, rows in _shared(partly, roots.line):
+        directly.append((np.array(some_roots), np.flatnonzero(rows)))
+        for i in some_roots:
             left_out[i] = left_out[i] | rows
             reasons[i] = reasons[i] & ~rows
     for i, why in reasons.items():
-        low, high = tree.leaves_of(i)
-        missed[:, low:high] = why.sum(axis=1)[:, None]
+        missed[:, i] = why.sum(axis=1)
     return TileCoverage(merged, left_out, directly, missed)
 
 
-def _shared(partly: dict[int, np.ndarray], line_of: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
-    """Runs of tops next to one another, and the rows that any of them needs: at most MORE times what each does."""
-    tops: list[int] = []
+def _shared(partly: dict[int, np.ndarray], line: np.ndarray) -> Iterator[tuple[list[int], np.ndarray]]:
+    """Runs of neighbouring roots, and the rows that any of them needs: at most MORE times the rows that each needs."""
+    roots: list[int] = []
     rows, fewest = np.zeros(0, bool), 0
     for i, some in partly.items():
-        both = rows | some if tops else some
-        least = min(fewest, int(some.sum())) if tops else int(some.sum())
-        if tops and (line_of[i] != line_of[tops[-1]] or i != tops[-1] + 1 or both.sum() > MORE * least):
-            yield tops, rows
-            tops, both, least = [], some, int(some.sum())
-        tops.append(i)
+        both = rows | some if roots else some
+        least = min(fewest, int(some.sum())) if roots else int(some.sum())
+        if roots and (line[i] != line[roots[-1]] or i != roots[-1] + 1 or both.sum() > MORE * least):
+            yield roots, rows
+            roots, both, least = [], some, int(some.sum())
+        roots.append(i)
         rows, fewest = both, least
-    if tops:
-        yield tops, rows
+    if roots:
+        yield roots, rows
 
 
 def same_coverage(
     rows: list[np.ndarray | None], low: int, high: int, most: int
 ) -> Iterator[tuple[int, int, np.ndarray | None]]:
-    """Tops low ... high - 1 in runs of up to `most` that leave out the same rows: (first, how many, these rows)."""
+    """Roots low ... high - 1 in runs of up to `most` that leave out the same rows: (first, how many, these rows)."""
     first = low
     while first < high:
         last, those = first + 1, rows[first]

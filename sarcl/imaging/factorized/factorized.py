@@ -8,7 +8,6 @@ Source: McCorkle and Rofheart
 
 from __future__ import annotations
 
-import copy
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from typing import Any
@@ -19,15 +18,14 @@ from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
 from ...numerics import range_profiles
-from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..direct.direct import Direct
 from ..direct.tile_kernels import TilesOnDevice, kernel_of
 from ..focusing_task import FocusingTask, Skipped
-from ..tiling import GridTiling
+from ..tile_tree import Tree
+from ..tiling import Roots, Tiling
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
-from ._tile_tree import Tree, tree_of
 from .plan import GUARD, FactorPlan, Level
 
 SPAN = 32  # vectors of a profile a work-item
@@ -49,7 +47,7 @@ class Factorized:
 
     dtype = np.complex64
 
-    def __init__(self, device: Device, task: FocusingTask, plan: FactorPlan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: FactorPlan, tiling: Tiling) -> None:
         self.device, self.plan, self.tiling = device, plan, tiling
         self.whole = self.task = task
         if (plan.order != np.arange(len(plan.order))).any():
@@ -128,42 +126,15 @@ class Factorized:
         def part_of(pixels: int) -> Callable[[float], None]:
             return lambda rows: on_progress((done * n_rows + rows * pixels) / of)
 
-        if not tiling.grid.is_plane:
-            tree = tree_of(tiling, first, last, self.plan.factors)
-            n = len(tree.centers[0])
-            coverage, sizes = self._coverage(_top_of(tree.centers[0]), first, last), tiling.tile_sizes(first, last)
-            values, most = (
-                np.empty((tree.leaves.n_tiles, tiling.per_tile), np.complex64),
-                max(1, self.memory.most(budget)),
-            )
-            for low in range(0, n, most):
-                tops = np.arange(low, min(low + most, n))
-                at = slice(*(tree.leaves_of(t)[i] for i, t in enumerate(tops[[0, -1]])))
-                pixels = (at.stop - at.start) * tiling.per_tile
-                some = _some_of(tree, low, tops[-1] + 1)
-                image, missed = self._sums(some, _seen(coverage, tops), budget, clock, part_of(pixels))
-                sums = self.device.download(image, np.empty((4, pixels), np.float32))
-                values[at] = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(-1, tiling.per_tile)
-                skipped += Skipped.of_tiles(missed, sizes[at])
-                done += pixels
-            tiling.place(values.ravel(), first, last, tiling.bands(first, last)[1], flat)
-            clock.lap("write")
-            return skipped
-        factor, lines = self.plan.factors[0], (0, 0)
-        wide = -(-tiling.across // factor)
-        for a, b, left, right in self.memory.parts(first, last, budget):
-            before, lines = lines, (a // factor, -(-b // factor))
-            if lines != before:
-                coverage = self._coverage(_top_of(self._centers(*lines)), a, b)
-            part = _columns(tiling, left, right)
-            tree, pixels = tree_of(part, a, b, self.plan.factors), part.pixels(a, b)
-            down, over = np.arange(lines[1] - lines[0]), np.arange(left // factor, -(-right // factor))
-            seen = _seen(coverage, (down[:, None] * wide + over).ravel())
-            image, missed = self._sums(tree, seen, budget, clock, part_of(pixels))
-            made = part.download(self.device, image, a, b, tree.slot)
-            at = slice(left * tiling.wide, left * tiling.wide + made.shape[1])
-            flat[a * tiling.high : a * tiling.high + len(made), at] = made
-            skipped += Skipped.of_tiles(missed, part.tile_sizes(a, b)[tree.slot])
+        roots = coverage = None
+        for section in tiling.sections(self.memory.parts(first, last, budget), self.plan.factors):
+            if section.roots is not roots:
+                roots, coverage = section.roots, self._coverage(section.roots)
+            assert coverage is not None
+            tree, pixels = section.tree, section.tree.leaves.n_tiles * tiling.per_tile
+            image, missed = self._sums(tree, coverage.of(section.which), budget, clock, part_of(pixels))
+            tiling.place_section(self.device, image, section, flat)
+            skipped += Skipped.of_tiles(missed, section.sizes)
             done += pixels
             clock.lap("write")
         return skipped
@@ -206,25 +177,12 @@ class Factorized:
         on_progress(n_rows)
         return image, missed
 
-    def _centers(self, low: int, high: int) -> np.ndarray:
-        """Centres of lines low ... high - 1 of a plane's tiles of the first level, m (n, 3), those of its trees."""
-        tiling, factor = self.tiling, self.plan.factors[0]
-        if factor == 1:
-            return tiling.bands(low, high)[0].references
-        rows = (np.arange(low, high) + 0.5) * factor * tiling.high
-        columns = (np.arange(-(-tiling.across // factor)) + 0.5) * factor * tiling.wide
-        return np.asarray(tiling.grid.at(rows[:, None], columns).reshape(-1, 3) - tiling.center)
-
-    def _coverage(self, tree: Tree, first: int, last: int) -> TileCoverage:
-        """How rows see tiles of the first level of bands first ... last - 1, whole lines of them in a plane."""
-        plan, factor = self.plan, self.plan.factors[0]
-        if self.tiling.grid.is_plane:
-            line_of = np.repeat(range(first // factor, -(-last // factor)), -(-self.tiling.across // factor))
-        else:
-            line_of = np.repeat(range(first, last), [self.memory.tops(b, b + 1) for b in range(first, last)])
+    def _coverage(self, roots: Roots) -> TileCoverage:
+        """Coverage of roots by all rows."""
+        plan = self.plan
         # merging costs the same for any number of rows
         least = self.task.raw.n_rows * plan.cost / plan.edge.cost
-        return coverage_of(self.antennas, tree, self.tiling, plan.levels[0].radius, line_of, least)
+        return coverage_of(self.antennas, roots, self.tiling.center, plan.levels[0].radius, least)
 
     def _add_directly(
         self, down: _Descent, tops: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
@@ -239,7 +197,7 @@ class Factorized:
             task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
         picked = np.concatenate([np.arange(*tree.leaves_of(top)) for top in tops])
         engine = Direct(self.device, task, self.plan.edge, self.tiling)
-        some = _picked(tree.leaves, picked)
+        some = tree.leaves.picked(picked)
         image, missed = engine.add_up(some, budget, clock, lambda rows: None)
         copy = self.device.kernel("assemble_image.cl", "move")
         where = self.device.upload(picked.astype(np.int32))
@@ -352,45 +310,3 @@ def _runs(low: int, high: int, most: float) -> Iterator[tuple[int, int]]:
     step = max(1, int(min(most, high - low)))
     for begin in range(low, high, step):
         yield begin, min(begin + step, high)
-
-
-def _columns(tiling: GridTiling, left: int, right: int) -> GridTiling:
-    """Leaves left ... right - 1 across a plane; left is a multiple of the first level's factor."""
-    if (left, right) == (0, tiling.across):
-        return tiling
-    part = copy.copy(tiling)
-    part.across = right - left
-    part.grid = tiling.grid.columns(left * tiling.wide, min(right * tiling.wide, tiling.grid.shape[1]))
-    return part
-
-
-def _top_of(centers: np.ndarray) -> Tree:
-    """Tiles of the first level about `centers`, m (n, 3), and nothing below them."""
-    n = len(centers)
-    return Tree((centers,), (), Tiles(1, centers, np.zeros(n), np.zeros((6, 0), np.float32), True), np.arange(n))
-
-
-def _some_of(tree: Tree, low: int, high: int) -> Tree:
-    """Tiles low ... high - 1 of the first level, and all below them."""
-    centers, children = [tree.centers[0][low:high]], []
-    for below, begins in zip(tree.centers[1:], tree.children, strict=True):
-        children.append(begins[low : high + 1] - begins[low])
-        low, high = int(begins[low]), int(begins[high])
-        centers.append(below[low:high])
-    return Tree(tuple(centers), tuple(children), _picked(tree.leaves, np.arange(low, high)), tree.slot[low:high])
-
-
-def _picked(tiles: Tiles, which: np.ndarray) -> Tiles:
-    """These tiles."""
-    return Tiles(tiles.per_tile, tiles.references[which], tiles.radius[which], tiles.tile_offsets(which), tiles.shared)
-
-
-def _seen(coverage: TileCoverage, tops: np.ndarray) -> TileCoverage:
-    """What `coverage` says of these tops: the same rows are added directly, whichever neighbours are made with them."""
-    place = np.full(len(coverage.merged), -1)
-    place[tops] = np.arange(len(tops))
-    directly = [(mine[mine >= 0], rows) for mine, rows in ((place[t], rows) for t, rows in coverage.directly)]
-    return TileCoverage(
-        coverage.merged[tops], [coverage.left_out[i] for i in tops], [d for d in directly if len(d[0])],
-        coverage.missed[:, tops],
-    )  # fmt: skip

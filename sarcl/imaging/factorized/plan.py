@@ -19,9 +19,8 @@ from ..direct import line_plan
 from ..direct.line_plan import LinePlan, LineTiling
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
-from ..tiling import GridTiling
+from ..tiling import Tiling, tiling_of
 from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
-from ._tile_tree import spread_of, tree_of
 
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)
@@ -78,7 +77,7 @@ class FactorPlan:
         }
 
 
-def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay
@@ -87,7 +86,8 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     order, runs = runs_of(task.raw)
     track = replace(task.antennas.picked(order), runs=tuple(runs))
     reason = ""
-    for lines in (True, False) if lanes and task.grid.is_plane else (False,):  # near an antenna lines bend too much
+    # near an antenna, lines are curved too much
+    for lines in (True, False) if line_plan.possible(task.grid, lanes) else (False,):
         case = _Case(task, track, order, tolerance, lines)
         tried = sorted(case.candidates(), key=lambda c: c[0])[:TRIES]
         for _, choice in tried:
@@ -115,21 +115,9 @@ class _Case:
         self.task, self.track, self.order, self.tolerance, self.lines = task, track, order, tolerance, lines
         self.highest, self.bandwidth = task.highest, float(task.raw.bandwidth.max())
         self.distance = task.antennas.distance(grid.bounds)
-        self.axes: np.ndarray | None = None
-        if grid.is_plane:
-            assert grid.x_axis is not None and grid.y_axis is not None
-            self.axes = np.stack([grid.x_axis, grid.y_axis])
-            self.points = line_plan.outline(grid)
-            assert grid.spacing is not None
-            pixel, self.largest = float(np.hypot(*grid.spacing)), max(grid.shape)
-            self.leaves = {side: side / 2 * pixel for side in (cost_model.LEAF if lines else (32, 16))}
-        else:
-            low, high = grid.bounds
-            signs = np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
-            self.points = (low + high) / 2 + signs * (high - low) / 2
-            side = 16
-            self.leaves = {side: GridTiling(grid, side).radius}
-            self.largest = int(np.sqrt(grid.size))
+        tiling = tiling_of(grid, 16)
+        self.axes, self.points, self.largest = tiling.axes, tiling.outline(), tiling.longest_side
+        self.leaves = {side: tiling.leaf_radius(side) for side in (cost_model.LEAF if lines else tiling.leaf_sides)}
         self.turning = (
             rate(track, self.points, self.axes) * 2 * self.highest / SPEED_OF_LIGHT
         )  # cycles per row and metre
@@ -156,9 +144,8 @@ class _Case:
         n_rows, leaf = self.task.raw.n_rows, min(self.leaves.values())
         if n_rows < 4:
             return f"the aperture has {n_rows} pulses; at least 4 are needed to merge any"
-        tiles = "tiles" if self.task.grid.is_plane else "tiles of listed points"
         return (
-            f"neighbouring pulses see the smallest {tiles}, of {leaf:.3g} m radius, from directions that differ too "
+            f"neighbouring pulses see the smallest tiles, of {leaf:.3g} m radius, from directions that differ too "
             "much to be merged"
         )
 
@@ -183,7 +170,7 @@ class _Case:
 
     def build(
         self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, thins: list[int], share: float
-    ) -> tuple[FactorPlan, GridTiling] | str:  # fmt: skip
+    ) -> tuple[FactorPlan, Tiling] | str:  # fmt: skip
         """The plan of a candidate, its errors computed for the track as it is; where they are too large, which are."""
         raw, grid = self.task.raw, self.task.grid
         between = interpolation.line_interpolator(taps, spacing)
@@ -193,9 +180,9 @@ class _Case:
         first = next((i for i in made if i.error <= share), None)
         if first is None:
             return f"interpolation of range profiles with {max(interpolation.TERMS)} taps errs by more than its share"
-        tiling = LineTiling(grid, chain[-1]) if self.lines else GridTiling(grid, chain[-1])
+        tiling = LineTiling(grid, chain[-1]) if self.lines else tiling_of(grid, chain[-1])
         factors = tuple(side // chain[-1] for side in chain)
-        radii = self._radii(tiling, factors)
+        radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
         for radius, thin in zip(radii, thins, strict=True):
@@ -217,7 +204,7 @@ class _Case:
         # from the leaves up: a tile's profiles hold those of its children, and what their interpolation touches
         reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
         for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
-            apart = radius if not grid.is_plane else radius - below * (1 - 2 / chain[-1])
+            apart = tiling.child_distance(radius, below)
             reach.append(int(np.ceil(apart * sigma)) + reach[-1] + GUARD)
         if self.task.wrap and reach[-1] + 4 * GUARD > length:
             return "the largest tiles are wider than the period in which ranges repeat"
@@ -232,15 +219,8 @@ class _Case:
             cost / (raw.n_rows * grid.size), self.order,
         ), tiling  # fmt: skip
 
-    def _radii(self, tiling: GridTiling, factors: tuple[int, ...]) -> list[float]:
-        """Largest distance of a point from its tile's centre, m, level by level."""
-        if tiling.grid.is_plane:
-            return [tiling.radius * factor for factor in factors]
-        tree = tree_of(tiling, 0, tiling.n_bands, factors)
-        return spread_of(tree, tree.leaves.radius)
-
     def _leaf(
-        self, tolerance: float, nodes: PulseGeometry, source: tuple[Interpolator, int], tiling: GridTiling
+        self, tolerance: float, nodes: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
     ) -> LinePlan | Plan | None:
         """How leaves become pixels within a tolerance."""
         raw, n_samples = self.task.raw, self.task.raw.n_samples
@@ -263,7 +243,7 @@ class _Case:
                     best = Plan(*source, tiling.per_tile, mode, order, error, cost)
         return best
 
-    def _edge(self, tiling: GridTiling) -> LinePlan | Plan | None:
+    def _edge(self, tiling: Tiling) -> LinePlan | Plan | None:
         """For tiles that some pulse sees only in part: directly, on the same leaves. None where nothing can."""
         raw = self.task.raw
         if self.lines:

@@ -14,7 +14,7 @@ from ...opencl import fft
 from ...opencl.device import Device
 from ...opencl.device_list import devices
 from ..focusing_task import FocusingTask, Skipped, working_bytes
-from ..tiling import GridTiling
+from ..tiling import Tiling
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
@@ -29,7 +29,7 @@ class DirectFloat64:
     dtype = np.complex128
     least_pixels = np.inf
 
-    def __init__(self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: GridTiling) -> None:
+    def __init__(self, device: Device, task: FocusingTask, plan: Float64Plan, tiling: Tiling) -> None:
         if not device.info.fp64:
             raise ValueError(_no_float64(device))
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
@@ -53,13 +53,7 @@ class DirectFloat64:
                 f"max_bytes is {text.size_text(nbytes)} but the range profile of one row needs half of "
                 f"{text.size_text(least)}; give max_bytes={least:.2g} or more"
             )
-        most = self._tiles_at_once(nbytes) * self.tiling.per_tile
-        blocks, first = [], 0
-        for band in range(self.tiling.n_bands):
-            if band > first and self.tiling.pixels(first, band + 1) > most:
-                blocks.append((first, band))
-                first = band
-        return [*blocks, (first, self.tiling.n_bands)]
+        return self.tiling.blocks(self._tiles_at_once(nbytes) * self.tiling.per_tile)
 
     def working(self, nbytes: float) -> float:
         """See focusing_task.Engine."""
@@ -77,8 +71,8 @@ class DirectFloat64:
     ) -> Skipped:
         """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
-        positions, orders = tile_positions(tiling, first, last)
-        positions, lanes = by_range(positions, raw.tx[middle], raw.rx[middle])
+        orders = tiling.bands(first, last)[1]
+        positions, lanes = by_range(tiling.positions(first, last, orders), raw.tx[middle], raw.rx[middle])
         values, missed = np.empty(positions.shape[:2], np.complex128), np.empty((2, len(positions)), np.int64)
         # as few runs of tiles as fit; every one reads all rows anew
         runs = -(-len(positions) // self._tiles_at_once(budget))
@@ -90,7 +84,7 @@ class DirectFloat64:
 
             made, missed[:, run] = self._tiles(positions[run], budget, clock, part)
             np.put_along_axis(values[run], lanes[run], made, axis=1)
-        tiling.place(values.ravel(), first, last, orders, flat)
+        tiling.place(values.ravel(), (first, last), 0, orders, flat)
         clock.lap("write")
         return Skipped.of_tiles(missed, tiling.tile_sizes(first, last))
 
@@ -148,26 +142,6 @@ def remedy() -> str:
     """What to do on a device without float64."""
     able = [f"{i.index}: {i.name}" for i in devices() if i.works and i.fp64]
     return f"choose device= one of {'; '.join(able)}" if able else "no device here has float64"
-
-
-def tile_positions(tiling: GridTiling, first: int, last: int) -> tuple[np.ndarray, list[np.ndarray | None]]:
-    """Positions, m (n_tiles, per_tile, 3), of bands first ... last - 1, and for listed points their order.
-
-    They are grid.positions to the bit: near the Earth's surface, a rounding of 1 nm is 4e-7 rad at X band. Tiles
-    that reach beyond the grid repeat its last row and column.
-    """
-    grid, n = tiling.grid, tiling.per_tile
-    if grid.listed is not None:
-        _, orders = tiling.bands(first, last)
-        points, band = grid.listed.reshape(-1, 3), tiling.LISTED_BAND
-        parts = [points[b * band + o] for b, o in zip(range(first, last), orders, strict=True) if o is not None]
-        return np.concatenate(parts).reshape(-1, n, 3), orders
-    rows, columns = grid.shape
-    high, wide, across = tiling.high, tiling.wide, tiling.across
-    i = np.minimum(np.arange(first * high, last * high), rows - 1)
-    j = np.minimum(np.arange(across * wide), columns - 1)
-    made = grid.at(i[:, None], j).reshape(last - first, high, across, wide, 3)
-    return made.transpose(0, 2, 1, 3, 4).reshape(-1, n, 3), [None] * (last - first)
 
 
 def by_range(positions: np.ndarray, tx: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

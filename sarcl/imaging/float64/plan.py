@@ -17,7 +17,7 @@ from ...opencl import fft
 from .. import profile_energy
 from ..focusing_task import FocusingTask
 from ..profile_energy import ProfileEnergy
-from ..tiling import GridTiling
+from ..tiling import Tiling, tiling_of
 
 CHUNK = 64  # rows added plainly before the compensated total; blocks of rows are multiples of it
 SIDES = (16, 8)  # of tiles, pixels
@@ -72,7 +72,7 @@ class Float64Plan:
         }
 
 
-def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, GridTiling]:
+def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
     ToleranceUnreachable names the best tolerance there is; ValueError for paths that are too long (`too_long`).
@@ -80,7 +80,7 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, GridTi
     long = too_long(task)
     if long:
         raise ValueError(long)
-    tilings = {side**2: GridTiling(task.grid, side) for side in SIDES}
+    tilings = {side**2: tiling_of(task.grid, side) for side in SIDES}
     energy = profile_energy.estimate(task)
     plans = sorted(_plans(task, tilings, energy), key=lambda p: p.cost)
     good = next((p for p in plans if p.predicted_error <= tolerance), None)
@@ -97,7 +97,7 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, GridTi
     return named, tilings[named.per_tile]
 
 
-def _plans(task: FocusingTask, tilings: dict[int, GridTiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:
+def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:
     """Every plan there is. Memory plays no part: neither plan nor image depends on it."""
     raw, grid = task.raw, task.grid
     frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())

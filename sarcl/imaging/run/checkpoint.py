@@ -16,7 +16,7 @@ from ...model import store
 from ...model.image import Image
 from ..choose_method import MethodChoice
 from ..focusing_task import FocusingTask, Skipped
-from ..tiling import Run, extent, row_shape
+from ..tiling import Run
 from . import _fingerprint
 from .tile_files import TileStore, discard, folder_of, gaps
 
@@ -54,7 +54,7 @@ class Checkpoint:
         self.begun = time.monotonic()
         self.fresh = True
         self._waiting: list[tuple[int, int, Skipped]] = []
-        self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(row_shape(chosen.tiling.grid))
+        self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(chosen.tiling.row_shape)
         if resume is False:
             discard(self.folder)
         elif resume or self.folder.exists():
@@ -93,7 +93,7 @@ class Checkpoint:
         try:
             tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
-                tiles.save(a, b, _parts(flat, extent(self.chosen.tiling, a, b), self._row_bytes), n)
+                tiles.save(a, b, _parts(flat, self.chosen.tiling.extent(a, b), self._row_bytes), n)
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise

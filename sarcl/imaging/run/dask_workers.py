@@ -23,7 +23,7 @@ from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
 from ..choose_method import MethodChoice
 from ..focusing_task import Engine, FocusingTask, Skipped
-from ..tiling import Run, count, extent
+from ..tiling import Run
 from .image_output import BandBuffer
 from .workers import FinishedBlock, OutputFor, cut
 
@@ -78,9 +78,9 @@ class DaskWorkers:
                 future.release()
                 self.names = sorted({*self.names, name})
                 flat = output_for(first, last)
-                flat[extent(self.tiling, first, last)] = values
+                flat[self.tiling.extent(first, last)] = values
                 clock.lap("backproject")
-                pairs += self.n_rows * count(self.tiling, first, last)
+                pairs += self.n_rows * self.tiling.count(first, last)
                 on_progress(pairs)
                 yield first, last, flat, skipped
         finally:

@@ -13,14 +13,14 @@ from ...io import sarcl_hdf5
 from ...model import store
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
-from ..tiling import GridTiling, extent, row_shape
+from ..tiling import Tiling
 
 
 class ImageOutput:
     """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
 
-    def __init__(self, grid: ImageGrid, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
-        self.grid, self.writer = grid, None
+    def __init__(self, grid: ImageGrid, tiling: Tiling, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
+        self.grid, self.tiling, self.writer = grid, tiling, None
         self.data: Any
         if out is None:
             nbytes = float(grid.size * np.dtype(dtype).itemsize)
@@ -43,11 +43,13 @@ class ImageOutput:
                 raise ValueError(f"out has type {out.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
             self.data = out
         # rows of a plane go straight to their place; listed points arrive along a curve and go there at the end
-        self.flat = self.data if grid.is_plane else np.empty(grid.size, dtype)
+        self.flat = self.data if tiling.in_rows else np.empty(grid.size, dtype)
 
     def finish(self) -> None:
         """Everything has been written to `flat`."""
-        if not self.grid.is_plane:
+        if self.grid.empty is not None:
+            self.flat[self.grid.empty.ravel()] = 0  # where empty cells are not skipped, they were focused
+        if not self.tiling.in_rows:
             self.data[...] = self.flat.reshape(self.grid.shape)
 
     def image(self, job: str | None = None, **fields: Any) -> Image:
@@ -62,10 +64,10 @@ class ImageOutput:
 class BandBuffer:
     """The pixels of some bands alone, written as if they were ImageOutput.flat: where no whole image is at hand."""
 
-    def __init__(self, tiling: GridTiling, first: int, last: int, dtype: Any) -> None:
-        at = extent(tiling, first, last)
+    def __init__(self, tiling: Tiling, first: int, last: int, dtype: Any) -> None:
+        at = tiling.extent(first, last)
         self.start = at.start
-        self.values = np.empty((at.stop - at.start, *row_shape(tiling.grid)), dtype)
+        self.values = np.empty((at.stop - at.start, *tiling.row_shape), dtype)
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         return self.values[rows.start - self.start : rows.stop - self.start]

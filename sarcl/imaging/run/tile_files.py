@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..focusing_task import Skipped
-from ..tiling import GridTiling, Run, count, extent, row_shape
+from ..tiling import Run, Tiling
 from ._fingerprint import as_bytes, checker, difference, mark
 
 log = logging.getLogger(__name__)
@@ -43,7 +43,7 @@ class TileStore:
     ValueError where it holds another job's tiles; raises OSError where nothing can be made there.
     """
 
-    def __init__(self, folder: Path, job: dict[str, Any], tiling: GridTiling, dtype: Any) -> None:
+    def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: Any) -> None:
         self.folder, self.tiling, self.dtype = folder, tiling, np.dtype(dtype)
         self.mark = mark(job)
         try:
@@ -155,13 +155,13 @@ class TileStore:
         head = json.loads(data[len(MAGIC) + 8 : start])
         if head["job"] != self.mark:
             return None, Skipped(), FOREIGN
-        at = extent(self.tiling, first, last)
-        size = count(self.tiling, first, last) * self.dtype.itemsize
+        at = self.tiling.extent(first, last)
+        size = self.tiling.count(first, last) * self.dtype.itemsize
         fits = len(data) - DIGEST - start == size and head["dtype"] == self.dtype.str
         if not fits or (head["first"], head["last"]) != (first, last):
             return None, Skipped(), "does not hold what its name says"
         values = np.frombuffer(data, self.dtype, size // self.dtype.itemsize, start)
-        return values.reshape(at.stop - at.start, *row_shape(self.tiling.grid)), Skipped(**head["skipped"]), ""
+        return values.reshape(at.stop - at.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
 
     def _mark_in(self, path: Path) -> str | None:
         """The fingerprint in a file's head; None where it has none that can be read."""

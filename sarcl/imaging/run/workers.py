@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.stage_timer import Clock
 from ..focusing_task import Engine, Skipped
-from ..tiling import GridTiling, Run, count
+from ..tiling import Run, Tiling
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
 OutputFor = Callable[[int, int], Any]  # where the pixels of a run go
@@ -49,14 +49,14 @@ class WorkerPool(Protocol):
         ...
 
 
-def cut(tiling: GridTiling, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
+def cut(tiling: Tiling, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
     """The bands of `todo` in even blocks of about `most` pixels, none across one of `ends`.
 
     Blocks begin at multiples of `unit` bands where neither `todo` nor `ends` want otherwise.
     """
     blocks = []
     for start, stop in todo:
-        n = min(stop - start, max(1, int(np.ceil(count(tiling, start, stop) / max(most, 1)))))
+        n = min(stop - start, max(1, int(np.ceil(tiling.count(start, stop) / max(most, 1)))))
         even = {(start + (stop - start) * i // n) // unit * unit for i in range(1, n)}
         first = start
         for last in sorted({e for e in even | ends if start < e < stop} | {stop}):
@@ -104,7 +104,7 @@ class LocalWorkers:
         on_progress: Callable[[int], None],
     ) -> tuple[FinishedBlock, int]:
         """One block by engine k, and the pairs done after it."""
-        flat, pixels = output_for(first, last), count(self.engines[k].tiling, first, last)
+        flat, pixels = output_for(first, last), self.engines[k].tiling.count(first, last)
 
         def rows_done(rows: float) -> None:
             on_progress(before + int(min(rows, self.n_rows) * pixels))
