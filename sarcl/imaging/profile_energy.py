@@ -11,7 +11,8 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
-from ..numerics.interpolation_float64 import kernel
+from ..numerics import range_profiles
+from ..numerics.interpolation import deconvolved
 from ..opencl import fft
 from .focusing_task import FocusingTask
 
@@ -61,7 +62,7 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     n = raw.n_samples
     k = np.arange(n) - n // 2
     length = fft.good_length(max(4 * n, 48))
-    shaped = 1 / kernel(TAPS, FINER, TERMS).transform(k / length)
+    shaped = 1 / deconvolved(TAPS, FINER, TERMS, np.float64).transform(k / length)
     at = near = lit = 0.0
     for row, samples in read.items():
         turns, inside = _delays(task, x, row)
@@ -120,13 +121,10 @@ def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarra
 
     shaped  (n_samples,): what makes up for the kernel's transform
     """
-    made, n = kernel(TAPS, FINER, TERMS), len(samples)
-    k = np.arange(n) - n // 2
-    spectrum = np.zeros(length, np.complex128)
-    spectrum[k] = samples * shaped
-    profile = np.fft.ifft(spectrum) * length
-    spectrum[k] = samples
-    power = np.abs(np.fft.ifft(spectrum) * length) ** 2
+    made = deconvolved(TAPS, FINER, TERMS, np.float64)
+    weights = np.stack([shaped, np.ones(len(samples))])
+    profile, plain = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
+    power = np.abs(plain) ** 2
     place = turns * length - (made.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
     taps = (first[:, None] + np.arange(made.taps)) % length

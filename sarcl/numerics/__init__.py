@@ -4,10 +4,8 @@ For other folders:
 
     cost_model              measured costs by which plans are compared
     double_double           double-double arithmetic: sums, products and quotients with their rounding errors
-    error_bounds            error bounds of the float32 kernels
-    error_bounds_float64    error bounds of the float64 kernels
-    interpolation           interpolation kernels for range profiles in float32
-    interpolation_float64   interpolation kernels for range profiles in float64
+    error_bounds            error bounds of the kernels
+    interpolation           interpolation kernels for range profiles
     nufft2d                 two-dimensional nonuniform FFT of type 1
     plan                    the cheapest plan that meets a tolerance, and its predicted error
     polynomials             Lagrange polynomials, Chebyshev nodes
@@ -21,9 +19,7 @@ __all__ = [
     "cost_model",
     "double_double",
     "error_bounds",
-    "error_bounds_float64",
     "interpolation",
-    "interpolation_float64",
     "nufft2d",
     "plan",
     "polynomials",

@@ -1,42 +1,64 @@
 """Error formulas: numbers in, numbers out. Every bound is a worst case, relative, and small errors add.
 
-docs/theory/accuracy.md derives each; tests/numerics/test_accuracy.py measures each.
+docs/theory/accuracy.md derives each; tests/numerics/test_accuracy.py and tests/imaging/test_precise.py measure each.
 """
 
 from __future__ import annotations
+
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 
-U32 = 2.0**-24  # unit roundoff of float32
-# Root mean square of what rounding turns to float32 (twice) and the sine and cosine polynomials add, rad.
-ANGLE = 3e-7
+
+@dataclass(frozen=True)
+class NumberType:
+    """Rounding in one number type, as the kernels compute in it.
+
+    unit       unit roundoff
+    angle      phase error, rad, of the reduction to [-1/2, 1/2] cycles and of the sine and cosine polynomials
+    roundings  units of a differential range, and of its product with the wavenumber: so many roundings at most
+    sums       units of a sum: per square root of its terms, per square root of the FFT's doublings, and in any case
+    """
+
+    unit: float
+    angle: float
+    roundings: int
+    sums: tuple[float, float, float]
 
 
-def phase_rounding(radius: float, frequency: float, wide: bool) -> float:
-    """Phase error, rad, of differential ranges in float32 over a tile.
+# Five roundings: three products, the series, the product with kappa. The angle is the root mean square.
+FLOAT32 = NumberType(2.0**-24, 3e-7, 5, (0.25, 1.5, 1.0))
+# Offset, direction, three products, series or quotient and the product with kappa are together at most 10 units.
+FLOAT64 = NumberType(2.0**-53, 2e-14, 10, (1.0, 2.0, 4.0))
+# Largest |P_(n-2) - P_n|/(2n - 1): the n-th term of the range series over rho (rho/R)^(n - 1), for n = 3, 4, 5; later
+# ones are smaller.
+SERIES = {2: 0.193, 3: 0.125, 4: 0.0824}
+
+
+def phase_rounding(radius: float, frequency: float, wide: bool = False, number: NumberType = FLOAT32) -> float:
+    """Phase error, rad, of differential ranges over a tile.
 
     radius     largest distance of a point from its tile's reference, m
     frequency  largest carrier, Hz
-    wide       the linear term is computed in wide numbers; only its curvature stays float32
-    Five roundings (three products, the series, the product with kappa) of at most u each, on a range of at most
-    `radius`; ANGLE is added.
+    wide       the linear term is computed in wide numbers; only its curvature stays in `number`
     """
-    turns = 2 * frequency / SPEED_OF_LIGHT * radius
-    return (0.0 if wide else 2 * np.pi * turns * 5 * U32) + ANGLE
+    cycles = 2 * frequency / SPEED_OF_LIGHT * radius
+    return (0.0 if wide else 2 * np.pi * cycles * number.roundings * number.unit) + number.angle
 
 
-def place_rounding(radius: float, bandwidth: float, wide: bool) -> float:
-    """Phase error, rad, at the band's edge from rounding the place among samples; as `phase_rounding`."""
-    turns = bandwidth / SPEED_OF_LIGHT * radius
-    return 0.0 if wide else 2 * np.pi * turns * 6 * U32
+def position_rounding(radius: float, bandwidth: float, wide: bool) -> float:
+    """Phase error, rad, at the band's edge from rounding positions among samples in float32; as `phase_rounding`."""
+    cycles = bandwidth / SPEED_OF_LIGHT * radius
+    return 0.0 if wide else 2 * np.pi * cycles * 6 * FLOAT32.unit
 
 
 def series_error(radius: float, distance: float, frequency: float, order: int) -> float:
-    """Phase error, rad, of the range series cut after `order` (2 or 3; 0 is exact) for points within `radius`.
+    """Phase error, rad, of the range series cut after `order` (2, 3 or 4; 0 is exact) for points within `radius` m.
 
-    The first term left out is a w/(2 R^2) for order 2 and w (4 a^2 - w)/(8 R^3) for order 3, with a^2 + w <= radius^2.
+    The terms of |T - x| are R C_n (rho/R)^n, C_n the Gegenbauer polynomials of index -1/2: (P_(n-2) - P_n)/(2n - 1).
+    Infinite where the nearest antenna, `distance` m off, is no farther than twice the radius.
     """
     if order == 0:
         return 0.0
@@ -45,37 +67,65 @@ def series_error(radius: float, distance: float, frequency: float, order: int) -
     k = 4 * np.pi * frequency / SPEED_OF_LIGHT
     ratio = radius / distance
     rest = 1 / (1 - ratio)  # the later terms, as a geometric series
-    if order == 2:
-        return k * radius * 0.193 * ratio**2 * rest
-    return k * radius * 0.125 * ratio**3 * rest
+    return k * radius * SERIES[order] * ratio**order * rest
 
 
 def curvature_rounding(radius: float, distance: float, frequency: float) -> float:
     """Phase error, rad, of the float32 curvature term, at most radius^2/(2 distance) with four roundings."""
     k = 4 * np.pi * frequency / SPEED_OF_LIGHT
-    return k * min(radius**2 / (2 * max(distance, 1e-300)), radius) * 4 * U32
+    return k * min(radius**2 / (2 * max(distance, 1e-300)), radius) * 4 * FLOAT32.unit
 
 
 def root_rounding(radius: float, distance: float, frequency: float) -> float:
     """Phase error, rad, of the exact root in float32 near an antenna.
 
-    What lies across the line of sight is |p|^2 - a^2, rounded to 3 u |p|^2, over a range of at least `distance`.
+    The square across the line of sight is |p|^2 - a^2, rounded to 3 u |p|^2, over a range of at least `distance`.
     """
     k = 4 * np.pi * frequency / SPEED_OF_LIGHT
-    return k * 3 * U32 * radius**2 / max(distance, 1e-300)
+    return k * 3 * FLOAT32.unit * radius**2 / max(distance, 1e-300)
 
 
 def range_error(radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int) -> float:
-    """Phase error, rad, of differential ranges in range mode 0, 1 or 2 of kernels/range_phase.clh."""
+    """Phase error, rad, of differential ranges in float32, in range mode 0, 1 or 2 of kernels/range_phase.clh."""
     if mode == 2:
         return phase_rounding(0.0, frequency, True)
-    error = phase_rounding(radius, frequency, mode == 1) + place_rounding(radius, bandwidth, mode == 1)
+    error = phase_rounding(radius, frequency, mode == 1) + position_rounding(radius, bandwidth, mode == 1)
     error += series_error(radius, distance, frequency, order)
     if order == 0:
         error += root_rounding(radius, distance, frequency)
     return error + (curvature_rounding(radius, distance, frequency) if mode == 1 else 0.0)
 
 
-def sum_rounding(n_chunk: int, length: int) -> float:
-    """Relative rms error of a float32 sum of n_chunk terms, of complex64 samples and of their FFT of `length`."""
-    return U32 * (np.sqrt(n_chunk) / 4 + 1.5 * np.sqrt(np.log2(max(length, 2))) + 1)
+def range_error_float64(radius: float, distance: float, frequency: float, order: int) -> float:
+    """Phase error, rad, of paths in a tile of `radius` m by kernels/backproject_float64.cl, for its ORDER.
+
+    distance  of the nearest antenna, m
+    Infinite where an antenna is so near that differences from the tile's reference would cancel. Order -1 is
+    double-double, whose error is beyond float64 for any path below 1e12 m.
+    """
+    if order < 0:
+        return FLOAT64.angle
+    if distance <= 2 * radius:
+        return np.inf
+    return phase_rounding(radius, frequency, number=FLOAT64) + series_error(radius, distance, frequency, order)
+
+
+def sum_rounding(n_chunk: int, length: int, gain: float = 1.0, number: NumberType = FLOAT32) -> float:
+    """Relative rms error of a sum of n_chunk terms, of the samples and of their FFT of `length`.
+
+    gain  factor by which deconvolution raises the band's edge over its middle, and with it the FFT's rounding
+    """
+    terms, doublings, least = number.sums
+    return number.unit * (np.sqrt(n_chunk) * terms + doublings * gain * np.sqrt(np.log2(max(length, 2))) + least)
+
+
+def darkness(cells: float, chance: float = 1e-6) -> float:
+    """Ratio, exceeded with that chance, of a row's amplitude to that of its profile at `cells` positions, for noise.
+
+    Interpolation errors scale with a row's energy, the tolerance with what the pixels see. Over many resolution
+    cells the two are alike; a single one may lie where noise is dark: the mean of `cells` squared moduli is
+    gamma distributed.
+    """
+    from scipy.special import gammaincinv
+
+    return float(1 / np.sqrt(gammaincinv(cells, chance) / cells))

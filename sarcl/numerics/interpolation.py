@@ -1,4 +1,4 @@
-"""Short interpolation kernels for range profiles in float32: weights, transforms, largest errors, cheapest choice.
+"""Short interpolation kernels for range profiles in float32 and float64: weights, transforms, errors, cheapest choice.
 
 docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py measures them.
 """
@@ -7,28 +7,33 @@ from __future__ import annotations
 
 import functools
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
+from ..opencl import fft
 from . import cost_model
 
-MARGIN = 1.06  # of errors that are taken on a grid of frequencies and places
+MARGIN = 1.06  # factor on errors that are taken on a grid of frequencies and positions
 OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
-# Polynomial terms of each half (even, odd) of a tap's weight: enough that the fit errs less than the kernel.
+# Polynomial terms of each half (even, odd) of a tap's weight, by taps: the error of the fit is below the kernel's.
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
 # The same for lines of pixels, whose weights are not deconvolved.
 LINE_TERMS = {2: 2, 4: 3, 6: 4, 8: 5}
+# Choices in float64, where each kernel takes as few of these terms as its error allows.
+FLOAT64_TAPS, FLOAT64_TERMS = (4, 6, 8, 10, 12, 14), (3, 4, 5, 6, 7)
+FLOAT64_OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 12, 16)
 
 
 @dataclass(frozen=True, eq=False)
 class Interpolator:
-    """A kernel of `taps` samples for profiles `oversample` times finer than 1/bandwidth.
+    """An interpolation kernel of `taps` samples for profiles `oversample` times finer than 1/bandwidth.
 
-    table   coefficients (taps/2, 2, terms) float32 as kernels/interp.clh reads them
-    error   largest relative error at any frequency in the band and any place between samples
+    table   coefficients (taps/2, 2, terms) as kernels/interp.clh reads them, in the number type of the profiles
+    error   largest relative error at any frequency in the band and any position between samples
     """
 
     taps: int
@@ -36,29 +41,55 @@ class Interpolator:
     table: np.ndarray
     error: float
 
+    @property
+    def dtype(self) -> np.dtype[Any]:
+        """The number type of the profiles: float32 or float64."""
+        return self.table.dtype
+
+    @property
+    def terms(self) -> int:
+        """Coefficients of each half of a tap's polynomial."""
+        return int(self.table.shape[-1])
+
+    @property
+    def edge_gain(self) -> float:
+        """Factor by which deconvolution raises the band's edge over its middle."""
+        middle, edge = self.transform(np.array([0, 0.5 / self.oversample]))
+        return float(middle / edge)
+
     def weights(self, z: np.ndarray) -> np.ndarray:
         """Weights of all taps at z in [-1/2, 1/2]: (..., taps), float64."""
-        return _weights(self.taps, self.table, z)
+        return _weights(self.table, z)
 
     def transform(self, nu: np.ndarray) -> np.ndarray:
-        """Fourier transform of the kernel at nu cycles a sample; spectra are divided by it."""
-        return _transform(self.taps, self.table, nu)
+        """Fourier transform of the kernel at nu cycles per sample; spectra are divided by it."""
+        return _transform(self.table, nu)
 
 
-@functools.lru_cache(maxsize=256)
 def interpolator(taps: int, oversample: float) -> Interpolator:
+    """The interpolation kernel for float32 profiles: the hat (2 taps) or a Kaiser-Bessel kernel."""
+    return deconvolved(taps, oversample, TERMS[taps])
+
+
+@functools.cache
+def interpolator_float64(taps: int, oversample: float) -> Interpolator:
+    """The interpolation kernel for float64 profiles: as few terms as bring its error near that of many."""
+    best = deconvolved(taps, oversample, FLOAT64_TERMS[-1], np.float64)
+    tried = (deconvolved(taps, oversample, terms, np.float64) for terms in FLOAT64_TERMS)
+    return next(made for made in tried if made.error <= 1.3 * best.error + 1e-15)
+
+
+@functools.lru_cache(maxsize=1024)
+def deconvolved(taps: int, oversample: float, terms: int, dtype: Any = np.float32) -> Interpolator:
     """The hat (2 taps) or a Kaiser-Bessel kernel, deconvolved: a type-2 nonuniform FFT in range.
 
-    The Kaiser-Bessel shape is pi taps (1 - 1/(2 oversample)), the transform's edge at the first alias.
+    The Kaiser-Bessel shape is pi taps (1 - 1/(2 oversample)), the transform's edge at the first alias. Spectra are
+    divided by the transform of the polynomials themselves, so that the error of their fit is that of its aliases alone.
     """
-    table = np.zeros((1, 2, 1), np.float32) if taps == 2 else _kaiser_bessel(taps, oversample)
+    table = HAT if taps == 2 else _kaiser_bessel(taps, oversample, terms)
+    table = table.astype(dtype)
     nu = np.linspace(0, 0.5 / oversample, 33)
-    z = np.linspace(-0.5, 0.5, 65)
-    # what the taps make of exp(j 2 pi nu t), over what they should: worst at the band's edge
-    place = np.arange(taps) - (taps - 1) / 2
-    waves = np.exp(2j * np.pi * nu[:, None, None] * (place - z[:, None]))
-    made = (waves * _weights(taps, table, z)).sum(axis=-1) / _transform(taps, table, nu)[:, None]
-    return Interpolator(taps, oversample, table, MARGIN * float(np.abs(made - 1).max()))
+    return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
 
 
 def line_interpolator(taps: int, oversample: float) -> Interpolator:
@@ -72,87 +103,108 @@ def line_interpolator(taps: int, oversample: float) -> Interpolator:
 
 @functools.lru_cache(maxsize=256)
 def _least_squares(taps: int, oversample: float) -> Interpolator:
-    terms = LINE_TERMS[taps]
-    z = np.cos(np.pi * (np.arange(48) + 0.5) / 48) / 2
-    weights = least_squares_weights(taps, oversample, z)
-    powers = (z[:, None] ** 2) ** np.arange(terms)
-    out = np.empty((taps // 2, 2, terms))
-    for k in range(taps // 2):
-        mirrored = weights[:, taps - 1 - k]  # w_{taps-1-k}(z) = w_k(-z)
-        out[k, 0] = np.linalg.lstsq(powers, (weights[:, k] + mirrored) / 2, rcond=None)[0]
-        out[k, 1] = np.linalg.lstsq(powers * z[:, None], (weights[:, k] - mirrored) / 2, rcond=None)[0]
-    table = out.astype(np.float32)
+    z = _fitting_points(48)
+    weights = least_squares_weights(taps, oversample, z).T
+    w, mirrored = weights[: taps // 2], weights[: taps // 2 - 1 : -1]  # w_{taps-1-k}(z) = w_k(-z)
+    table = _fitted(z, (w + mirrored) / 2, (w - mirrored) / 2, LINE_TERMS[taps]).astype(np.float32)
     nu = np.linspace(0, 0.5 / oversample, 33)
-    z = np.linspace(-0.5, 0.5, 65)
-    waves = np.exp(2j * np.pi * nu[:, None, None] * (np.arange(taps) - (taps - 1) / 2 - z[:, None]))
-    made = (waves * _polynomials(table, z)).sum(axis=-1)
-    return Interpolator(taps, oversample, table, MARGIN * float(np.abs(made - 1).max()))
+    return Interpolator(taps, oversample, table, _largest_error(table, nu, np.ones(len(nu))))
 
 
 def least_squares_weights(taps: int, oversample: float, z: np.ndarray) -> np.ndarray:
-    """Weights (n, taps) that interpolate best at z (n,) what has no frequency above 1/(2 oversample) a sample."""
-    place = np.arange(taps) - (taps - 1) / 2
+    """Weights (n, taps) that interpolate best at z (n,) what has no frequency above 1/(2 oversample) per sample."""
     nu = 0.5 / oversample * np.cos(np.pi * (np.arange(40) + 0.5) / 80)  # denser at the band's edge, where errors are
-    angle, wanted = 2 * np.pi * nu[:, None] * place, 2 * np.pi * nu[:, None] * z
+    angle, wanted = 2 * np.pi * nu[:, None] * _positions(taps), 2 * np.pi * nu[:, None] * z
     waves = np.concatenate([np.cos(angle), np.sin(angle)])
     return np.linalg.lstsq(waves, np.concatenate([np.cos(wanted), np.sin(wanted)]), rcond=None)[0].T
 
 
-def _kaiser_bessel(taps: int, oversample: float) -> np.ndarray:
+HAT = np.array([[[0.5], [-1.0]]])  # the table of the hat: weights 1/2 - z and 1/2 + z
+
+
+def _kaiser_bessel(taps: int, oversample: float, terms: int) -> np.ndarray:
     beta = np.pi * taps * (1 - 0.5 / oversample)
-    terms = TERMS[taps]
-    z = np.cos(np.pi * (np.arange(200) + 0.5) / 200) / 2  # Chebyshev points: a fit near minimax
-    out = np.empty((taps // 2, 2, terms))
-    for k in range(taps // 2):
+    z = _fitting_points(200)
 
-        def psi(z: np.ndarray, k: int = k) -> np.ndarray:
-            x = 2 * (z + (taps - 1) / 2 - k) / taps
-            return np.i0(beta * np.sqrt(np.maximum(1 - x * x, 0))) / np.i0(beta)
+    def psi(z: np.ndarray) -> np.ndarray:
+        x = 2 * (z + (taps - 1) / 2 - np.arange(taps // 2)[:, None]) / taps
+        return np.asarray(np.i0(beta * np.sqrt(np.maximum(1 - x * x, 0))) / np.i0(beta))
 
-        even, odd = (psi(z) + psi(-z)) / 2, (psi(z) - psi(-z)) / (2 * z)
-        powers = (z[:, None] ** 2) ** np.arange(terms)
-        out[k, 0] = np.linalg.lstsq(powers, even, rcond=None)[0]
-        out[k, 1] = np.linalg.lstsq(powers * z[:, None], odd * z, rcond=None)[0]
-    return out.astype(np.float32)
+    w, mirrored = psi(z), psi(-z)
+    # the odd part over z, times z: so the last bits of float32 tables are those of earlier versions
+    return _fitted(z, (w + mirrored) / 2, (w - mirrored) / (2 * z) * z, terms)
 
 
-def _weights(taps: int, table: np.ndarray, z: np.ndarray) -> np.ndarray:
-    if taps == 2:
-        return np.stack([0.5 - z, 0.5 + z], axis=-1)
-    return _polynomials(table, z)
+def _fitting_points(n: int) -> np.ndarray:
+    """Chebyshev points of [-1/2, 1/2]: a fit at them is near minimax."""
+    return np.cos(np.pi * (np.arange(n) + 0.5) / n) / 2
 
 
-def _polynomials(table: np.ndarray, z: np.ndarray) -> np.ndarray:
+def _fitted(z: np.ndarray, even: np.ndarray, odd: np.ndarray, terms: int) -> np.ndarray:
+    """Coefficients (taps/2, 2, terms) of weights whose even and odd parts at z (n,) are given, (taps/2, n) each."""
+    powers = (z[:, None] ** 2) ** np.arange(terms)
+    out = np.empty((len(even), 2, terms))
+    for k in range(len(even)):
+        out[k, 0] = np.linalg.lstsq(powers, even[k], rcond=None)[0]
+        out[k, 1] = np.linalg.lstsq(powers * z[:, None], odd[k], rcond=None)[0]
+    return out
+
+
+def _positions(taps: int) -> np.ndarray:
+    """Positions of the taps in samples, from the middle of all."""
+    return np.arange(taps) - (taps - 1) / 2
+
+
+def _weights(table: np.ndarray, z: np.ndarray) -> np.ndarray:
     powers = (z[..., None] ** 2) ** np.arange(table.shape[-1])
     even, odd = (np.tensordot(powers, table[:, i].astype(np.float64), axes=(-1, -1)) for i in (0, 1))
     odd = odd * z[..., None]
     return np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=-1)
 
 
-def _transform(taps: int, table: np.ndarray, nu: np.ndarray) -> np.ndarray:
-    """Integral of the kernel times cos(2 pi nu x), by Gauss-Legendre over each tap's stretch."""
+def _largest_error(table: np.ndarray, nu: np.ndarray, transform: np.ndarray) -> float:
+    """Largest error of exp(j 2 pi nu t) interpolated by a table, relative, at any nu and position."""
+    z = np.linspace(-0.5, 0.5, 65)
+    waves = np.exp(2j * np.pi * nu[:, None, None] * (_positions(2 * len(table)) - z[:, None]))
+    made = (waves * _weights(table, z)).sum(axis=-1) / transform[:, None]
+    return MARGIN * float(np.abs(made - 1).max())
+
+
+@functools.cache
+def _gauss() -> tuple[np.ndarray, np.ndarray]:
+    """Nodes and weights of Gauss-Legendre quadrature over [-1/2, 1/2]."""
+    nodes, weights = np.polynomial.legendre.leggauss(12)
+    return nodes / 2, weights / 2
+
+
+def _transform(table: np.ndarray, nu: np.ndarray) -> np.ndarray:
+    """Integral of the kernel times cos(2 pi nu x), by quadrature over each tap's stretch."""
     nu = np.asarray(nu, np.float64)
-    if taps == 2:
+    if len(table) == 1:
         return np.sinc(nu) ** 2
-    x, gauss = np.polynomial.legendre.leggauss(12)
-    z = x / 2
+    z, gauss = _gauss()
+    kernel = _weights(table, z) * gauss[:, None]
+    taps = 2 * len(table)
     distance = z[:, None] + (taps - 1) / 2 - np.arange(taps)
-    kernel = _weights(taps, table, z) * (gauss / 2)[:, None]
     waves = np.cos(2 * np.pi * nu[..., None, None] * distance)
-    return (waves * kernel).sum(axis=(-1, -2))
+    return np.asarray((waves * kernel).sum(axis=(-1, -2)))
+
+
+def profile_length(oversample: float, n_samples: int, taps: int) -> int:
+    """The shortest even length with a fast FFT for rows of n_samples; an even length puts delay 0 on a sample.
+
+    One sample has no bandwidth, but a profile of a few samples keeps its taps apart.
+    """
+    return 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
 
 
 @functools.lru_cache(maxsize=256)
 def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
     """Taps, oversampling and profile length of every interpolator for rows of n_samples."""
-    from ..opencl import fft
-
     out = []
     for taps in TERMS:
         for oversample in OVERSAMPLE:
-            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
-            # and an even length puts delay 0 on a sample
-            length = 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
+            length = profile_length(oversample, n_samples, taps)
             while not off_carrier(length, carrier):
                 length = 2 * fft.good_length(length // 2 + 1)
             if length <= max(LONGEST, 2 * n_samples * taps):

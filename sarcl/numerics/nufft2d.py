@@ -15,7 +15,7 @@ from ..base.tolerances import rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
 from . import cost_model
-from .error_bounds import U32, sum_rounding
+from .error_bounds import FLOAT32, sum_rounding
 from .interpolation import TERMS, Interpolator, interpolator
 from .plan import LEAST_TOLERANCE
 
@@ -67,7 +67,7 @@ def make_plan(
             length = tuple(2 * fft.good_length(-(-int(max(np.ceil(oversample * n), room)) // 2)) for n in shape)
             cells = float(length[0]) * length[1]
             in_cell = most * shape[0] * shape[1] / cells
-            rounding = sum_rounding(max(1, int(in_cell * taps**2)), int(min(cells, 2**60))) + 6 * U32
+            rounding = sum_rounding(max(1, int(in_cell * taps**2)), int(min(cells, 2**60))) + 6 * FLOAT32.unit
             rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
             error = crowding * (2 * kernel.error + kernel.error**2) + rounding
             least = min(least, error)
@@ -136,7 +136,7 @@ class Gridder:
         high = np.rint(step / grain) * grain
         self.cell = cell.astype(np.int32)
         self.line = np.stack([place - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
-        macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.table.shape[-1], "TILE": self.tile}
+        macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.terms, "TILE": self.tile}
         self.kernel = device.kernel("nufft2d.cl", "spread", **{**macros, "VW": 1})
         self.table = device.upload(plan.interpolator.table)
 

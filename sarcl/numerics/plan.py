@@ -52,7 +52,7 @@ class Plan:
             "BISTATIC": int(bistatic),
             "WRAP": self.length if wrap else 0,
             "TAPS": self.interpolator.taps,
-            "TERMS": self.interpolator.table.shape[-1],
+            "TERMS": self.interpolator.terms,
             "RANGE": self.range_mode,
             "ORDER": self.order,
         }

@@ -8,12 +8,16 @@ from ..opencl import fft
 from ..opencl.device import Device
 from .interpolation import Interpolator
 
-LARGEST = 1e34  # of a profile: sums of ten thousand such rows still fit in complex64
+# Largest modulus of a profile: sums of ten thousand such rows still fit in complex64, of any number in complex128.
+LARGEST: dict[type[np.complexfloating], float] = {np.complex64: 1e34, np.complex128: 1e290}
 
 
 def padding(interpolator: Interpolator) -> int:
-    """Samples kept on each side of a profile, so that taps never leave their row."""
-    return interpolator.taps + 2
+    """Samples kept on each side of a profile, so that taps never leave their row.
+
+    In float64 windows of FAR samples more, which neighbouring lanes share, must not leave it either.
+    """
+    return interpolator.taps + (4 if interpolator.dtype == np.float64 else 2)
 
 
 def correction(interpolator: Interpolator, n_samples: int, length: int) -> np.ndarray:
@@ -23,38 +27,40 @@ def correction(interpolator: Interpolator, n_samples: int, length: int) -> np.nd
 
 
 def from_samples(
-    device: Device,
+    device: Device | None,
     samples: np.ndarray,
-    weights: np.ndarray,
-    interpolator: Interpolator,
+    weights: np.ndarray | float,
     length: int,
-    pad: int | None = None,
+    pad: int = 0,
+    dtype: type[np.complexfloating] = np.complex64,
 ) -> np.ndarray:
-    """Profiles (n, length + 2 pad) complex64 of samples (n, n_samples), each times weights (n, n_samples).
+    """Profiles (n, length + 2 pad) complex64 or complex128 of samples, each times its weight.
 
-    Delay 0 stands at pad + length/2; the padding, by default what taps need, repeats the profile's other end.
+    device            that transforms; None: the host
+    samples, weights  (n, n_samples), or what broadcasts to it
+    Delay 0 stands at pad, with a `correction` among the weights at pad + length/2. The padding repeats the profile's
+    other end. ValueError where samples are too large for sums in this number type.
     """
-    n, n_samples = samples.shape
-    spectrum = np.zeros((n, length), np.complex64)
     shaped = samples * weights
-    largest = float(np.abs(shaped).max(initial=0.0)) * n_samples
-    if largest > LARGEST:
+    n, n_samples = shaped.shape
+    largest, limit = float(np.abs(shaped).max(initial=0.0)) * n_samples, LARGEST[dtype]
+    if not largest <= limit:
         raise ValueError(
-            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in complex64 hold up "
-            f"to {LARGEST:.0e}: scale the samples down"
+            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in "
+            f"{dtype.__name__} hold up to {limit:.0e}: scale the samples down"
         )
+    spectrum = np.zeros((n, length), dtype)
     low = n_samples // 2
     spectrum[:, : n_samples - low] = shaped[:, low:]
     if low:
         spectrum[:, -low:] = shaped[:, :low]
-    pad = padding(interpolator) if pad is None else pad
-    profiles = np.empty((n, length + 2 * pad), np.complex64)
-    profiles[:, pad:-pad] = made = fft.rows(device, spectrum, inverse=True)
-    if pad <= length:
-        profiles[:, :pad], profiles[:, -pad:] = made[:, length - pad :], made[:, :pad]
-    else:  # several times over
-        profiles[:, :pad] = made[:, np.arange(-pad, 0) % length]
-        profiles[:, -pad:] = made[:, np.arange(pad) % length]
+    made = fft.rows(device, spectrum, inverse=True)
+    if not pad:
+        return made
+    profiles = np.empty((n, length + 2 * pad), dtype)
+    profiles[:, pad:-pad] = made
+    profiles[:, :pad] = made[:, np.arange(-pad, 0) % length]
+    profiles[:, -pad:] = made[:, np.arange(pad) % length]
     return profiles
 
 

@@ -9,6 +9,8 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics import range_profiles
+from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels looked at
 OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, and another one at each place
@@ -116,10 +118,8 @@ def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float
 
     lags  cells of c/(2 bandwidth) by which the profile is read behind x, with the carrier's phase of x itself
     """
-    import scipy.fft
-
     n_rows, n_samples = raw.n_rows, raw.n_samples
-    length = int(scipy.fft.next_fast_len(OVERSAMPLE * n_samples))
+    length = fft.good_length(OVERSAMPLE * n_samples)
     low = n_samples // 2
     lags = np.asarray(lags, np.float64)
     out = np.empty((n_rows, len(places), len(lags)), np.complex64)
@@ -127,12 +127,7 @@ def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float
     for start in range(0, n_rows, ROWS):
         stop = min(start + ROWS, n_rows)
         samples = raw.read(start, stop)
-        spectrum = np.zeros((stop - start, length), np.complex64)
-        shaped = samples * (weight[start:stop, None] / scale)
-        spectrum[:, : n_samples - low] = shaped[:, low:]
-        if low:
-            spectrum[:, -low:] = shaped[:, :low]
-        profiles = scipy.fft.ifft(spectrum, axis=1, norm="forward", overwrite_x=True)
+        profiles = range_profiles.from_samples(None, samples, weight[start:stop, None] / scale, length)
         for row in range(start, stop):
             late = delay(raw, row, places)
             carrier = raw.frequency[row] + low * raw.frequency_step[row]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.morton import morton_order
-from ..numerics.error_bounds import U32
+from ..numerics.error_bounds import FLOAT32
 from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
@@ -68,4 +68,4 @@ def splits(device: Device, n_pulses: int, tiles: Tiles) -> int:
 
 def terms(tolerance: float) -> float:
     """Terms that may join one float32 sum: n like ones err by up to n/2 roundings, a fifth of the tolerance."""
-    return 0.2 * tolerance * 2 / U32
+    return 0.2 * tolerance * 2 / FLOAT32.unit

@@ -12,7 +12,7 @@ from helpers.precise_cases import decimal_image, error, focus, task_of
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64.plan import WIDE, make_plan
-from sarcl.numerics import error_bounds_float64, interpolation_float64
+from sarcl.numerics import error_bounds, interpolation
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact_image
 
@@ -91,23 +91,23 @@ def test_side_lobes_beside_a_bright_point_stay_below_prediction(double):
 
 def test_a_broken_formula_breaks_the_contract(double, monkeypatch):
     """Interpolation errors predicted 4 x too small are noticed: the bound is that close."""
-    honest = interpolation_float64.kernel.__wrapped__
+    honest = interpolation.deconvolved
     edge = np.zeros((3, 256))
     edge[:, 0] = 1
     raw = replace(noise_history(n_rows=3, n_samples=256), samples=edge)
     grid = sarcl.ImageGrid.plane(shape=(64, 64), spacing=1.3)
     ratio = []
     for factor in (1.0, 0.25):
-        interpolation_float64.cheapest_kernel.cache_clear()
+        interpolation.interpolator_float64.cache_clear()
 
-        def said(taps, oversample, terms, factor=factor):
-            made = honest(taps, oversample, terms)
+        def said(taps, oversample, terms, dtype, factor=factor):
+            made = honest(taps, oversample, terms, dtype)
             return replace(made, error=made.error * factor)
 
-        monkeypatch.setattr(interpolation_float64, "kernel", said)
+        monkeypatch.setattr(interpolation, "deconvolved", said)
         data, plan, _ = focus(raw, grid, 1e-7, double)
         ratio.append(error(data, raw, grid, most=200) / plan.predicted_error)
-    interpolation_float64.cheapest_kernel.cache_clear()
+    interpolation.interpolator_float64.cache_clear()
     assert ratio[0] <= 1 < ratio[1]
 
 
@@ -149,11 +149,11 @@ def test_rows_may_have_their_own_frequency_plan(double):
 @pytest.mark.parametrize("order, bistatic", [(2, False), (3, True), (4, False), (0, True), (WIDE, True)])
 def test_every_order_of_the_range_series_errs_less_than_its_formula(double, order, bistatic):
     raw = noise_history(n_rows=5, distance=300.0, bistatic=bistatic)
-    kernel = interpolation_float64.kernel(14, 4.0, 7)
+    kernel = interpolation.deconvolved(14, 4.0, 7, np.float64)
     made, tiling = make_plan(task_of(raw, PLANE), 1e-7)
-    plan = replace(made, kernel=kernel, length=4 * 48, order=order)
+    plan = replace(made, interpolator=kernel, length=4 * 48, order=order)
     data, _, _ = focus(raw, PLANE, 1e-7, double, plan=plan)
-    bound = error_bounds_float64.range_error(tiling.radius, 290.0, 9.9e9, order)
+    bound = error_bounds.range_error_float64(tiling.radius, 290.0, 9.9e9, order)
     assert error(data, raw, PLANE) <= bound + 1e-13
     if order > 1:  # and not much less: no term is missing from the series
         assert error(data, raw, PLANE) >= bound / 300
@@ -164,9 +164,11 @@ def test_coarse_tiles_err_as_their_formula_says(double):
     raw = replace(raw, frequency_step=raw.frequency_step / 400)
     grid = sarcl.ImageGrid.plane(shape=(16, 16), spacing=70.0)
     made, tiling = make_plan(task_of(raw, grid), 1e-7)
-    plan = replace(made, kernel=interpolation_float64.kernel(14, 4.0, 7), length=4 * 48, per_tile=256, order=0)
+    plan = replace(
+        made, interpolator=interpolation.deconvolved(14, 4.0, 7, np.float64), length=4 * 48, per_tile=256, order=0
+    )
     data, _, _ = focus(raw, grid, 1e-7, double, plan=plan)
-    bound = error_bounds_float64.phase_rounding(tiling.radius, 9.4e9)
+    bound = error_bounds.phase_rounding(tiling.radius, 9.4e9, number=error_bounds.FLOAT64)
     assert 1e-10 < bound and bound / 100 <= error(data, raw, grid) <= bound
 
 

@@ -12,7 +12,7 @@ from helpers.cases import noise_history
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64._pulse_records import packed
 from sarcl.imaging.focusing_task import geometry_of
-from sarcl.numerics import error_bounds_float64, interpolation_float64
+from sarcl.numerics import error_bounds, interpolation
 from sarcl.opencl import _programs, fft
 from sarcl.reference.interp import interpolate
 
@@ -101,7 +101,7 @@ def test_sine_and_cosine_of_turns_err_less_than_4e_15(double, monkeypatch):
 @pytest.mark.parametrize("taps", [4, 8, 14])
 def test_look_up_equals_its_twin_however_far_lanes_are_apart(double, monkeypatch, taps, apart):
     random = np.random.default_rng(taps)
-    made = interpolation_float64.kernel(taps, 2.0, 5)
+    made = interpolation.deconvolved(taps, 2.0, 5, np.float64)
     row = random.standard_normal(400) + 1j * random.standard_normal(400)
     places = 200 + apart * random.uniform(-3, 3, 1001) + np.repeat(random.uniform(-90, 90, 126), 8)[:1001]
     table = np.concatenate([made.table.ravel(), row.view(np.float64)])
@@ -120,18 +120,18 @@ def test_taps_never_leave_their_row(double, monkeypatch):
         "dv k = 0; long lane[VW]; STORE(j, 0, lane); for (int l = 0; l < VW; l++) ((double *)&k)[l] = lane[l];"
         "STORE(k, i, out);"
     )
-    table = interpolation_float64.kernel(8, 2.0, 5).table
+    table = interpolation.deconvolved(8, 2.0, 5, np.float64).table
     places = np.array([[0, -1e9, 1e9, 5e14, -5e14, 30, -30, 0], [0, 0, 0, 0, 0, 0, 0, 1e12]])
     macros = {"TAPS": 8, "TERMS": 5, "WRAP": 0, "table": table}
     first = probe(double, monkeypatch, body, places, 1, "interp_float64.clh", **macros)[0]
     assert first.min() >= -40 and first.max() + 8 + 3 <= 60
 
 
-@pytest.mark.parametrize("taps", interpolation_float64.TAPS)
+@pytest.mark.parametrize("taps", interpolation.FLOAT64_TAPS)
 def test_kernels_err_no_more_than_they_say(taps):
     random = np.random.default_rng(taps)
-    for oversample in interpolation_float64.OVERSAMPLE:
-        made = interpolation_float64.cheapest_kernel(taps, float(oversample))
+    for oversample in interpolation.FLOAT64_OVERSAMPLE:
+        made = interpolation.interpolator_float64(taps, float(oversample))
         z = random.uniform(-0.5, 0.5, 300)
         place = np.arange(taps) - (taps - 1) / 2
         for nu in (0.5 / oversample, *random.uniform(0, 0.5 / oversample, 4)):
@@ -144,11 +144,9 @@ def test_dark_places_are_as_rare_as_said():
     energy = (random.standard_normal((200_000, 6, 2)) ** 2).sum(axis=-1) / 2
     for cells in (1, 2, 6):
         mean = energy[:, :cells].mean(axis=1)
-        bound = error_bounds_float64.darkness(cells, 1e-3)
+        bound = error_bounds.darkness(cells, 1e-3)
         assert (mean < bound**-2).mean() == pytest.approx(1e-3, rel=0.3)
-    assert (
-        error_bounds_float64.darkness(1) == pytest.approx(1000, rel=1e-3) and error_bounds_float64.darkness(1e4) < 1.05
-    )
+    assert error_bounds.darkness(1) == pytest.approx(1000, rel=1e-3) and error_bounds.darkness(1e4) < 1.05
 
 
 def test_pulses_are_packed_in_pairs_that_are_exact_to_100_bits():

@@ -14,7 +14,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging.float64.direct import DirectFloat64
 from sarcl.imaging.float64.plan import WIDE, make_plan
-from sarcl.numerics import interpolation_float64
+from sarcl.numerics import interpolation
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact_image
 
@@ -149,7 +149,7 @@ def test_error_does_not_grow_with_the_number_of_pulses(double, n_rows):
     task = task_of(raw, grid)
     plan, _ = make_plan(task, 1e-8)
     # a kernel that errs 1e-14 shows the sum alone
-    plan = replace(plan, kernel=interpolation_float64.kernel(14, 4.0, 7), length=64, order=WIDE)
+    plan = replace(plan, interpolator=interpolation.deconvolved(14, 4.0, 7, np.float64), length=64, order=WIDE)
     data, _, _ = focus(raw, grid, 1e-8, double, plan=plan)
     assert np.linalg.norm(data.ravel() - wanted) <= 3e-14 * np.linalg.norm(wanted)
 

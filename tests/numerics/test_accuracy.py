@@ -99,7 +99,7 @@ def test_spreading_is_the_adjoint_of_interpolation_profiles(device):
     samples = (random.standard_normal((3, 37)) + 1j * random.standard_normal((3, 37))).astype(np.complex64)
     rows = random.standard_normal((3, length + 2 * pad)) + 1j * random.standard_normal((3, length + 2 * pad))
     weights = np.broadcast_to(range_profiles.correction(made, 37, length), samples.shape)
-    forward = range_profiles.from_samples(device, samples, weights, made, length)
+    forward = range_profiles.from_samples(device, samples, weights, length, pad)
     backward = range_profiles.to_samples(device, rows.astype(np.complex64), 37, made)
     assert np.vdot(rows, forward) == pytest.approx(np.vdot(backward, samples), rel=1e-5)
 

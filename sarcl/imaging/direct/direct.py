@@ -134,9 +134,8 @@ class Direct:
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
             weights = self.task.row_weight[start:stop, None] * self.sample_weight
-            made = range_profiles.from_samples(
-                device, raw.read(start, stop), weights, self.plan.interpolator, self.plan.length
-            )
+            pad = range_profiles.padding(self.plan.interpolator)
+            made = range_profiles.from_samples(device, raw.read(start, stop), weights, self.plan.length, pad)
             block = device.upload(made)
             packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
             pulses = device.upload(packed), packed.shape[2], stop - start

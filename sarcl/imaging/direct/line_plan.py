@@ -69,7 +69,7 @@ class LinePlan:
             "BISTATIC": int(bistatic),
             "WRAP": self.length if wrap else 0,
             "TAPS": self.interpolator.taps,
-            "TERMS": self.interpolator.table.shape[-1],
+            "TERMS": self.interpolator.terms,
             "ORDER": self.order,
             "SIDE": self.side,
             "FINE": self.fine,
@@ -186,7 +186,7 @@ def choose(
         turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
         off = 1.1 * moved(rest)
         order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
-        fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.place_rounding(
+        fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.position_rounding(
             radius, bandwidth, False
         )
         fixed += error_bounds.series_error(radius, distance, highest, order)

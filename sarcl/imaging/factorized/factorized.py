@@ -66,7 +66,7 @@ class Factorized:
                 "SPAN": SPAN,
                 "WRAP": plan.length if task.wrap and not i else 0,
                 "TAPS": made.taps,
-                "TERMS": made.table.shape[-1],
+                "TERMS": made.terms,
                 "FROM_CENTRE": int(i == 0),
                 "NODES": level.decimation.filter.shape[1],
             }
@@ -229,7 +229,7 @@ class Factorized:
             stop = min(start + rows, raw.n_rows)
             weights = task.row_weight[start:stop, None] * self.sample_weight
             source = device.upload(
-                range_profiles.from_samples(device, raw.read(start, stop), weights, plan.first, plan.length, self.pad)
+                range_profiles.from_samples(device, raw.read(start, stop), weights, plan.length, self.pad)
             )
             packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
             pulse, n, used = device.upload(packed), packed.shape[2], stop - start

@@ -9,8 +9,7 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
-from ...numerics.interpolation_float64 import Kernel
-from ...opencl import fft
+from ...numerics import range_profiles
 from ...opencl.device import Device
 from ...opencl.device_list import devices
 from ..focusing_task import FocusingTask, Skipped, working_bytes
@@ -20,7 +19,6 @@ from .plan import CHUNK, Float64Plan
 
 N_CONST = 16  # of kernels/backproject_float64.cl
 PIXEL_BYTES = 56  # positions, totals and their errors
-LARGEST = 1e290  # of a profile: sums of any number of such rows still fit in complex128
 
 
 class DirectFloat64:
@@ -39,8 +37,11 @@ class DirectFloat64:
         self.constants = device.kernel("backproject_float64.cl", "tile_constants", **macros)
         self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
-        self.table = device.upload(plan.kernel.table)
-        self.sample_weight = task.sample_weight * correction(plan.kernel, task.raw.n_samples, plan.length)
+        self.table = device.upload(plan.interpolator.table)
+        self.pad = range_profiles.padding(plan.interpolator)
+        self.sample_weight = task.sample_weight * range_profiles.correction(
+            plan.interpolator, task.raw.n_samples, plan.length
+        )
 
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs of bands whose positions and totals fit in half of nbytes; a band that is alone may be larger.
@@ -61,7 +62,7 @@ class DirectFloat64:
 
     @property
     def _row_bytes(self) -> float:
-        return 16.0 * (self.plan.length + 2 * padding(self.plan.kernel))
+        return 16.0 * (self.plan.length + 2 * self.pad)
 
     def _tiles_at_once(self, nbytes: float) -> int:
         return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
@@ -103,12 +104,15 @@ class DirectFloat64:
         image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
         where = device.upload(positions.reshape(-1, 3).T)
         tile, reach = device.upload(references.T), device.upload(radius)
-        stride = plan.length + 2 * padding(plan.kernel)
+        stride = plan.length + 2 * self.pad
         clock.lap("prepare")
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
             weights = self.task.row_weight[start:stop, None] * self.sample_weight
-            block = device.upload(profiles(device, raw.read(start, stop), weights, plan.kernel, plan.length))
+            samples = raw.read(start, stop)
+            block = device.upload(
+                range_profiles.from_samples(device, samples, weights, plan.length, self.pad, np.complex128)
+            )
             pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
             pulse, n = device.upload(pulse_host), pulse_host.shape[1]
             clock.lap("profiles")
@@ -152,40 +156,3 @@ def by_range(positions: np.ndarray, tx: np.ndarray, rx: np.ndarray) -> tuple[np.
     path = sum(np.sqrt(((positions - end) ** 2).sum(axis=-1)) for end in (tx, rx))
     order = np.argsort(path, axis=1, kind="stable")
     return np.take_along_axis(positions, order[..., None], axis=1), order
-
-
-def padding(kernel: Kernel) -> int:
-    """Samples kept on each side of a profile, so that neither taps nor windows of FAR samples more leave their row."""
-    return kernel.taps + 4
-
-
-def correction(kernel: Kernel, n_samples: int, length: int) -> np.ndarray:
-    """What spectra (n_samples,) are multiplied by: 1/transform, and the sign that puts delay 0 at length/2."""
-    k = np.arange(n_samples) - n_samples // 2
-    return np.where(k % 2, -1.0, 1.0) / kernel.transform(k / length)
-
-
-def profiles(device: Device, samples: np.ndarray, weights: np.ndarray, kernel: Kernel, length: int) -> np.ndarray:
-    """Profiles (n, length + 2 padding) complex128 of samples (n, n_samples), each times weights (n, n_samples).
-
-    Delay 0 stands at padding + length/2; the padding repeats the profile's other end.
-    """
-    n, n_samples = samples.shape
-    shaped = samples * weights
-    largest = float(np.abs(shaped).max(initial=0.0)) * n_samples
-    if not largest <= LARGEST:
-        raise ValueError(
-            f"samples times weights reach {largest / n_samples:.1e} in rows of {n_samples}; sums in complex128 hold up "
-            f"to {LARGEST:.0e}: scale the samples down"
-        )
-    spectrum = np.zeros((n, length), np.complex128)
-    low = n_samples // 2
-    spectrum[:, : n_samples - low] = shaped[:, low:]
-    if low:
-        spectrum[:, -low:] = shaped[:, :low]
-    pad = padding(kernel)
-    made = np.empty((n, length + 2 * pad), np.complex128)
-    made[:, pad:-pad] = fft.rows(device, spectrum, inverse=True)
-    made[:, :pad] = made[:, length : length + pad]
-    made[:, -pad:] = made[:, pad : 2 * pad]
-    return made

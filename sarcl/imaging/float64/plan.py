@@ -11,9 +11,8 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import rounded_up
-from ...numerics import cost_model, error_bounds_float64, interpolation_float64
-from ...numerics.interpolation_float64 import Kernel
-from ...opencl import fft
+from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics.interpolation import Interpolator
 from .. import profile_energy
 from ..focusing_task import FocusingTask
 from ..profile_energy import ProfileEnergy
@@ -27,14 +26,14 @@ WIDE = -1  # the order of plans that compute every path in pairs of float64
 
 @dataclass(frozen=True, eq=False)
 class Float64Plan:
-    """How an image is computed: kernel and profile length, points a tile, order of the range series.
+    """How an image is computed: interpolator and profile length, points a tile, order of the range series.
 
     order         2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
     cost          relative, of a row
     next_cheaper  the most accurate of the plans that cost less, or None
     """
 
-    kernel: Kernel
+    interpolator: Interpolator
     length: int
     per_tile: int
     order: int
@@ -46,7 +45,7 @@ class Float64Plan:
         """The plan in words and numbers, for a report."""
         words = {
             "method": method,
-            "taps": self.kernel.taps,
+            "taps": self.interpolator.taps,
             "profile samples": self.length,
             "points a tile": self.per_tile,
             "ranges": "pairs of float64" if self.order == WIDE else "float64",
@@ -55,7 +54,7 @@ class Float64Plan:
         if self.next_cheaper:
             other = self.next_cheaper
             words["next cheaper"] = (
-                f"{other.kernel.taps} taps of {other.length} samples: error {other.predicted_error:.1e}"
+                f"{other.interpolator.taps} taps of {other.length} samples: error {other.predicted_error:.1e}"
             )
         return words
 
@@ -65,8 +64,8 @@ class Float64Plan:
             "BISTATIC": int(bistatic),
             "BEAM": int(beam),
             "WRAP": self.length if wrap else 0,
-            "TAPS": self.kernel.taps,
-            "TERMS": self.kernel.terms,
+            "TAPS": self.interpolator.taps,
+            "TERMS": self.interpolator.terms,
             "ORDER": self.order,
             "CHUNK": CHUNK,
         }
@@ -93,7 +92,9 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
         )  # fmt: skip
     cheaper = [p for p in plans if p.cost < good.cost]
     other = min(cheaper, key=lambda p: p.predicted_error, default=None)
-    named = Float64Plan(good.kernel, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other)
+    named = Float64Plan(
+        good.interpolator, good.length, good.per_tile, good.order, good.predicted_error, good.cost, other
+    )
     return named, tilings[named.per_tile]
 
 
@@ -105,10 +106,10 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
     cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
     # errors scale with the rows' energy, a tolerance with what pixels see of it: in these data, and at rare nulls
-    dark = max(energy.near_pixels, error_bounds_float64.darkness(float(cells)))
+    dark = max(energy.near_pixels, error_bounds.darkness(float(cells)))
     ranges = [
         (
-            error_bounds_float64.range_error(tiling.radius, distance, frequency, order),
+            error_bounds.range_error_float64(tiling.radius, distance, frequency, order),
             cost + cost_model.FLOAT64_TILE / per_tile,
             per_tile,
             order,
@@ -116,22 +117,20 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
         for per_tile, tiling in tilings.items()
         for order, cost in cost_model.FLOAT64_SERIES.items()
     ]
-    for taps in interpolation_float64.TAPS:
-        for oversample in interpolation_float64.OVERSAMPLE:
-            # one sample has no bandwidth, but a profile of a few samples keeps its taps apart
-            # and an even length puts delay 0 on a sample
-            length = 2 * fft.good_length(max(int(np.ceil(oversample * raw.n_samples / 2)), 2 * taps))
-            if length > max(interpolation_float64.LONGEST, 2 * raw.n_samples):
+    for taps in interpolation.FLOAT64_TAPS:
+        for oversample in interpolation.FLOAT64_OVERSAMPLE:
+            length = interpolation.profile_length(oversample, raw.n_samples, taps)
+            if length > max(interpolation.LONGEST, 2 * raw.n_samples):
                 continue
-            kernel = interpolation_float64.cheapest_kernel(taps, float(oversample))
-            fixed = dark * kernel.error
-            rounding = error_bounds_float64.sum_rounding(CHUNK, length, kernel.edge_gain)
+            interpolator = interpolation.interpolator_float64(taps, float(oversample))
+            fixed = dark * interpolator.error
+            rounding = error_bounds.sum_rounding(CHUNK, length, interpolator.edge_gain, error_bounds.FLOAT64)
             fixed += max(energy.whole_profile, dark) * rounding
             profile = cost_model.float64_profile(length)
             for error, extra, per_tile, order in ranges:
                 if np.isfinite(error):
                     pairs = grid.size * (cost_model.FLOAT64_PAIR + cost_model.FLOAT64_TAP * taps + extra)
-                    yield Float64Plan(kernel, length, per_tile, order, fixed + error, pairs + profile)
+                    yield Float64Plan(interpolator, length, per_tile, order, fixed + error, pairs + profile)
 
 
 def too_long(task: FocusingTask) -> str | None:

@@ -145,10 +145,10 @@ def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance
         turns = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
         made = made * np.exp(2j * np.pi * turns)
     largest = float(np.abs(made).max(initial=0.0))
-    if largest > LARGEST / raw.samples.size:
+    if largest > LARGEST[np.complex64] / raw.samples.size:
         raise ValueError(
             f"samples times weights reach {largest:.1e}; sums of {raw.samples.size} in complex64 hold up to "
-            f"{LARGEST:.0e}: scale the samples down"
+            f"{LARGEST[np.complex64]:.0e}: scale the samples down"
         )
     return made.astype(np.complex64)
 
