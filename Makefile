@@ -5,7 +5,7 @@
 .PHONY: help demo test bench results architecture lint clean ready ready-dev
 
 ARGS ?=
-CODE = sarcl kernels tests bench docs
+CODE = sarcl kernels tests bench docs conftest.py
 
 help:  ## this list
 	@echo "make GOAL [ARGS='...' handed to the command] [PYTHON=/path/to/python3.12]"

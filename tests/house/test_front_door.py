@@ -32,6 +32,11 @@ def test_every_public_name_is_there_and_is_what_it_is_called(name):
         assert value.__name__ == name and value.__module__.startswith("sarcl.")
 
 
+@pytest.mark.parametrize("name", sarcl.__all__)
+def test_every_public_name_has_a_docstring(name):
+    assert getattr(sarcl, name).__doc__
+
+
 def test_public_modules_are_there_after_a_bare_import():
     code = f"import sarcl; print([type(getattr(sarcl, n)).__name__ for n in {MODULES!r}])"
     assert run(code) == str(["module"] * len(MODULES))
