@@ -7,10 +7,10 @@ from __future__ import annotations
 
 import argparse
 import logging
-import math
 import sys
 import warnings
 from collections.abc import Callable, Sequence
+from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -117,6 +117,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
 
 def focus(args: argparse.Namespace, job: Job) -> int:
     """An image from echoes."""
+    from ..imaging.focus_options import FocusOptions
     from ..model.phase_history import PhaseHistory
     from ..model.store import read
     from ..opencl.choose_device import open_devices
@@ -139,22 +140,17 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
     raw = _compressed(raw, job)
     grid = grid or _default_grid(raw, job, given)
-    how = {name: getattr(args, name) for name in ("tolerance", "method", "window", "wrap", "max_bytes")}
-    how["beam"] = None if args.beam is None else math.radians(args.beam)
+    asked = {f.name: getattr(args, f.name) for f in fields(FocusOptions) if hasattr(args, f.name)}
+    options: dict[str, Any] = {**asked, "device": devices}
     if args.dry_run:
         from ..imaging.forecast import plan
 
-        print(plan(raw, grid, **how, device=devices))
+        print(plan(raw, grid, **options))
         return 0
     from ..imaging.backproject import backproject
 
-    _focus(
-        lambda out: backproject(
-            raw, grid, **how, out=out, device=devices, progress=job.progress,
-            tile=args.tile, resume=args.resume,
-        ),
-        outputs, args, job,
-    )  # fmt: skip
+    running = {"progress": job.progress, "tile": args.tile, "resume": args.resume}
+    _focus(lambda out: backproject(raw, grid, **options, **running, out=out), outputs, args, job)
     return 0
 
 

@@ -7,6 +7,7 @@ Only the parser is here, so that --help answers at once; sarcl/cli/_commands.py 
 from __future__ import annotations
 
 import argparse
+import math
 import os
 import re
 import sys
@@ -119,7 +120,12 @@ def _focus(p: argparse.ArgumentParser) -> None:
     how.add_argument("--dry-run", action="store_true", help="say what it will take, and do nothing")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
     how.add_argument(
-        "--beam", type=float, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
+        "--beam", type=degrees, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
+    )
+    how.add_argument(
+        "--mapping",
+        choices=["corrected", "apparent", "channels"],
+        help="map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
     )
     how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
@@ -232,6 +238,11 @@ def size(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is no size; give bytes, e.g. 2G, 500M or 1.5GiB")
     return value
+
+
+def degrees(text: str) -> float:
+    """An angle in degrees as rad."""
+    return math.radians(float(text))
 
 
 def piece(text: str) -> tuple[int, int]:

@@ -6,6 +6,7 @@ For other folders:
     choose_method    the cheapest method that meets the tolerance
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
+    focus_options    options that backproject, plan, the command line and scenarios share
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
@@ -26,6 +27,7 @@ __all__ = [
     "direct",
     "factorized",
     "float64",
+    "focus_options",
     "focusing_task",
     "forecast",
     "polar_format",

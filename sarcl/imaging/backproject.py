@@ -5,27 +5,26 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Collection, Sequence
 from contextlib import ExitStack, closing
-from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack, overload
+from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
+from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..base.types import PathLike, WritableArray
-from ..base.validation import choice, count, instance
-from ..base.validation import tolerance as allowed_error
+from ..base.validation import count, instance
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
-from ..opencl.memory_budget import budget
-from .choose_method import METHODS, MethodChoice, choose
-from .focusing_task import BeamCone, FocusingTask, Skip, Skipped, make_task
+from .choose_method import MethodChoice, choose
+from .focus_options import FocusKeywords, FocusOptions
+from .focusing_task import BeamCone, FocusingTask, Skip, Skipped
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
@@ -43,22 +42,12 @@ Progress = Callable[[str, int, int], None]
 Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
 
 
-class BackprojectOptions(TypedDict, total=False):
+class BackprojectOptions(FocusKeywords, total=False):
     """Options of `backproject` other than `tile`, which decides what it returns."""
 
-    tolerance: float
-    method: Literal["auto", "direct", "factorized"]
-    window: Window | None
-    weights: ArrayLike | None
-    beam: BeamCone | None
-    mapping: MapKind | MapApertureOptions | None
-    wrap: bool
-    skip: bool | Collection[Skip]
-    max_bytes: float | None
     out: PathLike | WritableArray | None
     resume: bool | None
     check: bool | None
-    device: DeviceChoice | Sequence[DeviceChoice] | None
     cluster: distributed.Client | None
     progress: Progress | None
 
@@ -130,15 +119,11 @@ def backproject(
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
-    instance("raw", raw, PhaseHistory)
-    instance("grid", grid, ImageGrid)
-    if mapping is not None:
-        raw = map_aperture(raw, **(mapping if isinstance(mapping, dict) else {"mapping": mapping}))
-    choice("method", method, METHODS)
-    tolerance = allowed_error(tolerance)
+    options = FocusOptions(tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device)
+    tolerance = options.tolerance
     piece = _piece(tile, resume, out)
-    task = make_task(raw, grid, window, weights, wrap, skip, beam)
-    workers, chosen = _open_workers(task, method, tolerance, device, cluster, max_bytes)
+    raw, task = options.task(raw, grid)
+    workers, chosen = _open_workers(task, options, cluster)
     clock.lap("plan")
 
     with ExitStack() as stack:
@@ -235,19 +220,16 @@ def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
     return i, n
 
 
-def _open_workers(
-    task: FocusingTask, method: str, tolerance: float, device: Any, cluster: Any, max_bytes: float | None
-) -> tuple[WorkerPool, MethodChoice]:
-    """Who makes the image, and how: one plan for all of them."""
+def _open_workers(task: FocusingTask, options: FocusOptions, cluster: Any) -> tuple[WorkerPool, MethodChoice]:
+    """The workers that make the image, and the one method and plan for all of them."""
     if cluster is not None:
         from .run.dask_workers import DaskWorkers, have_lanes
 
-        chosen = choose(task, method, tolerance, have_lanes(cluster, device))
-        return DaskWorkers(cluster, task, chosen, device, max_bytes), chosen
-    devices = open_devices(device)
-    budgets = [min(budget(d, max_bytes), d.info.memory) for d in devices]
-    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
-    chosen = choose(task, method, tolerance, lanes, float64)
+        chosen = choose(task, options.method, options.tolerance, have_lanes(cluster, options.device))
+        return DaskWorkers(cluster, task, chosen, options.device, options.max_bytes), chosen
+    devices = open_devices(options.device)
+    budgets = [options.budget(d) for d in devices]
+    chosen = options.choose(task, devices)
     engines = [chosen.on(d, task) for d in devices]
     return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
 

@@ -12,20 +12,19 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.errors import ToleranceUnreachable
 from ..base.stage_timer import Clock
 from ..base.text import duration, size_text
-from ..base.validation import choice, instance
-from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
-from ..opencl import memory_budget
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
 from . import profile_energy
-from .choose_method import METHODS, MethodChoice, choose
+from .choose_method import MethodChoice
 from .factorized.plan import FactorPlan, moving_cost
+from .focus_options import FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
 
 PROBE = 0.03  # s a probe of a device takes at least
@@ -67,6 +66,7 @@ def plan(
     window: Window | None = None,
     weights: ArrayLike | None = None,
     beam: BeamCone | None = None,
+    mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[Skip] = True,
     max_bytes: float | None = None,
@@ -74,18 +74,15 @@ def plan(
 ) -> Forecast:
     """How `backproject(raw, grid, ...)` would make the image with these options: a Forecast, before any work.
 
-    Samples are read once, up to 2^28 of them, to see how much of their energy lies on the grid. Time is scaled
-    from a short run of the kernel on each device. ValueError and MemoryError where `backproject` would raise one.
+    Samples are read once, up to 2^28 of them, to estimate how much of their energy lies on the grid; with `mapping`,
+    all are read and mapped first. Time is scaled from a short run of the kernel on each device. ValueError and
+    MemoryError where `backproject` would raise one.
     """
-    instance("raw", raw, PhaseHistory)
-    instance("grid", grid, ImageGrid)
-    choice("method", method, METHODS)
-    tolerance = allowed_error(tolerance)
-    task = make_task(raw, grid, window, weights, wrap, skip, beam)
+    options = FocusOptions(tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device)
+    raw, task = options.task(raw, grid)
     devices = open_devices(device)
-    lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
-    chosen = choose(task, method, tolerance, lanes, float64)
-    working = sum(_bytes(task, chosen, d, min(memory_budget.budget(d, max_bytes), d.info.memory)) for d in devices)
+    chosen = options.choose(task, devices)
+    working = sum(_bytes(task, chosen, d, options.budget(d)) for d in devices)
     # of a pixel in all rows that see it, at cost 1
     seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
     return Forecast(
@@ -94,7 +91,7 @@ def plan(
         seconds * _work(task, chosen),
         float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
         chosen.predicted_error,
-        _cheaper(task, method, tolerance, lanes, float64, chosen, seconds),
+        _cheaper(task, options, devices, chosen, seconds),
     )
 
 
@@ -120,13 +117,13 @@ def _rate(devices: list[Device]) -> float:
 
 
 def _cheaper(
-    task: FocusingTask, method: str, tolerance: float, lanes: bool, float64: bool, chosen: MethodChoice, seconds: float
+    task: FocusingTask, options: FocusOptions, devices: list[Device], chosen: MethodChoice, seconds: float
 ) -> tuple[float, float] | None:
-    """The plan of the smallest error that costs noticeably less."""
+    """Predicted error and seconds of the most accurate plan that costs noticeably less."""
     for factor in (2, 3, 10, 30):
-        if tolerance * factor < 1:
+        if options.tolerance * factor < 1:
             try:
-                other = choose(task, method, tolerance * factor, lanes, float64)
+                other = options.choose(task, devices, options.tolerance * factor)
             except ToleranceUnreachable:  # sub-apertures that a tighter tolerance allows may be refused here
                 continue
             if _work(task, other) < 0.95 * _work(task, chosen):

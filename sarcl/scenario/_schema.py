@@ -238,7 +238,7 @@ def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
         names = {"str" if n.startswith("Literal[") else n for n in names}  # its words are checked by the call
     if names and names <= set(_TYPES):
         return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
-    if "Mapping" in str(parameter.annotation) and isinstance(value, Mapping):
+    if re.search("Mapping|MapApertureOptions", str(parameter.annotation)) and isinstance(value, Mapping):
         return ""
     good = isinstance(value, (bool, int, float, str, list)) and not _is_table(value)
     return "" if good else "a number, a string, true, false or an array"

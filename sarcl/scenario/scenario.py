@@ -6,7 +6,7 @@ import inspect
 import re
 import tomllib
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
 from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
@@ -21,6 +21,8 @@ from ._schema import Where
 if TYPE_CHECKING:
     from ..base.types import PathLike
     from ..imaging.backproject import BackprojectOptions
+    from ..imaging.focus_options import FocusKeywords
+    from ..imaging.forecast import Forecast
     from ..model.antenna import Antenna
     from ..model.antenna_array import AntennaArray
     from ..model.image import Image
@@ -226,11 +228,27 @@ class Scenario:
         """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
         from ..imaging.backproject import backproject
 
-        given = self._options("backproject", options)
-        if grid is None:
-            grid = self.build_grid()
-        with self.where.blame(("backproject",), {k: v for k, v in given.items() if k not in options}, always=False):
-            return backproject(raw, grid, **given)
+        return self._focused(backproject, raw, grid, options, self._options("backproject", options))
+
+    def plan_focus(
+        self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[FocusKeywords]
+    ) -> Forecast:
+        """What `focus` with these options will take: method, time, bytes, error."""
+        from ..imaging.focus_options import FocusOptions
+        from ..imaging.forecast import plan
+
+        known = {f.name for f in fields(FocusOptions)}
+        given = {k: v for k, v in self._options("backproject", options).items() if k in known}
+        return self._focused(plan, raw, grid, options, given)
+
+    def _focused(
+        self, verb: Callable[..., Any], raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any],
+        given: Mapping[str, Any],
+    ) -> Any:  # fmt: skip
+        own = {k: v for k, v in given.items() if k not in options}
+        grid = self.build_grid() if grid is None else grid
+        with self.where.blame(("backproject",), own, always=False):
+            return verb(raw, grid, **given)
 
     def _aimed(self, track: Trajectory, section: str) -> Trajectory:
         table = getattr(self, section)

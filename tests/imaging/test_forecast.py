@@ -98,6 +98,33 @@ def test_dry_run_says_it_and_writes_nothing(tmp_path, capsys, monkeypatch):
     assert sorted(p.name for p in tmp_path.iterdir()) == before
 
 
+def test_a_mapped_image_is_planned_as_it_is_made(tmp_path, capsys, monkeypatch):
+    monkeypatch.chdir(tmp_path)
+    tone = sarcl.Waveform.tone(center=10e9, duration=5e-8)
+    track = sarcl.Trajectory.line(start=(-5000, -100, 0), velocity=(0, 100, 0), prf=10.0, n_pulses=20)
+    array = sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=20e6, axis=(0, -1, 0))
+    raw = sarcl.echo(
+        sarcl.Scene.points([[0.0, 0, 0], [1, 0.5, 0]]), tone, track, array=array, reference=(0, 0, 0),
+        range_window=(-3.5, 3.5), receive="reference",
+    )  # fmt: skip
+    raw.save("raw.h5")
+    grid = sarcl.ImageGrid.plane(shape=(16, 16), spacing=0.2)
+    where = ["--center", "0", "0", "0", "--shape", "16", "16", "--spacing", "0.2", "0.2"]
+    for mapping in ("channels", "corrected"):
+        forecast = sarcl.plan(raw, grid, mapping=mapping)
+        image = sarcl.backproject(raw, grid, mapping=mapping)
+        assert forecast.plan == dict(image.report.plan)
+        assert forecast.predicted_error == image.report.predicted_error
+        assert main(["focus", "raw.h5", *where, "--mapping", mapping, "--dry-run"]) == 0
+        assert capsys.readouterr().out.endswith(f"{forecast}\n")
+        assert main(["focus", "raw.h5", *where, "--mapping", mapping, "-o", "image.h5"]) == 0
+        assert (np.asarray(sarcl.read("image.h5").data) == image.data).all()
+        capsys.readouterr()
+    for verb in (sarcl.plan, sarcl.backproject):
+        with pytest.raises(ValueError, match="array"):
+            verb(noise_history(n_rows=4), grid, mapping="channels")
+
+
 def test_method_is_checked():
     with pytest.raises(ValueError, match="method is 'fast'"):
         sarcl.plan(noise_history(n_rows=4), GRID, method="fast")

@@ -49,6 +49,31 @@ def test_a_scenario_with_an_array_echoes_and_focuses():
 
 
 @pytest.mark.parametrize(
+    ("table", "rows"),
+    [
+        ('[backproject]\nmapping = "channels"\ncheck = false\n', 9 * 20),
+        ('[backproject.mapping]\nmapping = "corrected"\ncenter = [0, 0, 0]\nquadratic = false\n', 20),
+    ],
+    ids=["kind", "table"],
+)
+def test_a_mapped_image_is_planned_and_made_from_one_table(table, rows):
+    read = scenario.loads(TEXT + table)
+    raw = read.simulate()
+    forecast, image = read.plan_focus(raw), read.focus(raw)
+    assert forecast.plan == dict(image.report.plan) and forecast.predicted_error == image.report.predicted_error
+    assert image.report.contributions_done + sum(image.report.contributions_skipped.values()) == rows * 256
+    tight = read.plan_focus(raw, sarcl.ImageGrid.plane(shape=(8, 8), spacing=0.2), tolerance=1e-5)
+    assert tight.predicted_error <= 1e-5 < forecast.predicted_error
+
+
+@pytest.mark.parametrize("verb", ["focus", "plan_focus"])
+def test_a_mapping_that_is_none_is_named_with_its_line(verb):
+    read = scenario.loads(TEXT + '[backproject]\nmapping = "sideways"\n')
+    with pytest.raises(ValueError, match=r"scenario:30: \[backproject\] mapping .*corrected"):
+        getattr(read, verb)(read.simulate())
+
+
+@pytest.mark.parametrize(
     "array", [sarcl.AntennaArray.linear(3, spacing=0.1, frequency_step=1e6), sarcl.AntennaArray.planar(
         (2, 2), spacing=(0.1, 0.2), weights=[1, 1j, 0.5, -2]).mirrored(2, 5)]
 )  # fmt: skip

@@ -1,0 +1,72 @@
+"""Options that decide how an image is made: those that backproject, plan, the command line and scenarios share."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import Literal, TypedDict
+
+from numpy.typing import ArrayLike
+
+from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
+from ..base.validation import choice, instance
+from ..base.validation import tolerance as allowed_error
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..numerics.windows import Window
+from ..opencl.device import Device, DeviceChoice
+from ..opencl.memory_budget import budget
+from .choose_method import METHODS, MethodChoice, choose
+from .focusing_task import BeamCone, FocusingTask, Skip, make_task
+
+
+class FocusKeywords(TypedDict, total=False):
+    """FocusOptions as keywords."""
+
+    tolerance: float
+    method: Literal["auto", "direct", "factorized"]
+    window: Window | None
+    weights: ArrayLike | None
+    beam: BeamCone | None
+    mapping: MapKind | MapApertureOptions | None
+    wrap: bool
+    skip: bool | Collection[Skip]
+    max_bytes: float | None
+    device: DeviceChoice | Sequence[DeviceChoice] | None
+
+
+@dataclass(frozen=True, eq=False)
+class FocusOptions:
+    """Arguments of `backproject` that a plan depends on, which describes them. ValueError for those that cannot be."""
+
+    tolerance: float = 1e-3
+    method: Literal["auto", "direct", "factorized"] = "auto"
+    window: Window | None = None
+    weights: ArrayLike | None = None
+    beam: BeamCone | None = None
+    mapping: MapKind | MapApertureOptions | None = None
+    wrap: bool = False
+    skip: bool | Collection[Skip] = True
+    max_bytes: float | None = None
+    device: DeviceChoice | Sequence[DeviceChoice] | None = None
+
+    def __post_init__(self) -> None:
+        choice("method", self.method, METHODS)
+        object.__setattr__(self, "tolerance", allowed_error(self.tolerance))
+
+    def task(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[PhaseHistory, FocusingTask]:
+        """The echoes, mapped where a mapping is asked for, and what is to be focused."""
+        instance("raw", raw, PhaseHistory)
+        instance("grid", grid, ImageGrid)
+        if self.mapping is not None:
+            raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
+        return raw, make_task(raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam)
+
+    def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
+        """The method for these devices together; tolerance: another one than asked for."""
+        lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
+        return choose(task, self.method, self.tolerance if tolerance is None else tolerance, lanes, float64)
+
+    def budget(self, device: Device) -> float:
+        """Bytes that blocks may take on a device."""
+        return min(budget(device, self.max_bytes), device.info.memory)
