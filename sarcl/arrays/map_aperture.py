@@ -10,8 +10,10 @@ from numpy.typing import ArrayLike
 
 from ..base import errors, validation
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 from ..model.antenna_array import AntennaArray
 from ..model.phase_history import PhaseHistory
+from ..numerics.pulse_geometry import half_path
 from .channels import spacing
 
 MapKind = Literal["corrected", "apparent", "channels"]
@@ -59,7 +61,7 @@ def map_aperture(
     point = validation.array("center", center, np.float64, (3,))
     array = _array_of(raw)
     pulse = _pulses(raw, array)
-    away = (np.linalg.norm(raw.tx - point, axis=1) + np.linalg.norm(raw.rx - point, axis=1)) / 2
+    away = half_path(raw.tx, raw.rx, point)
     if np.abs(away - raw.reference_range).max() > NEAR:
         worst = int(np.abs(away - raw.reference_range).argmax())
         raise ValueError(
@@ -112,9 +114,7 @@ def _apparent(
     gradient = u + g / r * (axis - kappa * u)
     level = gradient - (gradient @ up)[:, None] * up
     sine = (u @ up)[:, None]
-    return np.asarray(
-        (r + g * kappa) * (np.sqrt(1 - sine**2) * level / np.linalg.norm(level, axis=1, keepdims=True) + sine * up)
-    )
+    return np.asarray((r + g * kappa) * (np.sqrt(1 - sine**2) * unit(level) + sine * up))
 
 
 def _rotations(attitude: Any, n_pulses: int) -> np.ndarray:

@@ -16,6 +16,7 @@ For other folders:
     tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
+    vectors       unit vectors
     version       the version of the package
     wgs84         longitude, latitude and height to Earth-centred coordinates and local axes
 """
@@ -35,6 +36,7 @@ __all__ = [
     "tolerances",
     "types",
     "validation",
+    "vectors",
     "version",
     "wgs84",
 ]

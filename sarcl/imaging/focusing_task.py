@@ -12,6 +12,7 @@ from numpy.typing import ArrayLike
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.stage_timer import Clock
 from ..base.validation import array, converted, finite, number
+from ..base.vectors import unit
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.plan import skips as known_skips
@@ -153,8 +154,7 @@ def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarra
         raise ValueError(f"beam[1]{which} is (0, 0, 0); a direction needs a length")
     if angle == 2 * np.pi:
         return None, angle
-    toward = toward / largest
-    return toward / np.linalg.norm(toward, axis=1, keepdims=True), angle
+    return unit(toward / largest), angle
 
 
 def make_task(

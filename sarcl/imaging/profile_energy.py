@@ -13,6 +13,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..numerics import range_profiles
 from ..numerics.interpolation import deconvolved
+from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 from .focusing_task import FocusingTask
 
@@ -108,7 +109,7 @@ def share(task: FocusingTask) -> float:
 def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
     """Delays of points, m (m, 3), in turns of a row's window, and whether the row sees them."""
     raw = task.raw
-    half = sum(np.linalg.norm(x - end[row], axis=1) for end in (raw.tx, raw.rx)) / 2
+    half = half_path(raw.tx[row], raw.rx[row], x)
     turns = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
     lit = np.full(len(x), True) if task.wrap else np.abs(turns) <= 0.5
     if task.antennas.beam is not None:

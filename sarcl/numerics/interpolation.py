@@ -15,6 +15,7 @@ from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
 from ..opencl import fft
 from . import cost_model
+from .polynomials import chebyshev
 
 MARGIN = 1.06  # factor on errors that are taken on a grid of frequencies and positions
 OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
@@ -103,7 +104,7 @@ def line_interpolator(taps: int, oversample: float) -> Interpolator:
 
 @functools.lru_cache(maxsize=256)
 def _least_squares(taps: int, oversample: float) -> Interpolator:
-    z = _fitting_points(48)
+    z = chebyshev(0, 1, 48)
     weights = least_squares_weights(taps, oversample, z).T
     w, mirrored = weights[: taps // 2], weights[: taps // 2 - 1 : -1]  # w_{taps-1-k}(z) = w_k(-z)
     table = _fitted(z, (w + mirrored) / 2, (w - mirrored) / 2, LINE_TERMS[taps]).astype(np.float32)
@@ -124,7 +125,7 @@ HAT = np.array([[[0.5], [-1.0]]])  # the table of the hat: weights 1/2 - z and 1
 
 def _kaiser_bessel(taps: int, oversample: float, terms: int) -> np.ndarray:
     beta = np.pi * taps * (1 - 0.5 / oversample)
-    z = _fitting_points(200)
+    z = chebyshev(0, 1, 200)  # a fit at them is near minimax
 
     def psi(z: np.ndarray) -> np.ndarray:
         x = 2 * (z + (taps - 1) / 2 - np.arange(taps // 2)[:, None]) / taps
@@ -133,11 +134,6 @@ def _kaiser_bessel(taps: int, oversample: float, terms: int) -> np.ndarray:
     w, mirrored = psi(z), psi(-z)
     # the odd part over z, times z: so the last bits of float32 tables are those of earlier versions
     return _fitted(z, (w + mirrored) / 2, (w - mirrored) / (2 * z) * z, terms)
-
-
-def _fitting_points(n: int) -> np.ndarray:
-    """Chebyshev points of [-1/2, 1/2]: a fit at them is near minimax."""
-    return np.cos(np.pi * (np.arange(n) + 0.5) / n) / 2
 
 
 def _fitted(z: np.ndarray, even: np.ndarray, odd: np.ndarray, terms: int) -> np.ndarray:

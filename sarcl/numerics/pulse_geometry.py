@@ -17,6 +17,11 @@ UNLIMITED = 1e30  # m: a limit of a range window that no range reaches and that 
 PER_PULSE = ("reference_range", "frequency", "frequency_step", "near", "far")
 
 
+def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray) -> np.ndarray:
+    """Half the path from transmitters over points to receivers, m: all (..., 3), broadcast."""
+    return np.asarray((np.linalg.norm(tx - points, axis=-1) + np.linalg.norm(rx - points, axis=-1)) / 2)
+
+
 @dataclass(frozen=True, eq=False)
 class PulseGeometry:
     """Positions of transmitter and receiver at each of n pulses, and how the range profiles of these pulses lie.

@@ -10,6 +10,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics import range_profiles
+from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels looked at
@@ -71,8 +72,7 @@ def energy(raw: PhaseHistory) -> np.ndarray:
 
 def delay(raw: PhaseHistory, row: int, places: np.ndarray) -> np.ndarray:
     """tau - tau_ref of one row at places, m (n, 3): s (n,)."""
-    path = np.linalg.norm(places - raw.tx[row], axis=1) + np.linalg.norm(places - raw.rx[row], axis=1)
-    return np.asarray((path - 2 * raw.reference_range[row]) / SPEED_OF_LIGHT)
+    return 2 * (half_path(raw.tx[row], raw.rx[row], places) - raw.reference_range[row]) / SPEED_OF_LIGHT
 
 
 def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:

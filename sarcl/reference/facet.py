@@ -7,11 +7,11 @@ import math
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 from ..scattering.physical_optics import (
     UP,
     _nodes,
     _sinc,
-    _unit,
     normals_and_areas,
     scattering_matrix,
     triangle_integral,
@@ -76,7 +76,7 @@ def facet_echo(
     out = np.zeros((len(frequencies), 2, 2), complex)
     for facet, normal, area, column in zip(triangles, normals, areas, eps.T, strict=True):
         edges = facet - np.roll(facet, 1, axis=0)
-        slope = _unit(tx - facet) + _unit(rx - facet)
+        slope = unit(tx - facet) + unit(rx - facet)
         phase = 2 * np.pi * frequencies.max() / SPEED_OF_LIGHT * np.abs(slope @ edges.T).max()
         nodes, weights = _nodes(int(phase / 4) + 40 + extra_nodes)
         s, t = nodes[:, None, None], nodes[None, :, None]
@@ -86,7 +86,7 @@ def facet_echo(
         at = facet.mean(axis=0)[None] if by_facet else points
         for i, f in enumerate(frequencies):
             if i == 0 or column[i] != column[i - 1]:  # S changes with frequency only through the permittivity
-                matrix = scattering_matrix(normal, _unit(tx - at), _unit(rx - at), column[i], up)
+                matrix = scattering_matrix(normal, unit(tx - at), unit(rx - at), column[i], up)
             wave = weight * np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(float))
             k = 2 * np.pi * f / SPEED_OF_LIGHT
             total = matrix[0] * wave.sum() if by_facet else np.tensordot(wave, matrix, 1)

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..numerics.polynomials import chebyshev
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
@@ -43,9 +44,8 @@ def _errors(
     center: float, bandwidth: float,
 ) -> dict[int, list[float]] | None:  # fmt: skip
     """None where no pulse sees anything."""
-    cosines = np.cos(np.pi * (np.arange(FREQUENCIES) + 0.5) / FREQUENCIES)
-    band = center + bandwidth / 2 * cosines
-    transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(cosines)))
+    band = chebyshev(center, bandwidth, FREQUENCIES)
+    transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(chebyshev(0, 2, FREQUENCIES))))
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
     seen = False
     for pulse in np.unique(np.linspace(0, len(antennas.tx) - 1, n_pulses).astype(int)):

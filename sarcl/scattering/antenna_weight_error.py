@@ -13,7 +13,9 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.errors import NothingSeen
+from ..base.vectors import unit
 from ..model.waveform import Waveform
+from ..numerics.polynomials import chebyshev
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
 from .antenna_weights import MOST_NODES, AntennaWeights, WeightError
@@ -52,8 +54,7 @@ def _sampled(
     places = np.concatenate([where, scene.positions[some]])
     total = bent = seen = floor = blurred = 0.0
     left = np.zeros(MOST_NODES + 1)
-    cosines = np.cos(np.pi * (np.arange(2 * MOST_NODES + 1) + 0.5) / (2 * MOST_NODES + 1))
-    band = waveform.center + waveform.bandwidth / 2 * cosines
+    band = chebyshev(waveform.center, waveform.bandwidth, 2 * MOST_NODES + 1)
     for pulse in np.unique(np.linspace(0, len(beam.geometry) - 1, n_pulses).astype(int)):
         power = np.empty(len(places))
         power[n_facets:] = point_power[some] * point_share
@@ -80,7 +81,7 @@ def _sampled(
         if beam.varies_over_band:
             values = np.stack([beam.weights(places, int(pulse), f) for f in band.tolist()])
             order = np.arange(len(band))
-            angles = np.outer(order, np.arccos(cosines))
+            angles = np.outer(order, np.arccos(chebyshev(0, 2, len(band))))
             coefficients = np.abs(2 / len(band) * np.cos(angles) @ values)  # Chebyshev's, of the weights over the band
             tails = np.cumsum(coefficients[::-1], axis=0)[::-1]
             left[1:] += [(power * (2 * tails[n]) ** 2).sum() for n in range(1, MOST_NODES + 1)]
@@ -119,13 +120,9 @@ def _unlit(beam: AntennaWeights, scene: Scene) -> str:
     assert beam.axes is not None
     boresights = beam.axes[0][:, :, 0]
     middle = box(np.concatenate([scene.positions, centroids(scene.triangles)])).mean(axis=0)
-    off = np.arccos(np.clip((_unit(middle - beam.geometry.tx) * boresights).sum(axis=1), -1, 1))
+    off = np.arccos(np.clip((unit(middle - beam.geometry.tx) * boresights).sum(axis=1), -1, 1))
     best = int(np.argmin(off))
     return (
         f"the scene is wholly out of the beam: its centre is never less than {np.degrees(off[best]):.3g} deg off the "
         f"boresight (pulse {best}); aim it with sarcl.pointing, such as pointing.spotlight(track, scene.center)"
     )
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

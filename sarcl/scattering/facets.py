@@ -8,6 +8,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
 from ..scene.triangles import centroids, normals
 from ..visibility.illumination import Lighting, Part, Span
@@ -100,8 +101,7 @@ class Facets:
         from .physical_optics import normals_and_areas, scattering_matrix, triangle_mean
 
         places = centroids(self.triangles)
-        to_tx, to_rx = (end - places for end in (tx, rx))
-        to_tx, to_rx = (d / np.linalg.norm(d, axis=1, keepdims=True) for d in (to_tx, to_rx))
+        to_tx, to_rx = (unit(end - places) for end in (tx, rx))
         behind = self.two_sided & ((normals(self.triangles) * to_tx).sum(axis=1) < 0)
         triangles = np.where(behind[:, None, None], self.triangles[:, ::-1], self.triangles)
         out, areas = normals_and_areas(triangles)

@@ -18,6 +18,8 @@ import math
 
 import numpy as np
 
+from ..base.vectors import unit
+
 UP = (0.0, 0.0, 1.0)
 
 
@@ -95,7 +97,7 @@ def polarisation(sight: np.ndarray, up: tuple[float, float, float] = UP) -> tupl
     other = np.array([0.0, 1.0, 0.0] if abs(up[1]) < 0.9 else [1.0, 0.0, 0.0])
     h = np.cross(s, np.asarray(up, float))
     h = np.where(np.linalg.norm(h, axis=-1, keepdims=True) < 1e-6, np.cross(s, other), h)
-    h = h / np.linalg.norm(h, axis=-1, keepdims=True)
+    h = unit(h)
     return h, np.cross(h, s)
 
 
@@ -157,10 +159,6 @@ def saras_matrix(normal: np.ndarray, look: float, permittivity: complex) -> np.n
     hv = a * along * (p + q)
     matrix = np.array([[a * a * q - along**2 * p, hv], [hv, along**2 * q - a * a * p]])
     return np.asarray(2 * cosine / (a * a + along * along) * matrix)
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))
 
 
 @functools.cache

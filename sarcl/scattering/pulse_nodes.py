@@ -11,7 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
-from ..numerics.polynomials import lagrange_shares
+from ..base.vectors import unit
+from ..numerics.polynomials import lagrange
 from ..scene.triangles import centroids, edges
 from ._frequency_nodes import typical_power
 from .antenna_weights import AntennaWeights
@@ -53,7 +54,7 @@ class Knots:
         near = self.pulses[first[:, None] + np.arange(ORDER)]
         nearest = first + np.abs(near - rows[:, None]).argmin(axis=1)
         both = np.stack([first - low, nearest - low], axis=1).astype(np.int32)
-        return self.pulses[low:high], both, lagrange_shares(near, rows).astype(np.float32)
+        return self.pulses[low:high], both, lagrange(near.T, rows).T.astype(np.float32, order="C")
 
 
 def every(n_pulses: int) -> Knots:
@@ -100,7 +101,7 @@ def _turning(beam: AntennaWeights, places: np.ndarray, spacing: int) -> float:
     """How much u_t + u_r turns over so many pulses at most, rad, as places' middle and farthest ends see it."""
     most = 0.0
     for place in (places.mean(axis=0), places[np.argmin(np.linalg.norm(places - beam.geometry.tx[0], axis=1))]):
-        look = _unit(beam.geometry.tx - place) + _unit(beam.geometry.rx - place)
+        look = unit(beam.geometry.tx - place) + unit(beam.geometry.rx - place)
         most = max(most, float(np.linalg.norm(look[spacing:] - look[:-spacing], axis=1).max()))
     return most
 
@@ -138,7 +139,3 @@ def _between(
             wrong += float((np.abs(guess - at(pulse)) ** 2).sum())
             right += typical_power((np.abs(at(pulse)) ** 2).sum(axis=1))
     return float(np.sqrt(wrong / right)) if right else 0.0
-
-
-def _unit(vectors: np.ndarray) -> np.ndarray:
-    return np.asarray(vectors / np.linalg.norm(vectors, axis=-1, keepdims=True))

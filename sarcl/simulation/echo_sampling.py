@@ -11,6 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import finite, instance
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
+from ..numerics.pulse_geometry import half_path
 from ..scene.scene import Scene
 
 LEAST_SAMPLES = 64  # of the default range window: a lone point still gets a profile to look at
@@ -24,11 +25,6 @@ def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.nda
     if len(receiver) != len(track):
         raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
     return receiver.positions
-
-
-def half_path(tx: np.ndarray, rx: np.ndarray, point: np.ndarray) -> np.ndarray:
-    """Half the two-way path from antennas (n, 3) to points (..., 3), m."""
-    return (np.linalg.norm(tx - point, axis=-1) + np.linalg.norm(rx - point, axis=-1)) / 2
 
 
 def window(

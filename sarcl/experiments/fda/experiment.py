@@ -14,6 +14,7 @@ import numpy as np
 from ...arrays.map_aperture import MapKind, map_aperture
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
+from ...base.vectors import unit
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
 from ._sweep import sweep
@@ -229,7 +230,7 @@ def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
     """K = f/c (u_T + u_R) at the origin, of up to `most` samples of every row, turns/m (n, 2): along x and y."""
     some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
-    look = _unit(raw.tx) + _unit(raw.rx)
+    look = unit(raw.tx) + unit(raw.rx)
     return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
 
 
@@ -242,9 +243,5 @@ def collected(case: Case, most: int = 101) -> dict[str, Any]:
     tx = track.positions[pulses, None] + np.einsum("pij,nj->pni", turn, array.positions)
     f = case.center + np.stack([array.offsets_at(int(p)) for p in pulses])
     ends = {"reference": track.positions[pulses, None, None], "own": tx[:, :, None], "all": tx[:, None]}
-    look = _unit(tx)[:, :, None] + _unit(ends[case.receive])
+    look = unit(tx)[:, :, None] + unit(ends[case.receive])
     return _support((f[:, :, None, None] / SPEED_OF_LIGHT * look[..., :2]).reshape(-1, 2))
-
-
-def _unit(v: np.ndarray) -> np.ndarray:
-    return np.asarray(v / np.linalg.norm(v, axis=-1, keepdims=True))

@@ -16,6 +16,8 @@ from itertools import product
 
 import numpy as np
 
+from ...numerics.polynomials import chebyshev
+
 SAFETY = 1.5  # factor on the error, which is sampled at some pulses only
 ELEMENTS = 1000  # elements at most at which errors are computed
 BLOCK = 64  # elements per array operation: bounds the memory
@@ -122,7 +124,7 @@ class _Grid:
         nodes, parts = [], []
         for i, n in enumerate(counts):
             angle, order = np.pi * (np.arange(n) + 0.5) / n, np.arange(n)
-            nodes.append(self.half[i] * np.cos(angle))
+            nodes.append(chebyshev(0, 2 * self.half[i], n))
             flat = np.full(len(along), np.pi / 2)
             where = np.arccos(np.clip(along[:, i] / self.half[i], -1, 1)) if self.half[i] else flat
             terms = np.cos(np.outer(where, order)) * np.where(order == 0, 1, 2) / n  # Chebyshev's polynomials

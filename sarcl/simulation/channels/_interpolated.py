@@ -13,6 +13,7 @@ import numpy as np
 from ...arrays.channels import Channel
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.vectors import unit
 from ...numerics import cost_model
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
@@ -130,7 +131,7 @@ class InterpolatedChannels:
         """Whether facets that face one element face all, with equal H and V; angle, rad, that the array subtends."""
         track = self.layout.rows.track
         look = track.tx - self.center
-        off_vertical = np.linalg.norm(np.cross(look / np.linalg.norm(look, axis=1, keepdims=True), vertical), axis=1)
+        off_vertical = np.linalg.norm(np.cross(unit(look), vertical), axis=1)
         turned = angle / max(float(off_vertical.min()), 1e-12)
         return track.is_monostatic and max(angle**1.5, turned**2) <= GRAZING * tolerance
 

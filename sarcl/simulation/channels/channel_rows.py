@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays.channels import Channel, Sampling
 from ...model.antenna_array import AntennaArray
 from ...model.trajectory import Trajectory
-from ...numerics.pulse_geometry import PulseGeometry
+from ...numerics.pulse_geometry import PulseGeometry, half_path
 from .. import echo_sampling
 
 CHANNELS = ("simultaneous", "separated")
@@ -67,7 +67,7 @@ class ChannelRows:
         """
         tx = self.tx_positions(transmitter, at) if self.separated else self.track.tx[at]
         rx = self.rx_positions(self.receivers_of(transmitter)[which], at)
-        return tx, rx, echo_sampling.half_path(tx[:, None], rx, self.point)
+        return tx, rx, half_path(tx[:, None], rx, self.point)
 
     def add(self, samples: np.ndarray, channel: Channel, receivers: slice, part: slice, echoes: np.ndarray) -> None:
         """Add echoes of a channel (n, receivers, n_polarizations, width) to samples of the pulses it is sent at.
@@ -88,7 +88,7 @@ class ChannelRows:
         tx = self.tx_positions(elements)[:, :, None] if self.separated else self.track.tx[:, None, None]
         own = self.receive == "own"
         rx = self.rx_positions(elements)[:, :, None] if own else self.rx_positions(self.receivers)[:, None]
-        reference = np.broadcast_to(echo_sampling.half_path(tx, rx, self.point), self.shape)
+        reference = np.broadcast_to(half_path(tx, rx, self.point), self.shape)
         tx, rx = (np.broadcast_to(ends, (*self.shape, 3)) for ends in (tx, rx))
         frequency = np.full(self.shape, sampling.frequency)
         if self.separated:
