@@ -38,7 +38,7 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
         drawn = any(_figures.ran(case) for case in document["cases"])
         if drawn:
             picture = docs / f"results-{name}.png"
-            pareto.picture(document["cases"]).save(picture)
+            picture.write_bytes(pareto.picture(document["cases"]))
             written.append(picture)
         page += section(name, document, drawn)
     page += f"## How to read this\n\n{_table.EXPLAINED}\n"

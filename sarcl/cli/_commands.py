@@ -175,8 +175,8 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     from ..experiments.fda import experiment
     from ..experiments.fda import page as fda_page
     from ..experiments.fda.file import load
-    from ..experiments.fda.text import setting, verdicts
-    from ..io import output_paths
+    from ..experiments.fda.text import conclusion, setting, verdicts
+    from ..figures import plots
     from ..opencl.choose_device import open_device
 
     title, cases = load(args.experiment)
@@ -184,28 +184,32 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     numbers = str(Path(output).with_suffix(".json"))
     _expect(job, [output], (".html", ".htm"), [args.experiment])
     job.expect(numbers)
-    results = []
+    plots.require("the page of sarcl fda")
+    results, sections = [], []
     for i, case in enumerate(cases):
         results.append(experiment.measure(case, open_device(args.device)))
+        sections.append(fda_page.section(results[-1]))
         job.progress("fda", i + 1, len(cases))
-        # what is measured is kept, whatever comes of the next case
-        for path, text in ((numbers, json.dumps(results)), (output, fda_page.html(results, title))):
-            with output_paths.atomic(path) as part:
-                part.write_text(text, encoding="utf-8")
+        # Both files are written after every case, so that a later failure does not lose them.
+        page = fda_page.html(results, title, args.command_line, sections, finished=len(results) == len(cases))
+        _write(numbers, json.dumps(results))
+        _write(output, page)
     for result in results:
         job.say(f"{result['name']}: {setting(result)}")
         for verdict in verdicts(result):
             job.say(f"  {verdict}")
+    for line in conclusion(results):
+        job.say(line)
     job.say(f"wrote {output} and {numbers}")
     return 0
 
 
 def papers(args: argparse.Namespace, job: Job) -> int:
-    """The papers there are, or one of them done again: a page and its numbers."""
+    """List the papers, or reproduce one: a page and its numbers."""
     import json
 
     from .. import papers as shelf
-    from ..io import output_paths
+    from ..figures import plots
 
     if args.paper is None:
         job.say(shelf.listing())
@@ -217,34 +221,43 @@ def papers(args: argparse.Namespace, job: Job) -> int:
     numbers = output.with_suffix(".json")
     for path in (output, numbers):
         job.expect(path)
+    plots.require("the page of sarcl papers")
     lab, sections = shelf.open_lab(args.device, args.quick), []
     for section in paper.run(lab):
         sections.append(section)
         job.progress("papers", len(sections), len(paper.sections))
-        # what is measured is kept, whatever comes of the next section
-        text = json.dumps(paper.document(sections, lab), allow_nan=False)
-        for path, whole in ((numbers, text), (output, paper.html(sections, lab))):
-            with output_paths.atomic(path) as part:
-                part.write_text(whole, encoding="utf-8")
+        # Both files are written after every section, so that a later failure does not lose them.
+        _write(numbers, json.dumps(paper.document(sections, lab), allow_nan=False))
+        _write(output, paper.html(sections, lab, args.command_line))
         fine = sum(row.holds for row in section.rows)
         tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
         job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
         for row in section.rows:
             if not row.holds:
-                job.say(f"  errs: {row.item}: printed {row.published}, measured {row.measured}")
+                job.say(f"  differs: {row.item}: printed {row.published}, measured {row.measured}")
     job.say(f"wrote {output} and {numbers}")
     return 0
+
+
+def _write(path: str | Path, text: str) -> None:
+    """A text file that appears whole."""
+    from ..io import output_paths
+
+    with output_paths.atomic(path) as part:
+        part.write_text(text, encoding="utf-8")
 
 
 def bench(args: argparse.Namespace, job: Job) -> int:
     """Run time against achieved error: a table, and where asked JSON and a picture."""
     from ..bench import backproject
-    from ..figures.decibels import write_png
+    from ..figures import plots
+    from ..io import output_paths
 
     if args.json is not None:
         _expect(job, [args.json], (".json",), [])
     if args.picture is not None:
         _expect(job, [args.picture], (".png",), [])
+        plots.require("--picture")
     names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
     given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
 
@@ -258,7 +271,8 @@ def bench(args: argparse.Namespace, job: Job) -> int:
     if args.picture is not None:
         from ..bench.pareto import picture
 
-        write_png(picture(document["cases"]), args.picture)
+        with output_paths.atomic(args.picture) as part:
+            part.write_bytes(picture(document["cases"]))
     return 0
 
 

@@ -10,6 +10,7 @@ import argparse
 import math
 import os
 import re
+import shlex
 import sys
 from typing import Any, NoReturn
 
@@ -260,6 +261,7 @@ def main(argv: list[str] | None = None) -> int:
     debug = "--debug" in (sys.argv[1:] if argv is None else argv)
     try:
         args = parser().parse_args(argv)
+        args.command_line = shlex.join(["sarcl", *(sys.argv[1:] if argv is None else argv)])
         from ._commands import run
 
         return run(args, outputs)

@@ -1,10 +1,14 @@
-"""Pictures and pages of plain arrays.
+"""Pictures, plots and pages of plain arrays.
 
 For other folders:
 
-    axes       frame, ticks and title of a picture
     decibels   grey images and line plots in decibels, with Pillow
-    html       one self-contained HTML page: headings, tables, drawings
+    html       a page in one file: headings, tables, figures; needs the extra `plots`
+    plots      plots as PNG files, with matplotlib; needs the extra `plots`
+
+For this folder alone:
+
+    _axes      frame, ticks, title and caption of a grey image
 """
 
-__all__ = ["axes", "decibels", "html"]
+__all__ = ["decibels", "html", "plots"]

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base import validation
 from ..base.version import __version__
-from .axes import INK, Sheet, image_axis, number, ticks_between
+from ._axes import INK, Axes, image_axis, number, ticks_between
 
 if TYPE_CHECKING:
     from PIL.Image import Image as Picture
@@ -211,25 +211,25 @@ def _grey_image(
     how = "given" if top_db is not None else _percentile_text(percentile)
     levels = grey_levels(drawn, white, floor_db, (height, width))
     caption = _caption(white, how, float(drawn.max()), floor_db, zero)
-    sheet = Sheet(width, height, across, up, title, 7.0, caption)
-    left, top, right, bottom = sheet.frame
-    sheet.image.paste(Image.fromarray(levels), (left, top))
-    sheet.axes()
+    drawing = Axes(width, height, across, up, title, 7.0, caption)
+    left, top, right, bottom = drawing.frame
+    drawing.image.paste(Image.fromarray(levels), (left, top))
+    drawing.axes()
 
-    u, line = sheet.unit, sheet.line
+    u, line = drawing.unit, drawing.line
     x0, x1 = right + round(1.4 * u), right + round(2.4 * u)
     ramp = np.rint(np.linspace(255, 0, height)).astype(np.uint8)
-    sheet.image.paste(Image.fromarray(np.repeat(ramp[:, None], x1 - x0, axis=1)), (x0, top))
-    sheet.box((x0, top, x1, bottom))
+    drawing.image.paste(Image.fromarray(np.repeat(ramp[:, None], x1 - x0, axis=1)), (x0, top))
+    drawing.box((x0, top, x1, bottom))
     highest = white if np.isfinite(white) else 0.0
     step, ticks = ticks_between(highest + floor_db, highest, height / (3.6 * u))
     for tick in ticks:
         y = top + round((tick - highest) / floor_db * (height - 1))
-        sheet.draw.line([(x1, y), (x1 + sheet.tick, y)], fill=INK, width=line)
+        drawing.draw.line([(x1, y), (x1 + drawing.tick, y)], fill=INK, width=line)
         text = number(tick, step) + (" dB" if tick == ticks[-1] else "")
-        sheet.draw.text((x1 + 2 * sheet.tick, y), text, INK, sheet.font, anchor="lm")
-    sheet.image.info |= {"top_db": white, "floor_db": float(floor_db)}
-    return sheet.image
+        drawing.draw.text((x1 + 2 * drawing.tick, y), text, INK, drawing.font, anchor="lm")
+    drawing.image.info |= {"top_db": white, "floor_db": float(floor_db)}
+    return drawing.image
 
 
 def _percentile_text(percentile: float | None) -> str:
@@ -271,8 +271,8 @@ def _line_plot(
     if zero and peak > -np.inf:
         caption += f" 0 dB: {zero}."
     up = (f"relative to {name} (dB)", floor_db, -0.04 * floor_db, 0.0)
-    sheet = Sheet(width, height, axis, up, title, 1.5, caption)
-    sheet.axes(grid=True)
+    drawing = Axes(width, height, axis, up, title, 1.5, caption)
+    drawing.axes(grid=True)
     relative = np.full(values.size, 2 * floor_db) if peak == -np.inf else values[0] - white
     n = len(relative)
     x = (np.arange(n) + 0.5) / n * width * fine
@@ -285,6 +285,6 @@ def _line_plot(
     if n <= 64:  # few enough to show each
         for px, py in points:
             draw.ellipse((px - 14, py - 14, px + 14, py + 14), fill=255)
-    sheet.image.paste(CURVE, sheet.frame[:2], curve.reduce(fine))
-    sheet.image.info |= {"top_db": white, "floor_db": float(floor_db)}
-    return sheet.image
+    drawing.image.paste(CURVE, drawing.frame[:2], curve.reduce(fine))
+    drawing.image.info |= {"top_db": white, "floor_db": float(floor_db)}
+    return drawing.image

@@ -1,4 +1,4 @@
-"""Papers done again with sarcl: what each one prints beside what comes out here.
+"""Papers reproduced with sarcl: published values and statements beside the values measured here.
 
 `sarcl papers` lists them, `sarcl papers farooq` writes a page and its numbers (docs/guide/papers.md).
 
@@ -37,12 +37,12 @@ def find(name: str) -> Paper:
 
 
 def listing() -> str:
-    """A line for each paper: its name, and what it is."""
+    """A line for each paper: its name, author, title and year."""
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
 
 
 def open_lab(device: DeviceChoice | None = None, quick: bool = False) -> Lab:
-    """What a paper is run with: an OpenCL device, opened now, and whether the largest arrays are left out."""
+    """The `Lab` of a run, with its OpenCL device opened; quick: leave out arrays of more than 100 elements."""
     from ..opencl.choose_device import open_device
     from .lab import Lab
 

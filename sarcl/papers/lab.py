@@ -1,4 +1,4 @@
-"""What the sections of a paper on arrays share: systems flown, echoes kept, images and cuts."""
+"""Shared by the sections of a paper on arrays: the systems, their echoes (made once), images and cuts."""
 
 from __future__ import annotations
 
@@ -19,11 +19,11 @@ from ..scene.scene import Scene
 from ..simulation.echo import echo
 
 CENTER = ((0.0, 0.0, 0.0),)
-HALF, STEP = (2.64, 4.0), 0.04  # of a picture along range and cross-range: half its sides and a pixel, m
+HALF, STEP = (2.64, 4.0), 0.04  # m: half the sides of a picture along range and cross-range; side of a pixel
 
 
 class Lab:
-    """Echoes of `sarcl.fda.Case`s, collected once and kept.
+    """Echoes of `sarcl.fda.Case` systems, made once and kept.
 
     device  an OpenCL device as elsewhere;  quick  leave out arrays of more than 100 elements
     """
@@ -33,7 +33,7 @@ class Lab:
         self._kept: dict[Any, PhaseHistory] = {}
 
     def small_enough(self, n: int) -> bool:
-        """Whether an array of n elements is flown."""
+        """Whether an array of n elements is part of the run."""
         return not self.quick or n <= 100
 
     def collect(self, case: Case, points: Any = CENTER) -> PhaseHistory:
@@ -50,7 +50,7 @@ class Lab:
         return self._kept[key]
 
     def mapped(self, case: Case, mapping: MapKind | None, points: Any = CENTER, **options: Any) -> PhaseHistory:
-        """The same, mapped; None: as collected."""
+        """The echoes of `collect`, mapped; mapping None: as collected."""
         raw = self.collect(case, points)
         return raw if mapping is None else map_aperture(raw, mapping, **options)
 
@@ -68,8 +68,8 @@ class Lab:
         made = backproject(raw, grid, tolerance=1e-3, check=False, device=self.device)
         return np.maximum(made.decibels().T, -200.0)
 
-    def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> str:
-        """The same as a drawing, over its brightest pixel; box: half the side of a dashed square, m."""
+    def picture(self, raw: PhaseHistory, caption: str, zoom: float = 1.0, box: float | None = None) -> html.Block:
+        """The image as a figure, white where it is brightest; box: half the side of a dashed square, m."""
         edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
         square = None if box is None else (box, box)
         return html.picture(
@@ -87,7 +87,7 @@ class Lab:
         return at, np.abs(np.asarray(made.data)) / made.gain
 
     def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
-        """Of a point `about` m along the axis: what `sarcl.fda.response` tells of a cut."""
+        """Response of a point `about` m along the axis: what `sarcl.fda.response` measures on a cut."""
         return response(*self.cut(raw, axis, half, about=about), about)
 
 

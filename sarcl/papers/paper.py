@@ -1,4 +1,4 @@
-"""A paper done again: sections that hold rows of published beside measured, words and drawings; the page of them."""
+"""A reproduced paper: sections with rows of published and measured values, paragraphs and figures; the page of them."""
 
 from __future__ import annotations
 
@@ -9,19 +9,20 @@ from typing import Any
 
 import numpy as np
 
-from ..figures.html import heading, page, table, words
+from ..figures.html import Block, heading, listed, page, table, terms, words
 from .lab import Lab
 
 
 @dataclass(frozen=True)
 class Row:
-    """One figure or statement of a paper, and what comes out here.
+    """One published value or statement, and the value measured here.
 
-    item, source  what it is, and its figure, table or equation
+    item, source  what it is; its figure, table or equation
     published     as printed
-    measured      the same here, in words;  value  as a number or several, for JSON
-    holds         whether what is printed is what comes out
-    why           where it is not: the reason; else a remark
+    measured      the measured value in words;  value: as a number or several, for JSON
+    holds         whether the measured value agrees with the published one
+    why           where it does not: the reason; else a remark
+    rule          what counts as agreement, for the page alone
     """
 
     item: str
@@ -31,16 +32,17 @@ class Row:
     holds: bool
     why: str = ""
     value: Any = None
+    rule: str = ""
 
 
 @dataclass
 class Section:
-    """A section as it grows: rows, the page's parts, and numbers for JSON."""
+    """A section as it grows: rows, blocks of the page, and numbers for JSON."""
 
     key: str
     title: str
     rows: list[Row] = field(default_factory=list)
-    parts: list[str] = field(default_factory=list)
+    parts: list[Block] = field(default_factory=list)
     numbers: dict[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
@@ -50,32 +52,33 @@ class Section:
     ) -> None:  # fmt: skip
         """A row that holds where `measured` lies within `within` of the number printed."""
         here, printed = (f"{v:{form}} {unit}".strip() for v in (measured, published))
-        self.rows.append(
-            Row(item, source, printed, here, bool(abs(measured - published) <= within), why, plain(measured))
-        )
+        holds, rule = bool(abs(measured - published) <= within), f"within {within:g} {unit}".strip()
+        self.rows.append(Row(item, source, printed, here, holds, why, plain(measured), rule))
 
     def states(
-        self, item: str, source: str, published: str, measured: str, holds: Any, why: str = "", value: Any = None
-    ) -> None:
-        """A row of words; the caller measured whether they hold."""
-        self.rows.append(Row(item, source, published, measured, bool(holds), why, plain(value)))
+        self, item: str, source: str, published: str, measured: str, holds: Any, why: str = "", value: Any = None,
+        *, rule: str,
+    ) -> None:  # fmt: skip
+        """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
+        self.rows.append(Row(item, source, published, measured, bool(holds), why, plain(value), rule))
 
     def say(self, text: str) -> None:
         """A paragraph."""
         self.parts.append(words(text))
 
-    def draw(self, *figures: str) -> None:
-        """Drawings."""
+    def draw(self, *figures: Block) -> None:
+        """Figures."""
         self.parts += figures
 
     def keep(self, **numbers: Any) -> None:
-        """Numbers behind the drawings, six digits of each."""
+        """Numbers behind the figures, six digits of each."""
         self.numbers |= {name: plain(value) for name, value in numbers.items()}
 
     def document(self) -> dict[str, Any]:
-        """What JSON holds of it."""
+        """The section in JSON."""
         out = {name: getattr(self, name) for name in ("key", "title", "seconds", "numbers")}
-        return out | {"rows": [asdict(row) for row in self.rows]}
+        rows = [asdict(row) for row in self.rows]
+        return out | {"rows": [{name: row[name] for name in row if name != "rule"} for row in rows]}
 
 
 Make = Callable[[Lab], Section]
@@ -83,12 +86,13 @@ Make = Callable[[Lab], Section]
 
 @dataclass(frozen=True)
 class Paper:
-    """A paper: its name on the command line, title, a paragraph, and what makes its sections."""
+    """A paper: its name on the command line, title, a paragraph about it, functions that make its sections, terms."""
 
     name: str
     title: str
     about: str
     sections: tuple[Make, ...]
+    terms: tuple[tuple[str, str], ...] = ()
 
     def run(self, lab: Lab) -> Iterator[Section]:
         """Its sections, one after the other, timed."""
@@ -109,36 +113,50 @@ class Paper:
             "sections": [s.document() for s in sections],
         }
 
-    def html(self, sections: Sequence[Section], lab: Lab) -> str:
-        """The page of the sections there are: the table of all rows first."""
+    def html(self, sections: Sequence[Section], lab: Lab, command: str = "") -> str:
+        """The page of the finished sections: conclusion, terms, sections with figures, then the table of all rows.
+
+        command  the line that made the page, printed on it
+        """
         rows = [row for section in sections for row in section.rows]
-        fine = sum(row.holds for row in rows)
-        parts = [words(self.about)]
+        different = [row for row in rows if not row.holds]
+        blocks = [words(self.about)]
         missing = len(self.sections) - len(sections)
         if missing:
-            parts.append(words(f"Not finished: {missing} sections are still to come.", True))
+            blocks.append(words(f"Not finished: {missing} sections follow.", True))
         if lab.quick:
-            parts.append(words("A quick run: the largest arrays were left out.", True))
-        parts += [
-            heading("Published and measured"),
+            blocks.append(words("A quick run: arrays of more than 100 elements were left out.", True))
+        blocks += [
+            heading("Conclusion"),
             words(
-                f"{fine} of {len(rows)} figures and statements come out as printed. Where one errs, the last column "
-                "says why. All of the third column was measured in this run."
+                f"{len(rows) - len(different)} of {len(rows)} published values and statements agree with what was "
+                f"measured in this run. {len(different)} differ:"
             ),
-            table(["item", "published", "measured", "verdict"], [_cells(row) for row in rows], text=True).replace(
-                "<td>errs", '<td class="errs">errs'
-            ),
+            listed([f"{row.item} ({row.source}): published {row.published}; measured {row.measured}. "
+                    f"{row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") for row in different]),
         ]  # fmt: skip
+        if self.terms:
+            blocks += [heading("Terms"), terms(self.terms)]
         for section in sections:
-            parts += [heading(section.title), *section.parts]
-        seconds = sum(s.seconds for s in sections)
-        parts.append(words(f"Made in {seconds:.0f} s.", True))
-        return page(self.title, parts)
+            blocks += [heading(section.title), *section.parts]
+        blocks += [
+            heading("Published and measured"),
+            table(
+                ["item", "published", "measured", "accepted if", "verdict"],
+                [_cells(row) for row in rows],
+                "All published values and statements. The third column was measured in this run; the fourth is the "
+                "criterion behind the verdict, ok or differs.",
+                text=True,
+                marked=[i for i, row in enumerate(rows) if not row.holds],
+            ),
+            words(f"Measured in {sum(s.seconds for s in sections):.0f} s.", True),
+        ]
+        return page(self.title, blocks, command)
 
 
 def _cells(row: Row) -> list[str]:
-    verdict = ("ok" if row.holds else "errs") + (f": {row.why}" if row.why else "")
-    return [row.item, f"{row.published} ({row.source})", row.measured, verdict]
+    verdict = ("ok" if row.holds else "differs") + (f": {row.why}" if row.why else "")
+    return [row.item, f"{row.published} ({row.source})", row.measured, row.rule, verdict]
 
 
 def plain(value: Any) -> Any:

@@ -15,6 +15,7 @@ from sarcl.bench import _cases, _exact, _figures, _measure, _peers, _quiet, _tab
 from sarcl.bench import backproject as bench
 from sarcl.bench._contestant import Absent, Contestant, Reading
 from sarcl.cli import parser
+from sarcl.figures import plots
 from sarcl.reference.backproject import backproject as reference
 
 # A peer that takes the exact sum of the case it is given, and does what else its name says.
@@ -322,15 +323,27 @@ def document_of(*cases_):
     return {"format": bench.FORMAT, "machine": machine, "devices": [device], "peers": [peer], "cases": list(cases_)}
 
 
-def test_the_picture_has_a_panel_a_case_and_marks_where_the_figures_are():
+def test_the_picture_has_a_panel_for_each_case_and_marks_the_figures(monkeypatch):
+    made = []
+    monkeypatch.setattr(plots, "png", lambda figure, *_: made.append(figure))
     one = result(row("sarcl", 1e-3, 1e-6, setting="1e-03"), row("peer", 1e-2, 2e-6, setting="linear, 8 x"))
-    single, double = pareto.picture([one]), pareto.picture([one, one])
-    assert double.size == (single.width, 2 * single.height)
-    pixels = np.asarray(single)
-    blue = np.argwhere((pixels == pareto.OURS[0]).all(axis=2))
-    green = np.argwhere((pixels == pareto.THEIRS[0]).all(axis=2))
-    blue, green = (np.median(p[p[:, 1] < 700], axis=0) for p in (blue, green))
-    assert green[1] > blue[1] + 100 and green[0] > blue[0] + 50  # less accurate and slower: right and below
+    pareto.picture([one]), pareto.picture([one, result(), one])
+    assert [len(figure.axes) for figure in made] == [1, 2]
+    axes = made[0].axes[0]
+    ours, theirs = axes.get_lines()
+    assert (ours.get_label(), theirs.get_label()) == ("sarcl direct, d", "peer direct, linear")
+    np.testing.assert_allclose([ours.get_xydata()[0], theirs.get_xydata()[0]], [[1e-3, 4.096], [1e-2, 2.048]])
+    assert ours.get_marker() != theirs.get_marker() and ours.get_linestyle() != theirs.get_linestyle()
+    assert [text.get_text() for text in axes.texts] == ["1e-3", "8 x"]
+
+
+def test_labels_that_would_overlap_stand_on_the_other_side_or_are_left_out(monkeypatch):
+    made = []
+    monkeypatch.setattr(plots, "png", lambda figure, *_: made.append(figure))
+    rows = [row("sarcl", 1e-3 * (1 + i / 1000), 1e-6, setting=f"1e-0{i}") for i in range(1, 5)]
+    pareto.picture([result(*rows, row("peer", 1e-1, 2e-6, setting="linear, 8 x"))])
+    boxes = [text.get_window_extent() for text in made[0].axes[0].texts]
+    assert len(boxes) == 3 and not any(a.overlaps(b) for a, b in itertools.combinations(boxes, 2))
 
 
 def test_the_page_is_made_from_the_files(tmp_path):

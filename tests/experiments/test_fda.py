@@ -11,15 +11,14 @@ from xml.etree import ElementTree
 import numpy as np
 import pytest
 
+import sarcl
 from sarcl import fda
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.cli import parser
-from sarcl.experiments.fda import _trends as fda_trends
 from sarcl.experiments.fda import file as fda_file
 from sarcl.experiments.fda import page as fda_page
 from sarcl.experiments.fda.case import Case
-from sarcl.experiments.fda.text import setting
-from sarcl.figures import html
+from sarcl.experiments.fda.text import conclusion, setting
 
 # 16 channels of 50 MHz; the same resolution as Farooq's, in a tenth of the pulses
 QUICK = {"n": 16, "frequency_step": 50e6, "n_pulses": 44, "aperture": 43.0, "distance": 500.0}
@@ -74,30 +73,55 @@ def test_the_centre_narrows_and_nothing_else_does(measured):
 
 def test_the_page_says_what_was_gained_and_what_was_not(measured):
     _, found = measured
-    text = fda_page.html([found], "Apertures <&>")
-    tree = ElementTree.fromstring(text.replace("<!doctype html>", "").replace('<meta charset="utf-8">', ""))
+    tree = parsed(fda_page.html([found], "Apertures <&>", "sarcl fda a & b.toml"))
     said = "".join(tree.itertext())
-    assert "Apertures <&>" in said and "nearer than the conventional antenna's" in said and "comes out" in said
-    assert "Two points are told apart at 0.3 m, the farthest tried (conventional: at 0.3 m, the farthest tried)" in said
+    assert "Apertures <&>" in said and "closer to the peak than the conventional antenna's" in said
+    assert "is displaced by" in said and "Two points are resolved at 0.3 m, the largest separation tried" in said
     # the mapped point's side lobes meet between the two
-    assert "0.3 m apart there is a dip of 13.0 dB, but another peak comes to -2.4 dB of the lower of the two" in said
-    assert len(tree.findall(".//svg")) == 4 and len(tree.findall(".//table")) == 3
-    assert len(tree.findall(".//table")[0]) == 1 + len(found["mapped"])
+    assert "At 0.3 m there is a dip of 13.0 dB, but another peak reaches -2.4 dB of the lower of the two peaks" in said
+    assert len(tree.findall(".//figure")) == 4 and len(tree.findall(".//table")) == 3
+    assert len(tree.find(".//table/tbody")) == len(found["mapped"])
+    assert f"Made by sarcl {sarcl.__version__}: sarcl fda a & b.toml" in said
+
+
+def test_the_conclusion_stands_on_top_then_terms_then_plots_then_tables(measured):
+    tree = parsed(fda_page.html([measured[1]]))
+    order = [node.tag if node.tag in ("figure", "table") else node.text for node in tree.iter()
+             if node.tag in ("h2", "dl", "figure", "table")]  # fmt: skip
+    assert order == ["Conclusion", "Terms", None, "quick", *["figure"] * 4, *["table"] * 3]
+    first = tree.find(".//li").text
+    assert first == "No mapping resolves two points closer together than the conventional antenna does."
+    assert tree.find(".//meta[@name='viewport']").attrib["content"] == "width=device-width, initial-scale=1"
+    terms = {node.text for node in tree.findall(".//dt")}
+    assert {"mapping", "null", "PSLR, ISLR", "dip", "resolved", "spatial frequencies"} <= terms
+
+
+def test_a_gain_is_said_first(measured):
+    found = json.loads(json.dumps(measured[1]))
+    found["mapped"]["apparent"]["told_apart"] = 0.1
+    for dip in found["mapped"]["apparent"]["dips"]:
+        dip |= APART
+    said = conclusion([found, found])
+    assert (
+        said[0]
+        == "Two points are resolved closer together than by the conventional antenna with apparent in 2 of 2 cases."
+    )
+    assert "points displaced by at most" in said[3] and "closer together in 2 of 2 cases" in said[3]
 
 
 def test_points_off_the_centre_have_widths_of_their_own(measured):
     _, found = measured
     off = found["mapped"]["apparent"]["points"][1]
     tree = parsed(fda_page.html([found]))
-    rows = [[cell.text for cell in row] for row in tree.findall(".//table")[1]]
+    rows = [[cell.text for cell in row] for row in tree.findall(".//table")[1].iter("tr")]
     apparent = next(row for row in rows if row[0] == "apparent")
-    assert rows[0][1:3] == ["y, m", "error of place, m"] and len(rows) == 1 + len(found["mapped"])
+    assert rows[0][1:3] == ["y, m", "error of position, m"] and len(rows) == 1 + len(found["mapped"])
     assert apparent[1] == "0.63" and float(apparent[2]) == pytest.approx(off["error"], abs=1e-3)
     assert [float(v) for v in apparent[4:6]] == pytest.approx([off["null"], off["irw"]], abs=1e-4)
 
 
 def parsed(text):
-    return ElementTree.fromstring(text.replace("<!doctype html>", "").replace('<meta charset="utf-8">', ""))
+    return ElementTree.fromstring(text.replace("<!doctype html>", ""))
 
 
 APART = {"dip_db": 20.0, "shift": 0.01, "false_db": -10.0}
@@ -256,27 +280,19 @@ def test_the_page_of_a_sweep_begins_with_its_table_and_trends(tmp_path):
     assert [round(r["swept"]["squint"], 6) for r in results] == [0, 1.047198] * 2
     tree = parsed(fda_page.html(results))
     table, body = tree.find(".//table"), "".join(tree.itertext())
-    rows = ["|".join(cell.text or "" for cell in row) for row in table]
+    rows = ["|".join(cell.text or "" for cell in row) for row in table.iter("tr")]
     assert len(rows) == 1 + 4 * 3 and rows[2].startswith("linear|0 deg|apparent|0.13")
     assert sum("not applicable" in row for row in rows) == 2 and rows[-1].startswith("costas|60 deg|channels|")
     assert body.index("sweep of progression, squint") < body.index("case 1: progression linear")
     # six quantities against squint, for each progression
     figures = [f.find("figcaption") for f in tree.findall(".//figure")]
     trends = ["".join(f.itertext()) for f in figures if "progression" in "".join(f.itertext())]
-    assert len(trends) == 12 and "(apparent: none)" in trends[-1]
-    said = fda_trends.words(results)
-    assert "it applies to 2 of 4 cases" in said[0] and said[1].startswith("channels: nulls of the first point 0.1")
-
-
-def test_drawings_keep_to_their_frame():
-    x = np.linspace(-3, 5, 50)
-    tree = ElementTree.fromstring(html.plot([("a", x, x**2), ("b", x, -x)], "x & y", "<m>", "caption"))
-    box = tree.find(".//rect").attrib
-    left, top, wide, high = (float(box[k]) for k in ("x", "y", "width", "height"))
-    for line in tree.findall(".//polyline"):
-        points = np.array([p.split(",") for p in line.attrib["points"].split()], float)
-        assert (points >= [left - 0.1, top - 0.1]).all() and (points <= [left + wide + 0.1, top + high + 0.1]).all()
-    assert [t.text for t in tree.findall(".//text")][-2:] == ["x & y", "<m>"]
+    assert len(trends) == 12
+    assert "(apparent: none)" in [f.find("img").attrib["alt"] for f in tree.findall(".//figure")][11]
+    said = conclusion(results)
+    assert "(applies to 2 of 4 cases)" in said[1] and said[2].startswith("channels: null of the first point 0.1")
+    unfinished = fda_page.html(results[:2], sections=[[], []], finished=False)
+    assert "<figure>" not in unfinished and "Not finished" in unfinished
 
 
 def test_the_command_writes_a_page_and_its_numbers(tmp_path, monkeypatch, capsys):
@@ -290,9 +306,20 @@ def test_the_command_writes_a_page_and_its_numbers(tmp_path, monkeypatch, capsys
     out = capsys.readouterr().out
     assert "steady: 16 elements" in out and "wrote try.html and try.json" in out
     numbers = json.loads((tmp_path / "try.json").read_text())
-    assert [case["name"] for case in numbers] == ["switched", "steady"] and "<h1>Two tries</h1>" in (
-        tmp_path / "try.html"
-    ).read_text()
+    page = (tmp_path / "try.html").read_text()
+    assert [case["name"] for case in numbers] == ["switched", "steady"]
+    assert "<h1>Two tries</h1>" in page and "<code>sarcl fda try.toml</code>" in page and "Not finished" not in page
+
+
+@pytest.mark.parametrize("command", [["fda", "try.toml"], ["papers", "farooq"]])
+def test_a_page_without_its_extra_is_refused_with_the_command_to_install_it(tmp_path, monkeypatch, capsys, command):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "try.toml").write_text("[fda]\n")
+    monkeypatch.setattr("importlib.util.find_spec", lambda name: None)
+    assert parser.main(command) == parser.FAILED
+    said = capsys.readouterr().err
+    assert "needs matplotlib and jinja2, of the extra plots: pip install 'sarcl[plots]'" in said
+    assert said.count("\n") == 1 and [p.name for p in tmp_path.iterdir()] == ["try.toml"]
 
 
 BAD = {

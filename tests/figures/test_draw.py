@@ -4,7 +4,8 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.figures import axes, decibels
+from sarcl.figures import _axes as axes
+from sarcl.figures import decibels
 
 
 def data_of(picture):

@@ -1,4 +1,4 @@
-"""Sweeps on the page of an experiment: a table of all cases, and what is measured drawn against what was swept."""
+"""Sweeps on the page of an experiment: measured quantities plotted against the swept one, and a table of all cases."""
 
 from __future__ import annotations
 
@@ -7,16 +7,11 @@ from typing import Any
 
 from ...figures import html
 from ._sweep import UNITS, shown
-from .experiment import CONVENTIONAL, nearer
-from .text import at_most
+from .experiment import CONVENTIONAL
+from .text import conclusion, mappings_of, worst
 
-DECADE = 20.0  # ratio of values from which on the axis is in decades
+DECADE = 20.0  # ratio of largest to smallest value from which on the axis is logarithmic
 Result = Mapping[str, Any]
-
-
-def worst(row: Mapping[str, Any]) -> float:
-    """The largest error of place of a lone point, m."""
-    return float(max(abs(p["error"]) for p in row["points"]))
 
 
 def _of_first(key: str) -> Callable[[Mapping[str, Any]], float | None]:
@@ -24,88 +19,58 @@ def _of_first(key: str) -> Callable[[Mapping[str, Any]], float | None]:
 
 
 QUANTITIES: tuple[tuple[str, str, Callable[[Mapping[str, Any]], float | None]], ...] = (
-    ("nulls, m", "{:.4f}", _of_first("null")),
+    ("null, m", "{:.4f}", _of_first("null")),
     ("half power, m", "{:.4f}", _of_first("irw")),
     ("PSLR, dB", "{:.2f}", _of_first("pslr_db")),
     ("ISLR, dB", "{:.2f}", _of_first("islr_db")),
-    ("largest error of place, m", "{:.3f}", worst),
-    ("told apart from, m", "{:g}", lambda row: row["told_apart"]),
+    ("largest error of position, m", "{:.3f}", worst),
+    ("resolved from, m", "{:g}", lambda row: row["told_apart"]),
 )
 
 
-def summary(results: Sequence[Result]) -> list[str]:
-    """Of every series that was swept: heading, words, table and drawings; nothing where nothing was."""
-    parts: list[str] = []
+def summary(results: Sequence[Result], plots: bool = True) -> list[html.Block]:
+    """Blocks of every series that was swept: heading, conclusion, plots (unless left out) and table."""
+    blocks: list[html.Block] = []
     series: dict[tuple[str, tuple[str, ...]], list[Result]] = {}
     for result in results:
         if result["swept"]:
             series.setdefault((result["series"], tuple(result["swept"])), []).append(result)
     for (name, keys), cases in series.items():
-        parts.append(html.heading(f"{name}: sweep of {', '.join(keys)}"))
-        parts += [html.words(text) for text in words(cases)]
-        parts.append(_table(cases))
-        drawings = _drawings(cases)
-        if drawings:
-            note = (
-                "Curves that coincide hide one another, the last named on top; a point is missing where there is none."
-            )
-            parts.append(html.words(note, True))
-        parts += drawings
-    return parts
+        blocks.append(html.heading(f"{name}: sweep of {', '.join(keys)}"))
+        if len(cases) < len(results):  # else the conclusion of the page says it
+            blocks.append(html.listed(conclusion(cases)))
+        drawn = _plots(cases) if plots else []
+        if drawn:
+            note = "The first point of each case. A marker is missing where there is no value."
+            blocks += [html.words(note, True), *drawn]
+        blocks.append(_table(cases))
+    return blocks
 
 
-def names(cases: Sequence[Result]) -> list[str]:
-    """Conventional antenna first, then every mapping asked for."""
-    return [CONVENTIONAL, *dict.fromkeys(name for case in cases for name in case["mappings"])]
+def _names(cases: Sequence[Result]) -> list[str]:
+    return [CONVENTIONAL, *mappings_of(cases)]
 
 
-def words(cases: Sequence[Result]) -> list[str]:
-    """Over all cases of a sweep, what each mapping gained and what it did not."""
-    out = []
-    for name in names(cases)[1:]:
-        there = [case for case in cases if name in case["mapped"]]
-        if not there:
-            out.append(f"{name}: applies to none of the {len(cases)} cases.")
-            continue
-        rows, plain = ([case["mapped"][who] for case in there] for who in (name, CONVENTIONAL))
-        found = [nearer(row, usual, case["null"]) for row, usual, case in zip(rows, plain, there, strict=True)]
-        some = "" if len(there) == len(cases) else f" (it applies to {len(there)} of {len(cases)} cases)"
-        out.append(
-            f"{name}{some}: nulls of the first point {_range(rows, 0)} m out (conventional {_range(plain, 0)}), "
-            f"highest side lobes {_range(rows, 2)} dB (conventional {_range(plain, 2)}), no point displaced by more "
-            f"than {at_most(max(worst(row) for row in rows))} m. Two points are told apart nearer together than by the "
-            f"conventional antenna in {found.count(1)} of {len(there)} cases, from the same separation on in "
-            f"{found.count(0)}, only farther apart or not at all in {found.count(-1)}, and by neither in "
-            f"{found.count(None)}."
-        )
-    return out
-
-
-def _range(rows: Sequence[Mapping[str, Any]], quantity: int) -> str:
-    _, form, value = QUANTITIES[quantity]
-    found = [v for v in map(value, rows) if v is not None]
-    if not found:
-        return "nowhere"
-    ends = [form.format(v) for v in (min(found), max(found))]
-    ends = [end if float(end) else end.lstrip("-") for end in ends]
-    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
-
-
-def _table(cases: Sequence[Result]) -> str:
+def _table(cases: Sequence[Result]) -> html.Block:
     rows = []
     for case in cases:
         values = [shown(key, value) for key, value in case["swept"].items()]
-        for name in names(cases):
+        for name in _names(cases):
             if name in case["mapped"]:
                 found = [(form, value(case["mapped"][name])) for _, form, value in QUANTITIES]
                 rows.append([*values, name, *("none" if v is None else form.format(v) for form, v in found)])
             elif name in case["not_applicable"]:
                 rows.append([*values, name, "not applicable", *[""] * (len(QUANTITIES) - 1)])
-    return html.table([*cases[0]["swept"], "", *(title for title, _, _ in QUANTITIES)], rows)
+    head = [*cases[0]["swept"], "mapping", *(title for title, _, _ in QUANTITIES)]
+    caption = (
+        "All cases of the sweep: the first point, focused alone; the largest error of position of any point; the "
+        "smallest separation from which on two points are resolved."
+    )
+    return html.table(head, rows, caption)
 
 
-def _drawings(cases: Sequence[Result]) -> list[str]:
-    """Every quantity against the first key of several numbers, anew for every combination of the other keys."""
+def _plots(cases: Sequence[Result]) -> list[html.Block]:
+    """Every quantity against the first swept key with several numbers, once for every combination of the others."""
     for key in cases[0]["swept"]:
         values = [case["swept"][key] for case in cases]
         if all(isinstance(v, (int, float)) and not isinstance(v, bool) for v in values) and len(set(values)) > 1:
@@ -123,7 +88,7 @@ def _drawings(cases: Sequence[Result]) -> list[str]:
     for rest, some in others.items():
         for title, _, value in QUANTITIES:
             curves = []
-            for name in names(some):
+            for name in _names(some):
                 found = sorted(
                     (scale * case["swept"][key], v)
                     for case in some

@@ -1,87 +1,127 @@
-"""The page of an experiment on frequency-diverse apertures: what was gained, and what was not, in words and numbers."""
+"""The page of an experiment on frequency-diverse apertures: conclusion, terms, plots, tables."""
 
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from typing import Any
 
-from ...figures.html import heading, page, plot, table, words
+from ...figures.html import Block, heading, page, plot, table, terms, words
+from ...figures.html import listed as bullets
 from . import _trends
-from .experiment import CONVENTIONAL, RESOLVED
-from .text import setting, verdicts
+from .experiment import CONVENTIONAL, NEAR, RESOLVED
+from .text import conclusion, setting, verdicts
 
 __all__ = ["html", "section", "setting", "verdicts"]
 
+Result = Mapping[str, Any]
+TITLE = "Frequency-diverse apertures"
+TERMS = (
+    ("conventional", "An antenna with the same phase centres, track and band that sends a chirp. The setting of each "
+     "case says whether it is one antenna or an array."),
+    ("mapping", "What is done to the echoes of the diverse array before they are focused. unmodified: nothing. "
+     "corrected: delay and phase of every channel, as seen from the scene's centre, are taken out. apparent: the "
+     "corrected echoes are focused from the positions of Farooq's equations instead of the antenna's. channels: every "
+     "channel is focused from its own element at its own carrier, the matched filter of the model."),
+    ("across, y", "The direction in the ground plane at right angles to the line of sight from mid-aperture, m. Points "
+     "lie along it, and the image is cut along it."),
+    ("null", "Half the distance between the first minima on both sides of a peak, m; half power: the width between the "
+     "points where the power has fallen to one half, m."),
+    ("PSLR, ISLR", "Highest side lobe over the peak (peak side-lobe ratio), and energy of all side lobes over that of "
+     "the main lobe (integrated side-lobe ratio), dB."),
+    ("dip", "How far the image of two equal points falls between their peaks, dB below the lower peak."),
+    ("resolved", f"Two points are resolved where the dip is {RESOLVED:g} dB or more, both peaks lie within "
+     f"{NEAR:g} times the null of their points, and every other peak is {RESOLVED:g} dB or more below the lower of the "
+     "two; the same must hold at every larger separation tried."),
+    ("spatial frequencies", "f/c times the sum of the unit vectors from the scene's centre to the transmitter and to "
+     "the receiver, in cycles/m. Their spread across sets the resolution across. Collected: those of the echoes. "
+     "Implied: those of the positions from which the echoes are focused."),
+    ("0 dB", "The peak of a unit point in focus, seen by one element."),
+)  # fmt: skip
 
-def html(results: Sequence[Mapping[str, Any]], title: str = "Frequency-diverse apertures") -> str:
-    """The page of `sarcl.fda.run`'s results: sweeps first, as tables and trends, then every case."""
-    parts = [
+
+def html(
+    results: Sequence[Result],
+    title: str = TITLE,
+    command: str = "",
+    sections: Sequence[Sequence[Block]] | None = None,
+    finished: bool = True,
+) -> str:
+    """The page of `sarcl.fda.run`'s results. Needs the extra `plots`.
+
+    command   the line that made the page, printed on it
+    sections  `section` of each result, where they were made before; None: made here
+    finished  whether all cases are there; until then the plots of sweeps are left out
+    """
+    blocks = [
         words(
-            "Every case is collected once and focused in several ways, beside a conventional antenna with the same "
-            "phase centres that sends a chirp of the same band along the same track. Widths are measured across: "
-            "along y, in the ground plane, at right angles to the line of sight from mid-aperture. Those of a point at "
-            "the centre say little by themselves: a mapping can narrow that point and nothing else. So there are "
-            "points off the centre, and two points side by side; the drawings show the spatial frequencies that were "
-            "collected, and those that the mapped positions claim. 0 dB is a focused point seen by one element."
-        )
+            "Every case is an array and a track. Its echoes are collected once, mapped and focused in several ways, "
+            "and compared with a conventional antenna. The terms are explained after the conclusion."
+        ),
+        heading("Conclusion"),
+        bullets(conclusion(results)),
+        heading("Terms"),
+        terms(TERMS),
     ]
-    parts += _trends.summary(results)
-    for result in results:
-        parts += section(result)
-    return page(title, parts)
+    if not finished:
+        blocks.insert(1, words("Not finished: more cases follow.", True))
+    blocks += _trends.summary(results, finished)
+    for made in sections or map(section, results):
+        blocks += made
+    return page(title, blocks, command)
 
 
-def section(result: Mapping[str, Any]) -> list[str]:
-    """One case."""
+def section(result: Result, level: int = 2) -> list[Block]:
+    """One case: what was flown, what each mapping gained, plots, tables; level: of its heading."""
     rows = result["mapped"]
     points = [p["place"] for p in rows[CONVENTIONAL]["points"]]
-    parts = [heading(result["name"]), words(setting(result))]
-    parts += [words(text) for text in verdicts(result)]
-    parts.append(words(f"A point at {points[0]:g} m:", True))
-    parts.append(table(
-        ["", "aperture, m", "gap, m", "claimed, turns/m", *WIDTHS],
-        [[name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}", *_widths(row["points"][0])]
-         for name, row in rows.items()],
-    ))  # fmt: skip
+    separations = [d["separation"] for d in rows[CONVENTIONAL]["dips"]]
+    dips = [(name, separations, [min(d["dip_db"], 40.0) for d in row["dips"]]) for name, row in rows.items()]
+    blocks = [
+        heading(result["name"], level),
+        words(setting(result)),
+        bullets(verdicts(result)),
+        plot(dips, "separation, m", "dip, dB", "Dip between two points against their separation, up to 40 dB."),
+        *_supports(result),
+        table(
+            ["mapping", "aperture, m", "gap, m", "spread of spatial frequencies, cycles/m", *WIDTHS],
+            [[name, f"{row['length']:.1f}", f"{row['gap']:.1f}", f"{row['claimed']:.3f}", *_widths(row["points"][0])]
+             for name, row in rows.items()],
+            f"A point at y = {points[0]:g} m, focused alone. Aperture and gap: length of the track from which the "
+            "echoes are focused, and the largest gap in it.",
+        ),
+    ]  # fmt: skip
     if len(points) > 1:
-        parts.append(words("Lone points elsewhere:", True))
-        parts.append(table(
-            ["", "y, m", "error of place, m", "peak, dB", *WIDTHS],
+        blocks.append(table(
+            ["mapping", "y, m", "error of position, m", "peak, dB", *WIDTHS],
             [[name, f"{p['place']:g}", f"{p['error']:+.3f}", f"{p['level_db']:.1f}", *_widths(p)]
              for i in range(1, len(points)) for name, row in rows.items() for p in [row["points"][i]]],
+            "Points elsewhere, each focused alone.",
         ))  # fmt: skip
-    separations = [d["separation"] for d in rows[CONVENTIONAL]["dips"]]
-    parts.append(words(
-        "Two equal points in phase about the centre: how deep the image falls between them, dB. They are told apart "
-        "where it falls by 3 dB, both peaks stand within a quarter of the null width of their points, and no other "
-        "peak comes within 3 dB of them; * marks a dip where that fails:", True
-    ))  # fmt: skip
-    parts.append(table(
-        ["", *(f"{s:g} m apart" for s in separations)],
+    blocks.append(table(
+        ["mapping", *(f"{s:g} m apart" for s in separations)],
         [[name, *(_dip(d, row["told_apart"]) for d in row["dips"])] for name, row in rows.items()],
+        "Two equal points in phase about the centre: dip between their peaks, dB. * marks a dip of "
+        f"{RESOLVED:g} dB or more between points that are not resolved all the same.",
     ))  # fmt: skip
-    curves = [(name, separations, [min(d["dip_db"], 40.0) for d in row["dips"]]) for name, row in rows.items()]
-    parts.append(plot(curves, "separation, m", "dip, dB", "Two points: the dip between them"))
-    return parts + _supports(result)
+    return blocks
 
 
-def _supports(result: Mapping[str, Any]) -> list[str]:
-    """Drawings of spatial frequencies: collected, of the conventional antenna, and claimed by each set of positions
-    that claims others."""
+def _supports(result: Result) -> list[Block]:
+    """Plots of spatial frequencies: collected, of the conventional antenna, and implied by the apparent positions."""
     rows = result["mapped"]
     clouds = [("collected", result["collected"], "Spatial frequencies collected"),
               (CONVENTIONAL, rows[CONVENTIONAL], "Spatial frequencies of the conventional antenna")]  # fmt: skip
     if "apparent" in rows:
-        clouds.append(("apparent", rows["apparent"], "Spatial frequencies claimed by the apparent positions"))
+        clouds.append(("apparent", rows["apparent"], "Spatial frequencies implied by the apparent positions"))
     out = []
     for name, row, caption in clouds:
         along, across = zip(*row["support"], strict=True)
-        text = f"{caption}: {row['claimed']:.3f} turns/m across"
-        out.append(plot([(name, across, along)], "across, turns/m", "along, turns/m", text, dots=True))
+        text = f"{caption}: spread of {row['claimed']:.3f} cycles/m across."
+        out.append(plot([(name, across, along)], "across, cycles/m", "along, cycles/m", text, dots=True))
     return out
 
 
-WIDTHS = ("nulls, m", "half power, m", "PSLR, dB", "ISLR, dB")
+WIDTHS = ("null, m", "half power, m", "PSLR, dB", "ISLR, dB")
 
 
 def _widths(point: Mapping[str, float]) -> list[str]:
@@ -90,6 +130,6 @@ def _widths(point: Mapping[str, float]) -> list[str]:
     return [f"{point['null']:.4f}", f"{point['irw']:.4f}", f"{point['pslr_db']:.2f}", f"{point['islr_db']:.2f}"]
 
 
-def _dip(found: Mapping[str, float], told_apart: float | None) -> str:
-    told = told_apart is not None and found["separation"] >= told_apart
-    return f"{found['dip_db']:.1f}{'' if told or found['dip_db'] < RESOLVED else '*'}"
+def _dip(found: Mapping[str, float], resolved_from: float | None) -> str:
+    resolved = resolved_from is not None and found["separation"] >= resolved_from
+    return f"{found['dip_db']:.1f}{'' if resolved or found['dip_db'] < RESOLVED else '*'}"

@@ -1,4 +1,4 @@
-"""Experiments on frequency-diverse apertures in words: what was flown, what was gained, and what was not."""
+"""Sentences about experiments on frequency-diverse apertures: array and track, and what each mapping gained or lost."""
 
 from __future__ import annotations
 
@@ -9,17 +9,72 @@ import numpy as np
 
 from .experiment import CONVENTIONAL, NEAR, RESOLVED, nearer
 
-SAME = 0.02  # relative: widths that differ by less are one
-WEAK = -6.0  # dB of a unit point: less than this is no main lobe on its place
+SAME = 0.02  # relative difference below which two widths count as equal
+WEAK = -6.0  # dB of a unit point: a weaker peak is not the main lobe of a focused point
 RECEIVERS = {
     "reference": "One receiver, at the reference element.",
     "own": "Every element receives its own channel.",
-    "all": "Every element receives all channels, told apart.",
+    "all": "Every element receives every channel; the channels are kept separate.",
 }
 
 
+def conclusion(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """What the mappings gained over the conventional antenna in all cases: a sentence, then a line per mapping."""
+    names, better, lines = mappings_of(results), [], []
+    for name in names:
+        cases = [case for case in results if name in case["mapped"]]
+        if not cases:
+            lines.append(f"{name}: applies to none of the {_cases(len(results))}.")
+            continue
+        rows, plain = ([case["mapped"][who] for case in cases] for who in (name, CONVENTIONAL))
+        found = [nearer(row, usual, case["null"]) for row, usual, case in zip(rows, plain, cases, strict=True)]
+        if found.count(1):
+            better.append(f"{name} in {found.count(1)} of {_cases(len(cases))}")
+        some = "" if len(cases) == len(results) else f" (applies to {len(cases)} of {_cases(len(results))})"
+        nulls, usual = _extremes(rows, "null", ".4f"), _extremes(plain, "null", ".4f")
+        lobes, normal = _extremes(rows, "pslr_db", ".1f"), _extremes(plain, "pslr_db", ".1f")
+        lines.append(
+            f"{name}{some}: null of the first point {nulls} m (conventional {usual}), highest side lobe {lobes} dB "
+            f"(conventional {normal}), points displaced by at most {at_most(max(worst(row) for row in rows))} m. "
+            f"Compared with the conventional antenna, two points are resolved closer together in {found.count(1)} of "
+            f"{_cases(len(cases))}, equally close in {found.count(0)}, only farther apart or not at all in "
+            f"{found.count(-1)}; by neither in {found.count(None)}."
+        )
+    if not names:
+        return ["No mapping was measured."]
+    first = (
+        f"Two points are resolved closer together than by the conventional antenna with {'; with '.join(better)}."
+        if better
+        else "No mapping resolves two points closer together than the conventional antenna does."
+    )
+    return [first, *lines]
+
+
+def mappings_of(results: Sequence[Mapping[str, Any]]) -> list[str]:
+    """Every mapping asked for in any case, in order."""
+    return list(dict.fromkeys(name for case in results for name in case["mappings"]))
+
+
+def worst(row: Mapping[str, Any]) -> float:
+    """The largest error of position of a lone point, m."""
+    return float(max(abs(p["error"]) for p in row["points"]))
+
+
+def _cases(n: int) -> str:
+    return f"{n} case" if n == 1 else f"{n} cases"
+
+
+def _extremes(rows: Sequence[Mapping[str, Any]], key: str, form: str) -> str:
+    """Smallest to largest value of the first points that have a peak on their cut."""
+    found = [row["points"][0][key] for row in rows if row["points"][0]["inside"]]
+    if not found:
+        return "nowhere"
+    ends = [f"{v + 0.0:{form}}" for v in (min(found), max(found))]
+    return ends[0] if ends[0] == ends[1] else " to ".join(ends)
+
+
 def setting(result: Mapping[str, Any]) -> str:
-    """What was flown, and what stands beside it."""
+    """Array, track and receiver of a case, and the conventional antenna it is compared with."""
     return f"{_array(result)} {_path(result)} {RECEIVERS[result['receive']]} {_beside(result)}"
 
 
@@ -29,20 +84,23 @@ def _array(result: Mapping[str, Any]) -> str:
     where = {"vertical": "along z", "planar": "along the track and along z"}.get(kind, "along the track")
     order = {
         "costas": " in a Costas order",
-        "subarrays": f" an element, in {result['groups']} groups that each send the carrier of their first",
+        "subarrays": f" per element, in {result['groups']} groups; each group sends the carrier of its first element",
     }.get(kind, "")
-    switch = ", in reverse over the elements from mid-aperture on with the centre frequency kept"
+    switch = (
+        "; from mid-aperture on the carriers run in reverse over the elements, at the same centre frequency"
+        if result["mirrored"] else ""
+    )  # fmt: skip
     apart = f"{result['spacing']:.4g} m" if result["spacing"] >= 1 else f"{1e3 * result['spacing']:.4g} mm"
     text = (
-        f"{' x '.join(str(i) for i in np.atleast_1d(n))} elements {apart} apart {where}, from "
-        f"{result['center'] / 1e9:g} GHz in steps of {steps} MHz{order}{switch if result['mirrored'] else ''}: "
-        f"{result['bandwidth'] / 1e6:g} MHz about {result['middle'] / 1e9:.4g} GHz."
+        f"{' x '.join(str(i) for i in np.atleast_1d(n))} elements {apart} apart {where}, with carriers from "
+        f"{result['center'] / 1e9:g} GHz in steps of {steps} MHz{order}{switch}. Bandwidth "
+        f"{result['bandwidth'] / 1e6:g} MHz, centre frequency {result['middle'] / 1e9:.4g} GHz."
     )
     if kind == "subarrays":
         off = (
             f"{np.rad2deg(result['steer']):.4g} deg off the scene's centre" if result["steer"] else "the scene's centre"
         )
-        text += f" The groups are steered at {off} as seen from mid-aperture."
+        text += f" The groups are steered at {off}, as seen from mid-aperture."
     return text
 
 
@@ -55,22 +113,26 @@ def _path(result: Mapping[str, Any]) -> str:
             f"An arc of {length}, {arc:.3g} deg about the scene's centre, {pulses} it{high}; the array turns with it."
         )
     squint = np.rad2deg(result["squint"])
-    lean = f", which lies {abs(squint):.3g} deg {'ahead of' if squint > 0 else 'behind'} abeam" if squint else ""
+    lean = f", squinted by {abs(squint):.3g} deg {'ahead of' if squint > 0 else 'behind'} broadside" if squint else ""
     return f"A straight track of {length}, {pulses} the scene{high}{lean}."
 
 
 def _beside(result: Mapping[str, Any]) -> str:
     if not result["is_wide"]:
-        return "Beside it: a conventional antenna at the mean phase centre, with a chirp of the same band."
-    heard = {"reference": "heard at the reference element", "own": "each heard by itself", "all": "heard by all"}
+        return "Compared with a conventional antenna at the mean phase centre that sends a chirp of the same band."
+    received = {
+        "reference": "received at the reference element",
+        "own": "each received by itself",
+        "all": "received by all elements",
+    }
     return (
-        "Beside it: a conventional array with the same phase centres, whose elements all send a chirp of the same "
-        f"band, told apart, {heard[result['receive']]}."
+        "Compared with a conventional array with the same phase centres, whose elements all send a chirp of the same "
+        f"band; the chirps are kept separate, {received[result['receive']]}."
     )
 
 
 def verdicts(result: Mapping[str, Any]) -> list[str]:
-    """What each mapping gained over the conventional antenna, and what it did not; why others do not apply."""
+    """What each mapping gained or lost against the conventional antenna; why other mappings do not apply."""
     rows, null = result["mapped"], result["null"]
     out = [f"{name}: {_verdict(row, rows[CONVENTIONAL], null)}" for name, row in rows.items() if name != CONVENTIONAL]
     return out + [f"{name}: not applicable. {reason}." for name, reason in result["not_applicable"].items()]
@@ -80,60 +142,61 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
     first, usual = row["points"][0], plain["points"][0]
     place = f"the point at {first['place']:g} m"
     if not first["inside"]:
-        return f"{place} has no peak on the cut through it, only {decibels(first['level_db'])} at an end of that."
+        return (
+            f"{place} has no peak on the cut through it: the largest value, {decibels(first['level_db'])}, is at an "
+            "end of the cut."
+        )
     narrower = 1 - first["null"] / usual["null"]
-    change = "as far out as" if abs(narrower) < SAME else (
-        f"{100 * abs(narrower):.0f} % {'nearer than' if narrower > 0 else 'farther than'}"
+    change = "as far from the peak as" if abs(narrower) < SAME else (
+        f"{100 * abs(narrower):.0f} % {'closer to the peak than' if narrower > 0 else 'farther from the peak than'}"
     )  # fmt: skip
     text = (
-        f"the first nulls of {place} lie {change} the conventional antenna's ({first['null']:.3f} and "
-        f"{usual['null']:.3f} m), its half-power width is {first['irw']:.3f} m (conventional {usual['irw']:.3f}), its "
-        f"peak is at {decibels(first['level_db'])}, its highest side lobe at {first['pslr_db']:.1f} dB (conventional "
-        f"{usual['pslr_db']:.1f})"
+        f"the first nulls of {place} are {change} the conventional antenna's ({first['null']:.3f} m; conventional "
+        f"{usual['null']:.3f}). Half-power width {first['irw']:.3f} m (conventional {usual['irw']:.3f}), peak at "
+        f"{decibels(first['level_db'])}, highest side lobe at {first['pslr_db']:.1f} dB (conventional "
+        f"{usual['pslr_db']:.1f})."
     )
     if first["level_db"] < WEAK:
-        text += "; so weak a peak is smeared, or its main lobe stands off this cut"
-    worst = max(row["points"], key=lambda p: abs(p["error"]))
-    if abs(worst["error"]) > 0.1 * usual["null"]:
-        text += f"; the point at {worst['place']:g} m comes out {worst['error']:+.3f} m off"
+        text += " So weak a peak is smeared, or its main lobe is not on this cut."
+    worst_point = max(row["points"], key=lambda p: abs(p["error"]))
+    if abs(worst_point["error"]) > 0.1 * usual["null"]:
+        text += f" The point at {worst_point['place']:g} m is displaced by {worst_point['error']:+.3f} m."
     else:
-        text += f"; on its cut no point comes out more than {at_most(worst['error'])} m off"
+        text += f" No point is displaced along its cut by more than {at_most(worst_point['error'])} m."
     alike = nearer(row, plain, null) == 0 and row["told_apart"] != plain["told_apart"]
     same = ", with dips that differ by less than 0.2 dB" if alike else ""
-    return (
-        f"{text}. Two points are told apart {_apart(row)} (conventional: {_apart(plain)}{same}).{_spoiled(row, null)}"
-    )
+    return f"{text} Two points are resolved {_apart(row)} (conventional: {_apart(plain)}{same}).{_spoiled(row, null)}"
 
 
 def decibels(value: float) -> str:
-    """With one decimal, and no minus before 0."""
+    """A level with one decimal, and no minus before 0."""
     return f"{round(value, 1) + 0.0:.1f} dB"
 
 
 def at_most(length: float) -> str:
-    """Its modulus, m, rounded up to millimetres."""
+    """The modulus of a length, m, rounded up to millimetres."""
     return f"{max(np.ceil(1e3 * abs(length)), 1.0) / 1e3:.3f}"
 
 
 def _apart(row: Mapping[str, Any]) -> str:
-    told = row["told_apart"]
-    if told is None:
+    least = row["told_apart"]
+    if least is None:
         return "at no separation tried"
-    last = told == max(d["separation"] for d in row["dips"])
-    return f"at {told:g} m, the farthest tried" if last else f"from {told:g} m on"
+    last = least == max(d["separation"] for d in row["dips"])
+    return f"at {least:g} m, the largest separation tried" if last else f"from {least:g} m on"
 
 
 def _spoiled(row: Mapping[str, Any], null: float) -> str:
-    """Why a dip does not tell two points apart."""
+    """Why a dip of enough decibels does not resolve two points: the first such dip."""
     dips: Sequence[Mapping[str, float]] = row["dips"]
     for found in dips:
-        told = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
-        if found["dip_db"] < RESOLVED or told:
+        resolved = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
+        if found["dip_db"] < RESOLVED or resolved:
             continue
-        start = f" {found['separation']:g} m apart there is a dip of {found['dip_db']:.1f} dB, but "
+        start = f" At {found['separation']:g} m there is a dip of {found['dip_db']:.1f} dB, but "
         if found["false_db"] > -RESOLVED:
-            return f"{start}another peak comes to {decibels(found['false_db'])} of the lower of the two."
+            return f"{start}another peak reaches {decibels(found['false_db'])} of the lower of the two peaks."
         if found["shift"] > null * NEAR:
-            return f"{start}a peak stands {found['shift']:.3f} m from its point."
-        return f"{start}farther apart they are not told apart again."
+            return f"{start}a peak is displaced by {found['shift']:.3f} m."
+        return f"{start}the points are not resolved at a larger separation."
     return ""

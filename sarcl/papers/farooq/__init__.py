@@ -1,18 +1,18 @@
-"""Farooq 2009: frequency-diverse arrays in synthetic aperture radar. Every figure and table, published beside measured.
+"""Farooq 2009: frequency-diverse arrays in synthetic aperture radar. Every figure and table, published and measured.
 
 Source: J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, Air Force Institute
 of Technology, AFIT/DEE/ENG/09-04, 2009. Figures, tables and equations are numbered as there.
 
 For other folders:
 
-    range_zones   range zones separated by carriers that continue from pulse to pulse (sarcl's own)
+    range_zones   range zones separated by carriers that continue from pulse to pulse (sarcl's own experiment)
 
-For this folder alone, a section or a group of sections each:
+For this folder alone, one section or a group of sections of the page each:
 
-    _aperture     5.2, 5.3: apparent apertures, without the switch and with it
-    _errata       errors in print
+    _aperture     5.2, 5.3: apparent apertures, without and with the switch of carriers at mid-aperture
+    _errata       errors in the printed equations and figures
     _field        4.4: delay of the pulse's peak against direction
-    _focus        5.1: backprojection of diverse data, unmodified and corrected
+    _focus        5.1: backprojection of frequency-diverse echoes, unmodified and corrected
     _honest       off-centre points, two points, spatial frequencies (sarcl's own check)
     _pattern      chapter 3: patterns of planar arrays
     _pulse        chapter 4: the pulse, its spectrum and its ambiguity function
@@ -30,15 +30,31 @@ from . import _aperture, _errata, _field, _focus, _honest, _pattern, _pulse, _re
 __all__ = ["PAPER", "range_zones"]
 
 ABOUT = (
-    "An array whose elements send a carrier each makes a pulse, by the sum of its carriers, that passes at another "
-    "time in every direction. The dissertation makes images of such echoes, and proposes to backproject them from "
-    "apparent places, so that a short aperture does what a longer one would. This page does all of it again. Source: "
-    + PAPERS["farooq"] + " (AFIT/DEE/ENG/09-04)."
+    "In a frequency-diverse array every element sends a carrier of its own. The sum of the carriers is a pulse whose "
+    "delay depends on the direction. The dissertation focuses echoes of such arrays. It proposes to backproject them "
+    "from apparent positions of the antenna, so that a short aperture would resolve like a longer one. This page "
+    "reproduces its figures and tables. Source: " + PAPERS["farooq"] + " (AFIT/DEE/ENG/09-04)."
+)  # fmt: skip
+TERMS = (
+    ("FDA, CFA", "Frequency-diverse array: a carrier per element, f0 + n df at element n of N. Constant-frequency "
+     "array: one carrier for all elements."),
+    ("d, k, t'", "Spacing of the elements, m; wavenumber 2 pi f/c, rad/m; time since a wave from the reference element "
+     "passed, s."),
+    ("null", "Half the distance between the first minima on both sides of a peak, m; the printed resolution."),
+    ("PSLR", "Peak side-lobe ratio: highest side lobe over the peak, dB."),
+    ("corrected, apparent, channels", "Mappings of the echoes before they are focused (sarcl.map_aperture). corrected: "
+     "delay and phase of every channel, as seen from the scene's centre, are taken out. apparent: the corrected echoes "
+     "are focused from the positions of the dissertation's equations. channels: every channel is focused from its own "
+     "element and carrier."),
+    ("switch", "The sign of df changes at mid-aperture, so that the two halves of the aperture are displaced in "
+     "opposite directions (systems marked +-)."),
+    ("conventional", "An antenna with the same phase centres, track and band that sends a chirp."),
+    ("LFM", "Linear frequency modulation: a chirp."),
 )  # fmt: skip
 
 PAPER = Paper(
     name="farooq",
-    title="Frequency-diverse arrays: Farooq 2009, published beside measured",
+    title="Frequency-diverse arrays: Farooq 2009, published and measured",
     about=ABOUT,
     sections=(
         _reference.section,
@@ -58,4 +74,5 @@ PAPER = Paper(
         _zones.section,
         _errata.section,
     ),
+    terms=TERMS,
 )

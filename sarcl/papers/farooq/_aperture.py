@@ -1,4 +1,4 @@
-"""Farooq 2009, sections 5.2 and 5.3: apparent apertures, without the switch and with it."""
+"""Farooq 2009, sections 5.2 and 5.3: apparent apertures, without and with the switch of carriers at mid-aperture."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ SWITCHED = (
     (450, 2e6, 574.0, 33, 0.125, "figure 5.8"),
 )
 OTHER_SPACING = 0.015  # m, half a wave of f0
-THIN = 5  # of the places drawn
+THIN = 5  # every fifth position is plotted
 
 
 def steady(lab: Lab) -> Section:
     """Figures 5.3 to 5.5."""
     out = Section("steady", "Apparent apertures without the switch (table 5.2, figures 5.3 to 5.5)")
     out.say(
-        "Mapping moves the whole aperture sideways by d f0/df, with the sign of the step. Its length stays, and so do "
-        "the nulls."
+        "The mapping displaces the whole aperture along the track by d f0/df, with the sign of the step. Length and "
+        "nulls stay the same."
     )
     curves = []
     for n, step, figure in ((45, 20e6, "5.3"), (450, 2e6, "5.4"), (450, -2e6, "5.5")):
@@ -41,6 +41,7 @@ def steady(lab: Lab) -> Section:
             out.states(
                 f"{name}: places are moved", f"figure {figure}", f"in the {wanted} direction", f"by {shift:+.1f} m",
                 (shift < 0) == (step > 0), value=shift,
+                rule="the mean displacement has that sign",
             )  # fmt: skip
         nulls = [lab.measure(raw)["null"] for raw in (actual, mapped)]
         remark = "" if step > 0 else (
@@ -51,6 +52,7 @@ def steady(lab: Lab) -> Section:
         out.states(
             f"{name}: nulls before and after the mapping", f"figure {figure}", "unchanged",
             f"{nulls[0]:.4f} and {nulls[1]:.4f} m", abs(nulls[0] - nulls[1]) < 0.002, value=nulls,
+            rule="difference below 2 mm",
         )  # fmt: skip
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
         if n == 45:
@@ -58,7 +60,11 @@ def steady(lab: Lab) -> Section:
             out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
         elif step > 0:
             out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
-    out.draw(html.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))
+    out.draw(
+        html.plot(
+            curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True
+        )
+    )
     return out
 
 
@@ -66,10 +72,10 @@ def switched(lab: Lab) -> Section:
     """Figures 5.6 to 5.8."""
     out = Section("switched", "Apparent apertures with the sign switched at mid-aperture (figures 5.6 to 5.8)")
     out.say(
-        "Half the aperture is moved one way and half the other, so that a gap opens amid them: 2 d f0/df of it. The "
-        "printed lengths follow with d half a wave of the CENTRE frequency, f0 = 10 GHz in both halves, and the range "
-        "offset of equation 5.15 as printed, which takes the two-way path c dt for a one-way one. Half of it, which is "
-        "right, makes half the growth."
+        "The two halves of the aperture are displaced in opposite directions, which opens a gap of 2 d f0/df between "
+        "them. The printed lengths follow with d half a wavelength of the centre frequency, f0 = 10 GHz in both "
+        "halves, and the range offset of equation 5.15 as printed. That offset uses the two-way path c dt as a "
+        "one-way range; half of it, which is right, makes half the growth."
     )
     curves, table = [], []
     for n, step, length, growth, _, figure in SWITCHED:
@@ -93,6 +99,7 @@ def switched(lab: Lab) -> Section:
             out.states(
                 "switched aperture", figure, "no longer continuous", f"gap of {gap:.1f} m", gap > 2 * _step(raw.tx),
                 value=gap,
+                rule="gap above twice the step of the track",
             )  # fmt: skip
             _outer(out, lab, figure)
             curves.append(("actual", raw.tx[::THIN, 1], raw.tx[::THIN, 1]))
@@ -103,12 +110,16 @@ def switched(lab: Lab) -> Section:
         )
     head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
     out.parts.append(html.table(head, table))
-    out.draw(html.plot(curves, "actual place, m", "place backprojected from, m", "Places along the track.", dots=True))
+    out.draw(
+        html.plot(
+            curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True
+        )
+    )
     return out
 
 
 def _outer(out: Section, lab: Lab, figure: str) -> None:
-    """Side lobes of the centre point and of the outermost across."""
+    """Side lobes of the centre point and of a point 2 m off in cross-range."""
     case = system(45, 20e6)
     inner, outer = (
         lab.measure(lab.mapped(case, "apparent", ((0.0, y, 0.0),)), half=0.9, about=y)["pslr_db"] for y in (0.0, 2.0)
@@ -116,7 +127,8 @@ def _outer(out: Section, lab: Lab, figure: str) -> None:
     out.states(
         "side lobes of the outer targets", figure, "most noticeable there",
         f"PSLR {outer:.1f} dB 2 m off the centre, {inner:.1f} dB at it", outer > inner + 1,
-        "what points off the centre suffer from: measured again below", [outer, inner],
+        "points off the centre are measured again below", [outer, inner],
+        rule="PSLR more than 1 dB higher than at the centre",
     )  # fmt: skip
 
 
@@ -134,21 +146,23 @@ def nulls(lab: Lab) -> Section:
         value = [found["null"], found["pslr_db"]]
         if expected is None:
             out.states(f"{name}: nulls", figure, "no difference visible", text, abs(found["null"] - PRINTED) < 0.017,
-                       "6 % nearer", value)  # fmt: skip
+                       "6 % closer to the peak", value,
+                rule="within 17 mm of 0.167 m")  # fmt: skip
         else:
             uniform = SPEED_OF_LIGHT / case.middle * case.distance / (2 * np.ptp(mapped.tx[:, 1]))
             out.states(
                 f"{name}: nulls", f"{figure}, equation 5.36", f"{expected:.3f} m", text,
                 abs(found["null"] - expected) < 0.003,
-                f"{uniform:.3f} m is a filled aperture's; two halves with a gap amid them are an interferometer, whose "
-                "nulls are nearer and whose side lobes are higher", value,
+                f"an aperture of this length without a gap has {uniform:.3f} m; two halves with a gap are an "
+                "interferometer, whose nulls are closer to the peak and whose side lobes are higher", value,
+                rule="within 3 mm",
             )  # fmt: skip
         at, values = lab.cut(mapped, half=1.0, n=401)
         curves.append((name, at, _db(values)))
     plain = system(45, 20e6, mirrored=False)
     at, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
     curves.insert(0, ("not mapped", at, _db(values)))
-    out.say("Cross-range cuts through the centre point. Equation 5.36 takes the mapped aperture for a filled one.")
+    out.say("Cross-range cuts through the centre point. Equation 5.36 assumes that the mapped aperture has no gap.")
     out.draw(html.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8)."))
     return out
 

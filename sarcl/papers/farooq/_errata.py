@@ -1,4 +1,4 @@
-"""Farooq 2009: errors in print, each with how it shows in the numbers."""
+"""Farooq 2009: errors in print, each with its effect on the numbers."""
 
 from __future__ import annotations
 
@@ -25,21 +25,21 @@ def section(lab: Lab) -> Section:
         "and the exact field, have (-30, 60). Figures 3.8 and 3.9 have it right.",
         "Equations 3.39 and 3.40 look at the corner (N, P), where steps of opposite signs cancel; along the edges they "
         "do not. Equation 3.40 gives twice what 3.59 has, since the steps along y meet the elements along z as well.",
-        "Figure 3.14: within 45 deg the closed form errs by up to 0.60 of the peak power, not insignificantly; "
-        "equation 3.60 itself has 3.5 times the phase that 3.40 allows.",
+        "Figure 3.14: within 45 deg the closed form differs by up to 0.60 of the peak power, which is "
+        "significant; equation 3.60 itself has 3.5 times the phase that 3.40 allows.",
         "Equations 4.1 and 4.30: in the denominators dk_y and dk_z, and kappa_z and kappa_y, have changed places. At "
-        "r' = 0 the second is left: numerator and denominator no longer vanish together, and the factor has poles.",
+        "r' = 0 numerator and denominator no longer vanish together, and the factor has poles.",
         "Equation 4.27 leaves out the phase n^2 dk d sin(azimuth), whose linear part moves the peak to "
         "f0 + (N - 1) df: 8.8 to 9.0 % more at the imaging systems.",
         "Equations 5.9 to 5.14: the minus in front mirrors the aperture, and 1 + kappa^2 should be 1 - kappa^2, with a "
         "minus in the denominator: theta = atan{[(Yc - Ry) + g (1 - ky^2)]/[(Xc - Rx) - g kx ky]}, g = d f0/df.",
-        "Equation 5.15 takes the offset c dt of a two-way path for a range; half of it is right. The printed lengths, "
-        "445, 502 and 574 m, follow with the whole.",
+        "Equation 5.15 uses the offset c dt of a two-way path as a range; half of it is right. The printed lengths, "
+        "445, 502 and 574 m, follow with the full offset.",
         "Section 5.4: lambda_c/2 is 0.0144 m, not 0.14 m; the sizes printed beside it, 0.12 and 12 m, go with 0.0144.",
         "Figure 5.5: with -2 MHz from f0 = 10 GHz the centre frequency is 9.55 GHz, as section 5.3.1 says, and 430 m "
         "resolve 0.182 m, not 0.167.",
-        "Equation 5.36 expects nulls of 0.143 and 0.125 m of apertures with a gap: they come nearer, with side lobes "
-        "of -7.8 and -5.1 dB.",
+        "Equation 5.36 expects nulls of 0.143 and 0.125 m for apertures with a gap: they are closer to the peak, with "
+        "side lobes of -7.8 and -5.1 dB.",
         "Abstract: a 33 % longer aperture saves 25 % of the time, and 4.5 dB is 20 log10 of the 1 MHz case's length, "
         "or of the 2 MHz case's nulls.",
     )
@@ -51,6 +51,7 @@ def section(lab: Lab) -> Section:
     out.states(
         "size of 9 and 900 elements", "section 5.4", "0.12 and 12 m", f"{sizes[0]:.2f} and {sizes[1]:.1f} m",
         all(abs(a / b - 1) < 0.1 for a, b in zip(sizes, SIZES, strict=True)), "with 0.0144 m", sizes,
+        rule="within 10 %",
     )  # fmt: skip
     _poles(out)
     _mirror(out, lab)
@@ -58,8 +59,8 @@ def section(lab: Lab) -> Section:
 
 
 def _poles(out: Section) -> None:
-    """Equation 4.1 as printed, over the sky, beside what it should be."""
-    angles = np.arange(-84.63, 85.0, 1.0)  # off the poles themselves
+    """Equation 4.1 over all directions, as printed and corrected."""
+    angles = np.arange(-84.63, 85.0, 1.0)  # deg; none of them on a pole
     elevation, azimuth = np.meshgrid(np.radians(angles), np.radians(angles), indexing="ij")
     u = directions(azimuth, elevation)
     given: dict[str, Any] = {"shape": SHAPE, "spacing": SPACING, "frequency_step": STEPS, "retarded": -TIME}
@@ -74,9 +75,10 @@ def _poles(out: Section) -> None:
     out.states(
         "largest array factor, over N P", "equation 4.1", "1 (equation 3.46)", f"poles as printed, {worst:.0f} "
         f"on a grid of 1 deg; {right.max():.3f} mended", worst < 1.01,
-        "kappa_y stands for kappa_z in a denominator", worst,
+        "a denominator has kappa_y instead of kappa_z", worst,
+        rule="at most 1.01",
     )  # fmt: skip
-    for what, level in (("mended", right), ("as printed, cut at 1", np.minimum(printed, 1.0))):
+    for what, level in (("corrected", right), ("as printed, limited to 1", np.minimum(printed, 1.0))):
         out.draw(html.picture(
             np.maximum(20 * np.log10(np.maximum(level, 1e-6)), -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg",
             "elevation, deg", f"Equation 4.1 {what}, t' = -250 us.", floor_db=-40,
@@ -84,7 +86,7 @@ def _poles(out: Section) -> None:
 
 
 def _mirror(out: Section, lab: Lab) -> None:
-    """Equation 5.14 as printed, and mended, beside what `map_aperture` makes."""
+    """Equation 5.14 as printed and corrected, compared with `map_aperture`."""
     step = 20e6
     case = system(45, step, mirrored=False)
     actual, mapped = lab.collect(case).tx, lab.mapped(case, "apparent").tx
@@ -103,9 +105,10 @@ def _mirror(out: Section, lab: Lab) -> None:
         "places along the track, N 45, 20 MHz", "equation 5.14", "an aperture moved in the negative direction",
         f"as printed mirrored, up to {off[0]:.0f} m off; mended the same to {1e3 * off[1]:.1g} mm", off[0] < 1.0,
         "the figures show it right: they were not made with the minus", off,
+        rule="within 1 m of the mapped positions",
     )  # fmt: skip
-    curves = [("actual", actual[:, 1]), ("as printed", printed), ("mended", mended)]
+    curves = [("actual", actual[:, 1]), ("as printed", printed), ("corrected", mended)]
     out.draw(html.plot(
-        [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], "actual place, m", "place backprojected from, m",
-        "Equation 5.14 as printed and mended, N 45, 20 MHz.", dots=True,
+        [(name, actual[::THIN, 1], y[::THIN]) for name, y in curves], "actual position, m",
+        "position backprojected from, m", "Equation 5.14 as printed and corrected, N 45, 20 MHz.", dots=True,
     ))  # fmt: skip

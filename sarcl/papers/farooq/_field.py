@@ -1,4 +1,4 @@
-"""Farooq 2009, section 4.4: a pulse whose peak passes at another time in every direction."""
+"""Farooq 2009, section 4.4: a pulse whose delay depends on the direction."""
 
 from __future__ import annotations
 
@@ -21,9 +21,9 @@ def delays(lab: Lab) -> Section:
     """Equation 4.27, figures 4.10 to 4.12."""
     out = Section("delay", "A delay that depends on azimuth (equation 4.27, figures 4.10 to 4.12)")
     out.say(
-        "The closed form's peak passes d f0 sin(azimuth)/(c df) late. The exact one does not: of the phase "
-        "n^2 dk d sin(azimuth) that the closed form leaves out, the part n (N - 1) is linear in n and moves the peak "
-        "to (f0 + (N - 1) df) d sin(azimuth)/(c df); what is left smears it."
+        "The peak of the closed form is delayed by d f0 sin(azimuth)/(c df). The closed form leaves out the phase "
+        "n^2 dk d sin(azimuth). Its part n (N - 1) is linear in n and moves the peak of the exact field to "
+        "(f0 + (N - 1) df) d sin(azimuth)/(c df); the rest smears it."
     )
     array = AntennaArray.linear(N, spacing=-HALF_WAVE, frequency_step=STEP)
     t = np.linspace(-0.5e-9, 0.5e-9, 4001)
@@ -48,8 +48,9 @@ def delays(lab: Lab) -> Section:
     out.states(
         "the same in the exact field: a peak at +45 deg", "figure 4.11", "a peak as high as at boresight",
         f"{peak:.2f} of {N}", peak > 0.9 * N,
-        f"the phase left out is {bound / (np.pi / 4):.0f} times what equation 3.40 allows: the carriers never come "
-        "together there", peak,
+        f"the phase left out is {bound / (np.pi / 4):.0f} times what equation 3.40 allows: the carriers are never in "
+        "phase there", peak,
+        rule="above 0.9 N",
     )  # fmt: skip
     _systems(out, lab)
     out.draw(
@@ -60,7 +61,7 @@ def delays(lab: Lab) -> Section:
 
 
 def _systems(out: Section, lab: Lab) -> None:
-    """Delay and height of the exact peak at the end of the imaging apertures, over those of the closed form."""
+    """Delay and height of the exact peak at the end of the imaging apertures, relative to those of the closed form."""
     azimuth = np.arctan(215 / 5000)
     rows = []
     for n, step in ((45, 20e6), (225, 4e6), (450, 2e6)):
@@ -76,8 +77,9 @@ def _systems(out: Section, lab: Lab) -> None:
         out.states(
             f"delay at the aperture's end, N {n}, {step / 1e6:g} MHz", "equation 4.27", f"{1e9 * plain:.4g} ns by it",
             f"{1e9 * found:.4g} ns, {100 * (found / plain - 1):.1f} % more", abs(found / plain - 1) < 0.02,
-            f"the peak stands at f0 + (N - 1) df: {1e3 * offset:.0f} mm of range, beside a resolution of 167 mm",
+            f"the delay follows with f0 + (N - 1) df; {1e3 * offset:.0f} mm of range, the resolution is 167 mm",
             found / plain,
+            rule="within 2 %",
         )  # fmt: skip
         rows.append([f"N {n}, {step / 1e6:g} MHz", f"{found / plain:.4f}", f"{wanted / plain:.4f}",
                      f"{1e3 * offset:.0f}", f"{made.max() / n:.4f}"])  # fmt: skip
@@ -86,12 +88,12 @@ def _systems(out: Section, lab: Lab) -> None:
 
 
 def snapshots(lab: Lab) -> Section:
-    """Figures 4.9 and 4.13: the pulse on its way, over a plane."""
+    """Figures 4.9 and 4.13: the travelling pulse over a plane."""
     out = Section("snapshots", "The pulse on its way (figures 4.9 and 4.13)")
     out.say(
-        "Modulus of the field of 9 elements at (0, -n d), cut to the pulse's length. In the closed form the bright "
-        "line winds through the pulse, late on one side and early on the other: planes of equal amplitude are not "
-        "planes of equal phase. In the exact field it is bright about boresight only, where the carriers still meet."
+        "Modulus of the field of 9 elements at (0, -n d), limited to the length of the pulse. In the closed form the "
+        "brightest line is late on one side of boresight and early on the other: surfaces of equal amplitude are not "
+        "surfaces of equal phase. The exact field is bright about boresight only, where the carriers are in phase."
     )
     x, y = np.linspace(0.0, 1.6, 161), np.linspace(-1.2, 1.2, 241)
     place = np.stack([*np.meshgrid(x, y, indexing="ij"), np.zeros((len(x), len(y)))], axis=-1)
@@ -122,7 +124,7 @@ def snapshots(lab: Lab) -> Section:
 
 
 def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.ndarray) -> None:
-    """Where in the pulse the closed form is brightest, m off its middle, in three directions 2 ns out."""
+    """Distance of the closed form's brightest part from the middle of the pulse, m, in three directions, at 2 ns."""
     middle = 2e-9 * SPEED_OF_LIGHT
     places = []
     for degrees in (-45, 0, 45):
@@ -131,7 +133,8 @@ def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.n
     out.states(
         "brightest place at -45, 0, 45 deg, 2 ns", "figure 4.9", "early, centred, late in the pulse",
         ", ".join(f"{1e2 * p:+.1f} cm" for p in places), places[0] > 0.05 > abs(places[1]) and places[2] < -0.05,
-        "places off the pulse's middle, along range: what is late lies behind", places,
+        "distances from the middle of the pulse along range; the late part is at the shorter range", places,
+        rule="over 5 cm early, within 5 cm, over 5 cm late",
     )  # fmt: skip
 
 

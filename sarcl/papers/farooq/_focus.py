@@ -1,4 +1,4 @@
-"""Farooq 2009, section 5.1: diverse data backprojected as they are, and with delay and phase corrected."""
+"""Farooq 2009, section 5.1: frequency-diverse echoes backprojected unmodified, and with delay and phase corrected."""
 
 from __future__ import annotations
 
@@ -37,6 +37,7 @@ def section(lab: Lab) -> Section:
             f"unmodified, {name}", "figure 5.1" if n == 45 else "section 5.1", "defocused",
             f"peak {lost:.1f} dB, {abs(where):.2f} m off, {wide:.2f} m wide", lost < -3,
             value=[lost, where, wide],
+            rule="peak below -3 dB",
         )  # fmt: skip
         out.number(f"corrected, {name}: nulls in cross-range", "figure 5.2" if n == 45 else "section 5.1", PRINTED,
                    whole["null"], 0.002, "m")  # fmt: skip
@@ -51,7 +52,8 @@ def section(lab: Lab) -> Section:
             f"equations 5.4 and 5.5 alone, {name}", "section 5.1", "focused",
             f"null {linear['null']:.3f} m, peak {linear['level_db']:.2f} dB, PSLR {linear['pslr_db']:.1f} dB", not off,
             "" if not off else f"they leave the quadratic phase of the elements, {phase:.1f} rad at the aperture's "
-            "end; it must be undone frequency by frequency", [linear["null"], linear["level_db"], linear["pslr_db"]],
+            "end; it must be taken out frequency by frequency", [linear["null"], linear["level_db"], linear["pslr_db"]],
+            rule="null within 2 mm of 0.167 m, peak above -0.3 dB",
         )  # fmt: skip
         table.append([name, f"{lost:.1f}", f"{phase:.2f}", f"{linear['null']:.3f}", f"{linear['level_db']:.2f}",
                       f"{linear['pslr_db']:.1f}", f"{whole['null']:.3f}", f"{whole['pslr_db']:.1f}"])  # fmt: skip
@@ -59,12 +61,12 @@ def section(lab: Lab) -> Section:
             at, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
             curves.append((f"{name}, {label}", at, values))
     out.say(
-        "Every pulse's peak stands at its own wrong range, by equation 4.27, so that the image of figure 5.1 is "
-        "smeared. Taking delay and phase out focuses it. The paper takes out what is linear in the element's number; "
-        "for 225 and 450 elements the quadratic rest is no longer small."
+        "By equation 4.27 the peak of every pulse is at a wrong range of its own, which smears the image of figure "
+        "5.1. Taking out delay and phase focuses it. The paper takes out the part that is linear in the element's "
+        "number; for 225 and 450 elements the quadratic rest is no longer small."
     )
     out.parts.append(html.table(
-        ["", "as it is, dB", "quadratic phase, rad", "linear: null, m", "peak, dB", "PSLR, dB", "all: null, m",
+        ["", "unmodified peak, dB", "quadratic phase, rad", "linear: null, m", "peak, dB", "PSLR, dB", "all: null, m",
          "PSLR, dB"], table,
     ))  # fmt: skip
     out.draw(

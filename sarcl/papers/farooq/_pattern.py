@@ -1,4 +1,4 @@
-"""Farooq 2009, chapter 3: patterns of planar arrays of one carrier and of diverse ones; the closed form's errors."""
+"""Farooq 2009, chapter 3: patterns of planar arrays with one and with diverse carriers; error of the closed form."""
 
 from __future__ import annotations
 
@@ -42,7 +42,15 @@ def patterns(lab: Lab) -> Section:
         return power, (float(ANGLES[row]), float(ANGLES[column]))
 
     still, at = look(plain, 0.0)
-    out.states("CFA: beam", "figure 3.3, equations 3.29, 3.30", "(0, 0) deg", _deg(at), at == (0, 0), value=at)
+    out.states(
+        "CFA: beam",
+        "figure 3.3, equations 3.29, 3.30",
+        "(0, 0) deg",
+        _deg(at),
+        at == (0, 0),
+        value=at,
+        rule="that direction, on a grid of 1 deg",
+    )
     figures = [_sky(still, "One carrier (figure 3.3).")]
     for plane, figure, elevated in (("azimuth", "3.5", False), ("elevation", "3.4", True)):
         angle = np.radians(ANGLES)
@@ -55,6 +63,7 @@ def patterns(lab: Lab) -> Section:
         out.states(
             f"CFA: change with range, 1 to 100 km, along {plane}", f"figure {figure}", "none", f"{off:.1e} of the peak",
             off < 1e-2, value=off,
+            rule="below 0.01 of the peak",
         )  # fmt: skip
         figures.append(html.plot(
             [("1 km", ANGLES, _db(near)), ("100 km", ANGLES, _db(far))], f"{plane}, deg", "dB",
@@ -62,7 +71,15 @@ def patterns(lab: Lab) -> Section:
         ))  # fmt: skip
     start, _ = look(diverse, 0.0)
     off = float(np.abs(start - still).max())
-    out.states("FDA at t' = 0", "figure 3.6", "identical to the CFA", f"differs by {off:.1e}", off < 1e-2, value=off)
+    out.states(
+        "FDA at t' = 0",
+        "figure 3.6",
+        "identical to the CFA",
+        f"differs by {off:.1e}",
+        off < 1e-2,
+        value=off,
+        rule="below 0.01 of the peak",
+    )
     figures.append(_sky(start, "Diverse carriers at t' = 0 (figure 3.6)."))
     for sign in (1, -1):
         power, at = look(diverse, sign * TIME)
@@ -72,19 +89,20 @@ def patterns(lab: Lab) -> Section:
             "(30, -60) deg", _deg(at), holds,
             "the beam of figure 3.7" if holds else "equations 3.53 and 3.54 give this too: the figure shows -250 us",
             value=at,
+            rule="that direction, on a grid of 1 deg",
         )  # fmt: skip
         figures.append(_sky(power, f"Diverse carriers at t' = {sign * 250:+d} us (figure 3.7)."))
     _over_range(out, figures, diverse, lab)
     out.say(
-        "Exact fields of all 81 elements, 10 km away. Elements stand at -n d, as in equation 3.1; t' is the time since "
-        "a wave from the reference element passed. Figures 3.8 and 3.9 are taken at t = 0, where t' = -r/c: farther "
-        "out is earlier, and there the paper's signs are right."
+        "Exact fields of all 81 elements at 10 km. Element n is at -n d, as in equation 3.1. Figures 3.8 and 3.9 are "
+        "taken at t = 0, where t' = -r/c: the field farther out was sent earlier, and there the paper's signs are "
+        "right."
     )
     out.draw(*figures)
     return out
 
 
-def _over_range(out: Section, figures: list[str], array: AntennaArray, lab: Lab) -> None:
+def _over_range(out: Section, figures: list[html.Block], array: AntennaArray, lab: Lab) -> None:
     """Figures 3.8 and 3.9: principal planes at t = 0, over range."""
     ranges, angle = np.arange(2e3, 302e3, 2e3), np.radians(ANGLES)
     for name, figure, wanted, u in (
@@ -97,6 +115,7 @@ def _over_range(out: Section, figures: list[str], array: AntennaArray, lab: Lab)
             f"FDA: {name} of the beam at t = 0, 50 km out", f"figure {figure}",
             f"scans toward {'positive' if wanted > 0 else 'negative'} {name}", f"{peak:+.0f} deg",
             np.sign(peak) == wanted, value=peak,
+            rule="sign of the angle",
         )  # fmt: skip
         figures.append(html.picture(
             _db(power.T), (0.0, 302.0), (-85.5, 85.5), "range, km", f"{name}, deg",
@@ -108,8 +127,8 @@ def errors(lab: Lab) -> Section:
     """Figures 3.10 to 3.14."""
     out = Section("closed form", "The closed form against the exact pattern (table 3.3, figures 3.10 to 3.14)")
     out.say(
-        "Largest difference of the two power patterns over a period of time, both over the peak's power. The closed "
-        "form drops a phase that grows with the square of the element's number; it vanishes at broadside only."
+        "Largest difference of the two power patterns over one period in time, relative to the peak power. The closed "
+        "form leaves out a phase that grows with the square of the element's number and vanishes at broadside only."
     )
     azimuth = np.radians(np.linspace(-90, 90, 361))
     degrees = np.degrees(azimuth)
@@ -133,6 +152,7 @@ def errors(lab: Lab) -> Section:
             out.states(
                 "largest error of the power pattern, 30 MHz", "figure 3.11", "not appreciable", text, worst < 0.05,
                 "the figures show the top 3 dB; near +-90 deg the patterns differ by a fifth of the peak", worst,
+                rule="below 0.05 of the peak power",
             )  # fmt: skip
         else:
             out.number(
@@ -143,7 +163,8 @@ def errors(lab: Lab) -> Section:
             out.states(
                 "error inside +-45 deg, 150 MHz", "figure 3.14", "not significant",
                 f"{at20:.2f} at 20 deg, {float(apart[np.isclose(degrees, 45)][0]):.2f} at 45 deg", at20 < 0.1,
-                "equation 3.60 itself has 3.5 pi/4 at 45 deg, where 3.40 allows pi/4", at20,
+                "equation 3.60 itself gives 3.5 pi/4 at 45 deg; equation 3.40 allows pi/4", at20,
+                rule="below 0.1 of the peak power at 20 deg",
             )  # fmt: skip
             out.draw(*(
                 html.picture(
@@ -163,7 +184,7 @@ def errors(lab: Lab) -> Section:
     return out
 
 
-def _sky(power: np.ndarray, caption: str) -> str:
+def _sky(power: np.ndarray, caption: str) -> html.Block:
     edge = (-85.5, 85.5)
     return html.picture(_db(power), edge, edge, "azimuth, deg", "elevation, deg", caption, floor_db=-30)
 

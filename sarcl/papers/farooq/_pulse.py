@@ -1,4 +1,4 @@
-"""Farooq 2009, chapter 4: the pulse of diverse carriers, its spectrum, its ambiguity beside a chirp's."""
+"""Farooq 2009, chapter 4: the pulse of diverse carriers, its spectrum, its ambiguity compared with a chirp."""
 
 from __future__ import annotations
 
@@ -16,7 +16,7 @@ from ..paper import Section
 F0, N, STEP = 10e9, 9, 1e9  # table 4.1, scenario B
 HALF_WAVE = SPEED_OF_LIGHT / F0 / 2
 FAR = 1e7  # m
-RATE = 64e9  # samples of a pulse, Hz
+RATE = 64e9  # Hz, sampling rate of the pulses
 BORESIGHT = ((1.0, 0.0, 0.0),)
 
 
@@ -41,23 +41,31 @@ def waveform(lab: Lab) -> Section:
     out.states(
         "1 kHz steps: modulation over 2 ns", "figure 4.1", "none", f"{ripple:.1e} of the peak", ripple < 1e-3,
         value=ripple,
+        rule="below 0.001 of the peak",
     )  # fmt: skip
     f, channels, whole = spectra()
     middle = float((f * whole**2).sum() / (whole**2).sum())
     out.number("centre frequency of the pulse", "figure 4.5, equation 4.6", 14.0, middle / 1e9, 0.1, "GHz", ".2f")
-    # about the middle: what a flat band of N df holds, but for the tails of the outer tones
+    # Energy within a band of N df about the middle; the tails of the outer tones lie outside.
     inside = np.abs(f - 14e9) <= N * STEP / 2
     share = float((whole[inside] ** 2).sum() / (whole**2).sum())
     out.states(
         "bandwidth", "figure 4.5, equation 4.18", "9 GHz", f"{100 * share:.1f} % of the energy lies within 9 GHz",
         share > 0.95, value=share,
+        rule="more than 95 % of the energy",
     )  # fmt: skip
     crossing = 20 * np.log10(float(channels[0][np.isclose(f, F0 + STEP / 2, atol=2e6)].max()))
     out.states(
-        "neighbouring channels cross", "figure 4.4", "below 3 dB", f"{crossing:.2f} dB", crossing < -3, value=crossing
+        "neighbouring channels cross",
+        "figure 4.4",
+        "below 3 dB",
+        f"{crossing:.2f} dB",
+        crossing < -3,
+        value=crossing,
+        rule="below -3 dB",
     )
     out.say(
-        "Boresight, exact field. A pulse as long as the period holds one peak; its spectrum is nine tones in a row."
+        "Exact field at boresight. A pulse as long as the period has one peak; its spectrum is nine tones side by side."
     )
     shown = (f >= 7e9) & (f <= 21e9)
     out.draw(
@@ -74,7 +82,7 @@ def waveform(lab: Lab) -> Section:
 
 
 def spectra() -> tuple[np.ndarray, list[np.ndarray], np.ndarray]:
-    """Frequencies, Hz (n,), spectra of the pulses of all channels, peak 1, and of their sum, (n,) each."""
+    """Frequencies, Hz (n,); spectra of the channels' pulses, peak 1, and of their sum, (n,) each."""
     t = (np.arange(-8192, 8192) + 0.5) * 2.5e-12
     f = np.fft.fftshift(np.fft.fftfreq(len(t), 2.5e-12))
 
@@ -99,26 +107,30 @@ def ambiguities(lab: Lab) -> Section:
     out.states(
         "chirp: delay of the peak with Doppler", "figure 4.6", "range-Doppler coupling",
         f"{fit:.3f} of nu T/B; up to {moved:.0f} samples", abs(fit - 1) < 0.05, value=fit,
+        rule="within 5 % of nu T/B",
     )  # fmt: skip
     out.states(
         "tones: delay of the peak, |nu| < 3 GHz", "figure 4.7", "no coupling", f"{stays:.0f} sample of {len(t)}",
         stays <= 1.01, value=stays,
+        rule="at most one sample",
     )  # fmt: skip
     ridge = _ridge(tones, slope, length)
     out.states(
         "tones: largest value on the chirp's ridge", "figure 4.7", "no ridge",
         f"{ridge:.2f}, where the chirp has {_ridge(chirp, slope, length, np.min):.2f} or more", ridge < 0.25,
         value=ridge,
+        rule="below 0.25",
     )  # fmt: skip
     cuts = [(name, a.magnitude[:, int(np.abs(a.dopplers).argmin())]) for name, a in (("FDA", tones), ("LFM", chirp))]
     nulls = [1e9 * tones.delays[tones.delays > 0][int((np.diff(c[tones.delays > 0]) > 0).argmax())] for _, c in cuts]
     out.states(
         "first nulls of both without Doppler", "figure 4.8", "similar range resolution",
         f"{nulls[0]:.3f} and {nulls[1]:.3f} ns", abs(nulls[0] - nulls[1]) < 0.03, value=nulls,
+        rule="difference below 0.03 ns",
     )  # fmt: skip
     out.say(
-        "Both last 1 ns and are 9 GHz wide. The chirp's ridge turns a Doppler shift into a wrong range; the tones keep "
-        "their peak where it belongs, and pay with a plateau that is spread over the plane: the volume is 1 for both."
+        "Both last 1 ns and have a bandwidth of 9 GHz. With the chirp a Doppler shift becomes a range error (the "
+        "ridge). With the tones the peak stays, but a plateau covers the plane: the volume is 1 for both."
     )
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
         out.draw(html.picture(

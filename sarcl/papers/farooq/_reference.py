@@ -1,4 +1,4 @@
-"""Farooq 2009, section 2.2: the reference image that all others are compared with, by a chirp and by a tone."""
+"""Farooq 2009, section 2.2: the reference image for all others, with a chirp and with a tone."""
 
 from __future__ import annotations
 
@@ -13,7 +13,7 @@ from ..paper import Section
 
 F0, BAND, LENGTH, DISTANCE = 10e9, 900e6, 450.0, 5e3  # table 2.1
 PRINTED = 0.167  # m, theoretical resolution both ways, table 2.1
-# the scan of figure 2.11 lost the places of its 13 points: a diamond, 1 m from point to point
+# The positions of the 13 points cannot be read in the scan of figure 2.11: here they are a diamond, 1 m apart.
 DIAMOND = tuple((float(x), float(y), 0.0) for x in range(-2, 3) for y in range(-2, 3) if abs(x) + abs(y) <= 2)
 
 
@@ -22,7 +22,7 @@ def section(lab: Lab) -> Section:
     out = Section("reference", "The reference image: a chirp and a tone (table 2.1, figures 2.11 to 2.16)")
     case = Case("table 2.1", aperture=LENGTH, n_pulses=451, distance=DISTANCE)
     chirp = Waveform.chirp(center=F0, bandwidth=BAND, duration=1e-6)
-    # all of the triangle's spectrum that matters: 16 lobes
+    # 16 lobes of the spectrum: the triangle is right to 2 % of its peak.
     tone = Waveform.tone(center=F0, duration=1 / BAND, bandwidth=16 * BAND)
     angle = 2 * np.degrees(np.arctan(LENGTH / 2 / DISTANCE))
     out.number("angle of the aperture", "table 2.1", 5.2, angle, 0.06, "deg", ".2f")
@@ -38,9 +38,9 @@ def section(lab: Lab) -> Section:
         figures.append(lab.picture(lab.single(case, waveform, DIAMOND), caption))
     _shapes(out, curves)
     out.say(
-        "One antenna, first with a chirp, then with a short pulse of one frequency, both 900 MHz wide. The scan of "
-        "figure 2.11 lost the places of its 13 points: here they are a diamond, 1 m from point to point. (The paper "
-        "calls the centre point Target #6, so that its order was another one.)"
+        "One antenna, first with a chirp, then with a short pulse of one frequency, both with a bandwidth of 900 MHz. "
+        "The positions of the 13 points cannot be read in the scan of figure 2.11: here they are a diamond, 1 m apart. "
+        "(The paper calls the centre point Target #6, so its arrangement was different.)"
     )
     out.draw(*figures)
     for figure, (way, found) in zip(("2.15", "2.16"), curves.items(), strict=True):
@@ -53,7 +53,7 @@ def section(lab: Lab) -> Section:
 
 
 def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]]) -> None:
-    """Sinc and triangle, by the largest difference from each over the main lobe and the side lobes."""
+    """Largest difference of the responses from a sinc and a triangle, over main lobe and side lobes."""
     cell = SPEED_OF_LIGHT / (2 * BAND)
     for name, law, wanted in (("LFM", "sinc", _sinc), ("tone", "triangular", _triangle)):
         at, values = curves["range"][name]
@@ -61,6 +61,7 @@ def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarr
         out.states(
             f"{name}: shape of the range response", "figure 2.15", law, f"{law} to {off:.3f} of the peak", off < 0.05,
             value=off,
+            rule="within 0.05 of the peak",
         )  # fmt: skip
     at, chirp = curves["cross-range"]["LFM"]
     tone = curves["cross-range"]["tone"][1]
@@ -68,6 +69,7 @@ def _shapes(out: Section, curves: dict[str, dict[str, tuple[np.ndarray, np.ndarr
     out.states(
         "cross-range responses of both", "figure 2.16", "nearly identical", f"differ by {off:.3f} of the peak",
         off < 0.05, value=off,
+        rule="difference below 0.05 of the peak",
     )  # fmt: skip
 
 

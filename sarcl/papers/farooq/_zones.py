@@ -1,4 +1,4 @@
-"""Range zones told apart on transmit: what running carriers are good for (sarcl's own experiment, range_zones.py)."""
+"""Range zones separated by carriers that continue from pulse to pulse (sarcl's own experiment, range_zones.py)."""
 
 from __future__ import annotations
 
@@ -17,13 +17,13 @@ from ..paper import Section
 from .range_zones import RangeZones, collect, isolation, of_zone
 
 ZONES = 4
-BEYOND = (-45.0, -15.0, 15.0, 45.0)  # m behind its centre that each zone's point stands
-FLOOR = -60.0  # dB drawn
+BEYOND = (-45.0, -15.0, 15.0, 45.0)  # m, distance of each zone's point behind the centre of the zone
+FLOOR = -60.0  # dB, lowest level plotted
 
 
 def section(lab: Lab) -> Section:
-    """Isolation of four zones, and what becomes of it off 1/P and off the direction."""
-    out = Section("zones", "Range zones told apart by carriers that run on")
+    """Isolation of four zones; how it depends on the carrier step and on the direction."""
+    out = Section("zones", "Range zones separated by carriers that continue from pulse to pulse")
     radar = RangeZones()
     systems = {"running carriers": radar, "one carrier": replace(radar, step=0.0)}
     at = np.linspace(-70, 70, 281)
@@ -31,7 +31,9 @@ def section(lab: Lab) -> Section:
         cuts = cuts_of(system, at, lab.device)
         levels = matrix(system, lab.device)
         title = f"{name[0].upper()}{name[1:]}"
-        out.say(f"{title}: level of every zone's point, alone, in every zone's image, over that in its own, dB.")
+        out.say(
+            f"{title}: level of each zone's point, alone, in the image of every zone, relative to its own zone, dB."
+        )
         out.parts.append(html.table(
             ["", *(f"image of zone {q}" for q in range(ZONES))],
             [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
@@ -45,22 +47,22 @@ def section(lab: Lab) -> Section:
     _sweeps(out, radar, lab)
     out.parts.insert(0, html.words(
         f"{radar.n} elements send carriers {radar.step / 1e3:g} kHz apart at a PRF of {radar.prf / 1e3:g} kHz: "
-        f"{radar.step / radar.prf:g} turns from pulse to pulse, a quarter beyond whole ones. Echoes from "
-        f"{radar.depth / 1e3:.0f} km farther come a pulse late, and in step with a wave over the elements that turns "
-        "by a quarter from one to the next: four zones are orthogonal there. A point stands in each; the receiver "
-        "records their sum; every zone is focused from it. Equal carriers leave them one upon another. This is no "
-        "claim of the paper: it is what an array of diverse carriers does that an array of one cannot."
+        f"{radar.step / radar.prf:g} cycles per pulse, a quarter cycle beyond a whole number. Echoes from "
+        f"{radar.depth / 1e3:.0f} km farther arrive one pulse later, with a phase that advances by a quarter cycle per "
+        "element: over the elements four zones are orthogonal. Each zone holds one point; the receiver records their "
+        "sum; every zone is focused from that record. With equal carriers the zones overlap. This is not claimed in "
+        "the paper: an array with one carrier cannot do it."
     ))  # fmt: skip
     out.say(
-        "The price: as many elements told apart at the receiver as there are zones, or more, and directions that are "
-        "known. An echo from another direction turns over the elements by itself; 30 degrees off, at half a wave from "
-        "element to element, that is a quarter turn and the next zone is back in full."
+        "The cost: the receiver must separate at least as many elements as there are zones, and the directions must be "
+        "known. An echo from another direction has a phase that advances over the elements by itself; 30 degrees off, "
+        "with elements half a wavelength apart, that is a quarter cycle per element and the next zone is not rejected."
     )
     return out
 
 
 def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.ndarray]:
-    """Amplitudes along range, `at` m behind each zone's centre (n,), of zones with a unit point each: one a zone."""
+    """Amplitudes (n,) of each zone's image, `at` m (n,) behind its centre, with a unit point in every zone."""
     record = collect(radar, [Scene.points([radar.place(q, b)]) for q, b in enumerate(BEYOND)], device)
     weights = np.hamming(record.n_samples)
     record = replace(record, samples=(record.samples * (weights / weights.mean())).astype(np.complex64))
@@ -68,7 +70,7 @@ def cuts_of(radar: RangeZones, at: np.ndarray, device: Any = None) -> list[np.nd
 
 
 def matrix(radar: RangeZones, device: Any = None) -> np.ndarray:
-    """Levels (point, image), dB: each zone's point alone, the highest within 5 m of where it folds to, over its own."""
+    """Levels (point, image), dB: the highest within 5 m of each zone's point in each image, over its own image."""
     out = np.empty((ZONES, ZONES))
     for p, beyond in enumerate(BEYOND):
         empty: list[Scene | None] = [None] * p
@@ -79,7 +81,7 @@ def matrix(radar: RangeZones, device: Any = None) -> np.ndarray:
 
 
 def leak(radar: RangeZones, apart: int, elevation: float = 0.0, device: Any = None) -> float:
-    """Level in zone 0's image of a point `apart` zones farther and `elevation` rad above, dB over its own image."""
+    """Level in zone 0's image of a point `apart` zones farther, `elevation` rad above, dB relative to its own image."""
     scenes: list[Scene | None] = [None] * apart
     record = collect(radar, [*scenes, Scene.points([radar.place(apart, 0.0, elevation)])], device)
     levels = [
@@ -100,7 +102,7 @@ def _sweeps(out: Section, radar: RangeZones, lab: Lab) -> None:
 
     for name, x, measured, xs, predicted, axis in (
         ("df over PRF", turns, [leak(stepped(t), 1, device=lab.device) for t in turns], lines,
-         [isolation(stepped(t), 1) for t in lines], "df/PRF less whole turns"),
+         [isolation(stepped(t), 1) for t in lines], "df/PRF, fractional part"),
         ("direction", angles, [leak(short, 1, np.radians(a), lab.device) for a in angles], fine,
          [isolation(short, 1, np.radians(a)) for a in fine], "elevation of the echo, deg"),
     ):  # fmt: skip

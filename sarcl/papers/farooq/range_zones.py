@@ -1,17 +1,17 @@
-"""Range zones told apart by carriers that run on from pulse to pulse.
+"""Range zones separated by carriers that continue from pulse to pulse.
 
-An echo from zone q, at r0 + q c/(2 PRF) + r', arrives q pulses late, among those of zone 0. Oscillators that run on
-carry the pulse's absolute delay tau in their phase, so that element n's return from it is, in the interval's own time,
+An echo from zone q, at r0 + q c/(2 PRF) + r', arrives q pulses later, among those of zone 0. Oscillators that run
+without a break have the absolute delay tau in their phase. Element n's return in the time of the interval is then
 
     a P(f - f_n) exp(-j 2 pi f (tau - q/PRF - tau_ref)) exp(-j 2 pi f_n q/PRF)
 
 The last factor steps by 2 pi q df/PRF from element to element. Where df/PRF = 1/P (mod 1) and N is a multiple of P, the
-zones 0 ... P - 1 are orthogonal over the elements: what zone q' leaves in the image of zone q is
+zones 0 ... P - 1 are orthogonal over the elements. The relative level of zone q' in the image of zone q is
 
     |sin(N x/2)/(N sin(x/2))|,   x = 2 pi (q' - q) df/PRF - 2 pi f0 d (u' - u)/c
 
-d the spacing, u' and u the cosines of the echo and the pixel along the array. Pulses that start their carriers anew
-each time, or equal carriers, leave it whole. Elements must be told apart at the receiver.
+d the spacing, u' and u the cosines of the echo and the pixel along the array. With carriers
+that restart in every pulse, or equal carriers, it is 1. The receiver must separate the elements.
 """
 
 from __future__ import annotations
@@ -33,12 +33,12 @@ from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.echo import echo
 
-WINDOW = 100.0  # m about a zone's centre
+WINDOW = 100.0  # m, half width of the range window about the centre of a zone
 
 
 @dataclass(frozen=True)
 class RangeZones:
-    """A radar on a level track along y, zones one behind the other along x, an upright array.
+    """A radar on a level track along y with a vertical array; zones lie one behind the other along x.
 
     n, spacing m, step Hz   elements, along z
     center, bandwidth Hz, prf Hz, speed m/s, n_pulses
@@ -64,7 +64,7 @@ class RangeZones:
 
     @property
     def depth(self) -> float:
-        """c/(2 prf), m from zone to zone."""
+        """Distance from zone to zone, c/(2 prf), m."""
         return SPEED_OF_LIGHT / (2 * self.prf)
 
     @property
@@ -73,24 +73,24 @@ class RangeZones:
         return AntennaArray.linear(self.n, spacing=self.spacing, frequency_step=self.step, axis=(0.0, 0.0, 1.0))
 
     def place(self, zone: int, beyond: float = 0.0, elevation: float = 0.0) -> np.ndarray:
-        """A place in a zone, m (3,): `beyond` m behind its centre, `elevation` rad above it as the radar sees it."""
+        """A position in a zone, m (3,): `beyond` m behind its centre, `elevation` rad above it from the radar."""
         far = self.distance + zone * self.depth + beyond
         return np.array([far * np.cos(elevation), 0.0, far * np.sin(elevation)])
 
     def track(self, late: int = 0) -> Trajectory:
-        """Where the radar is at each pulse, or was `late` pulses before."""
+        """Positions of the radar at each pulse, or `late` pulses before."""
         pulse = np.arange(self.n_pulses)
         y = (pulse - late - (self.n_pulses - 1) / 2) * (self.speed / self.prf)
         return Trajectory(pulse / self.prf, np.stack([0 * y, y, 0 * y], axis=1))
 
 
 def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: DeviceChoice | None = None) -> PhaseHistory:
-    """What the receiver records: echoes of all zones added up in every interval, a row for each pulse and element.
+    """The received record: echoes of all zones, added up in every interval, a row for each pulse and element.
 
-    scenes  one a zone, from zone 0 on, where `radar.place` says; None: an empty zone
+    scenes  one per zone, from zone 0 on, at positions of `radar.place`; None: an empty zone
 
-    Distances are exact, from where the radar was when it sent each pulse to where it is when the echo arrives. The
-    result's geometry is that of zone 0; `of_zone` makes another's. ValueError: no scene at all.
+    Distances are exact, from the position at transmission to the position at reception. The geometry of the result is
+    that of zone 0; `of_zone` gives the geometry of another zone. ValueError: no scene at all.
     """
     total: PhaseHistory | None = None
     for zone, scene in enumerate(scenes):
@@ -105,19 +105,19 @@ def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: DeviceCho
 
 
 def of_zone(radar: RangeZones, received: PhaseHistory, zone: int) -> PhaseHistory:
-    """The same record as zone `zone` alone would have made it: for `sarcl.backproject`, on a grid in that zone.
+    """The record with delays and phases of zone `zone`: for `sarcl.backproject`, on a grid in that zone.
 
-    Its delays are counted from the pulse that the zone answers, and exp(+j 2 pi f_n zone/PRF) undoes the phase of the
-    carriers that ran on meanwhile: other zones are left out of step over the elements.
+    Delays are counted from the pulse that this zone returns. exp(+j 2 pi f_n zone/PRF) takes out the phase of the
+    carriers since then, so that echoes of other zones cancel over the elements.
     """
     turned = received.samples * np.exp(2j * np.pi * _turns(radar, received, zone))
     return _as_of(radar, replace(received, samples=turned), zone)
 
 
 def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
-    """How far an echo from `apart` zones farther, `elevation` rad above the pixel, is put down in its image, dB <= 0.
+    """Level in an image of an echo from `apart` zones farther, `elevation` rad above the pixel, dB <= 0.
 
-    The Dirichlet ratio of the module's head; -inf where zones are orthogonal.
+    The ratio in the module's docstring; -inf where zones are orthogonal.
     """
     turns = np.mod(apart * radar.step / radar.prf, 1.0)
     turns -= radar.center * radar.spacing * np.sin(validation.number("elevation", elevation)) / SPEED_OF_LIGHT
@@ -135,7 +135,7 @@ def _echo(radar: RangeZones, zone: int, scene: Scene, device: Any) -> PhaseHisto
 
 
 def _turns(radar: RangeZones, raw: PhaseHistory, zone: int) -> np.ndarray:
-    """Turns by which a zone's samples lag in the receiver's interval, whose delays count from zone 0's centre."""
+    """Phase, cycles, by which a zone's samples lag; delays in the interval are counted from zone 0's centre."""
     late = 2 * (_ends(radar, zone)[2] - _ends(radar, 0)[2]) / SPEED_OF_LIGHT - zone / radar.prf
     carrier = radar.center + np.tile(radar.array.offsets[0], radar.n_pulses)
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
@@ -149,7 +149,7 @@ def _as_of(radar: RangeZones, raw: PhaseHistory, zone: int) -> PhaseHistory:
 
 
 def _ends(radar: RangeZones, zone: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Where the element stood that sent, and the receiver, m (n_rows, 3); half the path over the zone's centre, m."""
+    """Positions of the sending element and of the receiver, m (n_rows, 3); half the path over the zone's centre, m."""
     tx = (radar.track(zone).positions[:, None] + radar.array.positions).reshape(-1, 3)
     rx = np.repeat(radar.track().positions, radar.n, axis=0)
     ways = [np.linalg.norm(end - radar.place(zone), axis=1) for end in (tx, rx)]

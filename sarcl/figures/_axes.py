@@ -7,10 +7,10 @@ from typing import Any
 
 import numpy as np
 
-PAPER, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
+WHITE, INK, FAINT = (255, 255, 255), (38, 38, 38), (226, 226, 226)
 
 
-class Sheet:
+class Axes:
     """White background with a frame of (width, height) pixels for the data, axes, a title above and a caption below.
 
     across, up   (label, value at the low edge, value at the high edge, least tick step) of the two axes
@@ -18,7 +18,7 @@ class Sheet:
     """
 
     def __init__(
-        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str = ""
+        self, width: int, height: int, across: Any, up: Any, title: str | None, side: float, caption: str
     ) -> None:
         from PIL import Image, ImageDraw, ImageFont
 
@@ -33,11 +33,11 @@ class Sheet:
         top = round(2.6 * u if title else 1.2 * u)
         self.frame = (left, top, left + width, top + height)
         small: Any = ImageFont.load_default(round(0.85 * u))
-        small_room: float = width + round(side * u) + left - u
-        lines = wrapped(caption, small_room, small.getlength)
+        room_below: float = width + round(side * u) + left - u
+        lines = wrapped(caption, room_below, small.getlength)
         below = top + height + round(3.9 * u)
         size = (left + width + round(side * u), below + round((1.2 * len(lines) + 0.4) * u))
-        self.image = Image.new("RGB", size, PAPER)
+        self.image = Image.new("RGB", size, WHITE)
         self.image.info |= {"frame": self.frame, "caption": caption}
         self.draw = ImageDraw.Draw(self.image)
         for i, line in enumerate(lines):

@@ -1,0 +1,139 @@
+"""Plots as PNG files, drawn by matplotlib on canvases of their own: nothing of pyplot, no global state.
+
+Needs the extra `plots`. Curves differ in colour, line style and marker, so that a legend can be read without colours.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from io import BytesIO
+from typing import TYPE_CHECKING, Any
+
+import numpy as np
+
+if TYPE_CHECKING:
+    from matplotlib.axes import Axes
+    from matplotlib.figure import Figure
+
+SIZE, DPI = (5.6, 4.0), 120  # of a figure, inches; pixels per inch
+LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # of the axes, relative to the figure
+GREY_WIDTH = 0.76  # of a picture with its scale
+LEGEND_LINE = 0.055  # height of a line of the legend above the axes, relative to the figure
+COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
+LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 2)), (0, (4, 1, 1, 1, 1, 1)))
+MARKERS = ("o", "s", "^", "D", "v", "x")
+ALL_MARKED = 24  # points; of a longer curve only about eight points are marked
+
+
+def require(what: str) -> None:
+    """ImportError with the command that installs them where matplotlib or jinja2 is missing; `what` needs them."""
+    from importlib.util import find_spec
+
+    missing = [name for name in ("matplotlib", "jinja2") if find_spec(name) is None]
+    if missing:
+        raise ImportError(f"{what} needs {' and '.join(missing)}, of the extra plots: pip install 'sarcl[plots]'")
+
+
+def figure(size: tuple[float, float] = SIZE) -> Figure:
+    """An empty figure of (width, height) inches on an Agg canvas."""
+    from matplotlib.backends.backend_agg import FigureCanvasAgg
+    from matplotlib.figure import Figure
+
+    made = Figure(figsize=size, dpi=DPI)
+    FigureCanvasAgg(made)
+    return made
+
+
+def png(figure: Figure, colours: int = 64) -> bytes:
+    """A figure of `figure` as a PNG file of so many colours, 256 at most."""
+    from PIL import Image
+
+    canvas: Any = figure.canvas
+    canvas.draw()
+    pixels = Image.fromarray(np.asarray(canvas.buffer_rgba())[..., :3])
+    file = BytesIO()
+    pixels.quantize(colours, method=Image.Quantize.MEDIANCUT).save(file, "PNG")
+    return file.getvalue()
+
+
+def style(i: int) -> dict[str, Any]:
+    """Colour, line style and marker of curve i, as matplotlib's options.
+
+    Lines get thinner and hollow markers smaller from curve to curve, so that curves that coincide can all be seen.
+    """
+    k = i % len(COLORS)
+    return {
+        "color": COLORS[k], "linestyle": LINES[k], "linewidth": 2.6 - 0.3 * k, "marker": MARKERS[k],
+        "markersize": 9.0 - k, "markerfacecolor": "none",
+    }  # fmt: skip
+
+
+def curves(
+    curves: Sequence[tuple[str, Any, Any]], x_name: str, y_name: str, *, dots: bool | Sequence[str] = False,
+    log_x: bool = False,
+) -> bytes:  # fmt: skip
+    """PNG of curves (name, x (n,), y (n,)) in one frame, with a legend where there are two or more.
+
+    dots  True: all are clouds of dots; names: these are dots, and larger;  log_x: x > 0, in decades
+    """
+    made = figure()
+    lines = 0 if len(curves) == 1 else -(-len(curves) // 2)
+    axes = made.add_axes((LEFT, BOTTOM, WIDTH, HEIGHT - lines * LEGEND_LINE))
+    for i, (name, x, y) in enumerate(curves):
+        look = style(i)
+        if dots is True:
+            look |= {"linestyle": "none", "markersize": 3, "alpha": 0.6, "markeredgewidth": 0.6}
+        elif dots and name in dots:
+            look["linestyle"] = "none"
+        elif len(x) > ALL_MARKED:
+            look["markevery"] = (i * len(x) // 40, len(x) // 8)
+        axes.plot(np.asarray(x, float), np.asarray(y, float), label=name, **look)
+    if log_x:
+        axes.set_xscale("log")
+        decades(axes.xaxis)
+    names(axes, x_name, y_name)
+    if lines:
+        axes.legend(loc="lower left", bbox_to_anchor=(-0.12, 1.0), ncols=2, fontsize=9, frameon=False, handlelength=4)
+    return png(made)
+
+
+def names(axes: Axes, x_name: str, y_name: str) -> None:
+    """Names of the axes, and faint lines at their ticks."""
+    axes.set_xlabel(x_name)
+    axes.set_ylabel(y_name)
+    axes.grid(alpha=0.3)
+
+
+def decades(axis: Any) -> None:
+    """Ticks of a logarithmic axis at 1, 2 and 5 times powers of ten, written as numbers."""
+    from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+
+    axis.set_major_locator(LogLocator(subs=(1, 2, 5)))
+    axis.set_major_formatter(FuncFormatter(lambda value, _: f"{value:g}"))
+    axis.set_minor_formatter(NullFormatter())
+
+
+def picture(
+    db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
+    box: tuple[float, float] | None = None,
+) -> bytes:  # fmt: skip
+    """PNG of decibels (rows, columns) in grey, row 0 at the bottom: white is the largest value, black floor_db below.
+
+    x, y  edges of the frame;  box: half widths along x and y of a dashed rectangle about the origin
+    """
+    from matplotlib.patches import Rectangle
+
+    db = np.asarray(db, np.float64)
+    top = float(db.max())
+    made = figure()
+    axes = made.add_axes((LEFT, BOTTOM, GREY_WIDTH, HEIGHT))
+    shown = axes.imshow(
+        db, cmap="gray", vmin=top + floor_db, vmax=top, origin="lower", extent=(*x, *y), aspect="auto"
+    )  # fmt: skip
+    names(axes, x_name, y_name)
+    axes.grid(visible=False)
+    made.colorbar(shown, ax=axes, label="dB", fraction=0.08, pad=0.03)
+    if box is not None:
+        corner = -box[0], -box[1]
+        axes.add_patch(Rectangle(corner, 2 * box[0], 2 * box[1], fill=False, edgecolor="#2ecc71", linestyle="--"))
+    return png(made, 256)
