@@ -11,6 +11,7 @@ from .text import tolerance_text
 
 if TYPE_CHECKING:
     from ..model.image import Image
+    from ..model.phase_history import PhaseHistory
 
 # the folder of the whole package, wherever in it this file lies
 _HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")[0]].__file__))) + os.sep
@@ -29,15 +30,22 @@ def warn(text: str) -> None:
 
 
 class ToleranceMissed(ValueError):
-    """A finished image errs more than was asked, where it was checked: `image`, `tolerance`, `measured`."""
+    """The check of a finished image, or of finished echoes, measured an error above the tolerance.
 
-    def __init__(self, tolerance: float, measured: float, image: Image) -> None:
+    tolerance, measured  relative errors;  image, raw  the finished Image or PhaseHistory, the other is None
+    """
+
+    def __init__(
+        self, tolerance: float, measured: float, image: Image | None = None, raw: PhaseHistory | None = None
+    ) -> None:
+        kept = "the image is kept: in its file, or in this error's .image"
+        if raw is not None:
+            kept = "the echoes are kept: in their file, or in this error's .raw"
         super().__init__(
             f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the error "
-            f"formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it (the image is kept: "
-            "in its file, or in this error's .image)"
+            f"formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it ({kept})"
         )
-        self.tolerance, self.measured, self.image = tolerance, measured, image
+        self.tolerance, self.measured, self.image, self.raw = tolerance, measured, image, raw
 
 
 class ToleranceUnreachable(ValueError):

@@ -74,6 +74,7 @@ def cheapest(
     chunk: int,
     least_tolerance: float = LEAST_TOLERANCE,
     carrier: float = 0.0,
+    image_gain: float = 1.0,
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
@@ -81,6 +82,7 @@ def cheapest(
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
     chunk        rows or points summed in float32; least_tolerance: below it none is offered
     carrier      Hz, that no image of the kernel may lie on (interpolation.off_carrier); 0: any may
+    image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
     ToleranceUnreachable names the best tolerance there is.
     """
     best: tuple[float, Plan] | None = None
@@ -94,7 +96,7 @@ def cheapest(
                     continue
                 try:
                     interpolator, length, cost = interpolation.choose_interpolator(
-                        tolerance - fixed, n_samples, points_per_row, steps
+                        (tolerance - fixed) / image_gain, n_samples, points_per_row, steps
                     )
                 except ToleranceUnreachable:  # another range mode may leave more to the interpolator
                     continue
@@ -104,7 +106,8 @@ def cheapest(
                 cost += range_cost - 1 + cost_model.TILE / per_tile
                 cost += cost_model.SERIES[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
-                    best = cost, Plan(interpolator, length, per_tile, mode, order, fixed + interpolator.error, cost)
+                    error = fixed + image_gain * interpolator.error
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost)
     if best is None or tolerance < least_tolerance:
         reach = rounded_up(max(least_tolerance, least(n_samples, chunk, steps)))
         raise ToleranceUnreachable(tolerance, reach, PROFILES, how="in complex64")

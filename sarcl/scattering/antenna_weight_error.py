@@ -38,7 +38,7 @@ def weight_error(
         found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
         if found is not None:
             return found
-    raise NothingSeen(_unlit(beam, scene))
+    raise NothingSeen(out_of_beam(beam, scene))
 
 
 def _sampled(
@@ -115,8 +115,8 @@ def _drawn(size: np.ndarray, n: int, most: int, random: np.random.Generator) -> 
     return some, 1 / (most * chance[some])
 
 
-def _unlit(beam: AntennaWeights, scene: Scene) -> str:
-    """That the scene is out of the beam, and by how much."""
+def out_of_beam(beam: AntennaWeights, scene: Scene) -> str:
+    """A message: the scene is out of the beam, by how much, and what to do."""
     assert beam.axes is not None
     boresights = beam.axes[0][:, :, 0]
     middle = box(np.concatenate([scene.positions, centroids(scene.triangles)])).mean(axis=0)

@@ -3,6 +3,7 @@
 For other folders:
 
     echo               echo(): echoes of points and facets, to a stated tolerance
+    echo_check         random samples recomputed exactly
     echo_forecast      plan_echo(): rows, bytes, seconds and error before the work
     echo_output        destination of samples: memory or a file
     echo_sampling      rows and frequencies that echoes are written to
@@ -12,9 +13,19 @@ For other folders:
 
 For this folder alone:
 
-    _echo_check        random samples recomputed exactly
     _facet_spreading   facets to range profiles
+    _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
+    _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """
 
-__all__ = ["channels", "echo", "echo_forecast", "echo_output", "echo_sampling", "scene_echoes", "spreading"]
+__all__ = [
+    "channels",
+    "echo",
+    "echo_check",
+    "echo_forecast",
+    "echo_output",
+    "echo_sampling",
+    "scene_echoes",
+    "spreading",
+]

@@ -7,150 +7,172 @@ from typing import Any
 
 import numpy as np
 
-from ..base import float_pairs
-from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.stage_timer import Clock
+from ..model.waveform import Waveform
 from ..numerics import range_profiles
-from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, Facets
-from ..scattering.pulse_nodes import Knots, plan_knots
+from ..scattering.pulse_nodes import plan_knots
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
-from .spreading import Band, plan_tiles, splits, terms
+from ._kernel_images import sample_patches
+from .spreading import Band, Counts, TiledScatterers, splits, terms
 
-MOST_PULSES = 256  # a block, where amplitudes are shared: knots at its ends serve it alone
-KNOTS_SHARE = 0.2  # of the tolerance left, for what lies between knots
+MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
+NODES_SHARE = 0.2  # of the tolerance that is left: the most that interpolation between pulse nodes may take
+
+
+class TiledFacets(TiledScatterers):
+    """Facets prepared for every channel, receiver and pulse.
+
+    nodes  Hz (n,), frequencies at which amplitudes are computed, and by what they are scaled: those of `plan`
+    metal  all are perfect conductors;  dispersive  the materials differ from node to node
+    """
+
+    def __init__(
+        self, device: Device, facets: Facets, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
+        weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+    ) -> None:  # fmt: skip
+        """antennas, waveform, weights, polarizations  of all channels: samples of patches are computed for them"""
+        self.facets, self.facet_plan, nodes = facets, plan, plan.nodes
+        self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
+        roots = np.stack([facets.roots(float(f)) for f in nodes])
+        self.dispersive = not self.metal and bool(np.ptp(roots, axis=0).any())
+        positions = centroids(facets.triangles)
+
+        def amplitudes(some: np.ndarray, pulse: int, frequencies: np.ndarray) -> np.ndarray:
+            ends = antennas.tx[pulse], antennas.rx[pulse]
+            gains = [weights.weights(positions[some], pulse, f) for f in frequencies.tolist()]
+            sent = facets.picked(some).amplitudes(*ends, frequencies, polarizations, vertical)
+            return np.asarray(sent * np.stack(gains)[..., None])
+
+        super().__init__(
+            device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive),
+            lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
+        )  # fmt: skip
 
 
 class FacetSpreader:
-    """Adds facets to the samples of every pulse by the cheapest plan that meets the tolerance."""
+    """Facets of one channel at one receiver, by the cheapest plan that meets the tolerance: prepared once, then added
+    to the samples of some pulses after the other.
+
+    plan, pulse_nodes, predicted_error  known before anything is added
+    """
 
     def __init__(
-        self, device: Device, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray, tolerance: float,
-        budget: float, skip: bool, polarizations: Sequence[str], plan: FacetPlan, vertical: np.ndarray,
-        beam: AntennaWeights,
+        self, held: TiledFacets, facets: Facets, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray,
+        tolerance: float, budget: float, gated: bool, polarizations: Sequence[str], vertical: np.ndarray,
+        weights: AntennaWeights,
     ) -> None:  # fmt: skip
-        self.device, self.antennas, self.frequencies, self.bandwidth = device, antennas, frequencies, bandwidth
-        self.tolerance, self.budget, self.skip, self.facet_plan = tolerance, budget, skip, plan
-        self.vertical, self.beam = vertical, beam
-        # from one place what is sent as H and received as V equals what is sent as V and received as H
-        self.alike = {"VH": "HV"} if antennas.is_monostatic else {}
-        self.wanted = [self.alike.get(name, name) for name in polarizations]
-        self.made = [name for name in POLARIZATIONS if name in self.wanted]
-
-    def add(
-        self, part: Facets, samples: np.ndarray, clock: Clock, tell: Callable[[int], object] | None
-    ) -> tuple[Plan, Knots, int, int, int]:
-        """Add to samples (n_pulses, n_polarizations, n_samples).
-
-        Returns the plan, the knots, and how many pairs of facet and pulse were outside the window, inside but from
-        behind, and left out of the beam.
+        """facets  as the antennas' pulses see them;  gated  leave out facets outside the range window
+        budget  bytes on the device;  frequencies  Hz, of the samples
         """
-        n_samples, left = samples.shape[2], self.tolerance - self.facet_plan.predicted_error
-        highest = float(self.frequencies[-1])
-        band = Band(n_samples, self.bandwidth, float(self.antennas.frequency.mean()))
-        room = left - band.least_tolerance(len(part), left)  # what range profiles need comes first
-        knots = plan_knots(part, self.beam, self.made, self.vertical, highest, min(KNOTS_SHARE * left, room))
-        work = _Work(self, part, knots, left - knots.error, n_samples)
-        clock.lap("scene")
-        basis = self.facet_plan.basis(self.frequencies).astype(np.float32)
-        counts = np.zeros(3, np.int64)
-        pairs = 0
-        for start, stop, span in self._blocks(part, len(samples), work.pulses):
-            total, found = work.profiles(start, stop, span)
-            clock.lap("echo")
-            spectra = range_profiles.to_samples(self.device, total, n_samples, work.plan.interpolator)
-            spectra = spectra.reshape(stop - start, len(self.made), len(basis), n_samples)
-            for i, name in enumerate(self.wanted):
-                for m, weight in enumerate(basis):
-                    samples[start:stop, i] += spectra[:, self.made.index(name), m] * weight
-            counts += found
-            pairs += (stop - start) * len(part)
-            clock.lap("spectra")
-            if tell:
-                tell(stop * len(part))
-        inside, front, unlit = counts.tolist()
-        return work.plan, knots, pairs - inside - unlit, inside - front, unlit
-
-    @staticmethod
-    def _blocks(part: Facets, n_pulses: int, most: int) -> Iterator[tuple[int, int, Span]]:
-        """(first pulse, last + 1, span they lie in) of blocks of at most `most` pulses."""
-        for span in part.spans(n_pulses):
-            for start in range(span.first, span.stop, most):
-                yield start, min(start + most, span.stop), span
-
-
-class _Work:
-    """What lies on the device for all blocks: facets in tiles, tables, kernels."""
-
-    def __init__(self, of: FacetSpreader, part: Facets, knots: Knots, tolerance: float, n_samples: int) -> None:
-        self.of, self.part, self.knots, device = of, part, knots, of.device
-        positions = centroids(part.triangles)
-        self.center = box(positions).mean(axis=0)
-        self.plan, self.tiles, self.order = plan_tiles(
-            positions, self.center, of.antennas, of.bandwidth, n_samples, tolerance, least_tolerance=0.0
+        self.device, self.held, self.facets, self.antennas, self.weights = held.device, held, facets, antennas, weights
+        self.gated, self.n_samples, facet_plan = gated, len(frequencies), held.facet_plan
+        # a single antenna receives as V what is sent as H, exactly as it receives as H what is sent as V
+        alike = {"VH": "HV"} if antennas.is_monostatic else {}
+        self.wanted = [alike.get(name, name) for name in polarizations]
+        self.made = [name for name in POLARIZATIONS if name in self.wanted]
+        left = tolerance - facet_plan.predicted_error
+        band = Band(self.n_samples, bandwidth, float(antennas.frequency.mean()))
+        room = left - band.least_tolerance(len(facets), left)  # what range profiles need comes first
+        self.pulse_nodes = plan_knots(
+            facets, weights, self.made, vertical, float(frequencies[-1]), min(NODES_SHARE * left, room)
         )
-        plan, tiles, nodes, bistatic = self.plan, self.tiles, of.facet_plan.nodes, not of.antennas.is_monostatic
-        metal = all(np.isinf(m.conductivity) for m in part.materials)
-        dispersive = not metal and bool(np.ptp(np.stack([part.roots(float(f)) for f in nodes]), axis=0).any())
-        macros = {**plan.macros(bistatic), **of.beam.macros(len(nodes)), "TILE": tiles.per_tile, "METAL": int(metal)}
+        left -= self.pulse_nodes.error
+        self.plan = held.plan(antennas, band, left, least_tolerance=0.0)
+        self.predicted_error = self.plan.predicted_error + facet_plan.predicted_error + self.pulse_nodes.error
+        self.basis = facet_plan.basis(frequencies).astype(np.float32)
+        self._upload(vertical, tolerance)
+        self.at_once, self.tiles_at_once = self._blocks(budget)
+
+    def _upload(self, vertical: np.ndarray, tolerance: float) -> None:
+        """Kernels, and what all blocks of pulses share on the device."""
+        device, held, plan, weights = self.device, self.held, self.plan, self.weights
+        self.tiles = held.tiles(plan.per_tile)
+        tiles, nodes, bistatic = self.tiles.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
+        macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
-            "DISPERSIVE": int(dispersive),
-            "ROUGH": int(part.is_rough),
-            "KNOTS": knots.order,
-            **{name: int(name in of.made) for name in POLARIZATIONS},
+            "METAL": int(held.metal),
+            "DISPERSIVE": int(held.dispersive),
+            "ROUGH": int(self.facets.is_rough),
+            "KNOTS": self.pulse_nodes.order,
+            **{name: int(name in self.made) for name in POLARIZATIONS},
         }
         names = ("tile_constants", "facet_amplitudes", "spread_facets")
         self.constants, self.amplitudes, self.spread = (
             device.kernel("spread_facets.cl", name, **macros) for name in names
         )
-        shared = [float_pairs.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
-        self.references, self.radius, self.offsets = (device.upload(a) for a in shared)
-        self.facets = device.upload(part.planes(self.order, nodes, metal, dispersive))
-        at_nodes = nodes / SPEED_OF_LIGHT, of.facet_plan.scales(), nodes / of.beam.frequency
+        at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
-        self.patterns, self.second = of.beam.upload(device)
-        self.reach, self.up = device.upload(of.beam.limits), device.upload(_vertical(of.vertical))
+        self.patterns, self.second = weights.upload(device)
+        self.reach, self.up = device.upload(weights.limits), device.upload(_vertical(vertical))
         self.table = device.upload(plan.interpolator.table)
-        self.last = tiles.per_tile - (len(self.order) - len(part))
-        self.flush = max(1, int(terms(of.tolerance) / tiles.per_tile))
-        self.channels = len(nodes) * len(of.made)
+        self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
+        self.channels = len(nodes) * len(self.made)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
         self.record = 4 * plan.components(bistatic)
-        self.splits = splits(device, len(of.antennas.tx), tiles)
-        self.pulses, self.tiles_at_once = self._blocks()
+        self.splits = splits(device, len(self.antennas), tiles.n_tiles)
 
-    def _blocks(self) -> tuple[int, int]:
-        """Pulses of a block, and tiles whose amplitudes are held at once, that keep to the budget."""
-        device, tiles, lanes = self.of.device, self.tiles, self.of.device.info.vector_width
-        most = max(64, 16 * device.info.units)
-        if self.knots.spacing > 1:
+    def _blocks(self, budget: float) -> tuple[int, int]:
+        """Pulses per block, and tiles whose amplitudes are held at once, that keep to the budget, bytes."""
+        device, tiles, lanes = self.device, self.tiles.tiles, self.device.info.vector_width
+        most, spacing = max(64, 16 * device.info.units), self.pulse_nodes.spacing
+        if spacing > 1:
             most = max(most, MOST_PULSES)
-        per_pulse = self.record * tiles.n_tiles * (2 if self.knots.spacing > 1 else 1)
+        per_pulse = self.record * tiles.n_tiles * (2 if spacing > 1 else 1)
         per_pulse += 24 * self.stride * self.splits * self.channels
-        room = self.of.budget / 2
+        room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
-        n_knots = pulses if self.knots.spacing == 1 else pulses // self.knots.spacing + self.knots.order + 1
-        per_tile = tiles.per_tile * (8 * self.channels + 1) * n_knots
+        n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
+        per_tile = tiles.per_tile * (8 * self.channels + 1) * n_nodes
         return pulses, int(np.clip(room / 2 / per_tile, 1, tiles.n_tiles))
 
-    def profiles(self, start: int, stop: int, span: Span) -> tuple[np.ndarray, np.ndarray]:
+    def add(
+        self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
+    ) -> Counts:
+        """Add to samples (n_pulses, n_polarizations, n_samples) of consecutive `pulses` of the antennas.
+
+        on_progress is called with the number of pairs of facet and pulse that are done.
+        """
+        clock.lap("scene")
+        counts, first = Counts(), pulses[0]
+        for start, stop, span in self._pulse_blocks(first, pulses[-1] + 1):
+            total, found = self._profiles(start, stop, span)
+            clock.lap("echo")
+            spectra = range_profiles.to_samples(self.device, total, self.n_samples, self.plan.interpolator)
+            spectra = spectra.reshape(stop - start, len(self.made), len(self.basis), self.n_samples)
+            for i, name in enumerate(self.wanted):
+                for m, weight in enumerate(self.basis):
+                    samples[start - first : stop - first, i] += spectra[:, self.made.index(name), m] * weight
+            pairs, (inside, front, unlit) = (stop - start) * len(self.facets), found.tolist()
+            counts += Counts(pairs, pairs - inside - unlit, inside - front, unlit)
+            clock.lap("spectra")
+            on_progress(counts.pairs)
+        return counts
+
+    def _pulse_blocks(self, first: int, end: int) -> Iterator[tuple[int, int, Span]]:
+        """(start, stop, span they lie in) of blocks of pulses that keep to the budget."""
+        for span in self.facets.spans(len(self.antennas)):
+            for start in range(max(span.first, first), min(span.stop, end), self.at_once):
+                yield start, min(start + self.at_once, span.stop, end), span
+
+    def _profiles(self, start: int, stop: int, span: Span) -> tuple[np.ndarray, np.ndarray]:
         """Range profiles of pulses start ... stop - 1, complex64 (n channels, stride), and counts of pairs (3,): inside
-        the window, of these from the front, and left out of the beam."""
-        device, tiles, used = self.of.device, self.tiles, stop - start
-        at, which, shares = self.knots.of(start, stop)
-        pulse, constants, n = self._constants(np.arange(start, stop), self.of.skip)
-        knot_constants, n_knots = constants, n
-        if self.knots.spacing > 1:  # what a knot does not see in its window a pulse beside it may
-            _, knot_constants, n_knots = self._constants(at, False)
-        axes, knot_axes = (device.upload(self.of.beam.packed_axes(rows)) for rows in (np.arange(start, stop), at))
-        seen = device.upload(span.share[self.order])
-        later = seen if span.later is span.share else device.upload(span.later[self.order])
+        the window, of these from the front, and outside the beam."""
+        device, held, tiles, used = self.device, self.tiles, self.tiles.tiles, stop - start
+        at, which, shares = self.pulse_nodes.of(start, stop)
+        pulse, constants, n = self._constants(np.arange(start, stop), self.gated)
+        node_constants, n_nodes = constants, n
+        if self.pulse_nodes.spacing > 1:  # a facet outside the window at a node may be inside at a pulse beside it
+            _, node_constants, n_nodes = self._constants(at, False)
+        axes, node_axes = (device.upload(self.weights.packed_axes(rows)) for rows in (np.arange(start, stop), at))
+        seen = device.upload(span.share[held.order])
+        later = seen if span.later is span.share else device.upload(span.later[held.order])
         moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
@@ -161,14 +183,14 @@ class _Work:
             here = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
                 self.amplitudes, (len(at), here), ends,
-                n_knots, knot_constants, self.offsets, n_offsets, self.facets, seen, later, moments, self.nodes,
-                self.up, self.patterns, self.second, knot_axes, np.float32(self.of.beam.range), self.reach, self.radius,
-                first, made, marks,
+                n_nodes, node_constants, held.offsets, n_offsets, held.planes, seen, later, moments, self.nodes,
+                self.up, self.patterns, self.second, node_axes, np.float32(self.weights.range), self.reach,
+                held.radius, first, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (used, self.splits), ends,
-                pulse, n, used, constants, self.references, tiles.n_tiles, self.offsets, n_offsets, made, marks, first,
-                here, which_here, shares_here, axes, self.reach, self.radius, self.table, self.last, self.flush, rows,
+                pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, n_offsets, made, marks, first,
+                here, which_here, shares_here, axes, self.reach, held.radius, self.table, held.last, self.flush, rows,
                 self.stride, self.stride // 2, done,
             )  # fmt: skip
         found = device.download(rows, np.empty((self.splits, used * self.channels, 3, self.stride), np.complex64))
@@ -176,20 +198,20 @@ class _Work:
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return total, counts.sum(axis=(1, 2), dtype=np.int64)
 
-    def _constants(self, rows: np.ndarray, skip: bool) -> tuple[Any, Any, int]:
-        """Packed antennas of pulses, what tiles share with each of them, and how many there are with blanks."""
-        of, lanes = self.of, self.of.device.info.vector_width
-        packed = of.antennas.picked(rows).packed(self.center, self.plan.length, 0, len(rows), lanes)
-        n, device = packed.shape[2], of.device
-        pulse, constants = device.upload(packed), device.empty(self.record * n * self.tiles.n_tiles)
+    def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
+        """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""
+        device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles.tiles
+        packed = self.antennas.picked(rows).packed(self.held.center, self.plan.length, 0, len(rows), lanes)
+        n = packed.shape[2]
+        pulse, constants = device.upload(packed), device.empty(self.record * n * tiles.n_tiles)
         device.run(
-            self.constants, (n // lanes, self.tiles.n_tiles), None,
-            pulse, self.references, self.radius, n, self.tiles.n_tiles, 0, int(skip), constants,
+            self.constants, (n // lanes, tiles.n_tiles), None,
+            pulse, self.tiles.references, self.tiles.radius, n, tiles.n_tiles, 0, int(gated), constants,
         )  # fmt: skip
         return pulse, constants, n
 
 
 def _vertical(up: np.ndarray) -> np.ndarray:
-    """`up` and what takes its place for lines of sight along it (6,)."""
+    """`up`, and the direction that replaces it for lines of sight along it (6,)."""
     other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
     return np.array([*up, *other], np.float32)

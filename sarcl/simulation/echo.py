@@ -10,6 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
 from ..base import wgs84
+from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.types import PathLike
 from ..base.validation import array as numbers
@@ -31,9 +32,10 @@ from ..scattering.facets import POLARIZATIONS
 from ..scene.scene import Scene
 from . import echo_sampling
 from .channels.array_echo import array_echo
-from .echo_output import Target
-from .scene_echoes import Order, Progress, Work
-from .spreading import Band
+from .echo_check import measure_error, worth_checking
+from .echo_output import EchoOutput
+from .scene_echoes import EchoRequest, Progress, prepare_scene
+from .spreading import Band, Counts
 
 Polarization = Literal["HH", "HV", "VH", "VV"]
 Skip = Literal[
@@ -129,11 +131,12 @@ def echo(
     out           a file of sarcl's (.h5): samples are written there pulse after pulse, and read as they are needed
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
-    check         recompute 256 random samples exactly; None: where that costs less than 2 %
+    check         recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
     Stop and go. Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the
-    best that can, before the work starts. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
+    best that can, before the work starts. ToleranceMissed, a ValueError that holds the finished echoes: the check
+    measured more than the tolerance. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
     Source: the echo equation of sarcl/__init__.py.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
@@ -142,7 +145,7 @@ def echo(
     if not isinstance(shadows, (bool, np.bool_)):
         choice("shadows", shadows, ("embree",))
     opened = open_device(device)
-    order = Order(
+    request = EchoRequest(
         opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
         _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed, progress,
     )  # fmt: skip
@@ -150,13 +153,13 @@ def echo(
     tx = track.positions
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     reference_range = echo_sampling.half_path(tx, rx, point)
-    given, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
+    original_scene, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
     weights = antenna_weights.weights_of(antenna, radar, track, receiver, waveform, scene.center)
     if array is not None:
         instance("array", array, AntennaArray)
         if not is_single(array):
             return array_echo(
-                array, scene, given, waveform, track, receiver, point, range_window, weights, order,
+                array, scene, original_scene, waveform, track, receiver, point, range_window, weights, request,
                 channels=channels, receive=receive, compressed=compressed, check=check, out=out,
             )  # fmt: skip
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
@@ -164,55 +167,59 @@ def echo(
     antennas = PulseGeometry.sampled(
         tx, rx, reference_range, first=frequency, step=step, n_samples=n_samples, near=near, far=far
     )
-    n = len(order.polarizations)
-    with Target((len(tx), n, n_samples), out, order.budget, (near, far)) as target:
+    n = len(request.polarizations)
+    with EchoOutput((len(tx), n, n_samples), out, request.budget, (near, far)) as output:
         frequencies = frequency + step * np.arange(n_samples)
         pulse = waveform.pulse_spectrum(frequencies)
-        if progress:
-            progress("scene", 0, 3)
+        request.report("scene", 0, 3)
         bands = [Band(n_samples, waveform.bandwidth, float(antennas.frequency[0]))]
-        work, worst = Work(order, given, scene, waveform, antennas, weights, bands), 0.0
-        spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * work.weights.factor(frequencies)
-        for start in range(0, len(tx), target.pulses):
-            at = slice(start, min(start + target.pulses, len(tx)))
-            block = target.block(start, at.stop)
-            some = antennas.picked(np.arange(start, at.stop))
-            work.add(some, waveform, frequencies, block, work.scatterers * len(tx), start)
-            worst = max(worst, work.predicted_error)
+        prepared = prepare_scene(request, original_scene, scene, waveform, antennas, weights, bands)
+        spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * prepared.weights.factor(frequencies)
+        channel, counts = prepared.channel(antennas, waveform, frequencies), Counts()
+        for start in range(0, len(tx), output.pulses):
+            stop = min(start + output.pulses, len(tx))
+            block = output.block(start, stop)
+            counts += channel.add(block, range(start, stop), counts.pairs, len(prepared) * len(tx))
             block *= spectrum.astype(np.complex64)
-            target.keep(start, block)
-        work.must_show(near, far)
-        order.clock.lap("spectra")
-        measured = work.measured(antennas, frequencies, spectrum, target, check)
+            output.keep(start, block)
+        prepared.check_seen(counts, near, far)
+        request.clock.lap("spectra")
+        measured = None
+        if worth_checking(prepared, check):
+            measured = measure_error(prepared, antennas, frequencies, spectrum, output)
+            request.clock.lap("check")
 
         def every(values: Any) -> Any:
             return values if n == 1 or values is None else np.repeat(values, n, axis=0)
 
         velocities = [t.velocities for t in (track, track if receiver is None else receiver)]
-        return target.finish(
+        raw = output.finish(
             frequency=frequency,
             frequency_step=step,
             tx=every(tx),
             rx=None if receiver is None else every(rx),
             reference_range=every(reference_range),
             time=every(track.times),
-            polarization=np.tile(order.polarizations, len(tx)),
+            polarization=np.tile(request.polarizations, len(tx)),
             tx_velocity=every(velocities[0]),
             rx_velocity=every(velocities[1]),
             waveform=waveform,
             array=array,
             compressed=compressed,
             report=Report(
-                plan=work.plan(),
-                tolerance=order.tolerance,
-                predicted_error=worst,
+                plan=channel.plan,
+                tolerance=request.tolerance,
+                predicted_error=channel.predicted_error,
                 measured_error=measured,
-                **work.counted(),
-                seconds=order.clock.seconds,
+                **prepared.counted(counts),
+                seconds=request.clock.seconds,
                 device=opened.info.name,
                 seed=seed,
             ),
         )
+    if measured is not None and measured > request.tolerance:
+        raise ToleranceMissed(request.tolerance, measured, raw=raw)
+    return raw
 
 
 def _polarizations(asked: Any) -> tuple[str, ...]:

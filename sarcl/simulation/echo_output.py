@@ -19,7 +19,7 @@ COPIES = 3  # of rows' geometry, while a PhaseHistory is made of it: 320 bytes a
 SHARE = 0.25  # of max_bytes, for samples on their way into a file
 
 
-class Target:
+class EchoOutput:
     """Samples (n_pulses, ..., n_samples), complex64; a row is all but the first axis' last.
 
     out  the file they are written to, or None: memory. Its size is logged before the work.
@@ -40,7 +40,7 @@ class Target:
             raise MemoryError(
                 f"echoes of {shape[0]} pulses are {n_rows} rows, whose geometry alone takes {size_text(geometry)} of "
                 f"the {size_text(room)} of memory here; split the track, or take channels='simultaneous' for arrays: "
-                "carriers are told apart by their frequencies"
+                "carriers differ in their frequencies"
             )
         if out is not None:
             self.writer = EchoWriter(out, n_rows, shape[-1])
@@ -84,7 +84,7 @@ class Target:
             return store.finish_phase_history(self.writer, **fields)
         return PhaseHistory(sealed(self.whole.reshape(-1, self.shape[-1])), **fields)
 
-    def __enter__(self) -> Target:
+    def __enter__(self) -> EchoOutput:
         return self
 
     def __exit__(self, *exc: object) -> None:

@@ -1,59 +1,174 @@
-"""How scatterers are spread into range profiles: what points and facets have in common."""
+"""What the spreading of points and of facets into range profiles has in common: tiles, plan, counts."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+from typing import Any
 
 import numpy as np
 
+from ..base import float_pairs
 from ..base.boxes import box
+from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
 from ..numerics.error_bounds import FLOAT32
 from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tiles import Tiles, tile_points
 from ..opencl.device import Device
+from ._kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
 
 
 @dataclass(frozen=True)
+class Counts:
+    """Pairs of scatterer and pulse that were visited, and how many of them contributed nothing.
+
+    outside_window  outside the range window;  facing_away  inside it, the facet seen from behind
+    outside_beam    beyond the limits of an antenna's beam
+    """
+
+    pairs: int = 0
+    outside_window: int = 0
+    facing_away: int = 0
+    outside_beam: int = 0
+
+    def __add__(self, other: Counts) -> Counts:
+        return Counts(
+            self.pairs + other.pairs, self.outside_window + other.outside_window,
+            self.facing_away + other.facing_away, self.outside_beam + other.outside_beam,
+        )  # fmt: skip
+
+    @property
+    def contributing(self) -> int:
+        """Pairs that were added up."""
+        return self.pairs - self.outside_window - self.facing_away - self.outside_beam
+
+
+@dataclass(frozen=True)
 class Band:
-    """The band of a row of samples: how many, over which bandwidth, Hz, about which carrier, Hz."""
+    """The band of a row of samples: their number, the bandwidth, Hz, and the carrier, Hz, in its middle."""
 
     n_samples: int
     bandwidth: float
     carrier: float
 
     def least_tolerance(self, n_scatterers: int, tolerance: float) -> float:
-        """The smallest tolerance that `plan_tiles` meets.
+        """The smallest tolerance that range profiles of the band can meet.
 
-        tolerance  that is asked for: it says how many scatterers are summed in float32
+        tolerance  that is asked for: it determines how many scatterers are summed in float32
         """
         steps = carrier_steps(self.carrier, self.n_samples, self.bandwidth)
         return least(self.n_samples, _chunk(n_scatterers, tolerance), steps)
 
 
-def plan_tiles(
-    positions: np.ndarray, center: np.ndarray, antennas: PulseGeometry, bandwidth: float, n_samples: int,
-    tolerance: float, least_tolerance: float = LEAST_TOLERANCE,
-) -> tuple[Plan, Tiles, np.ndarray]:  # fmt: skip
-    """The cheapest plan for scatterers at positions, m (n, 3), about `center`, their tiles and their order in them."""
-    order = morton_order(positions)
-    made = {n: tile_points(positions, center, n, order) for n in PER_TILE}
-    plan = cheapest(
-        tolerance,
-        [(n, float(tiles.radius.max())) for n, (tiles, _) in made.items()],
-        distance=antennas.distance(box(positions)),
-        frequency=float(antennas.frequency.max()) + bandwidth / 2,
-        bandwidth=bandwidth,
-        n_samples=n_samples,
-        points_per_row=len(positions),
-        chunk=_chunk(len(positions), tolerance),
-        least_tolerance=least_tolerance,
-        carrier=float(antennas.frequency.mean()),
-    )
-    return plan, *made[plan.per_tile]
+@dataclass(frozen=True, eq=False)
+class DeviceTiles:
+    """Tiles of scatterers on a device.
+
+    order                        of the scatterers in whole tiles; the last scatterer fills up the last tile
+    references, radius, offsets  of the tiles, and planes  of the scatterers' numbers: buffers
+    last                         scatterers in the last tile
+    """
+
+    tiles: Tiles
+    order: np.ndarray
+    references: Any
+    radius: Any
+    offsets: Any
+    planes: Any
+    last: int
+
+
+class TiledScatterers:
+    """Scatterers in Morton order, in tiles and on a device: prepared once, for all channels, receivers and pulses.
+
+    Tiles of one size stay on the device: those of the last plan. Every array here is computed at its first use.
+    """
+
+    def __init__(
+        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray],
+        patches: Callable[[np.ndarray], PatchSamples],
+    ) -> None:  # fmt: skip
+        """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them
+        patches  of the Morton order: samples from which the error of evenly spaced scatterers is measured
+        """
+        self.device, self.positions, self._planes, self._patches = device, positions, planes, patches
+        self.bounds, self._order = box(positions), morton_order(positions)
+        self.center = self.bounds.mean(axis=0)
+        self._tiles = {n: self._tiled(n) for n in PER_TILE}
+        self._radius = {n: float(tiles.radius.max()) for n, (tiles, _) in self._tiles.items()}
+        self._on_device: DeviceTiles | None = None
+        self._samples: PatchSamples | None = None
+        self._image_errors: dict[tuple[Any, ...], float] = {}
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def plan(
+        self, antennas: PulseGeometry, band: Band, tolerance: float, least_tolerance: float = LEAST_TOLERANCE
+    ) -> Plan:
+        """The cheapest plan for these scatterers. ToleranceUnreachable where none meets the tolerance."""
+        gain, n = 1.0, len(self)
+        while True:
+            try:
+                plan = cheapest(
+                    tolerance,
+                    self._radius.items(),
+                    distance=antennas.distance(self.bounds),
+                    frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
+                    bandwidth=band.bandwidth,
+                    n_samples=band.n_samples,
+                    points_per_row=n,
+                    chunk=_chunk(n, tolerance),
+                    least_tolerance=least_tolerance,
+                    carrier=band.carrier,
+                    image_gain=gain,
+                )
+            except ToleranceUnreachable as refused:
+                if gain == 1:
+                    raise
+                lattice = "with scatterers that lie so evenly: the images of the interpolation kernel add up"
+                raise ToleranceUnreachable(tolerance, None, refused.limit, "take a larger tolerance", lattice) from None
+            kernel = plan.interpolator.error
+            fixed = plan.predicted_error - gain * kernel
+            if fixed + np.sqrt(n) * kernel <= tolerance:  # n echoes are at most the root of n times their power's root
+                return plan
+            images = self._image_error(plan, band)
+            if gain == 1 and images <= kernel:
+                return plan
+            if fixed + images <= tolerance:
+                return replace(plan, predicted_error=fixed + max(images, kernel))
+            gain = max(images / kernel, 2 * gain)
+
+    def tiles(self, per_tile: int) -> DeviceTiles:
+        """Tiles of `per_tile` scatterers on the device."""
+        found = self._on_device
+        if found is None or found.tiles.per_tile != per_tile:
+            self._on_device = None  # frees the buffers of the other size first
+            tiles, order = self._tiles[per_tile] if per_tile in self._tiles else self._tiled(per_tile)
+            self._tiles = {}  # what the device holds is not needed here, and the other size hardly ever
+            upload = self.device.upload
+            found = self._on_device = DeviceTiles(
+                tiles, order, upload(float_pairs.wide(tiles.references.T)), upload(tiles.radius.astype(np.float32)),
+                upload(tiles.offsets), upload(self._planes(order)), per_tile - (len(order) - len(self)),
+            )  # fmt: skip
+        return found
+
+    def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
+        return tile_points(self.positions, self.center, per_tile, self._order)
+
+    def _image_error(self, plan: Plan, band: Band) -> float:
+        """Relative error of the images of a plan's kernel."""
+        kernel = plan.interpolator
+        key = kernel.taps, kernel.oversample, plan.length, band.n_samples, band.bandwidth
+        if key not in self._image_errors:
+            if self._samples is None:
+                self._samples = self._patches(self._order)
+            self._image_errors[key] = self._samples.error(kernel, plan.length, band.n_samples, band.bandwidth)
+        return self._image_errors[key]
 
 
 def _chunk(n_scatterers: int, tolerance: float) -> int:
@@ -61,11 +176,11 @@ def _chunk(n_scatterers: int, tolerance: float) -> int:
     return min(n_scatterers, max(min(PER_TILE), int(terms(tolerance))))
 
 
-def splits(device: Device, n_pulses: int, tiles: Tiles) -> int:
-    """Partial sums a row: enough work-items for the device."""
-    return int(min(max(1, -(-4 * device.info.units // n_pulses)), tiles.n_tiles, 64))
+def splits(device: Device, n_pulses: int, n_tiles: int) -> int:
+    """Partial sums per pulse: enough work-items for the device."""
+    return int(min(max(1, -(-4 * device.info.units // n_pulses)), n_tiles, 64))
 
 
 def terms(tolerance: float) -> float:
-    """Terms that may join one float32 sum: n like ones err by up to n/2 roundings, a fifth of the tolerance."""
+    """Terms of one float32 sum: n equal terms err by up to n/2 roundings, which may take a fifth of the tolerance."""
     return 0.2 * tolerance * 2 / FLOAT32.unit

@@ -247,7 +247,7 @@ def interpolated(verb=sarcl.echo):
 PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_echoes.plan_scene", interpolated),
-    "a scene made ready": ("sarcl.simulation.scene_echoes.Work.__init__", interpolated),
+    "a scene made ready": ("sarcl.simulation.channels.array_echo.prepare_scene", interpolated),
     "forecast of echoes": (
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(sarcl.plan_echo),

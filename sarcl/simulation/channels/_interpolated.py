@@ -8,6 +8,8 @@ elements, and some twenty pairs of positions for 450 transmitting by 450 receivi
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...arrays.channels import Channel
@@ -17,11 +19,11 @@ from ...base.vectors import unit
 from ...numerics import cost_model
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import Work, band_of
+from ..scene_echoes import SceneEchoes, band_of
 from ..spreading import Band
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples
-from ._separate import ChannelLayout, active_channels, echoes_of
+from ._separate import Added, ChannelLayout, active_channels, echoes_of
 
 SHARE = 0.3  # of the tolerance, for the interpolation
 FAR = 0.02  # of the distance: larger arrays are not interpolated
@@ -148,9 +150,9 @@ class InterpolatedChannels:
         channel = rows.n_receivers * (min(grid.width, grid.n) * (48 + 24 * names) + 100)
         return max(1, int(budget / 2 / (at_positions + channel)))
 
-    def fill(self, work: Work, samples: np.ndarray, start: int, total: int) -> float:
+    def fill(self, scene: SceneEchoes, samples: np.ndarray, start: int, done: int, total: int) -> Added:
         """Add echoes to samples, as `SeparateChannels.fill` does."""
-        layout, rows, worst = self.layout, self.layout.rows, 0.0
+        layout, rows, added = self.layout, self.layout.rows, Added()
         grid, frequencies = layout.grid, layout.frequencies
         at = slice(start, start + len(samples))
         band = band_of(layout.waveform, float(frequencies.mean()), grid.n * grid.step)
@@ -162,8 +164,9 @@ class InterpolatedChannels:
             path = _length(tx, self.center) + _length(rx, self.center)
             reference = np.asarray(path / 2, np.float64)
             geometry = layout.geometry(tx, rx, reference, frequencies, (-reach, reach))
-            echoes[i, j] = echoes_of(work, geometry, band, frequencies, start, total)
-            worst = max(worst, work.predicted_error)
+            before = done + added.counts.pairs
+            echoes[i, j], at_position = echoes_of(scene, geometry, band, frequencies, start, before, total)
+            added += at_position
             rounded = np.asarray(path - 2 * reference, np.float64)
             if np.abs(rounded).max() * frequencies[-1] > 1e-9 * SPEED_OF_LIGHT:  # thousands of kilometres away
                 echoes[i, j] *= _phase(-rounded, frequencies)[:, None]
@@ -173,17 +176,17 @@ class InterpolatedChannels:
                 lengths = self._rx_lengths(rows.rx_positions(channel.offset[None], now))
             else:
                 lengths = shared[0][here], shared[1][here]
-            self._add(work, channel, now, echoes[:, :, here], samples[here], *lengths)
-        work.order.clock.lap("channels")
-        return self.error + self.growth * worst
+            self._add(scene, channel, now, echoes[:, :, here], samples[here], *lengths)
+        scene.request.clock.lap("channels")
+        return replace(added, predicted_error=self.error + self.growth * added.predicted_error)
 
     def _rx_lengths(self, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths, m, from rx (n, m, 3) to the scene's centre, in extended precision, and to the reference point."""
         return _length(rx, self.center), np.linalg.norm(rx - self.layout.rows.point, axis=-1)
 
     def _add(
-        self, work: Work, channel: Channel, at: slice, echoes: np.ndarray, samples: np.ndarray, to_center: np.ndarray,
-        to_reference: np.ndarray,
+        self, scene: SceneEchoes, channel: Channel, at: slice, echoes: np.ndarray, samples: np.ndarray,
+        to_center: np.ndarray, to_reference: np.ndarray,
     ) -> None:  # fmt: skip
         """Interpolate a channel from echoes at the positions, and add it, at every receiver, to samples of pulses `at`.
 
@@ -202,7 +205,7 @@ class InterpolatedChannels:
         tx_to_reference = np.linalg.norm((tx if rows.separated else rows.track.tx[at]) - rows.point, axis=-1)
         reference = (tx_to_reference[:, None] + to_reference) / 2  # as `ChannelRows.fields` rounds it
         path = np.asarray(_length(tx, self.center)[:, None] + to_center - 2 * reference, np.float64)
-        spectrum = layout.spectrum(channel, frequencies) * work.weights.factor(frequencies)
+        spectrum = layout.spectrum(channel, frequencies) * scene.weights.factor(frequencies)
         values = values * (_phase(path, frequencies) * spectrum).astype(np.complex64)[:, :, None]
         rows.add(samples, channel, slice(None), part, values)
 

@@ -2,15 +2,16 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from ...arrays.channels import Channel, Sampling
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
-from ..scene_echoes import Work, band_of
-from ..spreading import Band
+from ..scene_echoes import SceneEchoes, band_of
+from ..spreading import Band, Counts
 from .channel_rows import ChannelRows
 
 
@@ -80,6 +81,19 @@ class ChannelLayout:
         return max(1.0, *(float(count.max()) for count in counts.values()))
 
 
+@dataclass(frozen=True)
+class Added:
+    """Echoes that were added to samples: their largest predicted error, the plan of the last channel, counts."""
+
+    predicted_error: float = 0.0
+    plan: dict[str, Any] = field(default_factory=dict)
+    counts: Counts = field(default_factory=Counts)
+
+    def __add__(self, other: Added) -> Added:
+        worst = max(self.predicted_error, other.predicted_error)
+        return Added(worst, other.plan or self.plan, self.counts + other.counts)
+
+
 class SeparateChannels:
     """Echoes of every channel at every receiver, each computed by itself over its own band."""
 
@@ -96,24 +110,25 @@ class SeparateChannels:
         """Pulses per call of `fill`: all of them, since each computation keeps to the memory budget by itself."""
         return len(self.layout.rows.track)
 
-    def fill(self, work: Work, samples: np.ndarray, start: int, total: int) -> float:
+    def fill(self, scene: SceneEchoes, samples: np.ndarray, start: int, done: int, total: int) -> Added:
         """Add echoes to samples (n, transmitters, receivers, n_polarizations, n_samples), zeros, from pulse `start` on.
 
-        total  pairs of scatterer and range profile, for progress. Returns the predicted error.
+        done, total  pairs of scatterer and range profile, for progress
         """
-        layout, rows, worst = self.layout, self.layout.rows, 0.0
+        layout, rows, added = self.layout, self.layout.rows, Added()
         for channel, at, here in active_channels(layout.sent, start, len(samples)):
             part, frequencies = layout.samples(channel)
-            spectrum = (layout.spectrum(channel, frequencies) * work.weights.factor(frequencies)).astype(np.complex64)
+            spectrum = (layout.spectrum(channel, frequencies) * scene.weights.factor(frequencies)).astype(np.complex64)
             band = band_of(layout.waveform, channel.carrier, len(frequencies) * layout.grid.step)
             tx = rows.tx_positions(channel.offset, at)
             _, rx, reference = rows.ends(channel.offset, at)
             for j in range(rows.n_receivers):
                 geometry = layout.geometry(tx, rx[:, j], reference[:, j], frequencies)
-                echoes = echoes_of(work, geometry, band, frequencies, at.start, total)
-                worst = max(worst, work.predicted_error)
+                before = done + added.counts.pairs
+                echoes, of_channel = echoes_of(scene, geometry, band, frequencies, at.start, before, total)
+                added += of_channel
                 rows.add(samples[here], channel, slice(j, j + 1), part, (echoes * spectrum)[:, None])
-        return worst
+        return added
 
     def describe(self) -> dict[str, int]:
         """Words and numbers for a report: none."""
@@ -131,9 +146,12 @@ def active_channels(sent: list[Channel], start: int, n: int) -> list[tuple[Chann
 
 
 def echoes_of(
-    work: Work, geometry: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, total: int
-) -> np.ndarray:
+    scene: SceneEchoes, geometry: PulseGeometry, band: Waveform, frequencies: np.ndarray, first: int, done: int,
+    total: int,
+) -> tuple[np.ndarray, Added]:  # fmt: skip
     """Echoes (n, n_polarizations, n_samples) of the scene at n pulses from `first` on, without the pulse's spectrum."""
-    out = np.zeros((len(geometry), len(work.order.polarizations), len(frequencies)), np.complex64)
-    work.add(geometry, band, frequencies, out, total, first)
-    return out
+    n = len(geometry)
+    out = np.zeros((n, len(scene.request.polarizations), len(frequencies)), np.complex64)
+    channel = scene.channel(geometry, band, frequencies, first)
+    counts = channel.add(out, range(n), done, total)
+    return out, Added(channel.predicted_error, channel.plan, counts)

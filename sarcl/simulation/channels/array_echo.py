@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.channels import channels_of, sampling, warn_of
-from ...base.errors import ToleranceUnreachable
+from ...base.errors import ToleranceMissed, ToleranceUnreachable
 from ...base.report import Report
 from ...base.validation import choice
 from ...model.antenna_array import AntennaArray
@@ -20,23 +20,24 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..echo_output import Target
-from ..scene_echoes import Order, Work, band_of, bounded
+from ..echo_check import draws_of, exact, worth_checking
+from ..echo_output import EchoOutput
+from ..scene_echoes import EchoRequest, SceneEchoes, band_of, bounded, prepare_scene
 from ._interpolated import InterpolatedChannels
-from ._separate import ChannelLayout, SeparateChannels, active_channels
+from ._separate import Added, ChannelLayout, SeparateChannels, active_channels
 from .channel_rows import CHANNELS, RECEIVE, ChannelRows
 
 EQUAL, INTERPOLATED = "equal channels", "interpolated channels"  # reasons to leave out contributions
 
 
 def array_echo(
-    array: AntennaArray, scene: Scene, given: Scene, waveform: Waveform, track: Trajectory,
-    receiver: Trajectory | None, point: np.ndarray, range_window: Any, weights: AntennaWeights, order: Order, *,
+    array: AntennaArray, scene: Scene, original_scene: Scene, waveform: Waveform, track: Trajectory,
+    receiver: Trajectory | None, point: np.ndarray, range_window: Any, weights: AntennaWeights, request: EchoRequest, *,
     channels: str, receive: str, compressed: bool, check: bool | None, out: Any,
 ) -> PhaseHistory:  # fmt: skip
     """The phase history that `sarcl.echo` returns with an array; arguments as there.
 
-    scene  with its random heights;  given  the scene without them;  point  the reference point, m (3,)
+    scene  with its random heights;  original_scene  without them;  point  the reference point, m (3,)
 
     Source: Farooq 2009, equations 4.28 to 4.32, with exact distances to every element.
     """
@@ -45,9 +46,9 @@ def array_echo(
     if receive == "own" and channels != "separated":
         raise ValueError("receive='own' keeps the channel of every element separate; pass channels='separated' too")
     bounded(float(np.abs(scene.amplitudes).max(initial=0.0)) * weights.peak * float(np.abs(array.weights).sum()))
-    rows = ChannelRows(array, track, receiver, point, channels, receive, order.polarizations)
+    rows = ChannelRows(array, track, receiver, point, channels, receive, request.polarizations)
     tx, rx = rows.track.tx, rows.track.rx
-    sent = channels_of(array, waveform.center, len(track), EQUAL in order.skips)
+    sent = channels_of(array, waveform.center, len(track), EQUAL in request.skips)
     carriers = np.array([c.carrier for c in sent])
     warn_of(array, waveform, carriers)
     reference_range = echo_sampling.half_path(tx, rx, point)
@@ -56,92 +57,99 @@ def array_echo(
     whole = band_of(waveform, grid.frequency + (grid.n - 1) / 2 * grid.step, grid.n * grid.step)
     layout = ChannelLayout(rows, sent, grid, (near, far), waveform, compressed)
     geometry = layout.geometry(tx, rx, reference_range, layout.frequencies)
-    with Target(layout.shape(len(track)), out, order.budget, (near, far)) as target:
-        method, work = _planned(layout, scene, given, whole, geometry, weights, order)
-        worst = _filled(method, work, target)
-        work.must_show(near, far)
-        order.clock.lap("spectra")
+    with EchoOutput(layout.shape(len(track)), out, request.budget, (near, far)) as output:
+        method, prepared = _planned(layout, scene, original_scene, whole, geometry, weights, request)
+        added = _filled(method, prepared, output)
+        prepared.check_seen(added.counts, near, far)
+        request.clock.lap("spectra")
         measured = None
         overlap = len(sent) if rows.separated else layout.overlap
-        if work.worth_checking(check, overlap):
-            measured = _measured(work, layout, target)
-            order.clock.lap("check")
-        counted = work.counted(method.runs // len(track))
+        if worth_checking(prepared, check, overlap):
+            measured = _measured(prepared, layout, output)
+            request.clock.lap("check")
+        counted = prepared.counted(added.counts, method.runs // len(track))
         left_out = {
             EQUAL: sum((c.stop - c.first) * rows.n_receivers * (len(c.elements) - 1) for c in sent),
             INTERPOLATED: layout.runs - method.runs,
         }
-        counted["contributions_skipped"] |= {why: work.scatterers * n for why, n in left_out.items() if n}
+        counted["contributions_skipped"] |= {why: len(prepared) * n for why, n in left_out.items() if n}
         how = (
-            work.plan()
+            added.plan
             | {"channels": channels, "carriers": len(sent), "receivers": rows.n_receivers}
             | method.describe()
         )
-        return target.finish(
+        raw = output.finish(
             **rows.fields(waveform.center, grid, track, receiver or track),
             waveform=waveform, array=array, compressed=compressed,
             report=Report(
-                plan=how, tolerance=order.tolerance, predicted_error=worst, measured_error=measured,
+                plan=how, tolerance=request.tolerance, predicted_error=added.predicted_error, measured_error=measured,
                 **counted,
-                seconds=order.clock.seconds, device=order.device.info.name, seed=order.seed,
+                seconds=request.clock.seconds, device=request.device.info.name, seed=request.seed,
             ),
         )  # fmt: skip
+    if measured is not None and measured > request.tolerance:
+        raise ToleranceMissed(request.tolerance, measured, raw=raw)
+    return raw
 
 
 def _planned(
-    layout: ChannelLayout, scene: Scene, given: Scene, whole: Waveform, geometry: PulseGeometry,
-    weights: AntennaWeights, order: Order,
-) -> tuple[SeparateChannels | InterpolatedChannels, Work]:  # fmt: skip
+    layout: ChannelLayout, scene: Scene, original_scene: Scene, whole: Waveform, geometry: PulseGeometry,
+    weights: AntennaWeights, request: EchoRequest,
+) -> tuple[SeparateChannels | InterpolatedChannels, SceneEchoes]:  # fmt: skip
     """The cheaper method whose plan keeps the tolerance, and the scene prepared for it.
 
     whole  waveform over the band of all channels;  geometry  of the arrays' reference points
     """
-    interpolated = _interpolated(layout, scene, weights, order)
+    margin = float(np.linalg.norm(layout.rows.array.positions, axis=1).max())
+    interpolated = _interpolated(layout, scene, weights, request)
     if interpolated is not None:
-        inner = replace(order, tolerance=interpolated.tolerance)
+        inner = replace(request, tolerance=interpolated.tolerance)
         try:
-            return interpolated, Work(inner, given, scene, whole, geometry, weights, interpolated.bands)
+            return interpolated, prepare_scene(
+                inner, original_scene, scene, whole, geometry, weights, interpolated.bands, margin
+            )
         except ToleranceUnreachable:  # interpolation leaves less of the tolerance to the echoes at the positions
             pass
     separate = SeparateChannels(layout)
-    return separate, Work(order, given, scene, whole, geometry, weights, separate.bands)
+    return separate, prepare_scene(request, original_scene, scene, whole, geometry, weights, separate.bands, margin)
 
 
 def _interpolated(
-    layout: ChannelLayout, scene: Scene, weights: AntennaWeights, order: Order
+    layout: ChannelLayout, scene: Scene, weights: AntennaWeights, request: EchoRequest
 ) -> InterpolatedChannels | None:
     """Channels interpolated from a few positions, where that is allowed, accurate and cheaper."""
     shared = not layout.rows.separated or layout.grid.holds([c.carrier for c in layout.sent])
-    if INTERPOLATED not in order.skips or layout.runs <= len(layout.rows.track) or not shared:
+    if INTERPOLATED not in request.skips or layout.runs <= len(layout.rows.track) or not shared:
         return None
-    channels = InterpolatedChannels(layout, scene, weights, order.vertical, order.tolerance)
+    channels = InterpolatedChannels(layout, scene, weights, request.vertical, request.tolerance)
     pays = channels.pays(len(scene.positions) + len(scene.triangles))
     return channels if pays and channels.tolerance >= LEAST_TOLERANCE else None
 
 
-def _filled(method: SeparateChannels | InterpolatedChannels, work: Work, target: Target) -> float:
-    """Fill the target with samples; returns the predicted error."""
-    worst, total = 0.0, work.scatterers * method.runs
-    pulses = min(method.pulses(work.order.budget), target.pulses)
-    for start in range(0, len(target), pulses):
-        block = target.block(start, min(start + pulses, len(target)))
-        worst = max(worst, method.fill(work, block, start, total))
-        target.keep(start, block)
-    return worst
+def _filled(method: SeparateChannels | InterpolatedChannels, prepared: SceneEchoes, output: EchoOutput) -> Added:
+    """Fill the output with samples."""
+    added, total = Added(), len(prepared) * method.runs
+    pulses = min(method.pulses(prepared.request.budget), output.pulses)
+    for start in range(0, len(output), pulses):
+        block = output.block(start, min(start + pulses, len(output)))
+        added += method.fill(prepared, block, start, added.counts.pairs, total)
+        output.keep(start, block)
+    return added
 
 
-def _measured(work: Work, layout: ChannelLayout, samples: Target) -> float:
+def _measured(prepared: SceneEchoes, layout: ChannelLayout, samples: EchoOutput) -> float:
     """Relative error of 256 random samples, 16 in each of 16 rows, against the exact sum over channels and scatterers.
 
-    With many facets (as in `_echo_check.measure_error`) or many channels there are fewer rows and samples.
+    With many facets (as in `echo_check.measure_error`) or many channels there are fewer rows and samples.
     """
     rows, sent = layout.rows, layout.sent
-    random, draws = np.random.default_rng(0), min(work.draws, 16 if len(sent) < 8 else 4 if len(sent) < 64 else 2)
+    random = np.random.default_rng(0)
+    draws = min(draws_of(prepared), 16 if len(sent) < 8 else 4 if len(sent) < 64 else 2)
     sums = np.zeros(3)
     for _ in range(draws):
         pulse, transmitter, receiver = (int(random.integers(n)) for n in rows.shape)
         some = random.integers(0, samples.shape[-1], draws)
-        wanted = np.zeros((len(work.order.polarizations), draws), np.complex128)
+        wanted = np.zeros((len(prepared.request.polarizations), draws), np.complex128)
         power = np.zeros(wanted.shape)
         for channel, _, _ in active_channels(sent, pulse, 1):
             part, frequencies = layout.samples(channel)
@@ -152,8 +160,8 @@ def _measured(work: Work, layout: ChannelLayout, samples: Target) -> float:
             _, rx, reference = rows.ends(channel.offset, which=slice(receiver, receiver + 1))
             geometry = layout.geometry(rows.tx_positions(channel.offset), rx[:, 0], reference[:, 0], f[:1])
             weight = rows.array.weights[transmitter] if rows.separated else channel.weight
-            factor = weight * layout.spectrum(channel, f) * work.weights.factor(f)
-            values, powers = work.exact(geometry, pulse, f, work.weights.at(geometry))
+            factor = weight * layout.spectrum(channel, f) * prepared.weights.factor(f)
+            values, powers = exact(prepared, geometry, pulse, f, prepared.weights.at(geometry))
             wanted[:, inside] += values * factor
             power[:, inside] += powers * np.abs(factor) ** 2
         made = samples[pulse][transmitter, receiver][:, some]
