@@ -11,7 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
 from ..scene.triangles import centroids, normals
-from ..visibility.illumination import Lighting, Part, Span
+from ..visibility.illumination import Illumination, Span
 
 AT_ONCE = 100_000  # amplitudes in one go
 POLARIZATIONS = ("HH", "HV", "VH", "VV")
@@ -32,7 +32,7 @@ class Facets:
     two_sided: np.ndarray
     material: np.ndarray
     materials: tuple[Material, ...]
-    light: Lighting | Part | None
+    light: Illumination | None
     kept: np.ndarray
     random: np.ndarray
 

@@ -1,4 +1,4 @@
-"""Pulses that may share one shadow: blocks as fine as the change of aspect demands."""
+"""Blocks of pulses that share one illumination: as short as the change of aspect angle requires."""
 
 from __future__ import annotations
 
@@ -9,16 +9,16 @@ import numpy as np
 from ..base.boxes import box
 from ..scene.triangles import areas, edges, normals
 
-STRIDE = 16  # blocks that may go without a look from the first
-UNEVEN = 0.25  # of a facet: more is no even change, and more than counting samples errs
-LEFT = 4e-4  # of the lit shares' squares: two hundredths of their norm
+STRIDE = 16  # blocks from one viewpoint to the next, before refinement
+UNEVEN = 0.25  # of a facet: larger differences from a linear change count; above the error of counting samples
+LEFT = 4e-4  # of the sum of squared shares (0.02 of their norm): largest sum of squared differences that is left
 
 
-def lever(bounds: np.ndarray, antennas: np.ndarray) -> float:
-    """Longest way, m, from a facet along any line of sight to what shadows it, inside a scene's box (2, 3).
+def shadow_length(bounds: np.ndarray, antennas: np.ndarray) -> float:
+    """Largest distance, m, from a facet along a line of sight to what occludes it, inside a scene's box (2, 3).
 
-    Its height over the sine of the lowest elevation under which any of the antennas, m (n, 3), is seen from anywhere in
-    it, and never more than its diagonal.
+    The height of the box over the sine of the lowest elevation at which any antenna, m (n, 3), is seen from a point in
+    the box; at most its diagonal.
     """
     size = bounds[1] - bounds[0]
     diagonal = float(np.linalg.norm(size))
@@ -27,10 +27,10 @@ def lever(bounds: np.ndarray, antennas: np.ndarray) -> float:
     return min(diagonal, float(size[2]) / sine) if sine > 0 else diagonal
 
 
-def reach(triangles: np.ndarray, viewpoint: np.ndarray) -> float:
-    """Area seen over longest edge, m, of the middle facet of triangles (k, 3, 3) that are not seen edge-on.
+def projected_width(triangles: np.ndarray, viewpoint: np.ndarray) -> float:
+    """Projected area over longest edge, m: the median of triangles (k, 3, 3) that are not seen edge-on.
 
-    A shadow's edge that moves by m across the line of sight changes a facet's lit share by at most m over this.
+    A shadow edge that moves by d m across the line of sight changes a facet's share by at most d over this.
     """
     ahead = viewpoint - triangles[:, 0]
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-300)
@@ -43,10 +43,12 @@ def reach(triangles: np.ndarray, viewpoint: np.ndarray) -> float:
 def pulse_blocks(
     ends: list[np.ndarray], bounds: np.ndarray, limits: list[float]
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Blocks of pulses, first and last + 1 (n, 2), one pulse of each (n,) to look from, and how far it is off (n,).
+    """Blocks of pulses in each of which antenna directions differ by no more than a limit.
 
-    From everywhere in the box `bounds`, m (2, 3), the direction of each antenna, m (n_pulses, 3), of `ends` differs by
-    no more than its limit, rad, between that pulse and any other of its block; (n,) bounds by how much it does.
+    ends    positions of each antenna, m (n_pulses, 3);  limits  rad, one for each antenna
+    Returns first and last + 1 of the pulses of each block (n, 2), its viewpoint, which is one of its pulses (n,), and a
+    bound (n,), rad, on how much directions differ between the viewpoint and any pulse of the block, as seen from
+    anywhere in the box `bounds`, m (2, 3).
     """
     distance = [np.linalg.norm(e - np.clip(e, *bounds), axis=1) for e in ends]
 
@@ -57,7 +59,7 @@ def pulse_blocks(
         return np.minimum(np.divide(move, away, out=np.where(move > 0, 2.0, 0.0), where=away > 0), 2.0)
 
     def run(start: int, step: int, stop: int) -> int:
-        """How far from pulse `start` on the direction stays within the limits: the last pulse."""
+        """The last pulse, from `start` on, up to which directions stay within the limits of that at `start`."""
         at, width = start, 64
         while at != stop:
             to = min(at + width, stop) if step > 0 else max(at - width, stop)
@@ -69,25 +71,26 @@ def pulse_blocks(
         return at
 
     n, first = len(ends[0]), 0
-    blocks, looks, turns = [], [], []
+    blocks, viewpoints, turns = [], [], []
     while first < n:
-        look = run(first, 1, n - 1)
-        # tracks that turn back: all from the first on must be near the one looked from
-        while run(look, -1, first) != first:
-            look = first + (look - first) // 2
-        last = run(look, 1, n - 1)
+        viewpoint = run(first, 1, n - 1)
+        # tracks may turn back: all pulses from the first on must be within the limits of the viewpoint
+        while run(viewpoint, -1, first) != first:
+            viewpoint = first + (viewpoint - first) // 2
+        last = run(viewpoint, 1, n - 1)
         blocks.append((first, last + 1))
-        looks.append(look)
-        turns.append(max(turn(i, np.arange(first, last + 1), look).max() for i in range(len(ends))))
+        viewpoints.append(viewpoint)
+        turns.append(max(turn(i, np.arange(first, last + 1), viewpoint).max() for i in range(len(ends))))
         first = last + 1
-    return np.array(blocks, np.int64), np.array(looks, np.int64), np.array(turns)
+    return np.array(blocks, np.int64), np.array(viewpoints, np.int64), np.array(turns)
 
 
-def enough_looks(look: Callable[[int], np.ndarray], at: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Rising places in `at`, pulses (n,) that may be looked from, and shares, uint8 (k,), that look(place) finds there.
+def refine_viewpoints(look: Callable[[int], np.ndarray], at: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    """Viewpoints between which shares change linearly, as increasing indices into `at`, pulses (n,), with the shares.
 
-    Every 16th and the last, and what lies between as far as shares do not change evenly from one to the next: halfway,
-    those more than a quarter off must hold less than 0.04 % of the squares of all.
+    look(index) returns the shares, uint8 (k,), at a viewpoint. Every 16th viewpoint and the last are taken. Between two
+    of them, the one halfway is compared with linear interpolation: where differences above a quarter hold more than
+    0.04 % of the sum of squared shares, both halves are refined in the same way.
     """
 
     def between(a: int, first: np.ndarray, b: int, last: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
@@ -114,9 +117,9 @@ def enough_looks(look: Callable[[int], np.ndarray], at: np.ndarray) -> Iterator[
         held, share = place, end
 
 
-def blocks_around(looks: np.ndarray, n_pulses: int) -> np.ndarray:
-    """First and last + 1, int64 (n, 2), of the pulses nearest each of rising looks (n,)."""
-    ends = np.concatenate([[0], (looks[:-1] + looks[1:]) // 2 + 1, [n_pulses]])
+def blocks_around(viewpoints: np.ndarray, n_pulses: int) -> np.ndarray:
+    """First and last + 1, int64 (n, 2), of the pulses nearest each viewpoint, increasing pulses (n,)."""
+    ends = np.concatenate([[0], (viewpoints[:-1] + viewpoints[1:]) // 2 + 1, [n_pulses]])
     return np.stack([ends[:-1], ends[1:]], axis=1)
 
 

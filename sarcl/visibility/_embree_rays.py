@@ -1,4 +1,4 @@
-"""Rays by Embree (package embreex), in place of kernels/ray_casting.cl: faster on few processors, no part of sarcl."""
+"""Occlusion of facets by rays of Embree (optional package embreex): faster than kernels/ray_casting.cl on few cores."""
 
 from __future__ import annotations
 
@@ -7,13 +7,13 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._ray_casting import Facets, Frame
+from ._ray_casting import DeviceFacets, Frame
 
-CHUNK = 2**18  # facets at a time: their rays stand in the host's memory
+CHUNK = 2**18  # facets per array operation: bounds the memory on the host
 
 
 class EmbreeOccluders:
-    """Facets, m (k, 3, 3), as those who hide. ImportError without embreex."""
+    """Facets, m (k, 3, 3), that occlude others. Raises ImportError without embreex."""
 
     def __init__(self, device: Device, triangles: np.ndarray, frame: Frame) -> None:
         try:
@@ -25,15 +25,15 @@ class EmbreeOccluders:
             ) from exc
         self.device, self.frame = device, frame
         self._scene = rtcore_scene.EmbreeScene()
-        # the scene does not keep what it is made of
+        # kept here: the scene holds no reference to its mesh
         self._mesh = TriangleMesh(self._scene, ((triangles - frame.center) * frame.unit).astype(np.float32))
 
-    def hide(self, facets: Facets, index: Any, n: int, places: Any, viewpoint: np.ndarray, hidden: Any) -> None:
-        """Set the bits of hidden samples: as `_ray_casting.Occluders.hide`."""
-        samples = places[1]
+    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+        """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
+        samples = points[1]
         row = self.device.download(facets.buffer, np.empty((facets.size, 12), np.float32))
         row = row[self.device.download(index, np.empty(n, np.int32))]
-        uv = self.device.download(places[0], np.empty((samples, 2), np.float32))
+        uv = self.device.download(points[0], np.empty((samples, 2), np.float32))
         eye = (viewpoint - self.frame.center) * self.frame.unit
         found = np.empty((n, samples), np.uint8)
         for first in range(0, n, CHUNK):
@@ -44,7 +44,7 @@ class EmbreeOccluders:
                 ahead = eye - start
                 far = np.linalg.norm(ahead, axis=1)
                 way = (ahead / far[:, None]).astype(np.float32)
-                # what lies beyond the viewpoint hides nothing
+                # facets beyond the viewpoint do not occlude
                 hit = self._scene.run(start.astype(np.float32), way, dists=far.astype(np.float32), query="OCCLUDED")
                 found[first : first + CHUNK, s] = hit != -1
         join = self.device.kernel("ray_casting.cl", "join")

@@ -1,21 +1,21 @@
-"""Where facets are sampled: equal shares of a triangle, and its corners."""
+"""Sample points of facets, which stand for equal parts of a triangle; and probes at its corners."""
 
 from __future__ import annotations
 
 import numpy as np
 
-# Sample points of a facet, and by how much its lit share then errs at most where the shadow's edge is straight.
+# Number of sample points of a facet, and the largest error of its illuminated share behind a straight shadow edge.
 SAMPLES = ((1, 5 / 9), (4, 0.31), (16, 0.14), (64, 1 / 16))
 
-# A shadow with a straight edge that covers part of a triangle covers some of its corners, not all.
+# Corners and centre: a shadow with a straight edge that covers part of a triangle covers some of its corners, not all.
 PROBES = np.array([[0.01, 0.01], [0.98, 0.01], [0.01, 0.98], [1 / 3, 1 / 3]], np.float32)
 
 
-def places(n: int) -> np.ndarray:
-    """Barycentric coordinates of n sample points, float32 (n, 2): equal shares of the triangle.
+def sample_points(n: int) -> np.ndarray:
+    """Barycentric coordinates of n sample points, float32 (n, 2): each for an equal part of the triangle.
 
-    The R2 sequence (Roberts 2018) on a square, folded to the triangle (Heitz 2019). Its offset is the one of some 20000
-    tried for which shares behind straight edges err least: see SAMPLES.
+    The R2 sequence (Roberts 2018) on a square, folded to the triangle (Heitz 2019). Of some 20000 offsets of the
+    sequence this one has the smallest error of shares behind straight edges: see SAMPLES.
     """
     if n == 1:
         return np.full((1, 2), 1 / 3, np.float32)

@@ -1,4 +1,4 @@
-"""What a viewpoint sees of a scene's facets: rays through a tree of boxes, from anywhere."""
+"""Occlusion of facets by facets, as seen from a viewpoint anywhere: rays through a tree of boxes."""
 
 from __future__ import annotations
 
@@ -12,41 +12,41 @@ from ..base.morton import interleaved
 from ..opencl.device import Device
 from ..scene.triangles import edges, normals
 
-# Rays start above a facet by this share of its longest edge: coplanar and touching neighbours, and sheets modelled
-# twice, do not hide one another.
+# Height above a facet at which rays start, relative to its longest edge: so coplanar and touching neighbours, and
+# sheets modelled twice, do not occlude one another.
 LIFT = 1e-3
-# float32 resolves places to 1e-7 of the scene: rays start, and boxes reach, a few such steps further out
+# Least height at which rays start, and margin of boxes, relative to the scene: float32 resolves 1e-7 of it
 STEP = 1e-6
-FAR = np.float32(4)  # of boxes that are none: points a ray can only meet by chance, with nothing in them
+FAR = np.float32(4)  # coordinate of boxes that fill up a node: they are empty, and outside the scene
 
 
 @dataclass(frozen=True, eq=False)
 class Frame:
-    """Where facets are told in float32: (x - center) unit, at most one for all corners; unit is a power of two."""
+    """Coordinates of facets in float32: (x - center) unit, at most 1 for all corners; unit is a power of two, 1/m."""
 
     center: np.ndarray
     unit: float
 
     @classmethod
     def around(cls, points: np.ndarray) -> Frame:
-        """The frame that just holds points, m (n, 3)."""
+        """The smallest frame that holds points, m (n, 3)."""
         corners = box(points)
         half = float((corners[1] - corners[0]).max()) / 2
         return cls(corners.mean(axis=0), 2.0 ** -np.ceil(np.log2(half)) if half else 1.0)
 
     def eye(self, viewpoint: np.ndarray) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-        """A viewpoint, m (3,), for the kernels, and the power of two that makes its distance about one."""
+        """A viewpoint, m (3,), in the frame, and the power of two that scales its distance to about 1."""
         at = (np.asarray(viewpoint, np.float64) - self.center) * self.unit
         shrink = 2.0 ** -np.ceil(np.log2(max(float(np.abs(at).max()), 1.0)))
         x, y, z = at.astype(np.float32)
         return x, y, z, np.float32(shrink)
 
 
-class Facets:
-    """Facets on a device, m (k, 3, 3), as those who are looked at.
+class DeviceFacets:
+    """Facets on a device, m (k, 3, 3), whose illumination is computed.
 
-    frame      of all that can hide them too
-    one_sided  (k,) bool: dark from behind
+    frame      holds all that can occlude them too
+    one_sided  (k,) bool: not illuminated from behind
     """
 
     def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
@@ -65,7 +65,7 @@ class Facets:
 
 
 class Occluders:
-    """Facets on a device, m (k, 3, 3), as those who hide: a tree of boxes, eight children each."""
+    """Facets on a device, m (k, 3, 3), that occlude others: a tree of boxes with eight children each."""
 
     def __init__(self, device: Device, triangles: np.ndarray, frame: Frame) -> None:
         self.device, self.frame = device, frame
@@ -82,7 +82,7 @@ class Occluders:
             levels.append(np.stack([low, high], axis=1).transpose(0, 1, 3, 2))
             if len(low) == 1:
                 break
-            # the filling is no part of the boxes above
+            # boxes that only fill up a node do not extend its parent
             low, high = low.min(axis=1), np.where(high == FAR, -FAR, high).max(axis=1)
         levels.reverse()
         self.depth = len(levels)
@@ -91,15 +91,18 @@ class Occluders:
         self.node = device.upload(np.concatenate(levels))
         self.base = device.upload(base.astype(np.int32))
 
-    def hide(self, facets: Facets, index: Any, n: int, places: Any, viewpoint: np.ndarray, hidden: Any) -> None:
-        """Set the bits of hidden samples: index (n,) int32, places (buffer, samples), hidden (n,) uint64."""
+    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+        """Set the bits of occluded sample points.
+
+        index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
+        """
         kernel = self.device.kernel("ray_casting.cl", "hidden")
-        arguments = (facets.buffer, index, *places, *self.frame.eye(viewpoint))
+        arguments = (facets.buffer, index, *points, *self.frame.eye(viewpoint))
         self.device.run(kernel, (n,), None, *arguments, self.leaf, self.node, self.base, self.depth, hidden)
 
 
 def _curve(points: np.ndarray) -> np.ndarray:
-    """Place (n,) of points (n, 3) between -1 and 1 on a curve that fills space (Morton 1966)."""
+    """Position (n,) of points (n, 3), between -1 and 1, on a space-filling curve (Morton 1966)."""
     return interleaved(np.clip((points + 1) * 2.0**20, 0, 2**21 - 1).astype(np.uint64))
 
 

@@ -1,4 +1,4 @@
-"""What a terrain of heights hides: horizons along range lines, about one look at a cell for each viewpoint."""
+"""Occlusion by a terrain of heights: horizons along range lines, about one evaluation per cell and viewpoint."""
 
 from __future__ import annotations
 
@@ -8,9 +8,9 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._ray_casting import Facets, Frame
+from ._ray_casting import DeviceFacets, Frame
 
-FINE = 2  # range lines a cell, where the terrain ends
+FINE = 2  # range lines per cell at the border of the terrain
 
 
 class Terrain:
@@ -25,14 +25,14 @@ class Terrain:
         z = z.astype(np.float32)
         self.z_rows, self.z_columns = device.upload(z), device.upload(z.T)
 
-    def scan(self, viewpoint: np.ndarray) -> Scan:
-        """Horizons seen from a viewpoint, m (3,)."""
+    def sweep(self, viewpoint: np.ndarray) -> Horizons:
+        """Horizons along range lines around a viewpoint, m (3,)."""
         eye = (viewpoint - self.frame.center) * self.frame.unit
         sectors = [_sector(self.axes, self.per, eye, axis, sign) for axis in (0, 1) for sign in (1, -1)]
         offsets = np.cumsum([0, *(len(s.lines) * s.columns for s in sectors)])
         table = self.device.empty(4 * max(int(offsets[-1]), 1))
         kernel = self.device.kernel("terrain_horizon.cl", "sweep")
-        held = []  # until the kernels are done with them
+        held = []  # buffers that must outlive the kernels
         for s, offset in zip(sectors, offsets, strict=False):
             if not s.columns:
                 continue
@@ -48,11 +48,11 @@ class Terrain:
         ]
         number = [(s.end, s.start, s.density, 0, 0, 0, 0, 0) for s in sectors]
         numbers = self.device.upload(np.array(number, np.float32))
-        return Scan(self, viewpoint, numbers, self.device.upload(np.array(whole, np.int32)), table, held)
+        return Horizons(self, viewpoint, numbers, self.device.upload(np.array(whole, np.int32)), table, held)
 
 
 @dataclass(frozen=True, eq=False)
-class Scan:
+class Horizons:
     """The horizons of one viewpoint, on the device."""
 
     terrain: Terrain
@@ -62,13 +62,13 @@ class Scan:
     table: Any
     held: list[Any]
 
-    def hide(self, facets: Facets, index: Any, n: int, places: Any, hidden: Any) -> None:
-        """Set the bits of hidden samples: index (n,) int32, places (buffer, samples), hidden (n,) uint64."""
+    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, hidden: Any) -> None:
+        """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
         t = self.terrain
         kernel = t.device.kernel("terrain_horizon.cl", "horizon")
         eye = t.frame.eye(self.viewpoint)[:3]
         grid = (t.x, t.y, t.z_rows, t.z_columns, len(t.axes[0]), len(t.axes[1]), *np.array(t.per, np.float32))
-        arguments = (facets.buffer, index, *places, *eye, *grid, self.number, self.whole, self.table, hidden)
+        arguments = (facets.buffer, index, *points, *eye, *grid, self.number, self.whole, self.table, hidden)
         t.device.run(kernel, (n,), None, *arguments)
 
 
@@ -76,9 +76,9 @@ class Scan:
 class _Sector:
     """Range lines that cross at least as many grid lines along `axis` as across it.
 
-    end      of the terrain, where lines are told by their places `start` + i/density
-    lines    (n, 2): place there, and slope
-    first    grid line next to the viewpoint, of `columns` on the way outwards, `step`
+    end      coordinate along `axis` of the terrain's border; there line i has the coordinate start + i/density across
+    lines    (n, 2): coordinate across at the border, and slope
+    first    grid line next to the viewpoint; from it outwards, by `step`, there are `columns` grid lines
     """
 
     axis: int
@@ -94,7 +94,7 @@ class _Sector:
 def _sector(axes: Any, per: Any, eye: np.ndarray, axis: int, sign: int) -> _Sector:
     along, across = axes[axis], axes[1 - axis]
     end = along[-1] if sign > 0 else along[0]
-    # columns under the viewpoint itself have no range line
+    # grid lines through the viewpoint itself cross no range line
     out = np.flatnonzero(sign * (along - eye[axis]) * per[axis] > 1e-3)[::sign]
     none = _Sector(axis, sign, 0, end, 0.0, 1.0, np.zeros((0, 2)), 0)
     if len(out) == 0:

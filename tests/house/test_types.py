@@ -33,7 +33,7 @@ from sarcl.simulation.echo import SKIPS, EchoOptions, Polarization, Skip
 ROOT = Path(__file__).parents[2]
 MODULES = {f"sarcl.{n}": getattr(sarcl, n) for n in sarcl.__all__ if inspect.ismodule(getattr(sarcl, n))}
 MODULES["sarcl.papers.farooq.range_zones"] = range_zones
-ONLY = {"sarcl.illumination": ("lit", "Lighting")}  # of a module whose other names are not for users
+ONLY = {"sarcl.illumination": ("lit", "Illumination")}  # of a module whose other names are not for users
 EXTRAS = {"distributed": types.SimpleNamespace(Client=object)}  # packages of extras, which need not be installed
 
 

@@ -12,10 +12,11 @@ from sarcl.base.boxes import box
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import areas, centroids, normals
-from sarcl.visibility import illumination
-from sarcl.visibility._aspect_blocks import enough_looks, lever, pulse_blocks, reach
-from sarcl.visibility._facet_samples import SAMPLES, places
-from sarcl.visibility.illumination import Light, lit
+from sarcl.visibility import _illumination_solver
+from sarcl.visibility._aspect_blocks import projected_width, pulse_blocks, refine_viewpoints, shadow_length
+from sarcl.visibility._facet_samples import SAMPLES, sample_points
+from sarcl.visibility._illumination_solver import IlluminationSolver
+from sarcl.visibility.illumination import lit
 
 TOLERANCE = {
     "straight edge": 1 / 16 + 0.004,  # the finest sampling, and 1/255 steps with the lift's displacement
@@ -73,7 +74,12 @@ def area_within(triangle, outline):
 
 
 def shares(triangles, viewpoint, device=None, tolerance=1 / 16, **options):
-    return Light(open_device(device), triangles, tolerance=tolerance, **options).share([np.asarray(viewpoint)]) / 255
+    return (
+        IlluminationSolver(open_device(device), triangles, tolerance=tolerance, **options).share(
+            [np.asarray(viewpoint)]
+        )
+        / 255
+    )
 
 
 @pytest.mark.parametrize("name", BODIES)
@@ -133,7 +139,7 @@ def test_a_large_facet_half_in_shadow_returns_its_lit_share(tolerance):
 def test_sample_points_fill_triangles_evenly():
     """Behind any straight edge the share of points is the share of area within the error that SAMPLES states."""
     for n, stated in SAMPLES:
-        points = places(n).astype(float)
+        points = sample_points(n).astype(float)
         assert points.shape == (n, 2) and (points > 0).all() and (points.sum(axis=1) < 1).all()
         worst = 0.0
         for angle in np.linspace(0, 2 * np.pi, 1001):
@@ -150,7 +156,7 @@ def test_shares_are_those_of_the_reference_in_a_soup(device):
     random = np.random.default_rng(8)
     soup = random.uniform(-5, 5, (60, 1, 3)) + 2 * random.standard_normal((60, 3, 3))
     for viewpoint in (eye(20, 50), np.array([1.0, 0.5, -0.2]), eye(100, 80, 14)):
-        wanted = 1 - hidden(soup, viewpoint, places(16)).mean(axis=1)
+        wanted = 1 - hidden(soup, viewpoint, sample_points(16)).mean(axis=1)
         assert shares(soup, viewpoint, device, tolerance=0.14) == pytest.approx(wanted, abs=0.51 / 255)
 
 
@@ -183,16 +189,16 @@ def test_shares_do_not_depend_on_order_chunks_or_device(device, monkeypatch):
     wanted = shares(scene, viewpoint)
     assert (shares(scene, viewpoint, device) == wanted).all() and 0.05 < (wanted < 1).mean() < 0.5
     assert (shares(scene[order], viewpoint, device) == wanted[order]).all()
-    monkeypatch.setattr(illumination, "CHUNK", 333)
+    monkeypatch.setattr(_illumination_solver, "CHUNK", 333)
     assert (shares(scene, viewpoint, device) == wanted).all()
 
 
 def test_fine_facets_get_the_shares_that_all_samples_give(monkeypatch):
     """Corners and centre find every facet on the edge of a shadow that is wider than facets are."""
     scene = np.concatenate([ground(60), BODIES["frustum"].triangles])
-    assert len(scene) > illumination.FEW
+    assert len(scene) > _illumination_solver.FEW
     some = shares(scene, eye(12, 55), two_sided=False)
-    monkeypatch.setattr(illumination, "FEW", 10**9)
+    monkeypatch.setattr(_illumination_solver, "FEW", 10**9)
     full = shares(scene, eye(12, 55), two_sided=False)
     assert np.abs(some - full).max() <= 1 / 16 and ((full > 0) & (full < 1)).sum() > 20
 
@@ -203,7 +209,9 @@ def test_a_large_facet_among_fine_ones_holds_a_whole_shadow():
     lid = ground(60, 6.0) + np.array([-6.0, 0.0, 3.0])
     share = shares(np.concatenate([plate, lid]), [-6.0, 0, 1e7])
     assert (
-        len(lid) > illumination.FEW and share[0] == pytest.approx(1 - 36 / 200, abs=1 / 16) and (share[1:] == 1).all()
+        len(lid) > _illumination_solver.FEW
+        and share[0] == pytest.approx(1 - 36 / 200, abs=1 / 16)
+        and (share[1:] == 1).all()
     )
 
 
@@ -225,7 +233,7 @@ def test_a_short_straight_track_is_one_block_a_circle_many():
     assert len(lit(scene, straight(1000), two_sided=False)) == 1
     tx = circle(1000)
     bounds = box(scene.reshape(-1, 3))
-    offered = len(pulse_blocks([tx], bounds, [0.25 * reach(scene, tx[500]) / lever(bounds, tx)])[0])
+    offered = len(pulse_blocks([tx], bounds, [0.25 * projected_width(scene, tx[500]) / shadow_length(bounds, tx)])[0])
     assert 100 < offered < 500
     assert offered / 8 < len(lit(scene, tx, two_sided=False)) < offered / 2  # not all of them need a look
     assert len(lit(ground(), circle(1000), two_sided=False)) == 1  # nothing stands above the ground
@@ -258,6 +266,10 @@ def test_directions_within_a_block_differ_by_no_more_than_the_limit(track):
         assert worst > 0.8 * limit and len(blocks) < 1.3 * np.ceil(total_turn(tx) / (2 * limit))
 
 
+def block_at(found, pulse):
+    return int(np.searchsorted(found.blocks[:, 0], pulse, side="right")) - 1
+
+
 def total_turn(tx):
     """Way of the direction from the origin, rad."""
     way = tx / np.linalg.norm(tx, axis=1, keepdims=True)
@@ -267,16 +279,16 @@ def total_turn(tx):
 @pytest.mark.parametrize("tolerance", [0.25, 0.0625])
 def test_a_sweeping_poles_shadow_is_right_at_every_pulse_within_the_bound(tolerance):
     scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
-    light = Light(open_device(), scene, two_sided=False, tolerance=1 / 16)
+    light = IlluminationSolver(open_device(), scene, two_sided=False, tolerance=1 / 16)
     blocks = lit(scene, tx, two_sided=False, tolerance=tolerance)
     assert len(blocks) > 5
-    typical, way = reach(scene, tx[350]), lever(box(scene.reshape(-1, 3)), tx)
+    typical, way = projected_width(scene, tx[350]), shadow_length(box(scene.reshape(-1, 3)), tx)
     u = tx[350] / np.linalg.norm(tx[350])
     own = areas(scene) * np.abs(normals(scene) @ u) / np.linalg.norm(scene - np.roll(scene, 1, 1), axis=2).max(axis=1)
     floor = np.arange(len(scene)) < 1800
     worst = 0.0
     for pulse in range(0, 700, 23):
-        block = blocks.block_of(pulse)
+        block = block_at(blocks, pulse)
         assert blocks.blocks[block, 0] <= pulse < blocks.blocks[block, 1]
         moved = np.abs(light.share([tx[pulse]]) / 255.0 - light.share([tx[blocks.viewpoints[block]]]) / 255.0)
         # two samplings, and two edges of a shadow narrower than a facet
@@ -290,7 +302,7 @@ def test_a_sweeping_poles_shadow_is_right_at_every_pulse_within_the_bound(tolera
 def test_shares_change_evenly_between_the_pulses_looked_from():
     scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
     found = lit(scene, tx, two_sided=False, tolerance=0.5)
-    light = Light(open_device(), scene, two_sided=False, tolerance=1 / 16)
+    light = IlluminationSolver(open_device(), scene, two_sided=False, tolerance=1 / 16)
     spans = list(found.spans())
     assert [s.first for s in spans] == [0, *(s.stop for s in spans[:-1])] and spans[-1].stop == len(tx)
     assert len(found) - 1 <= len(spans) <= len(found) + 1
@@ -302,7 +314,7 @@ def test_shares_change_evenly_between_the_pulses_looked_from():
             assert share == pytest.approx(found.fraction_at(pulse), abs=1e-6)
             true = light.share([tx[pulse]]) / 255.0
             even += ((share - true) ** 2).sum()
-            stepped += ((found.fraction(found.block_of(pulse)) - true) ** 2).sum()
+            stepped += ((found.fraction(block_at(found, pulse)) - true) ** 2).sum()
     assert even < 0.7 * stepped  # the rest is that shares are counted in samples
     for block, pulse in enumerate(found.viewpoints):
         assert (found.fraction_at(pulse) == found.fraction(block)).all()
@@ -319,13 +331,13 @@ def test_where_shadows_hardly_move_every_sixteenth_block_is_looked_at(monkeypatc
         return shares[place]
 
     at = 3 * np.arange(100)
-    found = dict(enough_looks(look, at))
+    found = dict(refine_viewpoints(look, at))
     assert list(found) == sorted(asked) == [*range(0, 97, 8), 97, 99] and len(set(asked)) == len(asked)
     shares[:, 1:20] = (np.arange(100) * 2)[:, None]  # even change
-    assert len(list(enough_looks(look, at))) == len(found)
+    assert len(list(refine_viewpoints(look, at))) == len(found)
     shares[39:42, 30] = 255  # something passes: it is looked at as closely as it needs
-    assert {36, 38, 39, 40, 41, 42, 44} <= set(dict(enough_looks(look, at)))
-    assert [list(dict(enough_looks(look, at[:n]))) for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]
+    assert {36, 38, 39, 40, 41, 42, 44} <= set(dict(refine_viewpoints(look, at)))
+    assert [list(dict(refine_viewpoints(look, at[:n]))) for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]
 
 
 def test_lighting_tells_dark_full_and_changing_facets(device):
@@ -334,8 +346,7 @@ def test_lighting_tells_dark_full_and_changing_facets(device):
     all_of_them = np.array([found.share(i) for i in range(len(found))])
     assert (found.dark == (all_of_them == 0).all(axis=0)).all() and 2 <= found.dark.sum() < 30
     assert (found.full == (all_of_them == 255).all(axis=0)).all() and 500 < found.full.sum() < 800
-    pulses = np.diff(found.blocks, axis=1)[:, 0]
-    assert found.dark_pairs() == (pulses * (all_of_them == 0).sum(axis=1)).sum()
+    assert (found.dark_facets == (all_of_them == 0).sum(axis=1)).all()
     assert found.fraction(0).dtype == np.float32 and found.fraction(-1).max() == 1
 
 
@@ -375,7 +386,7 @@ def test_a_scene_wholly_in_shadow_says_so():
     with pytest.warns(sarcl.SarclWarning, match="the whole scene is in shadow"):
         found = lit(np.concatenate([under, lid]), eye(0, 40)[None], wanted=wanted)
     assert found.dark.all()
-    with pytest.warns(sarcl.SarclWarning, match="the side the track is on"):
+    with pytest.warns(sarcl.SarclWarning, match="check the side the track is on"):
         lit(under, -eye(0, 40)[None], two_sided=False)
 
 
@@ -402,7 +413,7 @@ def test_bad_input_is_refused(change, message):
 
 def test_no_facet_is_lit_too():
     none = lit(np.zeros((0, 3, 3)), circle(5))
-    assert len(none) == 1 and none.share(0).shape == (0,) and none.block_of(4) == 0
+    assert len(none) == 1 and none.share(0).shape == (0,) and (none.blocks == [0, 5]).all()
 
 
 def test_embree_sees_what_opencl_sees():
