@@ -6,11 +6,11 @@ For other folders:
 
 For this folder alone:
 
-    _aperture_view     pulses as seen on a grid, with trial corrections
-    _bright_points     bright places of an image, and each row's contribution to them
+    _aperture_view     pulses of an aperture with trial corrections, and their images on a grid
+    _bright_points     bright points of an image, and the contribution of each row to them
     _phase_gradient    phase of each pulse from its contributions
     _phase_smoothing   phase over the aperture: smoothed, unwrapped
-    _search            phases and ranges that make the bright places sharpest
+    _search            search for the phases and ranges that maximise the sharpness of bright points
 """
 
 __all__ = ["autofocus"]

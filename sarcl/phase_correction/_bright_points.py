@@ -1,4 +1,4 @@
-"""Bright places of an image, and what each row contributes there: v_p(x), the terms of the image equation."""
+"""Bright points of an image, and the contribution of each row to them: v_p(x), the terms of the image equation."""
 
 from __future__ import annotations
 
@@ -13,17 +13,17 @@ from ..numerics import range_profiles
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 
-CANDIDATES = 50_000  # brightest pixels looked at
-OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, and another one at each place
-ROWS = 64  # at a time
+CANDIDATES = 50_000  # brightest pixels from which points are chosen
+OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, different at each point
+ROWS = 64  # rows per array operation: bounds the memory
 
 
 def in_pulses(raw: PhaseHistory) -> np.ndarray:
     """Rows by pulse and channel, (n_pulses, n_channels), pulses in order of time.
 
     Rows of equal time are one pulse; without times, rows with equal antenna positions, in the order in which
-    they come. A channel is a (tx_channel, rx_channel, polarization). ValueError where a pulse has a channel
-    twice, or lacks one that others have.
+    they come. A channel is a (tx_channel, rx_channel, polarization). Raises ValueError where a pulse has a channel
+    twice, or lacks a channel of other pulses.
     """
     key = np.concatenate([raw.tx, raw.rx], axis=1) if raw.time is None else raw.time[:, None]
     _, first, pulse = np.unique(key, axis=0, return_index=True, return_inverse=True)
@@ -55,8 +55,8 @@ def in_pulses(raw: PhaseHistory) -> np.ndarray:
         }
         lacking = ", ".join(f"{k} {v[there]}" for k, v in names.items() if v is not None)
         raise ValueError(
-            f"pulse {pulse_at} has no row of {lacking}, others have; autofocus takes one phase a pulse from all its "
-            "channels: choose rows that every pulse has, with raw.select(...)"
+            f"pulse {pulse_at} has no row of {lacking}, other pulses have; autofocus estimates one phase per pulse "
+            "from all its channels: choose rows that every pulse has, with raw.select(...)"
         )
     return rows
 
@@ -71,12 +71,12 @@ def energy(raw: PhaseHistory) -> np.ndarray:
 
 
 def delay(raw: PhaseHistory, row: int, places: np.ndarray) -> np.ndarray:
-    """tau - tau_ref of one row at places, m (n, 3): s (n,)."""
+    """Delays tau - tau_ref of one row at places, m (n, 3): s (n,)."""
     return 2 * (half_path(raw.tx[row], raw.rx[row], places) - raw.reference_range[row]) / SPEED_OF_LIGHT
 
 
 def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:
-    """The `most` brightest pixels, brightest first, none of them dark: places, m (n, 3). power  of grid.shape."""
+    """Positions, m (n, 3), of the `most` brightest pixels, brightest first, none with power 0; power  of grid.shape."""
     flat = power.ravel()
     count = min(most, flat.size)
     chosen = np.argpartition(flat, flat.size - count)[flat.size - count :]
@@ -86,10 +86,10 @@ def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:
 
 
 def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: float, most: int) -> np.ndarray:
-    """Up to `most` places, m (n, 3): the brightest pixels, no two in one range cell and `width` Doppler cells.
+    """Up to `most` points, m (n, 3): the brightest pixels, no two within one range cell and `width` Doppler cells.
 
-    power  of the image, of grid.shape. Range cells: the delay at mid-aperture times the bandwidth. Doppler
-    cells: turns of the carrier between the first row and the last. Both follow from the geometry alone.
+    power  of the image, of grid.shape. Range cells: the delay at mid-aperture times the bandwidth. Doppler cells:
+    cycles of the carrier between the first row and the last. Both follow from the geometry alone.
     """
     places = pixels(power, grid, CANDIDATES)
     first, middle, last = (delay(raw, row, places) for row in (0, raw.n_rows // 2, raw.n_rows - 1))
@@ -101,7 +101,7 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
     names = boxes @ np.array([2**32, 1])
     taken: dict[tuple[int, int], np.ndarray] = {}
     kept: list[int] = []
-    # the brightest of each box, unless a brighter one lies within a cell of it in a box beside
+    # the brightest of each box, unless a brighter one in a neighbouring box lies within a cell of it
     for i in np.sort(np.unique(names, return_index=True)[1]):
         a, b = (int(x) for x in boxes[i])
         around = [taken.get((a + da, b + db)) for da in (-1, 0, 1) for db in (-1, 0, 1)]
@@ -114,9 +114,9 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
 
 
 def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float) -> np.ndarray:
-    """v_p(x)/scale at places x, m (n, 3), and beside them in range: complex64 (n_rows, n, n_lags).
+    """v_p(x)/scale at points x, m (n, 3), and at lags behind them in range: complex64 (n_rows, n, n_lags).
 
-    lags  cells of c/(2 bandwidth) by which the profile is read behind x, with the carrier's phase of x itself
+    lags  cells of c/(2 bandwidth) behind x at which the range profile is read, with the carrier phase of x itself
     """
     n_rows, n_samples = raw.n_rows, raw.n_samples
     length = fft.good_length(OVERSAMPLE * n_samples)

@@ -1,12 +1,12 @@
-"""Phase of each pulse, from what bright places of an image get from it. Numbers in, numbers out.
+"""Phase of each pulse from its contributions to bright points of an image; functions of plain arrays.
 
-v[p, k] is the contribution of pulse p to place k (columns may also be lags and channels of it), complex64 (n, columns);
-pulse p carries the unknown factor exp(j phase[p]). Across p a scatterer beside place k turns evenly: the FFT over
-p is the image on a line through k, one bin a resolution cell of the whole aperture ("Doppler").
+v[p, k] is the contribution of pulse p to point k (columns may also be lags and channels of it), complex64 (n, columns);
+pulse p has the unknown factor exp(j phase[p]). The phase of a scatterer beside point k is linear in p: the FFT over p
+is the image on a line through k, one bin per resolution cell of the whole aperture ("Doppler").
 
-`gradient` is phase gradient autofocus with the power method for the principal eigenvector: robust from afar.
-`sharpen` climbs sum |I|^4: exact at the end. That sum is convex in exp(-j phase), so that going to the best phase
-of its linear part never lowers it.
+`gradient` is phase gradient autofocus with the power method for the principal eigenvector: robust for large errors.
+`sharpen` maximises sum |I|^4: accurate for small errors. That sum is convex in exp(-j phase): a step to the maximum of
+its linear part never decreases it.
 
 Sources: Wahl, Eichel, Ghiglia, Jakowatz, Phase gradient autofocus, IEEE Trans. AES 30(3), 1994; Jakowatz and Wahl,
 Eigenvector method for maximum-likelihood estimation of phase errors, JOSA A 10(12), 1993; Ash, An autofocus method for
@@ -21,17 +21,17 @@ import numpy as np
 
 from ._phase_smoothing import cosines, detrended
 
-CHUNK = 2**22  # values transformed at a time
-POWER_STEPS = 10
-NARROWEST = 10.0  # Doppler bins that `gradient` leaves about a point
+CHUNK = 2**22  # values per FFT call: bounds the memory
+POWER_STEPS = 10  # iterations of the power method
+NARROWEST = 10.0  # Doppler bins, smallest window of `gradient` about a point
 
 
 def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
-    """Phase (n,), rad, that brings the columns of v (n, columns) to points: a pass for each width (Doppler bins).
+    """Phase (n,), rad, whose removal focuses the columns of v (n, columns) to points: a pass per width (Doppler bins).
 
     A pass shifts every column's brightest bin, within +-width/2, to 0, cuts out `width` bins about it, takes
     the phase from pulse to pulse, common to all columns, and refines it as the principal eigenvector of their
-    covariance. Columns count by the ratio of point to clutter that their fourth moment tells.
+    covariance. Columns are weighted by their ratio of point to clutter, which is estimated from the fourth moment.
     """
     n = len(v)
     phase = np.zeros(n)
@@ -54,7 +54,7 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
     """The phase (n,) near `phase` where sum |I|^4 over `width` Doppler bins about 0 has its maximum.
 
     I is the FFT over pulses of v exp(-j phase); for width 0 only its bin 0, the image at the places themselves.
-    Stops after `steps`, or when a step gains less than `enough`.
+    Stops after `steps`, or when the relative gain of a step is less than `enough`.
     """
     before = 0.0
     for _ in range(steps):
@@ -70,7 +70,7 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
 
 
 def extended(v: np.ndarray, first: int, last: int) -> np.ndarray:
-    """Phase (n,) of all pulses against the image that pulses first ... last - 1 make at the places; theirs is 0."""
+    """Phase (n,) of all pulses relative to the image of pulses first ... last - 1 at the points; 0 for these pulses."""
     image = v[first:last].sum(axis=0, dtype=np.complex64)
     phase = np.angle(v @ (_cubed(image).conj()))
     phase[first:last] = 0
@@ -78,22 +78,22 @@ def extended(v: np.ndarray, first: int, last: int) -> np.ndarray:
 
 
 def sharpness(v: np.ndarray, phase: np.ndarray, width: float) -> float:
-    """Sum |I|^4 over `width` Doppler bins, on an axis so fine that it does not matter where points lie between bins."""
+    """Sum |I|^4 over `width` Doppler bins, sampled so finely that the position of points between bins has no effect."""
     return sum(_fourth(image) for _, image in _images(v, phase, width))
 
 
 def range_shift(v: np.ndarray, phase: np.ndarray, width: float, modes: int) -> np.ndarray:
-    """How many lags later than its common image each pulse's echo comes: (n,), smooth, mean 0, within +-1.
+    """Delay of each pulse's echo relative to the image of all pulses, in lags: (n,), smooth, mean 0, within +-1.
 
-    v (n, columns, lags) at lags of half a range cell. The correlation of a pulse with sum |I|^4's linear part
-    has its maximum where they fit; a Newton step towards it, least squares with the curvatures as weights, on
-    `modes` cosines over the aperture.
+    v (n, columns, lags) at lags of half a range cell. The correlation of a pulse with the linear part of sum |I|^4 is
+    largest at its delay. One Newton step towards that maximum, fitted by least squares with the curvatures as weights
+    to `modes` cosines over the aperture.
     """
     n, _, lags = v.shape
     flat = v.reshape(n, -1)
     fit = np.zeros((3, n))
     for columns, image in _images(flat, phase, width):
-        back = _back(image, n).reshape(n, -1, lags)[:, :, 1:-1].conj()  # whole places: see _images
+        back = _back(image, n).reshape(n, -1, lags)[:, :, 1:-1].conj()  # all lags of a point: see _images
         part = flat[:, columns].reshape(n, -1, lags)
         for i in range(3):
             fit[i] += ((back * part[:, :, i : lags - 2 + i]).sum(axis=(1, 2)) * np.exp(-1j * phase)).real
@@ -107,21 +107,21 @@ def range_shift(v: np.ndarray, phase: np.ndarray, width: float, modes: int) -> n
 
 
 def turned(v: np.ndarray, phase: np.ndarray) -> np.ndarray:
-    """v (n, columns) with the phase (n,) taken off."""
+    """v (n, columns) with the phase (n,) removed."""
     return np.asarray(v * np.exp(-1j * phase).astype(np.complex64)[:, None])
 
 
 def _length(n: int) -> int:
-    """Of the Doppler axis: twice n or more, so that |I|^2 is sampled as finely as it varies and nothing wraps."""
+    """Length of the Doppler axis: 2 n or more, so that |I|^2 is sampled at its Nyquist rate and nothing wraps."""
     import scipy.fft
 
     return int(scipy.fft.next_fast_len(2 * n))
 
 
 def _images(v: np.ndarray, phase: np.ndarray, width: float) -> Iterator[tuple[slice, np.ndarray]]:
-    """(columns, I (length, columns)) of v (n, columns or columns x lags), some whole places at a time.
+    """(columns, I (length, columns)) of v (n, columns or columns x lags), block by block of points with all their lags.
 
-    I is zero outside of `width` Doppler bins about 0.
+    I is zero outside `width` Doppler bins about 0.
     """
     import scipy.fft
 
@@ -131,7 +131,7 @@ def _images(v: np.ndarray, phase: np.ndarray, width: float) -> Iterator[tuple[sl
     n = len(v)
     length = _length(n)
     half = int(np.ceil(width / 2 * length / n))
-    step = max(1, CHUNK // length // 36) * 36  # a multiple of every count of lags in use (1 and 9)
+    step = max(1, CHUNK // length // 36) * 36  # a multiple of both numbers of lags in use, 1 and 9
     for first in range(0, v.shape[1], step):
         columns = slice(first, first + step)
         image = scipy.fft.fft(turned(v[:, columns], phase), length, axis=0, overwrite_x=True)
@@ -146,7 +146,7 @@ def _fourth(image: np.ndarray) -> float:
 
 
 def _back(image: np.ndarray, n: int) -> np.ndarray:
-    """|I|^2 I back in pulses, (n, columns), or (1, columns) where it is the same for all: sum |I|^4's derivative."""
+    """Derivative of sum |I|^4: |I|^2 I transformed to pulses (n, columns), or (1, columns) if the same for all."""
     import scipy.fft
 
     cubed = _cubed(image)
@@ -160,7 +160,7 @@ def _cubed(image: np.ndarray) -> np.ndarray:
 
 
 def _centered(v: np.ndarray, width: float) -> np.ndarray:
-    """Columns turned so that the brightest Doppler bin within +-width/2 comes to bin 0."""
+    """Columns shifted so that the brightest Doppler bin within +-width/2 comes to bin 0."""
     import scipy.fft
 
     n = len(v)
@@ -179,13 +179,13 @@ def _centered(v: np.ndarray, width: float) -> np.ndarray:
 
 
 def _windowed(v: np.ndarray, width: float) -> np.ndarray:
-    """Columns with only the `width` Doppler bins about 0 left."""
+    """Columns with all but the `width` Doppler bins about 0 set to zero."""
     import scipy.fft
 
     n = len(v)
     if width >= n:
         return v
-    length = _length(n)  # zeros behind: nothing leaks from the last pulse to the first
+    length = _length(n)  # padded: the last pulse does not leak into the first
     bins = np.minimum(np.arange(length), length - np.arange(length)) * n / length
     out = np.empty_like(v)
     step = max(1, CHUNK // length)

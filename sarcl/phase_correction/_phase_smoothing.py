@@ -1,4 +1,4 @@
-"""Phase as a curve over the pulses of an aperture, (n,) rad: smoothed, unwrapped, and moved as an image shift does."""
+"""Phase as a function of the pulse, (n,) rad: smoothing, unwrapping, and registration, which shifts the image."""
 
 from __future__ import annotations
 
@@ -6,8 +6,8 @@ from collections.abc import Iterator
 
 import numpy as np
 
-MENDINGS = 4
-MOST_BINS = 256.0  # Doppler cells by which two images are looked for apart
+MENDINGS = 4  # corrections of a smoothed phase by its wrapped residual
+MOST_BINS = 256.0  # Doppler cells, largest shift between two images that is searched
 
 
 def cosines(n: int, modes: int) -> np.ndarray:
@@ -16,15 +16,16 @@ def cosines(n: int, modes: int) -> np.ndarray:
 
 
 def smooth(phase: np.ndarray, modes: int) -> np.ndarray:
-    """The `modes` cosines and slope that fit exp(j phase) best, phase (n,) wrapped or not; all of it where modes is n.
+    """The sum of `modes` cosines and a slope that fits exp(j phase) best, phase (n,) wrapped or not.
 
-    Noise makes plain unwrapping slip by 2 pi now and then, and a slip spoils any smoothing. So several ways to unwrap
-    are smoothed, each is mended by what it leaves, wrapped, and the closest wins.
+    Where modes is n the phase is unwrapped, not smoothed. With noise, plain unwrapping makes errors of 2 pi, each of
+    which spoils any smoothing. So the results of several unwrapping methods are smoothed, each is corrected by its
+    wrapped residual, and the closest is returned.
     """
     if modes >= len(phase):
         return unwrapped(phase)
     best, closest = phase, -1.0
-    for way in _ways(phase):
+    for way in _unwrappings(phase):
         fit = _lowest(way, modes)
         for _ in range(MENDINGS):
             fit = fit + _lowest(_wrapped(phase - fit), modes)
@@ -35,18 +36,18 @@ def smooth(phase: np.ndarray, modes: int) -> np.ndarray:
 
 
 def unwrapped(phase: np.ndarray) -> np.ndarray:
-    """phase (n,) without jumps, as well as noise allows, and where it climbs by more than pi a pulse.
+    """phase (n,) unwrapped, also with noise, and where it changes by more than pi per pulse.
 
-    Of several ways, and of those that stay within pi of a smoothed one, the curve with the least bends.
+    Of the results of several methods, and of those within pi of a smoothed phase: the one with the least curvature.
     """
     n = len(phase)
     bases = [smooth(phase, modes) for modes in (8, n // 16, n // 8, n // 4) if 1 < modes < n]
-    curves = [*_ways(phase), *(base + _wrapped(phase - base) for base in bases)]
+    curves = [*_unwrappings(phase), *(base + _wrapped(phase - base) for base in bases)]
     return min(curves, key=lambda curve: float((np.diff(curve, 2) ** 2).sum()))
 
 
-def _ways(phase: np.ndarray) -> Iterator[np.ndarray]:
-    """Plainly unwrapped; along what stands out of the noise; and that after the slope, smoothed over some pulses."""
+def _unwrappings(phase: np.ndarray) -> Iterator[np.ndarray]:
+    """Unwrapped plainly; along the spectral peaks above the noise; and so after removal of a smoothed slope."""
     import scipy.fft
     import scipy.ndimage
 
@@ -59,7 +60,7 @@ def _ways(phase: np.ndarray) -> Iterator[np.ndarray]:
             slope = np.unwrap(np.angle(scipy.ndimage.uniform_filter1d(step, max(3, over), mode="nearest")))
             base[1:] = np.cumsum(slope)
         rest = phase - base
-        mirrored = np.exp(1j * np.concatenate([rest, rest[::-1]]))  # no jump from the end to the start
+        mirrored = np.exp(1j * np.concatenate([rest, rest[::-1]]))  # continuous from the end to the start
         spectrum = scipy.fft.fft(mirrored)
         level = scipy.ndimage.uniform_filter1d(np.abs(spectrum) ** 2, max(3, n // 16), mode="wrap")
         spectrum[level < 4 * np.median(level)] = 0
@@ -69,7 +70,7 @@ def _ways(phase: np.ndarray) -> Iterator[np.ndarray]:
 
 
 def _lowest(curve: np.ndarray, modes: int) -> np.ndarray:
-    """Least squares of a curve (n,) on the first `modes` cosines and a slope, which would take many of them."""
+    """Least-squares fit of a curve (n,) by the first `modes` cosines and a slope, which would take many cosines."""
     import scipy.fft
 
     both = np.stack([curve, np.arange(len(curve)) / len(curve)])
@@ -85,17 +86,17 @@ def _wrapped(phase: np.ndarray) -> np.ndarray:
 
 
 def detrended(phase: np.ndarray, along: np.ndarray | None = None) -> np.ndarray:
-    """phase (n,) less its mean and its least-squares slope along `along` (n,), default the pulses' numbers."""
+    """phase (n,) without its mean and its least-squares slope against `along` (n,), default the pulse number."""
     t = np.arange(len(phase)) if along is None else along
     t = t - t.mean()
     return np.asarray(phase - phase.mean() - t * (t @ phase) / max(t @ t, 1e-300))
 
 
 def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: float) -> tuple[np.ndarray, float]:
-    """`phase` (n,) moved to where its image lies on that of `other`, and how close they are then, 0 to 1.
+    """`phase` (n,) after a shift of its image to that of `other`, and the closeness of the two, 0 to 1.
 
-    along  (n, 2), rad/m: what shifts of the image across range and in range do to the phase
-    reach  m: limit of the shift in range; phases alone hardly tell it from a bend
+    along  (n, 2), rad/m: change of the phase per shift of the image across range, and in range
+    reach  m, largest shift in range: from phases alone it can hardly be distinguished from curvature
     Closeness is |mean exp(j difference)|: 1 for equal phases, about sqrt(log(n)/n) for unrelated ones.
     """
     n = len(phase)
@@ -108,7 +109,7 @@ def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: fl
     close = np.concatenate([np.abs(np.exp(-1j * np.outer(part, moves[:, 0])) @ difference) for part in parts])
     limit = np.array([np.inf, reach])
     best, closest = phase, -1.0
-    # the highest of a fine comb, which noise does not mislead; the unwrapped difference, which may bend
+    # two starts: the best of finely spaced shifts, robust to noise; a fit to the unwrapped difference, also in range
     for start in (np.array([slopes[close.argmax()], 0.0]), fit @ np.unwrap(np.angle(difference))):
         shift = np.clip(start, -limit, limit)
         for _ in range(5):
@@ -121,5 +122,5 @@ def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: fl
 
 
 def chance(n: int) -> float:
-    """Closeness that two unrelated phases of n pulses, shifted at will, reach once in a thousand times."""
+    """Closeness that two unrelated phases of n pulses exceed with probability 1/1000 after registration."""
     return float(np.sqrt(1 - np.exp(-(np.log(n) + np.log(1000)) / (n - 1))))

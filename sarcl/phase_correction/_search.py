@@ -1,4 +1,4 @@
-"""The search behind `autofocus`: phase and range of every pulse that make the bright places of an image sharpest."""
+"""The search of `autofocus`: phase and range of every pulse that maximise the sharpness of bright points."""
 
 from __future__ import annotations
 
@@ -8,34 +8,34 @@ from collections.abc import Callable
 import numpy as np
 
 from . import _phase_gradient
-from ._aperture_view import LAGS, NO_LAG, WINDOW, Errors, View
+from ._aperture_view import LAGS, NO_LAG, WINDOW, ApertureView, Errors
 
 log = logging.getLogger(__name__)
 
-PASSES = 5  # images of one climb, at most
-ENOUGH = 1.002  # gain in sharpness below which a climb ends
-MOVED = 0.05  # range cells below which it does
-GROWTH = 4  # an aperture grows by its fourth part on each side
-LAST_PASSES = 3
-BANDS = 8, 4, 2, 1  # a range error of eight cells is one of an eighth of the band
-LEAST_SAMPLES = 8
-RANGE_MODES = 8  # cosines over the aperture, or an eighth of the pulses where that is fewer
-RANGE_GAIN = 1.015  # what a range error must gain in sharpness to be believed,
-RANGE_CELLS = 0.05  # and how large it must be, rms: less can hardly be seen
+PASSES = 5  # largest number of images in one ascent
+ENOUGH = 1.002  # gain in sharpness below which an ascent ends, if also
+MOVED = 0.05  # range cells: no range error changes by more
+GROWTH = 4  # a sub-aperture grows by a fourth of its length on each side
+LAST_PASSES = 3  # passes over the whole aperture
+BANDS = 8, 4, 2, 1  # parts of the band: a range error of eight cells is one cell of an eighth of the band
+LEAST_SAMPLES = 8  # in a part of the band
+RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of the pulses where that is fewer
+RANGE_GAIN = 1.015  # least gain in sharpness by which range errors are accepted
+RANGE_CELLS = 0.05  # least rms of range errors, cells, at which they are tried: smaller ones can hardly be seen
 
 
-def climb(view: View, errors: Errors) -> Errors:
-    """The errors with the phase near `errors` that makes the image sharpest."""
-    return _narrow(view, errors, False, PASSES) if view.narrow else _grown(view, errors)
+def ascend(view: ApertureView, errors: Errors) -> Errors:
+    """The errors with the phase, near that of `errors`, of the largest sharpness."""
+    return _narrow(view, errors, False, PASSES) if view.is_narrow else _widened(view, errors)
 
 
-def _narrow(view: View, errors: Errors, walk: bool, passes: int) -> Errors:
-    """`climb` over a narrow aperture; with `walk` the range errors too.
+def _narrow(view: ApertureView, errors: Errors, ranges: bool, passes: int) -> Errors:
+    """`ascend` over a narrow aperture; with `ranges` the range errors too.
 
-    Each pass makes an image, picks bright places far enough apart for what is still blurred, and finds the
-    phase there: by gradient from afar, then by sharpness.
+    Each pass makes an image, chooses bright points farther apart than they are still blurred, and estimates the phase
+    from them: by phase gradient autofocus, then by sharpness.
     """
-    n, lags = view.n, LAGS if walk else NO_LAG
+    n, lags = view.n, LAGS if ranges else NO_LAG
     zero = np.zeros(n)
     for k in range(passes):
         places = view.brightest(errors, max(n / 2 / 4**k, 8.0))
@@ -48,26 +48,27 @@ def _narrow(view: View, errors: Errors, walk: bool, passes: int) -> Errors:
         step = _phase_gradient.sharpen(flat, starts[int(np.argmax(levels))], width)
         gain = _phase_gradient.sharpness(flat, step, width) / max(levels[0], 1e-300)
         cells = np.zeros(n)
-        if walk:
+        if ranges:
             cells = _phase_gradient.range_shift(v, step, width, min(RANGE_MODES, n // 8)) / 2
-        errors = view.unmoved((errors[0] + step, errors[1] + cells * view.cell))
+        errors = view.shift_removed((errors[0] + step, errors[1] + cells * view.cell))
         log.debug("pass %d: %d places, sharpness x %.4f, range %.3f cells", k, len(places), gain, abs(cells).max())
         if gain < ENOUGH and abs(cells).max() < MOVED:
             break
     return errors
 
 
-def _grown(view: View, errors: Errors) -> Errors:
-    """`climb` over a wide aperture: a narrow core first, then more and more pulses on both sides of it.
+def _widened(view: ApertureView, errors: Errors) -> Errors:
+    """`ascend` over a wide aperture: the narrow sub-aperture first, then more and more pulses on both sides of it.
 
-    Their phases are those that fit the image of the pulses before; then all climb, in the bright pixels alone.
+    Added pulses get the phases that fit the image of the others best; then all phases are sharpened, in the brightest
+    pixels alone.
     """
     n = view.n
     phase, shift = errors[0].copy(), errors[1]
-    first, last = view.core
-    core = view.pulses(first, last)
-    phase[first:last] = _narrow(core, (phase[first:last], shift[first:last]), False, PASSES)[0]
-    log.debug("core of pulses %d to %d of %d", first, last, n)
+    first, last = view.narrow_pulses
+    narrow = view.pulses(first, last)
+    phase[first:last] = _narrow(narrow, (phase[first:last], shift[first:last]), False, PASSES)[0]
+    log.debug("narrow sub-aperture: pulses %d to %d of %d", first, last, n)
     passes = 0
     while passes < LAST_PASSES:
         passes += last - first == n
@@ -79,43 +80,43 @@ def _grown(view: View, errors: Errors) -> Errors:
         start = _phase_gradient.extended(v, first - low, last - low)
         phase[low:high] += _phase_gradient.sharpen(v, start, 0)
         first, last = low, high
-    return view.unmoved((phase, shift))
+    return view.shift_removed((phase, shift))
 
 
-def searches(view: View, walk: bool) -> int:
-    """How often `search` calls `tick`."""
-    return 1 + (len(BANDS) if walk and view.narrow else 0)
+def searches(view: ApertureView, ranges: bool) -> int:
+    """Number of calls of `tick` by `search`."""
+    return 1 + (len(BANDS) if ranges and view.is_narrow else 0)
 
 
-def search(view: View, walk: bool, tick: Callable[[], None]) -> Errors:
-    """Errors from scratch. A range error is believed where it is sharper than the best without one.
+def search(view: ApertureView, ranges: bool, tick: Callable[[], None]) -> Errors:
+    """Errors, from a start without any. Range errors are accepted where they gain enough in sharpness.
 
-    Range errors are sought as what the phase means if it comes from motion; and over narrow apertures in an eighth
-    of the band first, whose cells they do not leave, then in more and more of it.
+    Two kinds are tried: the range errors of a motion that explains the phase; and over narrow apertures those estimated
+    in an eighth of the band first, in whose range cells they stay, and then in more and more of it.
     """
     zero = np.zeros(view.n)
-    plain = climb(view, (zero, zero))
+    plain = ascend(view, (zero, zero))
     tick()
     found = plain
-    if walk and view.narrow:
+    if ranges and view.is_narrow:
         found, m = (zero, zero), view.raw.n_samples
         for parts in BANDS:
             if m // parts >= LEAST_SAMPLES:
                 first = (m - m // parts) // 2
                 found = _narrow(view.band(first, first + m // parts), found, True, 3)
             tick()
-    if not walk:
+    if not ranges:
         return plain
     places = view.probes(plain, found)
 
     def sharpened(errors: Errors) -> tuple[float, Errors]:
         v = view.values(errors, places)
         step = _phase_gradient.sharpen(v, zero, view.window)
-        return _phase_gradient.sharpness(v, step, view.window), view.unmoved((errors[0] + step, errors[1]))
+        return _phase_gradient.sharpness(v, step, view.window), view.shift_removed((errors[0] + step, errors[1]))
 
     still = max((sharpened(e) for e in (plain, (found[0], zero))), key=lambda s: s[0])
-    walks = [(plain[0], view.tied(plain[0])), found, (found[0], view.tied(found[0]))]
-    walks = [e for e in walks if np.std(e[1]) > RANGE_CELLS * view.cell]
-    best = max((sharpened(e) for e in walks), key=lambda s: s[0], default=still)
+    motions = [(plain[0], view.implied_range(plain[0])), found, (found[0], view.implied_range(found[0]))]
+    motions = [e for e in motions if np.std(e[1]) > RANGE_CELLS * view.cell]
+    best = max((sharpened(e) for e in motions), key=lambda s: s[0], default=still)
     log.debug("with a range error the sharpness is x %.4f", best[0] / max(still[0], 1e-300))
     return best[1] if best[0] > RANGE_GAIN * still[0] else still[1]
