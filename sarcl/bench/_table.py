@@ -25,12 +25,13 @@ HEAD = [
 MATCH_HEAD = ["peer", "its error", "Gbp/s", "sarcl", "error", "Gbp/s", "form", "median form", "call", "process", "cpu"]
 GROWTH_HEAD = ["", "method", "setting", "error at most", "n", "form s", "form", "cpu"]
 EXPLAINED = (
-    "error: relative L2 against the exact sum, as docs/theory/accuracy.md says; of |I|: relative to the image alone. "
-    "form: data in memory to finished image, without what can be worked out once for a geometry (sarcl's plan, "
-    "fastsar's former), shortest and median run; call: with it; kernel: of that in the device's kernels; process: a "
-    "new process that reads the data and makes one image; cpu: seconds of all processors together (sarcl's call, a "
-    "peer's form), which other programs on the machine hardly touch. Gbp/s: 1e9 pulses x pixels a second, from the "
-    "shortest form."
+    "error: relative L2 error against the exact sum, as defined in docs/theory/accuracy.md; of |I|: the same relative "
+    "to the norm of the image alone. form: time from data in memory to the finished image, without the preparation "
+    "that serves all images of a geometry (sarcl's plan, fastsar's former), of the shortest and the median run. call: "
+    "time with that preparation. kernel: time in the device's kernels. process: time of a new process that reads the "
+    "data and makes one image. cpu: CPU seconds of all processors together (of sarcl's call, of a peer's form), which "
+    "other programs on the machine hardly affect. Gbp/s: 1e9 pairs of pulse and pixel per second, from the shortest "
+    "form. A peer is another program."
 )
 
 
@@ -76,7 +77,7 @@ def match_body(result: _figures.Result) -> Cells:
             f"{_figures.rate(result, peer):.3g}",
         ]
         if ours is None:
-            lines.append([*line, f"{entry['method']}: no row errs as little", *[""] * 7])
+            lines.append([*line, f"{entry['method']}: no row with an error as small", *[""] * 7])
             continue
         ratios = [entry[key] for key in ("form", "median form", "call", "process", "cpu")]
         lines.append(

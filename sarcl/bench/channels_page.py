@@ -16,11 +16,11 @@ HEAD = [
     "s",
     "median",
     "G contributions/s",
-    "seconds over one call's",
+    "seconds / seconds of one call",
 ]
-EXPLAINED = """A contribution: a scatterer seen by a pulse of a sender at a receiver. Few are visited where a scene lets
-channels be interpolated between places of the array (docs/theory/fda.md); the last column compares shortest runs. The
-error of calls a channel is the largest of nine of them.
+EXPLAINED = """A contribution is one scatterer in one pulse from one transmitter to one receiver. Few contributions are
+computed where channels are interpolated between positions ("places") of the array (docs/theory/fda.md). The last column
+compares shortest runs. "a call a channel" is one call per channel; its error is the largest of nine channels.
 """
 
 

@@ -7,9 +7,9 @@ from typing import Any
 from . import _table
 
 Row = dict[str, Any]
-EXPLAINED = """Mpts/s: millions of pairs of scatterer and pulse a second, shortest run. sarcl finds delays and carrier
-from antennas and positions; sorting the points, once a call, is in the whole call alone. finufft is given the delays,
-and sorts for every pulse, as its points move.
+EXPLAINED = """Mpts/s: millions of pairs of scatterer and pulse per second, shortest run. sarcl computes delays and
+carrier from antennas and positions; it sorts the points once per call, which only "whole call" includes. finufft is
+given the delays, and sorts for every pulse, because its points move.
 """
 
 
@@ -28,7 +28,7 @@ def section(name: str, document: Row) -> str:
         text += f"### Whole echoes of facets with their physics x {document['pulses']} pulses\n\n"
         head = [
             "",
-            "asked",
+            "tolerance",
             "error achieved",
             "predicted",
             "s",
@@ -39,7 +39,7 @@ def section(name: str, document: Row) -> str:
         text += _table.markdown(head, [_whole(row, fastest, pairs) for row in document["whole"]]) + "\n"
     if document["scenes"]:
         text += "### Whole scenes, one run each, compiling included\n\n"
-        head = ["", "asked", "error achieved", "pulses x facets", "samples", "s", "a VAX 3100/30 in 1992, s"]
+        head = ["", "tolerance", "error achieved", "pulses x facets", "samples", "s", "a VAX 3100/30 in 1992, s"]
         text += _table.markdown(head, [_scene(row) for row in document["scenes"]]) + "\n"
     return text
 

@@ -12,12 +12,12 @@ from .backproject import FORMAT
 
 INTRODUCTION = """# Results
 
-Made by `make results` from the JSON files under bench/results; `make bench` measures this machine. The columns are
-explained [at the end](#how-to-read-this); [how it is measured](../developers/benchmarks.md) is a page of its own.
+`make results` writes this page from the JSON files under bench/results; `make bench` measures your machine. How the
+figures are measured: [benchmarks](../developers/benchmarks.md).
 
 """
 OTHER = {"echo": echo_page.section, "channels": channels_page.section}  # kinds of documents that are not of images
-README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "of that in kernels"]
+README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "share in kernels"]
 
 
 def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
@@ -30,7 +30,7 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
     if not documents:
         raise ValueError(f"{results} holds no .json; make one: sarcl bench backproject --json {results}/1.json")
     written = []
-    page = INTRODUCTION
+    page = f"{INTRODUCTION}## How to read this\n\n{_table.EXPLAINED}\n\n"
     for name, document in documents.items():
         if document.get("kind") in OTHER:
             page += OTHER[document["kind"]](name, document)
@@ -41,8 +41,7 @@ def write(results: Path, docs: Path, readme: Path | None = None) -> list[Path]:
             picture.write_bytes(pareto.picture(document["cases"]))
             written.append(picture)
         page += section(name, document, drawn)
-    page += f"## How to read this\n\n{_table.EXPLAINED}\n"
-    (docs / "results.md").write_text(page)
+    (docs / "results.md").write_text(page.rstrip("\n") + "\n")
     written.append(docs / "results.md")
     if readme is not None:
         block = next((readme_table(d) for d in documents.values() if "cases" in d), "")
