@@ -14,6 +14,7 @@ from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
+from ..io import formats
 from ._job import Job, Outputs
 
 if TYPE_CHECKING:
@@ -84,8 +85,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
-    _expect(job, [output], (".h5", ".hdf5"), [args.scenario])
-    _expect(job, images, (".png", ".h5", ".hdf5"), [args.scenario, output])
+    _expect(job, [output], formats.writing("phase history"), [args.scenario])
+    _expect(job, images, formats.writing("picture", "image"), [args.scenario, output])
     _check_scale(args)
     grid = scenario.build_grid() if scenario.grid is not None else None
     options: dict[str, Any] = {"device": open_device(args.device)}
@@ -125,9 +126,9 @@ def focus(args: argparse.Namespace, job: Job) -> int:
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     for name in ("tile", "resume"):
-        if getattr(args, name) and all(Path(p).suffix.lower() == ".png" for p in outputs):
+        if getattr(args, name) and all(formats.named(p, formats.writing("picture")) for p in outputs):
             raise ValueError(f"--{name} keeps tiles beside an image in a file; give -o IMAGE.h5")
-    _expect(job, outputs, (".png", ".h5", ".hdf5"), [*args.raw, *([args.grid] if args.grid else [])])
+    _expect(job, outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
@@ -182,7 +183,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     title, cases = load(args.experiment)
     output = args.output or f"{Path(args.experiment).stem}.html"
     numbers = str(Path(output).with_suffix(".json"))
-    _expect(job, [output], (".html", ".htm"), [args.experiment])
+    _expect(job, [output], [formats.Format((".html", ".htm"))], [args.experiment])
     job.expect(numbers)
     plots.require("the page of sarcl fda")
     results, sections = [], []
@@ -254,9 +255,9 @@ def bench(args: argparse.Namespace, job: Job) -> int:
     from ..io import output_paths
 
     if args.json is not None:
-        _expect(job, [args.json], (".json",), [])
+        _expect(job, [args.json], [formats.Format((".json",))], [])
     if args.picture is not None:
-        _expect(job, [args.picture], (".png",), [])
+        _expect(job, [args.picture], formats.writing("picture"), [])
         plots.require("--picture")
     names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
     given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
@@ -276,14 +277,14 @@ def bench(args: argparse.Namespace, job: Job) -> int:
     return 0
 
 
-def _expect(job: Job, paths: list[str], suffixes: tuple[str, ...], inputs: list[str]) -> None:
+def _expect(job: Job, paths: list[str], among: list[formats.Format], inputs: list[str]) -> None:
     """Refuse outputs that cannot be written, or would be written over what is read or over one another."""
     taken = {Path(p).resolve() for p in inputs}
     for path in paths:
         if Path(path).resolve() in taken:
             raise ValueError(f"output {path!r} is also read by this command; choose another name")
-        if Path(path).suffix.lower() not in suffixes:
-            wanted = " or ".join(s for s in suffixes if s != ".hdf5")
+        if formats.named(path, among) is None:
+            wanted = formats.suggested(among)
             raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
         job.expect(path)
     if len({Path(p).resolve() for p in paths}) < len(paths):
@@ -333,10 +334,11 @@ def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
 
 
 def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args: argparse.Namespace, job: Job) -> None:
-    """Make the image, in the first .h5 of `outputs` where there is one, and write the other outputs."""
+    """Make the image, in the first of `outputs` that takes it block by block, and write the other outputs."""
     from ..figures.decibels import write_png
 
-    file = next((p for p in outputs if Path(p).suffix.lower() != ".png"), None)
+    by_blocks, pictures = formats.writing("image", by_blocks=True), formats.writing("picture")
+    file = next((p for p in outputs if formats.named(p, by_blocks)), None)
     image = make(file)
     if image is None:
         job.say(f"this piece is finished; its tiles wait in {file}.parts for those of the other pieces")
@@ -344,7 +346,7 @@ def _focus(make: Callable[[str | None], Image | None], outputs: list[str], args:
     _say_report("focus", image.report, job)
     for path in outputs:
         scale = ""
-        if Path(path).suffix.lower() == ".png":
+        if formats.named(path, pictures):
             picture = image.show(args.floor_db, top_db=args.top_db, percentile=args.percentile)
             write_png(picture, path)
             scale = f". {picture.info['caption']}"

@@ -14,6 +14,8 @@ import shlex
 import sys
 from typing import Any, NoReturn
 
+from ..io import formats
+
 EPILOG = """examples:
   sarcl demo                                            simulate and focus a scene: out/demo.png
   sarcl simulate scene.toml -o raw.h5 --image image.png
@@ -63,7 +65,9 @@ def parser() -> argparse.ArgumentParser:
     _simulate(command("simulate", "make the echoes that a scenario file describes", device))
     _focus(command("focus", "turn echoes into an image", device))
     measure = command("measure", "measure a point response: resolution and side lobes")
-    measure.add_argument("image", metavar="IMAGE", help="image that sarcl wrote (.h5)")
+    measure.add_argument(
+        "image", metavar="IMAGE", help=f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})"
+    )
     measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
     _fda(command("fda", "measure what aperture mappings of frequency-diverse arrays gain: a page and a JSON", device))
     _papers(
@@ -80,6 +84,7 @@ def _demo(p: argparse.ArgumentParser) -> None:
 
 
 def _simulate(p: argparse.ArgumentParser) -> None:
+    images = formats.suggested(formats.writing("picture", "image"))
     p.add_argument("scenario", metavar="FILE.toml", help="scenario, see docs/guide/scenarios.md")
     p.add_argument("-o", "--output", metavar="RAW.h5", help="echoes (default: the scenario's name with _raw.h5, here)")
     p.add_argument(
@@ -87,7 +92,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
         action="append",
         default=[],
         metavar="IMAGE",
-        help="focus too and write .png or .h5; repeatable (default, where there is a grid: FILE.png)",
+        help=f"focus too and write {images}; repeatable (default, where there is a grid: FILE.png)",
     )
     p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
     p.add_argument("--dry-run", action="store_true", help="say what the echoes will take, and write nothing")
@@ -95,14 +100,15 @@ def _simulate(p: argparse.ArgumentParser) -> None:
 
 
 def _focus(p: argparse.ArgumentParser) -> None:
-    p.add_argument("raw", nargs="+", metavar="RAW", help="sarcl's .h5 or Gotcha .mat; several are joined")
+    images = formats.suggested(formats.writing("picture", "image"))
+    p.add_argument("raw", nargs="+", metavar="RAW", help=f"{formats.readable('or')}; several are joined")
     p.add_argument(
         "-o",
         "--output",
         action="append",
         default=[],
         metavar="IMAGE",
-        help="image to write, .png or .h5; repeatable (default: RAW's name with .png, here)",
+        help=f"image to write, {images}; repeatable (default: RAW's name with .png, here)",
     )
     where = p.add_argument_group("grid", "default: chosen from the data, and printed")
     where.add_argument("--grid", metavar="FILE.toml", help="the [grid.*] table of a scenario file")

@@ -3,16 +3,17 @@
 For other folders:
 
     elevation      elevation models through rasterio: positions on WGS84
-    gotcha         AFRL Gotcha volumetric SAR data set, MATLAB 5
+    formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
     mesh           meshes through trimesh: triangles, names of parts, repairs
     output_paths   output files: checked before the work, written whole or not at all
-    sarcl_hdf5     sarcl's own HDF5 file: writers of phase histories and images from plain fields
+    sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
     toml           TOML: line numbers of keys, and values written back as text
 
 For this folder alone:
 
+    _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
 """
 
-__all__ = ["elevation", "gotcha", "hdf5", "mesh", "output_paths", "sarcl_hdf5", "toml"]
+__all__ = ["elevation", "formats", "hdf5", "mesh", "output_paths", "sarcl_hdf5", "toml"]

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import json
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -57,6 +57,15 @@ def get(group: Any, name: str) -> Any:
     if h5py.check_string_dtype(group[name].dtype) is not None:
         return group[name].asstr()[...].astype(str)
     return group[name][...]
+
+
+def get_all(group: Any, leave: Sequence[str] = ()) -> dict[str, Any]:
+    """What `put` stored in a group, by name, except the names to leave; a group in it becomes a mapping."""
+    import h5py
+
+    names = [name for name in (*group.attrs, *group) if name not in leave]
+    inside = {name for name in names if name not in group.attrs and isinstance(group[name], h5py.Group)}
+    return {name: get_all(group[name]) if name in inside else get(group, name) for name in names}
 
 
 def put_report(file: Any, report: Any) -> None:

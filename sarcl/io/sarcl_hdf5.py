@@ -1,14 +1,13 @@
-"""Writers of sarcl's own HDF5 file: a phase history or an image, every number as it was, to the bit.
+"""sarcl's own HDF5 file, read and written: a phase history or an image, every number as it was, to the bit.
 
 Root attributes: sarcl_file = "phase_history" or "image", format = 1. Every field is an attribute (a number or a
 word), a dataset (an array) or a group of these (a grid, a waveform, an array of antennas), named as the field of
 the Python object; a field that is None is left out. Samples and image data lie row after row, uncompressed, and
-are written in blocks of rows. Only plain values come in; sarcl/model/store.py reads the file back as an object.
+are written in blocks of rows. Only plain values come in and out; sarcl/model/store.py makes objects of them.
 """
 
 from __future__ import annotations
 
-import dataclasses
 import math
 from collections.abc import Mapping
 from pathlib import Path
@@ -18,14 +17,43 @@ import numpy as np
 
 from . import hdf5
 from ._partial_hdf5 import Unfinished
+from .formats import Kind, Make
 
 FILE_BYTES = 2**17  # bytes of all that is no row and no array: a waveform, a report, HDF5's own tables
 ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and the name of its polarisation
+# what a file's mark says it holds, and the dataset of that which stays in the file
+ROWS: dict[str, tuple[Kind, str]] = {"phase_history": ("phase history", "samples"), "image": ("image", "data")}
 
 
-def fields_of(value: Any) -> dict[str, Any]:
-    """The fields of a dataclass by name, as the writers here take them; arrays are not copied."""
-    return {field.name: getattr(value, field.name) for field in dataclasses.fields(value)}
+def load(path: Any, make: Make, autofocus: bool = False) -> Any:
+    """make(kind, fields) of a file of sarcl's; samples or data stay in it as an h5py.Dataset that keeps it open.
+
+    A group of the file is a mapping among the fields; what the file leaves out is no field. autofocus has no effect.
+    ValueError when the file is not HDF5, is truncated or damaged, is not sarcl's, or is of a newer format.
+    """
+    import h5py
+
+    name = str(path)
+    try:
+        file = h5py.File(path, "r", locking="best-effort")
+    except OSError as exc:
+        what = "truncated" if "truncated" in str(exc) else "not an HDF5 file, or damaged"
+        raise ValueError(f"{name!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
+    try:
+        mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
+        if not isinstance(mark, str) or mark not in ROWS or version is None:
+            raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
+        if version != hdf5.FORMAT:
+            raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
+        try:
+            kind, rows = ROWS[mark]
+            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: file[rows], "report": hdf5.get_report(file)}
+            return make(kind, fields)
+        except (KeyError, OSError, RuntimeError, TypeError, ValueError, AttributeError) as exc:
+            raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
+    except BaseException:
+        file.close()
+        raise
 
 
 def job_of(path: Any) -> str | None:

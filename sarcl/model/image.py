@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.report import Report
-from ..io import hdf5, sarcl_hdf5
+from ..io import formats, hdf5
 from .image_grid import ImageGrid, pair
 
 if TYPE_CHECKING:
@@ -149,18 +149,20 @@ class Image:
                                       Description say what white and black are;  title  above the picture
         On any exception `path` is as it was.
         """
-        suffix = Path(path).suffix.lower()
-        if suffix == ".png":
+        among = formats.writing("picture", "image")
+        form = formats.named(path, among)
+        if form is None:
+            ending, wanted = Path(path).suffix.lower(), formats.suggested(among, "'")
+            raise ValueError(f"image path {str(path)!r} ends in {ending!r}; choose {wanted}")
+        if form.is_picture:
             from ..figures.decibels import write_png
 
             write_png(self._picture(floor_db, top_db, percentile, title), path)
-        elif suffix in (".h5", ".hdf5"):
-            with sarcl_hdf5.ImageWriter(path, sarcl_hdf5.fields_of(self.grid), self.data.dtype) as out:
-                for a, b in hdf5.blocks(out.data):
-                    out.data[a:b] = np.asarray(self.data[a:b])
-                out.close(image_fields(self))
-        else:
-            raise ValueError(f"image path {str(path)!r} ends in {suffix!r}; choose '.png' or '.h5'")
+            return
+        with form.functions.ImageWriter(path, formats.fields_of(self.grid), self.data.dtype) as out:
+            for a, b in hdf5.blocks(out.data):
+                out.data[a:b] = np.asarray(self.data[a:b])
+            out.close(image_fields(self))
 
     def _picture(
         self, floor_db: float, top_db: float | None = None, percentile: float | None = None, title: str | None = None

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
-from ..io import hdf5, sarcl_hdf5
+from ..io import formats, hdf5
 from .lazy_rows import in_memory, pick, stack
 
 if TYPE_CHECKING:
@@ -252,7 +252,9 @@ class PhaseHistory:
         FileNotFoundError, PermissionError and the like before anything is written. On any exception `path` is as
         it was.
         """
-        writer = sarcl_hdf5.EchoWriter(path, self.n_rows, self.n_samples, self.samples.dtype)
+        writer = formats.writer_functions(path, "phase history").EchoWriter(
+            path, self.n_rows, self.n_samples, self.samples.dtype
+        )
         try:
             for a, b in hdf5.blocks(writer.samples):
                 writer.samples[a:b] = self.read(a, b)
@@ -268,8 +270,8 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
         **{name: getattr(raw, name) for name in names},
         "rx": None if raw.rx is raw.tx else raw.rx,
         "compressed": bool(raw.compressed),
-        "waveform": None if raw.waveform is None else sarcl_hdf5.fields_of(raw.waveform),
-        "array": None if raw.array is None else sarcl_hdf5.fields_of(raw.array),
+        "waveform": None if raw.waveform is None else formats.fields_of(raw.waveform),
+        "array": None if raw.array is None else formats.fields_of(raw.array),
         "report": raw.report,
     }
 

@@ -1,19 +1,19 @@
 """Files read as a PhaseHistory or an Image, and files in the making finished as one.
 
-`read` finds out what a file is and loads it. sarcl/io/sarcl_hdf5.py describes and writes sarcl's own HDF5 file; an
-object loaded from one keeps the file open and reads the rows of samples or data that are asked for.
+sarcl/io/formats.py is the table of file formats. An object read from sarcl's own HDF5 file keeps the file open: rows of
+samples or data are read when they are asked for.
 """
 
 from __future__ import annotations
 
 import os
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
-from ..io import gotcha, hdf5, sarcl_hdf5
+from ..io import formats, sarcl_hdf5
 from .antenna_array import AntennaArray
 from .image import Image, image_fields
 from .image_grid import ImageGrid
@@ -22,38 +22,6 @@ from .waveform import Waveform
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
-
-READABLE = "sarcl's own HDF5 files (raw.save, image.save) and AFRL Gotcha .mat files (MATLAB 5)"
-
-
-def load(path: Any) -> PhaseHistory | Image:
-    """Open a file of sarcl's, read-only: samples or data stay in it as an h5py.Dataset that keeps it open.
-
-    ValueError when the file is not HDF5, is truncated or damaged, is not sarcl's, or is of a newer format.
-    """
-    import h5py
-
-    name = str(path)
-    with open(path, "rb"):
-        pass  # FileNotFoundError and its like, as Python words them
-    try:
-        file = h5py.File(path, "r", locking="best-effort")
-    except OSError as exc:
-        what = "truncated" if "truncated" in str(exc) else "not an HDF5 file, or damaged"
-        raise ValueError(f"{name!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
-    try:
-        kind, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
-        if not isinstance(kind, str) or kind not in _LOADERS or version is None:
-            raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
-        if version != hdf5.FORMAT:
-            raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
-        try:
-            return _LOADERS[kind](file)
-        except (KeyError, OSError, RuntimeError, TypeError, ValueError, AttributeError) as exc:
-            raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
-    except BaseException:
-        file.close()
-        raise
 
 
 def finish_image(
@@ -71,53 +39,15 @@ def finish_image(
         writer.abandon()
         raise
     writer.close(image_fields(image))
-    made: Any = load(writer.path)
+    made: Any = read(writer.path)
     return made
 
 
 def finish_phase_history(writer: sarcl_hdf5.EchoWriter, **fields: Any) -> PhaseHistory:
     """Complete a file of echoes with the other fields of a PhaseHistory, and return that, read as it is needed."""
     writer.close(phase_history_fields(PhaseHistory(writer.samples, **fields)))
-    made: Any = load(writer.path)
+    made: Any = read(writer.path)
     return made
-
-
-def _load_phase_history(file: Any) -> PhaseHistory:
-    waveform = None
-    if "waveform" in file:
-        waveform = Waveform(**{n: hdf5.get(file["waveform"], n) for n in Waveform.__dataclass_fields__})
-    array = None
-    if "array" in file:
-        array = AntennaArray(**{n: hdf5.get(file["array"], n) for n in AntennaArray.__dataclass_fields__})
-    optional = {n: hdf5.get(file, n) for n in ("rx", *PER_ROW)}
-    needed = {n: file[n][...] for n in ("frequency", "frequency_step", "tx", "reference_range")}
-    return PhaseHistory(
-        file["samples"],
-        **needed,
-        **optional,
-        waveform=waveform,
-        array=array,
-        compressed=bool(file.attrs["compressed"]),
-        report=hdf5.get_report(file),
-    )
-
-
-def _load_image(file: Any) -> Image:
-    stored = {n: hdf5.get(file["grid"], n) for n in ImageGrid.__dataclass_fields__}
-    plane = ("center", "spacing", "x_axis", "y_axis")
-    if stored["listed"] is None and any(stored[n] is None for n in plane):
-        raise KeyError("its grid is neither a plane nor a list of points")
-    stored["shape"] = tuple(int(n) for n in stored["shape"])
-    if stored["spacing"] is not None:
-        stored["spacing"] = tuple(float(d) for d in stored["spacing"])
-    for value in stored.values():
-        if isinstance(value, np.ndarray):
-            value.flags.writeable = False
-    fields = {n: hdf5.get(file, n) for n in ("gain", "frequency", "tx", "rx")}
-    return Image(file["data"], ImageGrid(**stored), report=hdf5.get_report(file), **fields)
-
-
-_LOADERS: dict[str, Any] = {"phase_history": _load_phase_history, "image": _load_image}
 
 
 def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> PhaseHistory | Image:
@@ -141,35 +71,37 @@ def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> Pha
         return parts[0] if len(parts) == 1 else concatenate(parts)  # type: ignore[arg-type]
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
-    path = Path(path)
-    kind = _kind(path)
-    if kind == "hdf5":
-        return load(path)
-    return PhaseHistory(**gotcha.load(path, autofocus))
+    made: PhaseHistory | Image = formats.load(Path(path), _make, autofocus)
+    return made
 
 
-def _kind(path: Path) -> str:
-    """ "hdf5" or "mat", from the first bytes; ValueError for anything else."""
-    if path.is_dir():
-        raise IsADirectoryError(
-            f"{str(path)!r} is a folder; give the files in it, e.g. sorted(Path(folder).glob('*.mat'))"
-        )
-    try:
-        with open(path, "rb") as file:
-            head = file.read(520)
-    except FileNotFoundError:
-        raise FileNotFoundError(f"{str(path)!r} does not exist; check the name and the folder") from None
-    if head.startswith(b"\x89HDF\r\n\x1a\n"):
-        return "hdf5"
-    if head.startswith(b"MATLAB 5.0 MAT-file"):
-        return "mat"
-    if not head:
-        what = "is empty"
-    elif head.startswith(b"MATLAB 7.3"):
-        what = "is a MATLAB 7.3 file (save it again with -v7)"
-    elif head.startswith(b"CPHD/"):
-        what = "is a CPHD file, which sarcl does not read yet"
-    else:
-        what = f"starts with {head[:12]!r}, which is no file kind sarcl knows"
-    named = f" although its name ends in {path.suffix!r}" if path.suffix.lower() in (".h5", ".hdf5", ".mat") else ""
-    raise ValueError(f"{str(path)!r} {what}{named}; sarcl reads {READABLE}")
+def _make(kind: formats.Kind, fields: Mapping[str, Any]) -> PhaseHistory | Image:
+    """The object that a file holds, of its fields by name; KeyError names a field that is missing."""
+    return _phase_history(fields) if kind == "phase history" else _image(fields)
+
+
+def _phase_history(stored: Mapping[str, Any]) -> PhaseHistory:
+    fields: dict[str, Any] = {n: stored[n] for n in ("samples", "frequency", "frequency_step", "tx", "reference_range")}
+    fields |= {name: stored.get(name) for name in ("rx", *PER_ROW, "report")}
+    kinds: dict[str, Any] = {"waveform": Waveform, "array": AntennaArray}
+    fields |= {name: kind(**_fields(kind, stored[name])) for name, kind in kinds.items() if name in stored}
+    return PhaseHistory(**fields, compressed=bool(stored["compressed"]))
+
+
+def _fields(kind: Any, stored: Mapping[str, Any]) -> dict[str, Any]:
+    """The fields of a dataclass by name; None for those that the file leaves out."""
+    return {name: stored.get(name) for name in kind.__dataclass_fields__}
+
+
+def _image(stored: Mapping[str, Any]) -> Image:
+    grid = _fields(ImageGrid, stored["grid"])
+    if grid["listed"] is None and any(grid[n] is None for n in ("center", "spacing", "x_axis", "y_axis")):
+        raise KeyError("its grid is neither a plane nor a list of points")
+    grid["shape"] = tuple(int(n) for n in grid["shape"])
+    if grid["spacing"] is not None:
+        grid["spacing"] = tuple(float(d) for d in grid["spacing"])
+    for value in grid.values():
+        if isinstance(value, np.ndarray):
+            value.flags.writeable = False
+    others: dict[str, Any] = {name: stored.get(name) for name in ("gain", "frequency", "tx", "rx", "report")}
+    return Image(stored["data"], ImageGrid(**grid), **others)

@@ -10,7 +10,8 @@ import numpy as np
 
 from ..base.text import size_text
 from ..base.validation import sealed
-from ..io.sarcl_hdf5 import ROW_BYTES, EchoWriter
+from ..io import formats
+from ..io.sarcl_hdf5 import ROW_BYTES
 from ..model import store
 from ..model.phase_history import PhaseHistory
 
@@ -43,7 +44,7 @@ class EchoOutput:
                 "carriers differ in their frequencies"
             )
         if out is not None:
-            self.writer = EchoWriter(out, n_rows, shape[-1])
+            self.writer = formats.writer_functions(out, "phase history").EchoWriter(out, n_rows, shape[-1])
             self.pulses = max(1, int(SHARE * budget / (nbytes / shape[0])))
             return
         self.pulses = shape[0]

@@ -2,8 +2,10 @@
 
 import os
 import struct
+import sys
 from dataclasses import fields, replace
 from pathlib import Path
+from types import SimpleNamespace
 
 import h5py
 import numpy as np
@@ -11,7 +13,8 @@ import pytest
 from scipy.io import savemat
 
 import sarcl
-from sarcl.io import gotcha, hdf5, output_paths, sarcl_hdf5
+from sarcl.cli.parser import main
+from sarcl.io import formats, hdf5, output_paths, sarcl_hdf5
 from sarcl.model import store
 from sarcl.model.phase_history import PER_ROW
 
@@ -292,7 +295,7 @@ def test_an_image_is_written_in_blocks_of_rows(tmp_path, monkeypatch):
 
 
 def image_writer(path, grid):
-    return sarcl_hdf5.ImageWriter(path, sarcl_hdf5.fields_of(grid))
+    return sarcl_hdf5.ImageWriter(path, formats.fields_of(grid))
 
 
 def test_an_image_larger_than_memory_is_written_piece_by_piece(tmp_path):
@@ -384,12 +387,6 @@ def test_a_truncated_hdf5_file_is_refused(tmp_path, part):
     (tmp_path / "b.h5").write_bytes(whole[: int(len(whole) * part)])
     with pytest.raises(ValueError, match=r"b\.h5' is (truncated|not an HDF5 file, or damaged)"):
         sarcl.read(tmp_path / "b.h5")
-
-
-def test_load_refuses_what_is_not_hdf5(tmp_path):
-    (tmp_path / "a.h5").write_text("hello")
-    with pytest.raises(ValueError, match="not an HDF5 file"):
-        store.load(tmp_path / "a.h5")
 
 
 # Gotcha ----------------------------------------------------------------------------------------------------
@@ -633,14 +630,51 @@ def test_an_unknown_kind_is_told_what_can_be_read(tmp_path):
         sarcl.read(tmp_path / "a.bin")
 
 
+def test_a_new_format_is_one_file_and_one_line_of_the_table(tmp_path, monkeypatch, capsys):
+    class Writer:
+        def __init__(self, path, grid, dtype):
+            self.path, self.data = path, np.zeros(grid["shape"], dtype)
+
+        def __enter__(self):
+            return self
+
+        def __exit__(self, *exc):
+            pass
+
+        def close(self, fields):
+            self.path.write_bytes(b"toy" + self.data.tobytes() + np.float64(fields["gain"]).tobytes())
+
+    def load(path, make, autofocus):
+        data = np.frombuffer(path.read_bytes()[3:-8], np.complex64).reshape(2, 3)
+        grid = {"shape": (2, 3), "center": np.zeros(3), "spacing": (1, 1), "x_axis": X, "y_axis": Y}
+        return make("image", {"data": data, "grid": grid, "gain": np.frombuffer(path.read_bytes()[-8:])[0]})
+
+    X, Y = np.eye(3)[:2]
+    toy = formats.Format((".toy",), b"toy", "toys (.toy)", "_toy", writes=("image",))
+    monkeypatch.setattr(formats, "FORMATS", (*formats.FORMATS, toy))
+    monkeypatch.setitem(sys.modules, f"{formats.__package__}._toy", SimpleNamespace(load=load, ImageWriter=Writer))
+    image = sarcl.Image(
+        np.arange(6, dtype=np.complex64).reshape(2, 3), sarcl.ImageGrid.plane(shape=(2, 3), spacing=1.0), gain=3.0
+    )
+    image.save(tmp_path / "a.toy")
+    again = sarcl.read(tmp_path / "a.toy")
+    assert same(again.data, image.data) and again.gain == 3.0 and same(again.grid.positions, image.grid.positions)
+    with pytest.raises(ValueError, match=r"choose '\.png', '\.h5' or '\.toy'"):
+        image.save(tmp_path / "a.bmp")
+    (tmp_path / "b.toy").write_bytes(b"12345")
+    with pytest.raises(ValueError, match=r"although its name ends in '\.toy'; sarcl reads .*5\) and toys \(\.toy\)"):
+        sarcl.read(tmp_path / "b.toy")
+    with pytest.raises(SystemExit):
+        main(["focus", "--help"])
+    said = " ".join(capsys.readouterr().out.split())
+    assert "toys (.toy)" in said and ".png, .h5 or .toy" in said
+    assert formats.named("a.toy", formats.writing("image", by_blocks=True)) is None
+
+
 @pytest.mark.parametrize("name", ["no.h5", "no.mat", "no"])
 def test_a_missing_file_is_named(tmp_path, name):
     with pytest.raises(FileNotFoundError, match=rf"{name}' does not exist"):
         sarcl.read(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        store.load(tmp_path / name)
-    with pytest.raises(FileNotFoundError):
-        gotcha.load(tmp_path / name)
 
 
 def test_a_folder_an_empty_list_and_a_number_are_refused(tmp_path):

@@ -10,7 +10,7 @@ from typing import Any
 
 import numpy as np
 
-from ...io import output_paths, sarcl_hdf5
+from ...io import formats, output_paths
 from ...io.hdf5 import BLOCK_BYTES
 from ...model import store
 from ...model.image import Image
@@ -68,10 +68,10 @@ class Checkpoint:
 
     def finished(self) -> Image | None:
         """The image, where this very job has made it already."""
-        if self.mark is None or sarcl_hdf5.job_of(self.path) != self.mark:
+        if self.mark is None or formats.writer_functions(self.path, "image").job_of(self.path) != self.mark:
             return None
         self.done()
-        image = store.load(self.path)
+        image = store.read(self.path)
         return image if isinstance(image, Image) else None
 
     def complete(self) -> bool:

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...base.text import size_text
-from ...io import sarcl_hdf5
+from ...io import formats
 from ...model import store
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
@@ -32,7 +32,9 @@ class ImageOutput:
                     'take a smaller shape, or out="image.h5" to make it in a file'
                 ) from None
         elif is_path(out):
-            self.writer = sarcl_hdf5.ImageWriter(out, sarcl_hdf5.fields_of(grid), dtype, claim=True)
+            self.writer = formats.writer_functions(out, "image").ImageWriter(
+                out, formats.fields_of(grid), dtype, claim=True
+            )
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data
         else:
@@ -78,12 +80,14 @@ class BandBuffer:
 
 
 def is_path(out: Any) -> bool:
-    """True for the name of an image's file; ValueError for one that does not end in .h5 or .hdf5."""
+    """True for the name of an image's file; ValueError where no format that is written block by block ends so."""
     if not isinstance(out, str) and not hasattr(out, "__fspath__"):
         return False
     name = os.fspath(out)
-    if not isinstance(name, str) or not name.lower().endswith((".h5", ".hdf5")):
-        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in .h5")
+    among = formats.writing("image", by_blocks=True)
+    if not isinstance(name, str) or formats.named(name, among) is None:
+        wanted = formats.suggested(among)
+        raise ValueError(f"out is {name!r}; images are made in HDF5 files: give a name that ends in {wanted}")
     return True
 
 

@@ -39,10 +39,11 @@ from typing import Any
 import numpy as np
 
 from ..base import constants, validation
+from .formats import Make
 
 
-def load(path: Any, autofocus: bool = False) -> dict[str, Any]:
-    """Read one Gotcha file as the arguments of a PhaseHistory.
+def load(path: Any, make: Make, autofocus: bool = False) -> Any:
+    """make("phase history", fields) of one Gotcha file.
 
     samples          complex64 (n_pulses, n_frequencies)
     frequency        of sample 0, Hz, and
@@ -75,14 +76,16 @@ def load(path: Any, autofocus: bool = False) -> dict[str, Any]:
         k = 4 * np.pi / constants.SPEED_OF_LIGHT * (frequency + step * np.arange(n_frequencies))
         samples = samples * np.exp(1j * (phase[:, None] - r[:, None] * k))
     name = re.search(r"_(HH|HV|VH|VV)(?![A-Za-z])", path.name)
-    return {
+    found = {
         "samples": np.ascontiguousarray(samples, np.complex64),
         "frequency": frequency,
         "frequency_step": step,
         "tx": tx,
         "reference_range": reference,
         "polarization": name[1] if name else None,
+        "compressed": True,
     }
+    return make("phase history", found)
 
 
 def _struct(path: Path) -> np.void:

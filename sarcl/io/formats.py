@@ -1,0 +1,127 @@
+"""The table of file formats for phase histories and images: names, first bytes, and what reads and writes each.
+
+A new format is a new file of this folder and one line of FORMATS. That file holds, as far as the line says so:
+
+    load(path, make, autofocus)                 the file as make("phase history" or "image", its fields by name)
+    EchoWriter(path, n_rows, n_samples, dtype)  as in sarcl_hdf5
+    ImageWriter(path, grid, dtype, claim)       as in sarcl_hdf5
+    job_of(path)                                where by_blocks is True: the mark of the job that made an image
+
+Nothing here loads NumPy, so that the command line can print its help at once.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, fields
+from importlib import import_module
+from pathlib import Path
+from typing import Any, Literal
+
+Kind = Literal["phase history", "image"]
+Written = Literal["phase history", "image", "picture"]
+Make = Callable[[Kind, Mapping[str, Any]], Any]
+
+
+@dataclass(frozen=True)
+class Format:
+    """A file format.
+
+    endings    of names of its files; the first is the one that messages suggest
+    starts     first bytes of its files; none where the format is not read
+    name       for the list of what can be read
+    file       the file of this folder that reads and writes it; none where other rooms do
+    writes     what can be written: "picture" is made of an image by sarcl/figures
+    by_blocks  True where an image can be written block by block, and a killed run go on
+    """
+
+    endings: tuple[str, ...]
+    starts: bytes = b""
+    name: str = ""
+    file: str = ""
+    writes: tuple[Written, ...] = ()
+    by_blocks: bool = False
+
+    @property
+    def functions(self) -> Any:
+        """The file of this folder that reads and writes the format."""
+        return import_module(f".{self.file}", __package__)
+
+    @property
+    def is_picture(self) -> bool:
+        """True where an image's grey picture is written, not its numbers."""
+        return "picture" in self.writes
+
+
+HDF5 = Format(
+    (".h5", ".hdf5"), b"\x89HDF\r\n\x1a\n", "sarcl's own HDF5 files (raw.save, image.save)", "sarcl_hdf5",
+    writes=("phase history", "image"), by_blocks=True,
+)  # fmt: skip
+FORMATS = (
+    Format((".png",), writes=("picture",)),
+    HDF5,
+    Format((".mat",), b"MATLAB 5.0 MAT-file", "AFRL Gotcha .mat files (MATLAB 5)", "_gotcha"),
+)
+NOT_READ = {  # first bytes of files that are often met, and what to say of them
+    b"MATLAB 7.3": "is a MATLAB 7.3 file (save it again with -v7)",
+    b"CPHD/": "is a CPHD file, which sarcl does not read yet",
+}
+
+
+def load(path: Path, make: Make, autofocus: bool = False) -> Any:
+    """What make(kind, fields) makes of a file, whose format follows from its first bytes.
+
+    ValueError for a file that is of no known format, truncated or damaged; FileNotFoundError, IsADirectoryError.
+    """
+    if path.is_dir():
+        raise IsADirectoryError(
+            f"{str(path)!r} is a folder; give the files in it, e.g. sorted(Path(folder).glob('*.mat'))"
+        )
+    try:
+        with open(path, "rb") as file:
+            head = file.read(32)
+    except FileNotFoundError:
+        raise FileNotFoundError(f"{str(path)!r} does not exist; check the name and the folder") from None
+    found = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
+    if found is not None:
+        return found.functions.load(path, make, autofocus)
+    known = (text for starts, text in NOT_READ.items() if head.startswith(starts))
+    other = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
+    promised = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)
+    although = f" although its name ends in {path.suffix!r}" if promised else ""
+    raise ValueError(f"{str(path)!r} {next(known, other)}{although}; sarcl reads {readable('and')}")
+
+
+def writing(*kinds: Written, by_blocks: bool = False) -> list[Format]:
+    """The formats that any of `kinds` is written in; with by_blocks those alone that take an image block by block."""
+    return [f for f in FORMATS if set(kinds) & set(f.writes) and (f.by_blocks or not by_blocks)]
+
+
+def suggested(among: list[Format], quote: str = "") -> str:
+    """The endings that messages and help texts name: .png or .h5."""
+    return _listed([f"{quote}{f.endings[0]}{quote}" for f in among], "or")
+
+
+def readable(word: str) -> str:
+    """The names of the formats that are read, the last two joined by a word."""
+    return _listed([f.name for f in FORMATS if f.starts], word)
+
+
+def _listed(names: list[str], word: str) -> str:
+    return f" {word} ".join([*([", ".join(names[:-1])] if names[1:] else []), names[-1]])
+
+
+def named(path: Any, among: list[Format]) -> Format | None:
+    """The format, of those given, that the ending of a path stands for."""
+    ending = Path(path).suffix.lower()
+    return next((f for f in among if ending in f.endings), None)
+
+
+def writer_functions(path: Any, kind: Written) -> Any:
+    """The functions of the format that `path` is written in: the one that its ending stands for, else sarcl's own."""
+    return (named(path, writing(kind)) or HDF5).functions
+
+
+def fields_of(value: Any) -> dict[str, Any]:
+    """The fields of a dataclass by name, as the writers take them; arrays are not copied."""
+    return {field.name: getattr(value, field.name) for field in fields(value)}
