@@ -6,6 +6,7 @@ For other folders:
     choose_method    the cheapest method that meets the tolerance
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
+    engine           what every method offers: a plan, and an engine that makes bands on one device
     focus_options    options that backproject, plan, the command line and scenarios share
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
@@ -25,6 +26,7 @@ __all__ = [
     "compress",
     "default_grid",
     "direct",
+    "engine",
     "factorized",
     "float64",
     "focus_options",

@@ -23,8 +23,9 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
 from .choose_method import MethodChoice, choose
+from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
-from .focusing_task import BeamCone, FocusingTask, Skip, Skipped
+from .focusing_task import BeamCone, FocusingTask, Skip
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share

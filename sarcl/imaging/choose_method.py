@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -17,11 +16,13 @@ from ..opencl.device import Device
 from . import profile_energy
 from .direct import direct as direct_method
 from .direct import tile_kernels
+from .engine import Engine, ImagePlan
 from .factorized import plan as factorized_plan
 from .factorized.factorized import Factorized
+from .factorized.plan import FactorPlan
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
-from .focusing_task import Engine, FocusingTask
+from .focusing_task import FocusingTask
 from .tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
@@ -40,26 +41,25 @@ class MethodChoice:
     """
 
     method: str
-    plan: Any
+    plan: ImagePlan
     tiling: Tiling
-    engine: Any
+    engine: type[Engine]
     predicted_error: float
     cost: float
 
     @property
-    def dtype(self) -> Any:
-        """Of the pixels."""
+    def dtype(self) -> type[np.complexfloating]:
+        """Data type of the pixels."""
         return self.engine.dtype
 
     @property
     def unit(self) -> int:
-        """Bands that share work: cutting between them costs time."""
-        return self.tiling.root_bands(self.plan.factors[0]) if self.method == "factorized" else 1
+        """Number of consecutive bands that share work: blocks that begin elsewhere cost more time."""
+        return self.tiling.root_bands(self.plan.factors[0]) if isinstance(self.plan, FactorPlan) else 1
 
     def on(self, device: Device, task: FocusingTask) -> Engine:
         """The engine on one device."""
-        made: Engine = self.engine(device, task, self.plan, self.tiling)
-        return made
+        return self.engine(device, task, self.plan, self.tiling)
 
 
 def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> MethodChoice:
@@ -134,7 +134,7 @@ class _Float32:
             dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
             raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
 
-    def _offer(self, name: str, made: tuple[Any, Tiling], engine: Any) -> MethodChoice:
+    def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
         error = min(self.near * made[0].predicted_error + self.rounding, self.tolerance)
         return MethodChoice(name, *made, engine, error, made[0].cost)
 

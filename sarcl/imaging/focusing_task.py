@@ -2,15 +2,14 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Collection
+from collections.abc import Collection
 from dataclasses import dataclass
-from typing import Any, Literal, Protocol
+from typing import Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.constants import SPEED_OF_LIGHT
-from ..base.stage_timer import Clock
 from ..base.validation import array, converted, finite, number
 from ..base.vectors import unit
 from ..model.image_grid import ImageGrid
@@ -18,7 +17,6 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
-from .tiling import Tiling
 
 Skip = Literal["range window", "beam", "zero weight", "no data"]
 BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and where it is centred
@@ -51,75 +49,14 @@ class FocusingTask:
         return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
 
     @property
+    def skip_flags(self) -> int:
+        """SKIP_WINDOW and SKIP_BEAM of the kernels."""
+        return int("range window" in self.skips) + 2 * int("beam" in self.skips)
+
+    @property
     def pairs(self) -> int:
         """(row, pixel) pairs of the rows that count."""
         return self.raw.n_rows * self.grid.size
-
-
-@dataclass(frozen=True)
-class Skipped:
-    """Numbers of (row, pixel) pairs that were left out, by reason.
-
-    window  pairs outside the range window of the row
-    beam    pairs inside the range window but outside the beam
-    """
-
-    window: int = 0
-    beam: int = 0
-
-    @classmethod
-    def of_tiles(cls, missed: np.ndarray, sizes: np.ndarray) -> Skipped:
-        """From the rows left out of every tile, by reason (2, n_tiles), and the pixels of each tile (n_tiles,)."""
-        return cls(*(int((rows * sizes).sum()) for rows in missed))
-
-    def __add__(self, other: Skipped) -> Skipped:
-        return Skipped(self.window + other.window, self.beam + other.beam)
-
-
-class Engine(Protocol):
-    """One way to focus a task on one device. Every module of a method has one.
-
-    A class made as (device, task, plan, tiling).
-
-    plan          with describe(method) -> dict and predicted_error; independent of the device and its memory
-    tiling        tiling whose bands are the units of work; fixed by grid, geometry and tolerance
-    dtype         data type of the pixels: complex64 or complex128
-    least_pixels  pixels a block should have at least, so that the cost of the range profiles, which every block makes
-                  anew, stays below a tenth; inf: blocks are as large as memory allows, and a killed run loses as much
-    """
-
-    plan: Any
-    tiling: Tiling
-    dtype: Any
-    least_pixels: float
-
-    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
-
-        MemoryError where nbytes is too little for anything.
-        """
-        ...
-
-    def fill(
-        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
-    ) -> Skipped:
-        """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
-
-        budget  bytes on the device, all in all
-        on_progress    called as on_progress(rows_done): how many of the task's rows these bands have had so far
-        Returns the number of (row, pixel) pairs that were skipped.
-        """
-        ...
-
-    def working(self, nbytes: float) -> float:
-        """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
-        ...
-
-
-def working_bytes(tiling: Tiling, run: tuple[int, int], length: int, nbytes: float) -> float:
-    """Estimated bytes that a direct engine takes for a run of bands: sums and values of the pixels, and the range
-    profiles, of `length` samples, of 256 rows; nbytes at most."""
-    return min(24.0 * tiling.pixels(*run) + 8.0 * length * 256, nbytes)
 
 
 def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarray | None, float]:

@@ -214,8 +214,13 @@ class Tiling(ABC):
     ) -> None:
         """Write compensated sums (4, pixels) on the device of tiles start ... stop - 1 of a run, as `place` does."""
         start, stop = tiles
-        made = device.download(sums, np.empty((4, (stop - start) * self.per_tile), np.float32))
-        self.place(((made[0] + made[2]) + 1j * (made[1] + made[3])).astype(np.complex64), run, start, orders, flat)
+        self.place(download_sums(device, sums, (stop - start) * self.per_tile), run, start, orders, flat)
+
+
+def download_sums(device: Device, sums: Any, n: int, kind: type[np.floating] = np.float32) -> np.ndarray:
+    """Pixels (n,), complex of twice the bytes of `kind`, from compensated sums (4, n) on the device."""
+    real, imaginary, real_rest, imaginary_rest = device.download(sums, np.empty((4, n), kind))
+    return np.asarray((real + real_rest) + 1j * (imaginary + imaginary_rest))
 
 
 def _power_of_two(n: int) -> int:

@@ -8,9 +8,10 @@ import numpy as np
 
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
+from sarcl.imaging.engine import Skipped
 from sarcl.imaging.float64.direct import DirectFloat64
 from sarcl.imaging.float64.plan import make_plan
-from sarcl.imaging.focusing_task import FocusingTask, Skipped, beam_of, geometry_of
+from sarcl.imaging.focusing_task import FocusingTask, beam_of, geometry_of
 
 
 def task_of(raw, grid, *, wrap=False, skips=("range window", "beam"), samples=None, rows=None, beam=None):

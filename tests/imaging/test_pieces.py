@@ -20,7 +20,8 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.imaging.choose_method import choose
-from sarcl.imaging.focusing_task import Skipped, make_task
+from sarcl.imaging.engine import Skipped
+from sarcl.imaging.focusing_task import make_task
 from sarcl.imaging.run import checkpoint, tile_files
 from sarcl.imaging.run._fingerprint import job, mark
 from sarcl.imaging.run.image_output import BandBuffer, ImageOutput

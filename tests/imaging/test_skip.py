@@ -13,7 +13,8 @@ import sarcl
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging import choose_method
 from sarcl.imaging.direct import direct
-from sarcl.imaging.focusing_task import SKIPS, Skipped, make_task
+from sarcl.imaging.engine import Skipped
+from sarcl.imaging.focusing_task import SKIPS, make_task
 from sarcl.imaging.tiling import PointTiling
 from sarcl.model.image_grid import ImageGrid
 from sarcl.opencl.choose_device import open_device

@@ -9,11 +9,11 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
-from ...numerics import range_profiles
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
-from ..focusing_task import FocusingTask, Skipped, working_bytes
+from ..engine import DirectEngine, RowProfiles, Skipped
+from ..focusing_task import FocusingTask
 from ..tiling import Tiling, tiling_of
 from . import line_plan
 from .line_plan import LinePlan
@@ -51,8 +51,8 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     return plan, tilings[plan.per_tile]
 
 
-class Direct:
-    """The loops over row blocks and tiles on one device; see focusing_task.Engine."""
+class Direct(DirectEngine):
+    """The loops over row blocks and tiles on one device; see engine.Engine."""
 
     dtype = np.complex64
 
@@ -62,28 +62,16 @@ class Direct:
         bistatic = not task.antennas.is_monostatic
         beam = task.antennas.beam is not None
         self.kernels = kernel_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
-        self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
+        self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
         # making a row's profile anew for every block costs as much as this many pixels, ten times over
         self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
-        self.skip = int("range window" in task.skips) + 2 * int("beam" in task.skips)
-        self.sample_weight = task.sample_weight * range_profiles.correction(
-            plan.interpolator, task.raw.n_samples, plan.length
-        )
-
-    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs of bands whose accumulators fit in their share of nbytes; a band that is alone may be larger."""
-        return self.tiling.blocks(self._tiles_at_once(nbytes) * self.tiling.per_tile)
-
-    def working(self, nbytes: float) -> float:
-        """See focusing_task.Engine."""
-        return working_bytes(self.tiling, self.blocks(nbytes)[0], self.plan.length, nbytes)
 
     def _shares(self, nbytes: float) -> tuple[float, float, float]:
         """Bytes for rows' profiles, pixels and tiles' constants: one, two and one parts of four.
 
         Rows get more where they need it: half of it at most.
         """
-        least, chunk = (8.0 * self.stride * n for n in (self.kernels.least_rows, self.kernels.chunk))
+        least, chunk = (self.profiles.row_bytes * n for n in (self.kernels.least_rows, self.kernels.chunk))
         if least > nbytes / 2:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profiles of {self.kernels.least_rows} rows, the "
@@ -94,7 +82,7 @@ class Direct:
         alloc = float(self.device.info.max_alloc)
         return min(rows, alloc), min((nbytes - rows) * 2 / 3, alloc), min((nbytes - rows) / 3, alloc)
 
-    def _tiles_at_once(self, nbytes: float) -> int:
+    def tiles_at_once(self, nbytes: float) -> int:
         """Tiles whose accumulators, and offsets where each tile has its own, fit in the pixels' share of nbytes."""
         pixel_bytes = 16 + self.tiling.offset_bytes
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
@@ -102,10 +90,10 @@ class Direct:
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
-        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling = self.tiling
         tiles, orders = tiling.bands(first, last)
-        most = self._tiles_at_once(budget)
+        most = self.tiles_at_once(budget)
         skipped = Skipped()
         for start in range(0, tiles.n_tiles, most):
             stop = min(start + most, tiles.n_tiles)
@@ -113,7 +101,9 @@ class Direct:
             def rows_done(rows: float, start: int = start, stop: int = stop) -> None:
                 on_progress((start * self.task.raw.n_rows + (stop - start) * rows) / tiles.n_tiles)
 
-            image, missed = self.add_up(_some(tiles, start, stop), budget, clock, rows_done)
+            whole = stop - start == tiles.n_tiles
+            some = tiles if whole else tiles.picked(np.arange(start, stop))
+            image, missed = self.add_up(some, budget, clock, rows_done)
             tiling.place_sums(self.device, image, (first, last), (start, stop), orders, flat)
             skipped += Skipped.of_tiles(missed, tiling.tile_sizes(first, last)[start:stop])
         clock.lap("write")
@@ -123,20 +113,17 @@ class Direct:
         self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> tuple[Any, np.ndarray]:
         """All rows into these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
-        device, raw, kernels = self.device, self.task.raw, self.kernels
+        device, raw, kernels, stride = self.device, self.task.raw, self.kernels, self.profiles.stride
         for_rows, _, for_constants = self._shares(budget)
         # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
-        most = min(128 if device.is_cpu else 4096, int(for_rows / (8 * self.stride)))
+        most = min(128 if device.is_cpu else 4096, int(for_rows / self.profiles.row_bytes))
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
         image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
-        on = kernels.ready(tiles, self.skip)
+        on = kernels.ready(tiles, self.task.skip_flags)
         clock.lap("prepare")
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
-            weights = self.task.row_weight[start:stop, None] * self.sample_weight
-            pad = range_profiles.padding(self.plan.interpolator)
-            made = range_profiles.from_samples(device, raw.read(start, stop), weights, self.plan.length, pad)
-            block = device.upload(made)
+            block = self.profiles.upload(start, stop)
             packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
             pulses = device.upload(packed), packed.shape[2], stop - start
             clock.lap("profiles")
@@ -144,18 +131,10 @@ class Direct:
             step = max(1, min(tiles.n_tiles, at_once))
             for tile in range(0, tiles.n_tiles, step):
                 end = min(tile + step, tiles.n_tiles)
-                kernels.add(on, tile, end, pulses, block, self.stride, self.stride // 2, 0, image)
+                kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image)
                 if end < tiles.n_tiles:  # what one step keeps for its tiles is gone before the next begins
                     device.finish()
             device.finish()
             clock.lap("backproject")
             on_progress(stop)
         return image, on.skipped()
-
-
-def _some(tiles: Tiles, start: int, stop: int) -> Tiles:
-    """Tiles start ... stop - 1."""
-    if (start, stop) == (0, tiles.n_tiles):
-        return tiles
-    offsets = tiles.offsets if tiles.shared else tiles.offsets[:, start * tiles.per_tile : stop * tiles.per_tile]
-    return Tiles(tiles.per_tile, tiles.references[start:stop], tiles.radius[start:stop], offsets, tiles.shared)

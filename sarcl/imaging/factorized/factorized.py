@@ -17,11 +17,11 @@ import numpy as np
 from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
-from ...numerics import range_profiles
 from ...opencl.device import Device
 from ..direct.direct import Direct
 from ..direct.tile_kernels import TilesOnDevice, kernel_of
-from ..focusing_task import FocusingTask, Skipped
+from ..engine import Engine, RowProfiles, Skipped
+from ..focusing_task import FocusingTask
 from ..tile_tree import Tree
 from ..tiling import Roots, Tiling
 from ._memory import MemoryPlan
@@ -42,8 +42,8 @@ class _Descent:
     ready: TilesOnDevice
 
 
-class Factorized:
-    """The loops over levels on one device; see focusing_task.Engine."""
+class Factorized(Engine):
+    """The loops over levels on one device; see engine.Engine."""
 
     dtype = np.complex64
 
@@ -80,7 +80,6 @@ class Factorized:
         self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
         self.filters = [device.upload(v.decimation.filter) for v in plan.levels]
         self.blocks_of = [device.upload(v.decimation.blocks) for v in plan.levels]
-        self.sample_weight = task.sample_weight * range_profiles.correction(plan.first, task.raw.n_samples, plan.length)
         # nodes of each level as the kernels want them, about the scene's centre
         self.nodes = []
         for v in plan.levels:
@@ -91,11 +90,12 @@ class Factorized:
         # a tile that lies in the window may reach beyond it with what its profiles have to spare
         top = plan.levels[0]
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
-        self.pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
-        self.source_stride = plan.length + 2 * self.pad
+        pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
+        self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
+        self.least_pixels = 1000.0 * plan.length
         self.memory = MemoryPlan(
-            plan, tiling, task.raw.n_rows, self.strides, self.source_stride, self.nodes[-1][1], self.leaves.components,
-            device.info.max_alloc, device.is_cpu,
+            plan, tiling, task.raw.n_rows, self.strides, self.profiles.stride, self.nodes[-1][1],
+            self.leaves.components, device.info.max_alloc, device.is_cpu,
         )  # fmt: skip
 
     def _stride(self, level: Level) -> int:
@@ -108,18 +108,13 @@ class Factorized:
         return self.memory.blocks(nbytes)
 
     def working(self, nbytes: float) -> float:
-        """See focusing_task.Engine."""
+        """See engine.Engine."""
         return min(self.memory.working(nbytes), nbytes)
-
-    @property
-    def least_pixels(self) -> float:
-        """Making a row's profile anew for every block costs as much as this many pixels, ten times over."""
-        return 1000.0 * self.plan.length
 
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
-        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         tiling, n_rows = self.tiling, self.task.raw.n_rows
         skipped, done, of = Skipped(), 0, tiling.pixels(first, last)
 
@@ -219,7 +214,7 @@ class Factorized:
         """
         device, plan, task = self.device, self.plan, self.task
         level, raw = plan.levels[0], task.raw
-        stride = self.source_stride
+        stride = self.profiles.stride
         shifts, merge = self.merges[0]
         tops, centers = len(down.tree.centers[0]), down.centers[0]
         nowhere = device.upload(np.zeros(tops, np.int32))
@@ -227,10 +222,7 @@ class Factorized:
         rows = self.memory.rows(budget)
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
-            weights = task.row_weight[start:stop, None] * self.sample_weight
-            source = device.upload(
-                range_profiles.from_samples(device, raw.read(start, stop), weights, plan.length, self.pad)
-            )
+            source = self.profiles.upload(start, stop)
             packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
             pulse, n, used = device.upload(packed), packed.shape[2], stop - start
             clock.lap("profiles")

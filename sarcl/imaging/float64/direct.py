@@ -9,11 +9,11 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
-from ...numerics import range_profiles
 from ...opencl.device import Device
 from ...opencl.device_list import devices
-from ..focusing_task import FocusingTask, Skipped, working_bytes
-from ..tiling import Tiling
+from ..engine import DirectEngine, RowProfiles, Skipped
+from ..focusing_task import FocusingTask
+from ..tiling import Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
@@ -21,8 +21,8 @@ N_CONST = 16  # of kernels/backproject_float64.cl
 PIXEL_BYTES = 56  # positions, totals and their errors
 
 
-class DirectFloat64:
-    """The loops over row blocks and tiles; see focusing_task.Engine. ValueError on a device without float64."""
+class DirectFloat64(DirectEngine):
+    """The loops over row blocks and tiles; see engine.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
     least_pixels = np.inf
@@ -32,51 +32,33 @@ class DirectFloat64:
             raise ValueError(_no_float64(device))
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
-        self.skip = int("range window" in task.skips) + 2 * int("beam" in task.skips)
         macros = plan.macros(not task.antennas.is_monostatic, task.wrap, task.antennas.beam is not None)
         self.constants = device.kernel("backproject_float64.cl", "tile_constants", **macros)
         self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
-        self.pad = range_profiles.padding(plan.interpolator)
-        self.sample_weight = task.sample_weight * range_profiles.correction(
-            plan.interpolator, task.raw.n_samples, plan.length
-        )
+        self.profiles = RowProfiles(device, task, plan.interpolator, plan.length, dtype=np.complex128)
 
-    def blocks(self, nbytes: float) -> list[tuple[int, int]]:
-        """Runs of bands whose positions and totals fit in half of nbytes; a band that is alone may be larger.
-
-        MemoryError where not even one row's profile fits in the rest.
-        """
-        least = 2 * self._row_bytes
+    def tiles_at_once(self, nbytes: float) -> int:
+        """See DirectEngine: positions and totals take half of nbytes at most, and range profiles the rest."""
+        least = 2 * self.profiles.row_bytes
         if nbytes < least:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profile of one row needs half of "
                 f"{text.size_text(least)}; give max_bytes={least:.2g} or more"
             )
-        return self.tiling.blocks(self._tiles_at_once(nbytes) * self.tiling.per_tile)
-
-    def working(self, nbytes: float) -> float:
-        """See focusing_task.Engine."""
-        return working_bytes(self.tiling, self.blocks(nbytes)[0], self.plan.length, nbytes)
-
-    @property
-    def _row_bytes(self) -> float:
-        return 16.0 * (self.plan.length + 2 * self.pad)
-
-    def _tiles_at_once(self, nbytes: float) -> int:
         return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
 
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
-        """Focus bands first ... last - 1 into `flat`; see focusing_task.Engine."""
+        """Focus bands first ... last - 1 into `flat`; see engine.Engine."""
         raw, tiling, middle = self.task.raw, self.tiling, self.task.raw.n_rows // 2
         orders = tiling.bands(first, last)[1]
         positions, lanes = by_range(tiling.positions(first, last, orders), raw.tx[middle], raw.rx[middle])
         values, missed = np.empty(positions.shape[:2], np.complex128), np.empty((2, len(positions)), np.int64)
         # as few runs of tiles as fit; every one reads all rows anew
-        runs = -(-len(positions) // self._tiles_at_once(budget))
+        runs = -(-len(positions) // self.tiles_at_once(budget))
         for i in range(runs):
             run = slice(i * len(positions) // runs, (i + 1) * len(positions) // runs)
 
@@ -96,7 +78,7 @@ class DirectFloat64:
         device, raw, plan, n_tiles = self.device, self.task.raw, self.plan, len(positions)
         # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
         most = (2 if device.is_cpu else 64) * CHUNK
-        fit = int(budget / 4 / self._row_bytes)
+        fit = int(budget / 4 / self.profiles.row_bytes)
         rows = min(most, fit // CHUNK * CHUNK or max(1, fit))
         references = (positions.min(axis=1) + positions.max(axis=1)) / 2
         radius = np.linalg.norm(positions - references[:, None], axis=-1).max(axis=-1)
@@ -104,15 +86,11 @@ class DirectFloat64:
         image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
         where = device.upload(positions.reshape(-1, 3).T)
         tile, reach = device.upload(references.T), device.upload(radius)
-        stride = plan.length + 2 * self.pad
+        stride = self.profiles.stride
         clock.lap("prepare")
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
-            weights = self.task.row_weight[start:stop, None] * self.sample_weight
-            samples = raw.read(start, stop)
-            block = device.upload(
-                range_profiles.from_samples(device, samples, weights, plan.length, self.pad, np.complex128)
-            )
+            block = self.profiles.upload(start, stop)
             pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
             pulse, n = device.upload(pulse_host), pulse_host.shape[1]
             clock.lap("profiles")
@@ -122,7 +100,7 @@ class DirectFloat64:
                 count = min(step, n_tiles - at)
                 device.run(
                     self.constants, (n // self.lanes, count), None,
-                    pulse, tile, reach, n, n_tiles, at, self.skip, constants,
+                    pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, constants,
                 )  # fmt: skip
                 items = positions.shape[1] // self.lanes
                 device.run(
@@ -133,8 +111,7 @@ class DirectFloat64:
             device.finish()
             clock.lap("backproject")
             on_progress(stop)
-        sums = device.download(image, np.empty((4, pixels)))
-        made = ((sums[0] + sums[2]) + 1j * (sums[1] + sums[3])).reshape(positions.shape[:2])
+        made = download_sums(device, image, pixels, np.float64).reshape(positions.shape[:2])
         return made, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
 
 

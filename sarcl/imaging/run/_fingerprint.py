@@ -11,11 +11,14 @@ from typing import Any
 
 import numpy as np
 
+from ..engine import ImagePlan
 from ..focusing_task import FocusingTask
 from ..tiling import Tiling
 
 
-def job(task: FocusingTask, method: str, tolerance: float, plan: Any, tiling: Tiling, dtype: Any) -> dict[str, Any]:
+def job(
+    task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: Any
+) -> dict[str, Any]:
     """All that the pixels follow from, in words and numbers; arrays, and the samples, as checksums.
 
     Neither device nor memory: they change nothing but rounding. Reads all samples. TypeError for an option that

@@ -15,7 +15,8 @@ from ...io.hdf5 import BLOCK_BYTES
 from ...model import store
 from ...model.image import Image
 from ..choose_method import MethodChoice
-from ..focusing_task import FocusingTask, Skipped
+from ..engine import Skipped
+from ..focusing_task import FocusingTask
 from ..tiling import Run
 from . import _fingerprint
 from .tile_files import TileStore, discard, folder_of, gaps

@@ -22,7 +22,8 @@ from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
 from ..choose_method import MethodChoice
-from ..focusing_task import Engine, FocusingTask, Skipped
+from ..engine import Engine, Skipped
+from ..focusing_task import FocusingTask
 from ..tiling import Run
 from .image_output import BandBuffer
 from .workers import FinishedBlock, OutputFor, cut

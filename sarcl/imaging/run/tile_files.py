@@ -21,7 +21,7 @@ from typing import Any
 
 import numpy as np
 
-from ..focusing_task import Skipped
+from ..engine import Skipped
 from ..tiling import Run, Tiling
 from ._fingerprint import as_bytes, checker, difference, mark
 

@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...base.stage_timer import Clock
-from ..focusing_task import Engine, Skipped
+from ..engine import Engine, Skipped
 from ..tiling import Run, Tiling
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped

@@ -1,0 +1,142 @@
+"""What every method of focusing offers: a plan, and an engine that makes bands of the image on one device."""
+
+from __future__ import annotations
+
+from abc import ABC, abstractmethod
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+import numpy as np
+
+from ..base.stage_timer import Clock
+from ..numerics import range_profiles
+from ..numerics.interpolation import Interpolator
+from ..opencl.device import Device
+from .focusing_task import FocusingTask
+from .tiling import Run, Tiling
+
+
+@dataclass(frozen=True)
+class Skipped:
+    """Numbers of (row, pixel) pairs that were left out, by reason.
+
+    window  pairs outside the range window of the row
+    beam    pairs inside the range window but outside the beam
+    """
+
+    window: int = 0
+    beam: int = 0
+
+    @classmethod
+    def of_tiles(cls, missed: np.ndarray, sizes: np.ndarray) -> Skipped:
+        """From the rows left out of every tile, by reason (2, n_tiles), and the pixels of each tile (n_tiles,)."""
+        return cls(*(int((rows * sizes).sum()) for rows in missed))
+
+    def __add__(self, other: Skipped) -> Skipped:
+        return Skipped(self.window + other.window, self.beam + other.beam)
+
+
+class ImagePlan(Protocol):
+    """How a method makes an image. It depends on the task and the tolerance, never on the memory of a device."""
+
+    @property
+    def predicted_error(self) -> float:
+        """Bound of the relative error."""
+        ...
+
+    @property
+    def cost(self) -> float:
+        """Cost of the image, relative to that of other plans of the method."""
+        ...
+
+    def describe(self, method: str) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        ...
+
+
+class Engine(ABC):
+    """A method of focusing, on one device, for one task and plan.
+
+    tiling        tiling whose bands are the units of work; fixed by grid, geometry and tolerance
+    dtype         data type of the pixels: complex64 or complex128
+    least_pixels  pixels a block should have at least, so that the cost of the range profiles, which every block makes
+                  anew, stays below a tenth; inf: blocks are as large as memory allows, and a killed run loses as much
+    """
+
+    tiling: Tiling
+    dtype: type[np.complexfloating]
+    least_pixels: float
+
+    @abstractmethod
+    def __init__(self, device: Device, task: FocusingTask, plan: Any, tiling: Tiling) -> None: ...
+
+    @abstractmethod
+    def blocks(self, nbytes: float) -> list[Run]:
+        """Runs (first, last) of bands that together are all, each to be filled with nbytes on the device.
+
+        MemoryError where nbytes is too little for anything.
+        """
+
+    @abstractmethod
+    def working(self, nbytes: float) -> float:
+        """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
+
+    @abstractmethod
+    def fill(
+        self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
+    ) -> Skipped:
+        """Write the pixels of bands first ... last - 1 to their places in `flat` (ImageOutput.flat).
+
+        budget       bytes on the device, all in all
+        on_progress  called as on_progress(rows_done): how many of the task's rows these bands have had so far
+        Returns the number of (row, pixel) pairs that were skipped.
+        """
+
+
+class DirectEngine(Engine):
+    """What the direct methods of both number types share: blocks of as many tiles as fit."""
+
+    profiles: RowProfiles
+
+    @abstractmethod
+    def tiles_at_once(self, nbytes: float) -> int:
+        """Tiles that fit in nbytes on the device beside the range profiles; MemoryError where those do not fit."""
+
+    def blocks(self, nbytes: float) -> list[Run]:
+        """See Engine. A band that is alone may be larger than what fits: `fill` makes it in parts."""
+        return self.tiling.blocks(self.tiles_at_once(nbytes) * self.tiling.per_tile)
+
+    def working(self, nbytes: float) -> float:
+        """See Engine: sums and values of the pixels, and the range profiles of 256 rows."""
+        return min(24.0 * self.tiling.pixels(*self.blocks(nbytes)[0]) + 8.0 * self.profiles.length * 256, nbytes)
+
+
+class RowProfiles:
+    """Range profiles of a task's rows on a device, for an interpolator.
+
+    length  samples of a profile; pad: samples that repeat its other end, on each side; stride: both together
+    dtype   complex64 or complex128
+    """
+
+    def __init__(
+        self, device: Device, task: FocusingTask, interpolator: Interpolator, length: int, pad: int | None = None,
+        dtype: type[np.complexfloating] = np.complex64,
+    ) -> None:  # fmt: skip
+        self.device, self.task, self.length, self.dtype = device, task, length, dtype
+        self.pad = range_profiles.padding(interpolator) if pad is None else pad
+        self.stride = length + 2 * self.pad
+        correction = range_profiles.correction(interpolator, task.raw.n_samples, length)
+        self.sample_weight = task.sample_weight * correction
+
+    @property
+    def row_bytes(self) -> float:
+        """Bytes of the profile of a row."""
+        return float(np.dtype(self.dtype).itemsize * self.stride)
+
+    def upload(self, start: int, stop: int) -> Any:
+        """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
+        weights = self.task.row_weight[start:stop, None] * self.sample_weight
+        samples = self.task.raw.read(start, stop)
+        made = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
+        return self.device.upload(made)
