@@ -1,4 +1,4 @@
-"""Echo, focus and measure together: a point comes out where it is, as sharp as theory says, at any range."""
+"""Echo, focus and measure together: position and resolution of a point are those of theory, at any range."""
 
 from __future__ import annotations
 
@@ -32,7 +32,7 @@ def test_a_point_has_theoretical_width_lobes_place_and_phase(distance, point):
     image = sarcl.backproject(raw, grid, tolerance=1e-3)
     response = sarcl.measure(image, near=point)
 
-    # theory, projected on the grid; N dtheta: each of N pulses stands for one step of azimuth
+    # theory, projected on the grid; N dtheta: each of N pulses represents one step of azimuth
     azimuth = ARC * N / (N - 1)
     irw_range = 0.886 * SPEED_OF_LIGHT / (2 * BANDWIDTH) / np.cos(GRAZING)
     irw_cross = 0.886 * SPEED_OF_LIGHT / CENTER / (2 * azimuth) / np.cos(GRAZING)
@@ -49,7 +49,7 @@ def test_a_point_has_theoretical_width_lobes_place_and_phase(distance, point):
 @pytest.mark.parametrize("distance", [10e3, 800e3])
 @pytest.mark.parametrize("point", [(0.0, 0.0, 0.0), (24.0, 32.0, 0.0)], ids=["centre", "40 m off"])
 def test_phase_of_an_oracle_point_is_kept(distance, point):
-    # echoes from the formula in extended precision, not from sarcl: an error shared by echo and image would show
+    # echoes from the formula in extended precision, not from sarcl, to detect an error common to echo and image
     tx, n = spotlight(distance).positions, 1000
     reference = np.linalg.norm(tx, axis=1)
     frequency = CENTER - BANDWIDTH / 2 + (np.arange(n) + 0.5) * BANDWIDTH / n
@@ -86,7 +86,7 @@ WINDOWS = {"hamming": ("hamming", 1.303, -42.67), "taylor": (("taylor", 35, 5), 
 @pytest.mark.parametrize("name", WINDOWS)
 def test_windows_widen_and_quieten_as_theory_says(name):
     window, width, pslr = WINDOWS[name]
-    # a narrow band and arc: the keystone of the support would hide lobes 40 dB down
+    # a narrow band and arc: with wide ones the keystone shape of the spectrum changes lobes 40 dB below the peak
     chirp = sarcl.Waveform.chirp(center=CENTER, bandwidth=60e6, duration=2e-6)
     arc = 0.006
     track = sarcl.Trajectory.circle(radius=8e3, height=6e3, start=-arc / 2, arc=arc, n_pulses=200)

@@ -3,7 +3,7 @@
 The lobes expected of the exact sum are not quite those of a sinc. Across range every frequency makes its own
 sinc, as wide as its wavelength: 6 % of bandwidth spreads them by +-3.1 %, which blurs the outer lobes (ISLR
 -10.22 -> -10.33, PSLR -13.26 -> -13.285 dB; `cross_range_cut` is that mean in closed form). Along range the
-arc's sagitta, 1 % of the band at 4 degrees, moves PSLR by 0.003 dB. A tenth of band and arc leaves 1/100.
+arc's sagitta, 1 % of the band at 4 degrees, changes PSLR by 0.003 dB. A tenth of band and arc has 1/100 of that.
 """
 
 from dataclasses import replace
@@ -165,7 +165,7 @@ def test_the_lobes_across_range_are_the_mean_of_every_frequencys_sinc():
 
 
 def test_the_interpolator_follows_a_sinc_just_above_its_nyquist_rate():
-    """sinc(0.8 i) sinc(0.78 j) under 5 turns a pixel of carrier, read between pixels."""
+    """sinc(0.8 i) sinc(0.78 j) on a carrier of 5 cycles per pixel, interpolated between pixels."""
     seen = Pass()
     grid = seen.grid(CENTRE, shape=70)
     middle = (seen.tx[N // 2 - 1] + seen.tx[N // 2]) / 2
@@ -229,7 +229,7 @@ def test_near_chooses_the_point_and_none_the_brightest(pair):
     cell = seen.cells("ground").min()
     assert np.linalg.norm(sarcl.measure(image).position) < 0.01 * cell
     weak = sarcl.measure(image, near=(3.0, 3.1, 5.0))  # the height is projected away
-    # the strong one's lobes, -53 dB where the cuts cross, pull the weak one by some 1e-2 of a cell
+    # sidelobes of the strong point, -53 dB where the cuts cross, displace the weak one by some 1e-2 of a cell
     assert np.linalg.norm(weak.position - (3, 3, 0)) < 0.03 * cell
     assert abs(weak.peak / weak.gain) == pytest.approx(0.1, abs=0.002)
 

@@ -1,4 +1,4 @@
-"""The ambiguity function: closed forms, its volume, and who couples delay and Doppler."""
+"""The ambiguity function: closed forms, its volume, and which waveforms couple delay and Doppler."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What mappings of frequency-diverse apertures do, and what they do not: Farooq 2009, chapter 5."""
+"""Mappings of frequency-diverse apertures, their effects and limits: Farooq 2009, chapter 5."""
 
 from __future__ import annotations
 
@@ -59,7 +59,7 @@ def test_corrected_data_focus_as_an_ordinary_antenna_does(n, step):
     peak, height, null, pslr = response(*cut(fixed))
     assert abs(peak) < 1e-6 and height == pytest.approx(1, abs=1e-3)
     assert null == pytest.approx(0.167, abs=0.002) and pslr == pytest.approx(-13.3, abs=0.1)
-    # as they are, they defocus: at least 3 dB down, or 1.5 times as wide
+    # unmodified echoes are defocused: a peak at least 3 dB lower, or 1.5 times as wide
     _, lower, wider, _ = response(*cut(raw))
     assert 20 * np.log10(lower / height) < -3 and (wider > 1.5 * null or n > 45)
 

@@ -64,7 +64,7 @@ def test_the_constant_factor_is_the_far_field(device):
 
 
 def test_the_diverse_factor_is_the_far_field_of_small_steps(device):
-    """Steps of some kHz: what the closed form leaves out is 1e-5 rad."""
+    """Steps of some kHz: the closed form neglects 1e-5 rad."""
     steps, shape, spacing = (1.5e3, -1e3), (9, 9), (HALF, HALF)
     array = AntennaArray.planar(shape, spacing=spacing, frequency_step=steps)
     assert closed.quadratic_phase(shape=shape, spacing=spacing, frequency_step=steps) < 2e-4
@@ -189,7 +189,7 @@ def test_the_exact_waveform_peaks_where_the_last_carrier_would(device, n, step, 
     "n, step, phase, peak", [(45, 20e6, 0.547, 0.9992), (225, 4e6, 2.735, 0.9794), (450, 2e6, 5.470, 0.9193)]
 )
 def test_what_the_closed_form_leaves_out_at_the_end_of_the_papers_aperture(n, step, phase, peak):
-    """215 m along the track, 5 km away, elements 15 mm apart: quadratic phase, and what it leaves of the peak."""
+    """215 m along the track, 5 km away, elements 15 mm apart: quadratic phase, and the height of the peak with it."""
     azimuth, spacing = np.arctan(215 / 5000), -0.015
     left_out = closed.quadratic_phase(
         shape=(n, 1), spacing=(spacing, 0), frequency_step=(step, 0), cosines=(np.sin(azimuth), 0)
@@ -203,7 +203,7 @@ def test_what_the_closed_form_leaves_out_at_the_end_of_the_papers_aperture(n, st
 
 
 def test_the_papers_waveform_is_far_beyond_its_own_bound():
-    """At 45 deg its 9 carriers, 1 GHz apart, never come together: 4.9 of 9, over a whole period."""
+    """At 45 deg its 9 carriers, 1 GHz apart, are never in phase: at most 4.9 of 9 over a whole period."""
     array = AntennaArray.linear(9, spacing=-HALF, frequency_step=1e9)
     t, azimuth = np.linspace(-0.5e-9, 0.5e-9, 10_001), np.deg2rad(45)
     made = np.abs(sarcl.beam(array, F0, times=FAR / C + t, positions=FAR * directions(azimuth)))

@@ -66,7 +66,7 @@ def test_fields_meet_the_default_tolerance(device, n, distance):
 
 @pytest.mark.parametrize("distance", [1.0, 1e4, 3.6e7])
 def test_all_in_phase_does_not_drift(device, distance):
-    """10 000 equal terms: plain float32 sums would err by their number."""
+    """10 000 equal terms: the error of plain float32 sums grows with their number."""
     array = AntennaArray(positions=np.zeros((10_000, 3)), offsets=np.zeros((1, 10_000)))
     spread = array.with_offsets(np.linspace(-1e-3, 1e-3, 10_000))  # Hz: not constant, yet in phase for a millisecond
     t, x = np.linspace(0, 1e-3, 9), [[distance, 0, 0], [0.3 * distance, 0.2 * distance, 0]]
@@ -185,7 +185,7 @@ def test_tiles_as_wide_as_on_gpus(device, monkeypatch, n_times, n_points):
 
 
 def test_times_and_ranges_far_apart_are_taken_in_blocks_of_their_own(device):
-    """Seconds and a thousand kilometres apart, gigahertz apart: 1e9 turns that a float32 pair could not hold."""
+    """Seconds and a thousand kilometres apart, gigahertz apart: 1e9 cycles, too many for a float32 pair."""
     random = np.random.default_rng(6)
     array = AntennaArray.linear(9, spacing=0.015, frequency_step=1e9)
     t, x = random.uniform(0, 3.0, 20), around(random, 30, 1e6)
@@ -218,7 +218,7 @@ def test_a_constant_array_is_a_diverse_one_without_steps(device):
 @pytest.mark.parametrize("distance", [10.0e3, 10.6e3])
 @pytest.mark.parametrize("side", [1, -1])
 def test_the_beam_points_where_retarded_time_says(device, distance, side):
-    """sin(theta) = -(c/(f0 d)) df t' for elements at +n d; Farooq's stand at -n d, which turns the sign."""
+    """sin(theta) = -(c/(f0 d)) df t' for elements at +n d; Farooq's are at -n d, which changes the sign."""
     array = AntennaArray.linear(8, spacing=HALF, frequency_step=100e3, axis=(0, side, 0))
     angles = np.deg2rad(np.arange(-60, 60, 0.01))
     made = sarcl.beam(array, F0, times=distance / C + 2e-6, positions=on_circle(angles, distance), device=device)

@@ -1,4 +1,4 @@
-"""The progress bar: drawn on terminals and in notebooks only, for stages that last, and never in the way."""
+"""The progress bar: drawn on terminals and in notebooks only, and only for long stages."""
 
 import io
 import subprocess

@@ -1,4 +1,4 @@
-"""The command line: answers at once, refuses before the work, and leaves nothing half-written."""
+"""The command line: help without delay, refusals before the computation, and no half-written files."""
 
 import os
 import re

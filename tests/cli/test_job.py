@@ -1,4 +1,4 @@
-"""Ctrl-C reaches a command even where Python would drop it."""
+"""Ctrl-C ends a command even where Python drops the KeyboardInterrupt."""
 
 import os
 import signal

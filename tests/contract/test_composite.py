@@ -1,4 +1,4 @@
-"""A whole scene at once, a mesh and points on rough ground: culling changes nothing, memory is bounded."""
+"""A mesh and points on rough ground in one scene: culling does not change the echoes, memory is bounded."""
 
 from __future__ import annotations
 

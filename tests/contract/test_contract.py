@@ -41,7 +41,7 @@ def hold_all(seeds, share, **limits):
     return met
 
 
-# no plan is needlessly good: half of them use at least a thirtieth of what was allowed
+# plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance
 @pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 200), marks=SLOW)], ids=str)
 def test_hundreds_of_random_tasks(seeds):
     assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= 1 / 30
@@ -63,7 +63,7 @@ def test_random_tasks_in_float64(seeds):
 
 
 def test_a_formula_four_times_too_small_breaks_the_contract(monkeypatch):
-    # what follows would see it: with the error of interpolation divided by four, a task errs more than predicted
+    # the test is sensitive: with the interpolation error divided by four, an error exceeds its prediction
     honest = interpolation.interpolator
 
     def smaller(taps, oversample):
@@ -88,7 +88,7 @@ def clear_choices():
 
 
 def hold_worst(tolerance):
-    """All energy at the band's edge and pixels half way between samples: where interpolation errs most."""
+    """All energy at the band's edge and pixels half way between samples: where the interpolation error is largest."""
     n, n_samples = 6, 64
     tx = np.stack([np.full(n, -7e3), np.linspace(-1, 1, n), np.full(n, 7e3)], axis=1)
     samples = np.zeros((n, n_samples), np.complex64)
@@ -131,7 +131,7 @@ def test_the_same_error_at_10_km_and_at_800_km(monkeypatch, method, tolerance):
     far, far_predicted = focused(arc_at(800e3))
     assert near <= predicted <= tolerance and far <= far_predicted <= tolerance
     if method == "direct":
-        # less curvature lets cheaper plans through, so the arithmetic is compared under that of 10 km
+        # less curvature allows cheaper plans, so the errors are compared for the plan of 10 km
         monkeypatch.setattr(direct, "make_plan", lambda *a: plans[0])
         far, _ = focused(arc_at(800e3))
     assert far <= 1.5 * near

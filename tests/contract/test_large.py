@@ -1,4 +1,4 @@
-"""Memory limits: kept, and no matter for the image; the same bits every time."""
+"""Memory limits: kept, and without effect on the image; repeated calls give the same bits."""
 
 from __future__ import annotations
 

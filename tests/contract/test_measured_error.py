@@ -1,4 +1,4 @@
-"""The check that a report's measured error comes from: its paths, the edges it leaves out, and what it says."""
+"""The check that measures a report's error: its paths, the window edges it excludes, and its messages."""
 
 from __future__ import annotations
 
@@ -34,14 +34,14 @@ def test_the_reference_paths_are_those_of_fifty_digits(distance):
     for got, x in zip(half_path(tx, rx, points, reference), points, strict=True):
         wanted = (length(x, tx) + length(x, rx)) / 2 - Decimal(reference)
         high = float(got)
-        # what is left is the rounding of the result, of the scene's size, and of the range to twice the digits
+        # the rest is the rounding of the result, of the size of the scene, and of the range to twice the digits
         error = abs(Decimal(high) + Decimal(float(got - np.longdouble(high))) - wanted)
         assert error <= Decimal(1e-19 * min(200.0, distance) + 1e-25 * distance)
 
 
 @pytest.fixture
 def too_small(monkeypatch):
-    """Interpolators that err a thousand times more than they say."""
+    """Interpolators whose error is a thousand times the predicted one."""
     honest = interpolation.interpolator
     monkeypatch.setattr(interpolation, "interpolator", lambda *a: replace(honest(*a), error=honest(*a).error / 1000))
     monkeypatch.setattr(interpolation, "lower_bound", lambda taps, oversample: 0.0)
@@ -94,4 +94,4 @@ def test_the_check_is_good_to_1e_9_at_36_000_km():
     )
     image = sarcl.backproject(raw, sarcl.ImageGrid.plane(shape=(32, 32), spacing=0.3), tolerance=1e-9, check=True)
     assert image.report.measured_error <= image.report.predicted_error <= 1e-9
-    assert image.report.measured_error <= 2e-10  # the reference itself used to err by 5e-10 here
+    assert image.report.measured_error <= 2e-10  # a float64 reference has an error of 5e-10 here

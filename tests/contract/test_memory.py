@@ -1,4 +1,4 @@
-"""Large images stay in little memory: blocks of them are worked on, raw data and image in files."""
+"""Large images need little memory: they are computed in blocks, with raw data and image in files."""
 
 from __future__ import annotations
 

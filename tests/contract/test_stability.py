@@ -1,4 +1,4 @@
-"""Numbers that break naive sums: many pulses, high contrast, antennas among pixels, odd lengths, tiny values."""
+"""Inputs on which naive sums fail: many pulses, high contrast, antennas among pixels, odd lengths, tiny values."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SLOW = pytest.mark.slow
 
 @pytest.fixture
 def sights(monkeypatch):
-    """What factorised runs found their rows to see of their largest tiles (_tile_coverage.py)."""
+    """The coverage of the largest tiles by rows in factorised runs (_tile_coverage.py)."""
     seen, coverage_of = [], _tile_coverage.coverage_of
     monkeypatch.setattr(factorized, "coverage_of", lambda *a: seen.append(coverage_of(*a)) or seen[-1])
     return seen
@@ -28,7 +28,7 @@ def sights(monkeypatch):
 def exact_sum_of_equal_rows(raw, points):
     """The image equation where every row has the same samples, all equal: the sum over samples is a polynomial.
 
-    Float64: over tracks of a few metres at 10 km it errs by 1e-10.
+    Float64: over tracks of a few metres at 10 km its error is 1e-10.
     """
     turns, total = 2 / C * raw.frequency_step[0], np.zeros(len(points), complex)
     for first in range(0, raw.n_rows, 5000):
@@ -63,7 +63,7 @@ def hold_at_a_thousand_and(n, method, device):
         wanted = exact_sum_of_equal_rows(raw, grid.positions.reshape(-1, 3)[at])
         errors.append(np.linalg.norm(image.data.ravel()[at] - wanted) / np.linalg.norm(wanted))
         assert errors[-1] <= image.report.predicted_error <= 1e-4
-    # what all rows err alike stays, relative to the sum; the sum's own rounding is compensated and adds next to nothing
+    # the error common to all rows remains; the rounding of the sum itself is compensated and adds almost nothing
     assert errors[1] <= 1.1 * errors[0] + 3e-7
 
 

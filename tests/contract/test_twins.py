@@ -1,4 +1,4 @@
-"""Verbs without a kernel equal their twins in sarcl/reference (those with one are held to it elsewhere)."""
+"""Functions without a kernel equal their references in sarcl/reference (kernels are tested elsewhere)."""
 
 from __future__ import annotations
 

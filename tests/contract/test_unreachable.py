@@ -1,4 +1,4 @@
-"""What planners refuse, in the numbers of whoever asked; and that nothing else is taken for a refusal."""
+"""Refusals of planners, in the units of the caller's tolerance; and no other error counts as a refusal."""
 
 from __future__ import annotations
 
@@ -344,7 +344,7 @@ def test_a_forecast_looks_elsewhere_only_where_nothing_is_seen(monkeypatch):
     assert len(set(tried)) == 3
 
 
-# Files that may catch ValueError, or everything, and why: each turns the error of something foreign into words.
+# Files that may catch ValueError, or everything, and why: each gives the error of a foreign library a message.
 MAY_CATCH = {
     "bench/fastsar_peer.py": "a process of its own: what another library raises is a line of the table",
     "bench/page.py": "text that is no JSON",

@@ -1,4 +1,4 @@
-"""Rows and pixels that no plan looked at: what is sampled before planning must hold for the rest, or be found out."""
+"""Rows and pixels outside the planner's samples: its prediction must hold for them, or its failure be detected."""
 
 from __future__ import annotations
 
@@ -28,7 +28,7 @@ def test_sub_apertures_of_rows_shorter_than_what_their_tiles_reach(n_samples, to
 
 
 def test_a_few_rows_off_a_smooth_track():
-    # half a metre in 5 rows of 2048: thinning would err by a radian there
+    # half a metre in 5 rows of 2048: thinning would have an error of a radian there
     tx = straight(2048, aperture=600.0)
     tx[[77, 600, 1003, 1004, 1900]] += [0, 0.5, 0.5]
     raw, grid = noise_on(tx, n_samples=128, bandwidth=300e6), sarcl.ImageGrid.plane(shape=(128, 128), spacing=0.5)
@@ -51,7 +51,7 @@ def test_an_antenna_low_over_a_wide_grid_sees_longer_steps_beside_it_than_at_the
 
 @pytest.mark.parametrize("tolerance", [1e-3, 1e-4])
 def test_pulses_that_see_the_grid_more_grazing_than_the_sampled_ones(tolerance):
-    # those a plan samples look down steeply, the others graze
+    # rows that a plan samples look down steeply, the others at grazing angles
     n = 1600
     sampled = np.zeros(n, bool)
     for group in line_plan.GROUP_SIZES:

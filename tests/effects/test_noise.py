@@ -1,4 +1,4 @@
-"""Noise on echoes: its level in images, its statistics, and that it belongs to samples."""
+"""Noise on echoes: its level in images, its statistics, and its independence of blocks and row selection."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""The experiment harness: what it measures on curves that are known, and what it says of apertures."""
+"""Experiments on apertures: measurements of known curves, and the sentences of the report."""
 
 from __future__ import annotations
 
@@ -172,7 +172,7 @@ def test_what_does_not_apply_is_said_with_the_reason():
     assert set(found["not_applicable"]) == {"apparent"} and "apparent" not in rows
     said = "".join(parsed(fda_page.html([found])).itertext())
     assert "apparent: not applicable." in said and "even steps along a line" in said
-    # own receivers leave nothing to map, elements of one carrier nothing to tell apart
+    # with separated channels there is nothing to map, and elements of one carrier cannot be separated
     found, rows = rows_of(receive="own")
     assert set(found["not_applicable"]) == {"unmodified", "corrected", "apparent"} and set(rows) > {"channels"}
     found, rows = rows_of(progression="planar", n=(4, 2), frequency_step=(50e6, 0))

@@ -1,4 +1,4 @@
-"""Pictures: where a pixel lands, how bright it is, what the axes say, and what is refused."""
+"""Pictures: position and grey level of pixels, labels of the axes, and refusals."""
 
 import numpy as np
 import pytest

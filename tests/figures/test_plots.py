@@ -1,4 +1,4 @@
-"""Plots and pages: what is drawn where, curves that can be told apart without colour, text that is escaped."""
+"""Plots and pages: positions of marks, curves that are distinguished without colour, text that is escaped."""
 
 import subprocess
 import sys

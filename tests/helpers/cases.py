@@ -9,7 +9,7 @@ from sarcl.reference.backproject import backproject as exact_image
 
 
 def noise_on(tx, rx=None, *, center=9.6e9, bandwidth=300e6, n_samples=96, seed=0, **fields):
-    """White noise in every sample, on any track: nothing is left to chance alignment. Ranges are from the origin."""
+    """White noise in every sample, on any track, so that no error cancels by alignment. Ranges are from the origin."""
     random = np.random.default_rng(seed)
     shape = (len(tx), n_samples)
     samples = random.standard_normal(shape) + 1j * random.standard_normal(shape)

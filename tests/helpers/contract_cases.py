@@ -96,7 +96,7 @@ def build(case: Case) -> tuple[sarcl.PhaseHistory, sarcl.ImageGrid]:
     raw = sarcl.PhaseHistory(
         samples.astype(np.complex64), frequency=f[0], frequency_step=step, tx=tx, rx=rx, reference_range=reference
     )
-    # as many pixels as the window shows, whatever the extent: most would see nothing otherwise
+    # as many pixels as the window contains, at any extent: otherwise most would be outside it
     window = C / (2 * step)
     spacing = min(case.extent, 1.5 * window) / case.side
     angle = random.uniform(0, 2 * np.pi)

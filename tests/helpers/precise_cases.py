@@ -34,7 +34,7 @@ def focus(raw, grid, tolerance, device, *, budget=2.0**28, plan=None, **options)
 
 
 def decimal_image(raw, points, wrap=False):
-    """The image equation with paths of 50 digits: longdouble errs by 1e-9 rad at 36 000 km, X band."""
+    """The image equation with paths of 50 digits: longdouble has an error of 1e-9 rad at 36 000 km, X band."""
     getcontext().prec = 50
     tx, rx = ([[Decimal(float(v)) for v in row] for row in ends] for ends in (raw.tx, raw.rx))
     n = np.arange(raw.n_samples) - raw.n_samples // 2

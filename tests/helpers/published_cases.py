@@ -1,4 +1,4 @@
-"""A far radar in front of the scenes of published figures, and what their images should be on average."""
+"""A far radar for the scenes of published figures, and the expected mean of their images."""
 
 from __future__ import annotations
 

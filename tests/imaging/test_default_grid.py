@@ -1,4 +1,4 @@
-"""The grid of data that come without one."""
+"""The default grid of `sarcl focus`, chosen from the data."""
 
 import numpy as np
 import pytest

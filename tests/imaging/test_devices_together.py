@@ -1,4 +1,4 @@
-"""Several devices at one image: one plan, one queue of tiles, one result."""
+"""One image by several devices: one plan, one queue of tiles, one result."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What an image will take, told before any work."""
+"""`plan`: cost, memory and error of an image, before the computation."""
 
 from __future__ import annotations
 

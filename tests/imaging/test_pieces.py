@@ -1,4 +1,4 @@
-"""Large images: pieces, killed runs and damaged tiles give the same bits as one quiet run, or a word why not."""
+"""Large images: pieces, killed runs and damaged tiles give the same bits as one undisturbed run, or an error."""
 
 from __future__ import annotations
 
@@ -86,7 +86,7 @@ def half_done(raw, path, **options):
 def test_any_number_of_pieces_in_any_order_gives_the_same_bits(raw, whole, tmp_path, n):
     order = random.Random(n).sample(range(1, n + 1), n)
     made = [sarcl.backproject(raw, GRID, out=tmp_path / "image.h5", tile=(i, n)) for i in order]
-    if n <= bands(raw):  # of more pieces some are empty, and may come when all is done
+    if n <= bands(raw):  # with more pieces than bands some are empty, and may run after all others
         assert made[:-1] == [None] * (n - 1)
     assert np.array_equal(made[-1].data[...], whole.data)
     assert names(tmp_path) == ["image.h5"]
@@ -392,7 +392,7 @@ def test_a_command_killed_at_random_moments_ends_with_the_same_image(big, tmp_pa
     rng, killed = random.Random(seed), 0
     while not (tmp_path / "a.h5").exists():
         kept = len(tiles(tmp_path))
-        # few tiles at a time, so that there are many moments
+        # few tiles at a time, so that there are many moments at which to kill
         killed += kill_at([start(command, tmp_path, "--resume")], tmp_path, kept + rng.randint(1, 6), rng)
         assert len(tiles(tmp_path)) > kept or (tmp_path / "a.h5").exists()
     assert killed >= 2

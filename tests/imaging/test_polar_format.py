@@ -1,4 +1,4 @@
-"""Polar format images: the sum of plane waves at the tolerance asked, and what plane waves err, as predicted."""
+"""Polar format images: the sum of plane waves within the tolerance, and the plane-wave error as predicted."""
 
 from __future__ import annotations
 
@@ -81,7 +81,7 @@ def test_contract_where_the_only_bright_point_lies_outside_of_the_grid(x):
         shares.append(error_of(image, raw) / image.report.predicted_error)
         assert float(image.report.plan["error of a dark image"]) > image.report.predicted_error
     print(f"{x} m: shares of the prediction {shares}")
-    assert x != 24 or max(shares) > 0.3  # it is no luxury
+    assert x != 24 or max(shares) > 0.3  # the check is needed
 
 
 def test_contract_on_random_tasks():

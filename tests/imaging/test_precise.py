@@ -68,7 +68,7 @@ def test_unkind_data_stay_below_prediction(double, name, shape, tolerance):
 
 
 def test_dark_single_pixels_stay_below_prediction(double):
-    # a pixel where one row's noise happens to vanish sees that row's interpolation error alone
+    # at a pixel where the noise of the only row vanishes, the interpolation error is all there is
     raw = noise_history(n_rows=1)
     random = np.random.default_rng(1)
     for _ in range(20):
@@ -90,7 +90,7 @@ def test_side_lobes_beside_a_bright_point_stay_below_prediction(double):
 
 
 def test_a_broken_formula_breaks_the_contract(double, monkeypatch):
-    """Interpolation errors predicted 4 x too small are noticed: the bound is that close."""
+    """A prediction 4 times too small fails: the bound of interpolation errors is closer than that."""
     honest = interpolation.deconvolved
     edge = np.zeros((3, 256))
     edge[:, 0] = 1

@@ -1,4 +1,4 @@
-"""Float64 backprojection where it is hard: window edges, many pulses, weak beside strong, little memory; refusals."""
+"""Difficult float64 backprojection: window edges, many pulses, high contrast, little memory; refusals."""
 
 from __future__ import annotations
 
@@ -148,7 +148,7 @@ def test_error_does_not_grow_with_the_number_of_pulses(double, n_rows):
     raw, wanted = coherent(n_rows, grid)
     task = task_of(raw, grid)
     plan, _ = make_plan(task, 1e-8)
-    # a kernel that errs 1e-14 shows the sum alone
+    # with an interpolation error of 1e-14 only the error of the sum remains
     plan = replace(plan, interpolator=interpolation.deconvolved(14, 4.0, 7, np.float64), length=64, order=WIDE)
     data, _, _ = focus(raw, grid, 1e-8, double, plan=plan)
     assert np.linalg.norm(data.ravel() - wanted) <= 3e-14 * np.linalg.norm(wanted)

@@ -1,4 +1,4 @@
-"""What no pulse sees is skipped, counted by reason, and changes nothing: beams, range windows, weights, empty cells."""
+"""Skipped contributions are zero and counted by reason: beams, range windows, weights, empty cells."""
 
 from __future__ import annotations
 
@@ -232,7 +232,7 @@ def test_sub_apertures_take_rows_that_see_a_tile_whole_and_no_others():
     image = sarcl.backproject(raw, grid, beam=beam, tolerance=1e-2, method="factorized")
     assert near(image, raw, beam) <= 1e-2
     assert image.report.contributions_skipped["beam"] == 200 * grid.size
-    # a beam that lights nothing at all leaves nothing to be done
+    # with a beam that contains no pixel, no contribution is computed
     dark = sarcl.backproject(raw, grid, beam=(0.2, (-1, 0, 0)), tolerance=1e-2, method="factorized")
     assert not dark.data.any() and dark.report.contributions_done == 0
 

@@ -1,4 +1,4 @@
-"""Files: paths refused before the work, nothing half-written, lossless HDF5, Gotcha, what `read` refuses."""
+"""Files: paths refused before the computation, no half-written files, lossless HDF5, Gotcha, refusals of `read`."""
 
 import os
 import struct
@@ -563,7 +563,7 @@ def test_two_gotcha_files_focus_together_on_their_brightest_reflector():
     image = np.abs(exact_image(raw, points))
     peak = points[image.argmax()]
     assert np.abs(peak[:2] - (-15.6, 21.6)).max() < 0.11
-    # Were every pulse in phase, the peak would be the sum of its pulses' own peaks.
+    # With every pulse in phase, the peak would be the sum of the peaks of the pulses.
     alone = [abs(exact_image(raw[i], peak[None])[0]) for i in range(0, 234, 6)]
     assert image.max() > 0.97 * np.mean(alone) * 234
 

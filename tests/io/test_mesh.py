@@ -63,7 +63,7 @@ def test_an_open_sheet_is_wound_alike_and_keeps_both_sides():
     sheet = sarcl.Scene.from_heights(np.arange(9.0), np.arange(7.0), np.zeros((7, 9))).triangles
     sheet = np.where(np.arange(len(sheet))[:, None, None] % 3 == 0, sheet[:, ::-1], sheet)
     scene = sarcl.Scene.from_mesh(trimesh.Trimesh(**trimesh.triangles.to_kwargs(sheet)))
-    assert scene.two_sided.all() and (normals(scene.triangles) == (0, 0, 1)).all()  # most faced up
+    assert scene.two_sided.all() and (normals(scene.triangles) == (0, 0, 1)).all()  # most faces pointed upwards
 
 
 def strip(twists, n=20):

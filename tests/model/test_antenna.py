@@ -1,4 +1,4 @@
-"""Antenna patterns, aims and where they need not be asked, against closed forms."""
+"""Antenna patterns, pointing, and the limits beyond which a pattern is negligible, against closed forms."""
 
 from __future__ import annotations
 

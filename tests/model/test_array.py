@@ -1,4 +1,4 @@
-"""AntennaArray: places, carriers, plans of carriers over the pulses, and what is refused."""
+"""AntennaArray: positions, carriers, plans of carriers over the pulses, and refusals."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Error formulas against what they bound."""
+"""Error formulas against the errors that they bound."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def test_interpolation_error_is_bounded_at_every_frequency_and_place(taps, overs
     got = (weights * waves).sum(axis=1)
     error = np.abs(got - np.exp(2j * np.pi * nu * t)).max()
     assert error <= 1.02 * made.error  # the bound is taken on a grid of 33 frequencies and 65 places
-    assert error >= 0.3 * made.error  # and it is no exaggeration
+    assert error >= 0.3 * made.error  # and the bound is not much larger than the error
 
 
 def test_the_hat_errs_by_3_3_nu_squared():

@@ -1,4 +1,4 @@
-"""The OpenCL floor: which device, which errors, what is built once."""
+"""The room opencl: choice of a device, errors, and programs that are built once."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Papers done again: what is printed beside what comes out, the command, the page, and range zones told apart."""
+"""Papers recomputed: published beside measured values, the command, the page, and range zones separated."""
 
 from __future__ import annotations
 
@@ -273,10 +273,10 @@ def test_the_record_is_the_sum_over_absolute_delays():
 
 
 def test_four_zones_are_told_apart_by_quarter_turns_and_fold_with_one_carrier():
-    # one element's phase errs by 2e-7 or so: what is left of an exact null
+    # the phase error of an element, about 2e-7, is the residual at an exact null
     for apart in (1, 2, 3):
         assert _zones.leak(SHORT, apart) < -100 and range_zones.isolation(SHORT, apart) == -np.inf
-    for radar in (replace(SHORT, step=0.0), replace(SHORT, step=20 * SHORT.prf)):  # equal carriers, or whole turns
+    for radar in (replace(SHORT, step=0.0), replace(SHORT, step=20 * SHORT.prf)):  # equal carriers, or whole cycles
         assert _zones.leak(radar, 1) == pytest.approx(0, abs=0.02) and range_zones.isolation(radar, 1) == 0
     assert _zones.leak(SHORT, 4) == pytest.approx(0, abs=0.02) and range_zones.isolation(SHORT, 4) == 0  # P zones on
 
@@ -293,7 +293,7 @@ def test_off_the_quarter_isolation_is_the_dirichlet_ratio(turn):
 def test_another_direction_turns_over_the_elements_by_itself(degrees):
     up = np.radians(degrees)
     assert _zones.leak(SHORT, 1, up) == pytest.approx(range_zones.isolation(SHORT, 1, up), abs=0.05)
-    if degrees == 30:  # half a wave apart: a quarter turn back, and the zones fold
+    if degrees == 30:  # half a wavelength apart: a quarter cycle back, and the zones fold
         assert range_zones.isolation(SHORT, 1, up) == pytest.approx(0, abs=0.02)
 
 

@@ -1,4 +1,4 @@
-"""Autofocus: known errors are put on echoes made from the formula (or on measured ones), and must come off again."""
+"""Autofocus: known errors are added to echoes computed from the formula (or measured), and must be removed."""
 
 from __future__ import annotations
 
@@ -82,7 +82,7 @@ def smooth(n, seed, *, modes=8, rms=None, peak=None):
 
 
 def flat(curve):
-    """A curve less its straight line: what is left of it moves no image."""
+    """A curve minus its straight line, which only displaces the image."""
     t = np.arange(len(curve))
     return curve - np.polyval(np.polyfit(t, curve, 1), t)
 

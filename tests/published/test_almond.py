@@ -1,4 +1,4 @@
-"""The NASA almond by physical optics against the Austin RCS benchmark: good at broadside, and its limits."""
+"""The NASA almond by physical optics against the Austin RCS benchmark: accurate at broadside, wrong at the tip."""
 
 from __future__ import annotations
 
@@ -70,5 +70,5 @@ def test_it_knows_no_polarisation_on_a_conductor_and_lies_between_the_two(differ
 
 
 def test_its_limit_is_the_tip_where_diffraction_rules(differences):
-    # seen from the pointed end nothing is specular: 10 dB and more are missing
+    # from the pointed end nothing is specular: the result is 10 dB or more too low
     assert rms(differences, (4, "H"), 0, 60) > 10

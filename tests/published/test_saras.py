@@ -1,6 +1,6 @@
 """SARAS (Franceschetti et al. 1992), Figs 10 to 17, echoed and focused: statistics, materials, layover, shadows.
 
-The paper tells few parameters: those here keep facets of several wavelengths, so many a resolution cell as it says.
+The paper gives few parameters: these keep its number of facets per resolution cell, with facets of several wavelengths.
 """
 
 from __future__ import annotations
@@ -138,7 +138,7 @@ def parallelepiped():
 
 
 def test_fig_13_a_shadow_holds_no_speckle(parallelepiped):
-    # a Taylor window of -90 dB lets in -74 dB from the ground around: echo and focusing must let in less
+    # a Taylor window of -90 dB adds -74 dB from the ground around: echo and focusing must add less
     raw, depth, width, height = parallelepiped
     grid = FINE.grid((140, 130), pixels=2)
     power = np.abs(FINE.focus(raw, grid, tolerance=1e-3, window=("taylor", 90, 16))) ** 2
@@ -153,7 +153,7 @@ def test_fig_13_a_shadow_holds_no_speckle(parallelepiped):
 
 @pytest.mark.slow
 def test_fig_13_a_shadow_stays_dark_where_its_edges_move():
-    # in a wide aperture the shadow turns by half a metre while it is looked at: shares that stepped from block to
+    # in a wide aperture the shadow moves by half a metre along the track: shares that stepped from block to
     # block of pulses would leave -45 dB
     radar = Radar(look=np.radians(50), bandwidth=300e6, turn=0.05, n_pulses=192)
     scene = ground((-24, 24), (-24, 30), **STONE) + shapes.box((8, 12, 6), **STONE)

@@ -1,6 +1,6 @@
 """Wan, Yue and Yang 2004: speckle (Fig 3), 16 patches of roughness and permittivity (Figs 4, 5), solids (Figs 6-8).
 
-The paper tells neither wavelength nor resolution. Heights of 0.08 to 0.23 m ask for a long wave: L band, facets of
+The paper gives neither wavelength nor resolution. Heights of 0.08 to 0.23 m need a long wave: L band, facets of
 three wavelengths, resolution cells of a hundred facets.
 """
 
@@ -142,5 +142,5 @@ def test_figs_6_to_8_a_frustum_a_cuboid_and_a_cylinder_on_rough_ground(n):
     assert off == pytest.approx(1, abs=4 * error) and abs(mean) < 4
     dark = wanted < 1e-2 * np.median(wanted)
     assert dark.sum() > 100 and power[dark].mean() < 1.5 * wanted[dark].mean()
-    for shift in ((2, 0), (0, 2)) if n > 2 else ():  # moved by a null it would not fit; two looks do not tell
+    for shift in ((2, 0), (0, 2)) if n > 2 else ():  # moved by a null it would not fit; two looks are too few
         assert misfit(power, np.roll(wanted, shift, (0, 1)), n)[0] > 1 + 3 * error

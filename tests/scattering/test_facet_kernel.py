@@ -13,7 +13,7 @@ from sarcl.scattering import physical_optics
 
 HEADERS = ("common.clh", "doubleword.clh", "geometry.clh", "vec3_complex.clh", "facet.clh")
 MACROS = {"BISTATIC": 1, "WRAP": 0, "RANGE": 2, "WIDE_FACETS": 1}
-KAPPA = float(np.float32(9.6e9 / SPEED_OF_LIGHT))  # turns/m, X band
+KAPPA = float(np.float32(9.6e9 / SPEED_OF_LIGHT))  # cycles per metre, X band
 PERMITTIVITIES = np.array(
     [1, 1.0000012, 1.0000012 - 3.2e-4j, 3, 5 - 2j, 40 - 3j, 80 - 3e3j, 1e9, 1e9 - 1e9j, 1 - 1e9j, np.inf], complex
 )
@@ -58,7 +58,7 @@ def impedance(permittivity):
 
 
 def phases():
-    """Turns (2, n) float32: the adversarial ones, and random ones up to a million turns, many of them near equal."""
+    """Phases in cycles (2, n) float32: adversarial ones, and random ones up to a million, many of them nearly equal."""
     random = np.random.default_rng(1)
     wide = 10.0 ** random.uniform(-6, 6, (2, 60000)) * random.choice([-1, 1], (2, 60000))
     wide[1, ::3] = wide[0, ::3] * (1 + 10.0 ** random.uniform(-8, 0, 20000))

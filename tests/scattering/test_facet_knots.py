@@ -85,7 +85,7 @@ def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
 
 
 def test_a_jumping_track_shares_nothing(device, always):
-    """Neighbours in time that are no neighbours in space: every pulse its own, and still right."""
+    """Neighbours in time that are far apart in space: every pulse has its own amplitudes, and the echo is right."""
     tx = track()
     order = np.random.default_rng(2).permutation(len(tx))
     jumping = sarcl.Trajectory(tx.times, tx.positions[order])

@@ -1,4 +1,4 @@
-"""Warnings that measure: what flat facets in place of curves change in dB, and what contrast speckle will have."""
+"""Warnings with figures: the effect of flat facets in place of curves in dB, and the contrast of speckle."""
 
 from __future__ import annotations
 
@@ -117,7 +117,7 @@ def test_what_spheres_err_is_predicted(ka, mesh):
             predicted = facet_error.judge(body, from_afar(direction), wave).error_db
             if predicted:
                 assert abs(predicted - actual) < 0.15 + 0.15 * actual or min(predicted, actual) > 5
-            else:  # edges so fine that it is not worth looking
+            else:  # edges so fine that no test is needed
                 assert actual < 0.1
 
 
@@ -324,7 +324,7 @@ def test_only_what_the_radar_sees_counts():
     assert facet_error.judge(Scene.points([[0.0, 0, 0]]), from_afar(POLE), wave) == facet_error.Fineness()
     black = replace(body, reflectivity=np.zeros(len(body.triangles)))
     assert facet_error.judge(black, from_afar(POLE), wave) == facet_error.Fineness()
-    # cylinders whose sides nothing specular comes from are not judged by what is left of them
+    # cylinders without a specular echo from their sides are not judged by the remaining echo
     assert facet_error.judge(shapes.cylinder(1.0, 2.0), antennas(arc(0.7, 0, 0.2)), X_BAND).warnings() == []
 
 
@@ -362,7 +362,7 @@ def test_meshes_of_every_kind_are_judged(data_folder):
     for file in files[:3]:
         body = Scene.from_mesh(file, scale=0.0254)
         found = facet_error.judge(body, antennas(arc(0.5, 1.5, 1.6, distance=1e4)), X_BAND)
-        # wheels and wings of 10 to 30 cm facets at 3 cm: of course they err
+        # wheels and wings of 10 to 30 cm facets at 3 cm: a large error is expected
         assert found.warnings() and found.radius < 10 and 0.02 < found.edge < 2
 
 

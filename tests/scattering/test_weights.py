@@ -166,7 +166,7 @@ def test_left_out_of_the_beam_changes_nothing(device):
 
 
 def test_a_bright_plate_in_a_side_lobe_is_kept(device):
-    """A mirror far outside the beam outshines what the beam shows: nothing of it may be skipped unseen."""
+    """A mirror far outside the beam is brighter than all that is in it: none of its facets may be skipped."""
     tx = track(aim=(0, 0, 0))
     middle = tx.positions[len(tx) // 2] - (0, 1500, 0)
     u = middle / np.linalg.norm(middle)

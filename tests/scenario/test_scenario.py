@@ -1,4 +1,4 @@
-"""Scenario files: the Python names as TOML, mistakes located by line, and back without loss."""
+"""Scenario files: the Python names as TOML, mistakes located by line, and writing without loss."""
 
 import inspect
 

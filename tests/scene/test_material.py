@@ -1,4 +1,4 @@
-"""Materials: what they stand for, what is refused, and what the words for them mean."""
+"""Materials: permittivity and roughness, refusals, and the names in the table."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Echoes interpolated between few places of an array, against every channel's own exact sum."""
+"""Echoes interpolated between a few positions of an array, against the exact sum of every channel."""
 
 from __future__ import annotations
 
@@ -75,7 +75,7 @@ def test_random_arrays_keep_their_tolerance():
 
 
 def test_places_are_two_a_turn_and_a_few():
-    # phase turns by `span` over the array: Bessel's functions of pi span vanish beyond as many terms
+    # the phase changes by `span` cycles over the array: Bessel functions of pi span vanish beyond as many terms
     elements = np.stack([np.zeros(900), np.linspace(-1, 1, 900), np.zeros(900)], axis=1)
     for span in (0.1, 1.0, 10.0, 100.0):
         for allowed in (1e-2, 1e-6):
@@ -157,7 +157,7 @@ def test_every_element_to_every_other_takes_few_places():
 
 
 def test_a_single_pulse_close_by_is_seen():
-    # one pulse of 200 from a tenth of the distance, where the scene turns ten times as much over the array
+    # one pulse of 200 from a tenth of the distance, where phases change ten times as much over the array
     positions = np.stack([np.full(200, -5e4), np.linspace(-50, 50, 200), np.full(200, 2e4)], axis=1)
     positions[101] /= 10
     track, array = sarcl.Trajectory(np.arange(200), positions), line(45, spacing=0.3)
@@ -171,7 +171,7 @@ def test_a_single_pulse_close_by_is_seen():
     assert np.linalg.norm(raw.samples[101] - wanted) <= 1e-3 * np.linalg.norm(wanted)
 
 
-# Inputs that broke earlier ways to choose places
+# Inputs on which other choices of positions fail
 def straight(n, distance, length, look):
     look = np.array(look, float) / np.linalg.norm(look)
     across = np.cross([0, 0, 1.0], look)

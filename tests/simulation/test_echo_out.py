@@ -1,4 +1,4 @@
-"""Echoes written to a file pulse after pulse, and what they will take, told before."""
+"""Echoes written to a file pulse after pulse, and the forecast of their size, time and error."""
 
 from __future__ import annotations
 

@@ -45,7 +45,7 @@ def test_echo_from_far_away_is_that_of_plane_waves():
 
 
 def test_echo_of_a_plate_at_normal_incidence_is_a_pair_of_fresnel_integrals():
-    # exp(-2 j k (sqrt(R^2 + x^2 + y^2) - R)) to second order in x/R; the fourth errs by 8e-6 rad in the corners
+    # exp(-2 j k (sqrt(R^2 + x^2 + y^2) - R)) to second order in x/R; the fourth order is 8e-6 rad in the corners
     distance, side = 1e3, 5.0
     got = facet.facet_echo(plate(side), CONDUCTOR, BAND, distance * UP, distance * UP, distance, by_facet=True)
     k = 2 * np.pi * BAND / SPEED_OF_LIGHT

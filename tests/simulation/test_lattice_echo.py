@@ -1,4 +1,4 @@
-"""Scatterers that lie evenly: images of the interpolation kernel add up on them, within the tolerance all the same."""
+"""Evenly spaced scatterers: aliases of the interpolation kernel add up on them, and stay within the tolerance."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Echoes of terrain: scenes remember their heights, and what these hide is found by horizons as by rays."""
+"""Echoes of terrain: scenes keep their heights, and shadows by horizons equal those by rays."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""Lit shares: outlines of shadows on the ground, halves of facets, blocks of pulses, and what may not change them."""
+"""Illuminated shares: outlines of shadows on the ground, halves of facets, blocks of pulses, and invariances."""
 
 from __future__ import annotations
 
@@ -335,7 +335,7 @@ def test_where_shadows_hardly_move_every_sixteenth_block_is_looked_at(monkeypatc
     assert list(found) == sorted(asked) == [*range(0, 97, 8), 97, 99] and len(set(asked)) == len(asked)
     shares[:, 1:20] = (np.arange(100) * 2)[:, None]  # even change
     assert len(list(refine_viewpoints(look, at))) == len(found)
-    shares[39:42, 30] = 255  # something passes: it is looked at as closely as it needs
+    shares[39:42, 30] = 255  # an occlusion in some pulses only: viewpoints are added until it is resolved
     assert {36, 38, 39, 40, 41, 42, 44} <= set(dict(refine_viewpoints(look, at)))
     assert [list(dict(refine_viewpoints(look, at[:n]))) for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]
 
