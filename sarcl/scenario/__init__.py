@@ -6,8 +6,8 @@ For other folders:
 
 For this folder alone:
 
-    _schema    tables and keys a scenario may hold
-    _tables    objects such as Scene or Trajectory written as tables
+    _schema    tables and keys that a scenario may hold
+    _tables    Python objects (Scene, Trajectory, ...) written as tables
 """
 
 from .scenario import Scenario, load, loads

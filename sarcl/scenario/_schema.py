@@ -1,7 +1,7 @@
-"""Which tables and keys a scenario may hold: those of the Python calls they stand for.
+"""Tables and keys that a scenario may hold: those of the Python calls that they describe.
 
-A section of a scenario ([waveform.chirp], [[scene.points]], [echo]) stands for one call; its keys are the
-call's arguments, read from the signature, so that the file format cannot drift from the library.
+A section of a scenario ([waveform.chirp], [[scene.points]], [echo]) describes one call. Its keys are the call's
+arguments, read from the signature, so that file format and library always agree.
 """
 
 from __future__ import annotations
@@ -19,13 +19,13 @@ from ..base.text import unknown
 Path = tuple[str | int, ...]
 Call = Callable[..., Any]
 
-# A mesh or an elevation model is a file in a scenario.
+# Arguments that are called `file` in a scenario: a mesh or an elevation model is always a file there.
 RENAMED = {"mesh": "file", "path": "file"}
-# Arguments that are other sections, or belong to the run and not to the scenario.
+# Arguments that are no keys: other sections describe them, or they belong to one run and not to the scenario.
 NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
 NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
-NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material's is its table's; the others are tables of their own
-ON = "on"  # of a part of the scene: stand it on the parts before
+NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material is named by its table; others are tables
+ON = "on"  # key of a part of the scene: the part stands on the parts before it
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
     "int": (
@@ -41,8 +41,8 @@ _ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
 
 
 def calls(section: str) -> dict[str, Call]:
-    """The calls a section can stand for, by the name of its table; "" is the section's own table."""
-    # each section imports the rooms it needs and no more: the verbs load pyopencl
+    """The calls that a section can describe, by the name of the table; "" is the section's own table."""
+    # each section imports only the folders it needs: the verbs load pyopencl
     if section in ("trajectory", "receiver"):
         from ..model.trajectory import Trajectory
 
@@ -119,20 +119,20 @@ SECTIONS = (
 
 
 def parameters(call: Call) -> dict[str, inspect.Parameter]:
-    """Keys of the table that stands for `call`."""
+    """Keys of the table that describes `call`."""
     found = inspect.signature(call).parameters
     return {RENAMED.get(n, n): p for n, p in found.items() if n not in NOT_KEYS}
 
 
 @dataclass(frozen=True)
 class Where:
-    """The file a scenario came from, and the line of each of its keys; nothing for one made in Python."""
+    """The file of a scenario and the line of each key; no lines for a scenario that was made in Python."""
 
     name: str = "scenario"
     lines: Mapping[Path, int] = field(default_factory=dict)
 
     def text(self, path: Path, key: str | None = None) -> str:
-        """ "FILE.toml:12: [waveform.chirp]", the line that of `key` where it is known."""
+        """ "FILE.toml:12: [waveform.chirp]", with the line of `key` where that is known."""
         line = self.lines.get((*path, key)) if key else None
         at = path
         while line is None and at:
@@ -146,20 +146,20 @@ class Where:
 
     @contextmanager
     def blame(self, path: Path, keys: Mapping[str, Any], always: bool = True) -> Iterator[None]:
-        """Put the file, the line and the table before the message of what a call refuses.
+        """Put file, line and table in front of the message when a call refuses its arguments.
 
-        The line is that of the first key the message names. Without `always`, only messages that name a
-        key of the table are its fault.
+        The line is that of the first key that the message names. Without `always`, only messages that name a key of
+        the table are changed.
         """
         try:
             yield
         except (ValueError, TypeError, FileNotFoundError, MemoryError) as exc:
             words = re.findall(r"\w+", str(exc))
-            # from_mesh speaks of a mesh where the table has a file
+            # messages of from_mesh name the argument mesh, which is the key file
             named = next((RENAMED.get(w, w) for w in words if RENAMED.get(w, w) in keys), None)
             if named is None and not always:
                 raise
-            if isinstance(exc, ToleranceMissed):  # it holds the finished image
+            if isinstance(exc, ToleranceMissed):  # the exception holds the finished result
                 raise
             if isinstance(exc, ToleranceUnreachable):
                 raise exc.placed(self.text(path, named)) from exc
@@ -168,7 +168,7 @@ class Where:
 
 
 def check_section(section: str, table: Any, where: Where) -> None:
-    """Refuse what no call would take: unknown keys, wrong types, missing keys. ValueError names the line."""
+    """Check keys and types of a section. ValueError names the line of an unknown key, a missing key or a wrong type."""
     known = calls(section)
     if section == "materials" and isinstance(table, Mapping):
         for name, part in table.items():
@@ -200,7 +200,7 @@ def check_section(section: str, table: Any, where: Where) -> None:
 
 
 def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
-    """Each table of a kind with its path: scenes may hold many of one kind."""
+    """Each table of a kind with its path: a scene may hold several tables of one kind."""
     if section == "scene" and isinstance(value, list):
         return [((section, kind, i), part) for i, part in enumerate(value)]
     return [((section, kind), value)]
@@ -230,12 +230,12 @@ def _check_table(
 
 
 def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
-    """What the annotation asks for, in words, where `value` is not that; else ""."""
+    """The type that the annotation asks for, in words, where `value` has another; else ""."""
     if key == RENAMED["mesh"]:
         names = {"str"}
     else:
         names = {n.strip() for n in str(parameter.annotation).split("|")} - {"None"}
-        names = {"str" if n.startswith("Literal[") else n for n in names}  # its words are checked by the call
+        names = {"str" if n.startswith("Literal[") else n for n in names}  # the call checks which words are allowed
     if names and names <= set(_TYPES):
         return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
     if re.search("Mapping|MapApertureOptions", str(parameter.annotation)) and isinstance(value, Mapping):

@@ -1,4 +1,4 @@
-"""Nouns as the tables of a scenario."""
+"""Python objects written as the tables of a scenario."""
 
 from __future__ import annotations
 
@@ -20,7 +20,10 @@ from ..scene.scene import Scene
 
 
 def table_of(value: Any) -> Any:
-    """The table of a noun; anything else as it is. A noun's table gives an equal noun, but names no files."""
+    """The table of a Waveform, Trajectory, Scene, ...; any other value unchanged.
+
+    An object made from its table equals the object; meshes are written as facets, not as the file they came from.
+    """
     if isinstance(value, Waveform):
         return {value.kind: _waveform(value)}
     if isinstance(value, Trajectory):
@@ -43,7 +46,7 @@ def table_of(value: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """Arrays and tuples as lists, complex numbers as [real, imaginary], paths as text, all the way down."""
+    """A value with arrays and tuples as lists, complex numbers as [real, imaginary] and paths as text, at any depth."""
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
@@ -74,7 +77,7 @@ def _antenna(value: Antenna) -> dict[str, Any]:
 
 
 def named(scene: Scene) -> dict[str, Material]:
-    """The scene's materials by names that are unique, in their order."""
+    """The scene's materials, in their order, by unique names."""
     names: dict[str, Material] = {}
     for m in scene.materials:
         name, n = ("metal" if m == METAL else m.name or "material"), 1
@@ -86,7 +89,7 @@ def named(scene: Scene) -> dict[str, Material]:
 
 
 def look_up(key: str, value: Any, materials: Mapping[str, Material]) -> Any:
-    """A value of a scene's table: where the key is that of materials, those that `materials` names instead of names."""
+    """A value of a scene's table, with names of materials replaced by the Materials where the key takes these."""
     if key not in ("material", "materials"):
         return value
     if isinstance(value, str):
@@ -99,7 +102,7 @@ def look_up(key: str, value: Any, materials: Mapping[str, Material]) -> Any:
 
 
 def _material(value: Material) -> dict[str, Any]:
-    # what a default depends on is always written
+    # written even when equal to the default: defaults of other fields depend on these
     always = ("eps_r", "conductivity", "height")
     plain = {f.name: getattr(value, f.name) for f in fields(value) if f.name != "name"}
     return {n: v for n, v in plain.items() if n in always or v != Material.__dataclass_fields__[n].default}

@@ -1,4 +1,4 @@
-"""Scenario files: a simulation as TOML, its tables and keys the Python names. See docs/guide/scenarios.md."""
+"""Scenario files: a simulation as TOML, with the Python names as tables and keys. See docs/guide/scenarios.md."""
 
 from __future__ import annotations
 
@@ -36,30 +36,31 @@ if TYPE_CHECKING:
     from ..simulation.echo import EchoOptions
     from ..simulation.echo_forecast import EchoForecast
 
-# Arguments that may be complex, which TOML has no word for: a list of [real, imaginary] pairs.
+# Arguments that may be complex. TOML has no complex numbers: they are lists of [real, imaginary] pairs.
 COMPLEX = {"amplitudes", "signal", "weights"}
-Table = dict[str, Any]  # of a scenario: keys and plain values, or tables in it
+Table = dict[str, Any]  # table of a scenario: keys with plain values or further tables
 
 
 @dataclass(frozen=True, eq=False)
 class Scenario:
-    """What to simulate and how to focus it, as tables of plain values: `Scenario(...)` or `load(path)`.
+    """A simulation and how to focus it, as tables of plain values: `Scenario(...)` or `load(path)`.
 
     waveform     {"chirp": {"center": 9.6e9, ...}}, or a Waveform
     trajectory   {"circle": {...}}, {"line": {...}}, {"times": ..., "positions": ...}, or a Trajectory
-    receiver     the same for a receiver of its own, or None
-    pointing     {"spotlight": {"point": [0, 0, 0]}}, {"stripmap": ...}, {"fixed": ...}: what sets a track's attitude
+    receiver     the same for a separate receiver, or None
+    pointing     {"spotlight": {"point": [0, 0, 0]}}, {"stripmap": ...}, {"fixed": ...}: attitude along the track
     antenna      {"gaussian": {...}}, {"rectangular": ...}, {"table": ...}, {"isotropic": ...}, or an Antenna
     array        {"linear": {"n": 45, ...}}, {"planar": ...}, {"costas": ...}, or an AntennaArray
-    receiver_pointing, receiver_antenna   the receiver's, where they differ;  radar  {"power": ...}, or a Radar
-    materials    {name: {"eps_r": 4.0, ...}, ...}, or Materials, which the scene's tables name
+    receiver_pointing, receiver_antenna   of the receiver, where they differ from the transmitter's
+    radar        {"power": ...}, or a Radar
+    materials    {name: {"eps_r": 4.0, ...}, ...}, or Material objects; tables of the scene refer to them by name
     scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
     grid         {"plane": {...}} or {"points": {...}}, or an ImageGrid
     echo         arguments of `sarcl.echo`;  noise  of `sarcl.add_noise`;  backproject  of `sarcl.backproject`
-    folder       mesh files are named relative to it
+    folder       folder that names of mesh and elevation files are relative to
 
-    All are optional until they are used. Nouns become tables; arrays and tuples become lists. ValueError
-    names the file, line and table of an unknown or missing key, a wrong type, or a value that a noun refuses.
+    A section may be left out until it is used. Python objects become tables; arrays and tuples become lists. ValueError
+    names the file, line and table of an unknown or missing key, a wrong type, or a value that is refused.
     """
 
     waveform: Table | None = None
@@ -80,7 +81,7 @@ class Scenario:
     folder: Path = Path()
     where: Where = field(default_factory=Where, repr=False)
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types that the constructor takes; the fields above have the types that are stored
 
         def __init__(
             self,
@@ -122,15 +123,15 @@ class Scenario:
 
     @property
     def tables(self) -> dict[str, Any]:
-        """The sections that are there, as nested dicts and lists."""
+        """The sections of this scenario, as nested dicts and lists."""
         return {n: getattr(self, n) for n in _schema.SECTIONS if getattr(self, n) is not None}
 
     def dumps(self) -> str:
-        """The scenario as TOML; `loads` gives the same tables, floats to the last bit."""
+        """The scenario as TOML text. `loads` of it returns the same tables, with every float exact."""
         return toml.dumps(self.tables)
 
     def save(self, path: PathLike) -> None:
-        """Write it to a file. Mesh files must lie as before, relative to the new file."""
+        """Write the scenario to a file. Names of mesh files stay relative to the folder of the file."""
         from ..io import output_paths
 
         with output_paths.atomic(path) as part:
@@ -141,7 +142,7 @@ class Scenario:
         return self._one("waveform")
 
     def build_track(self) -> Trajectory:
-        """The transmitter's Trajectory, aimed as [pointing] says."""
+        """The transmitter's Trajectory, with the attitude that [pointing] describes."""
         return self._aimed(self._one("trajectory"), "pointing")
 
     def build_receiver(self) -> Trajectory | None:
@@ -154,17 +155,17 @@ class Scenario:
         """The Antenna, a pair (transmitting, receiving), or None."""
         if self.antenna is None:
             if self.receiver_antenna is not None:
-                raise ValueError(f"{self.where.text(('receiver_antenna',))} has no [antenna] that sends; add one")
+                raise ValueError(f"{self.where.text(('receiver_antenna',))} has no [antenna] to transmit; add one")
             return None
         sends = self._one("antenna")
         return sends if self.receiver_antenna is None else (sends, self._one("receiver_antenna"))
 
     def build_radar(self) -> Radar | None:
-        """The Radar, None where amplitudes do not fall with range."""
+        """The Radar; None where amplitudes do not decrease with range."""
         return None if self.radar is None else self._one("radar")
 
     def build_array(self) -> AntennaArray | None:
-        """The AntennaArray that sends, None where one antenna does."""
+        """The AntennaArray that transmits; None where a single antenna does."""
         return None if self.array is None else self._one("array")
 
     def build_grid(self) -> ImageGrid:
@@ -194,7 +195,7 @@ class Scenario:
         return scene
 
     def simulate(self, **options: Unpack[EchoOptions]) -> PhaseHistory:
-        """Echoes of the scene, with [noise]. `options` are arguments of `sarcl.echo`, before those in [echo]."""
+        """Echoes of the scene, with [noise]. `options`, arguments of `sarcl.echo`, take precedence over [echo]."""
         from ..simulation.echo import echo
 
         raw = self._echo(echo, options)
@@ -209,7 +210,7 @@ class Scenario:
             return add_noise(raw, **level)
 
     def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast:
-        """What `simulate` with these options will take: rows, bytes, time, error."""
+        """Forecast of `simulate` with these options: rows, bytes, seconds, predicted error."""
         from ..simulation.echo_forecast import plan_echo
 
         return self._echo(plan_echo, options)
@@ -225,7 +226,7 @@ class Scenario:
             )  # fmt: skip
 
     def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectOptions]) -> Image:
-        """The image of `raw` on `grid`, default [grid]. `options` come before those in [backproject]."""
+        """The image of `raw` on `grid`, default [grid]. `options` take precedence over those in [backproject]."""
         from ..imaging.backproject import backproject
 
         return self._focused(backproject, raw, grid, options, self._options("backproject", options))
@@ -233,7 +234,7 @@ class Scenario:
     def plan_focus(
         self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[FocusKeywords]
     ) -> Forecast:
-        """What `focus` with these options will take: method, time, bytes, error."""
+        """Forecast of `focus` with these options: method, seconds, bytes, predicted error."""
         from ..imaging.focus_options import FocusOptions
         from ..imaging.forecast import plan
 
@@ -258,7 +259,7 @@ class Scenario:
         return self._call((section, kind), table[kind], partial(_schema.calls(section)[kind], track))
 
     def _check_focus(self) -> None:
-        """Refuse a window that would be refused only after the echoes are made."""
+        """Check the window before the simulation: `backproject` would refuse it only after the echoes are computed."""
         from ..numerics.windows import weights
 
         given = self._options("backproject", {})
@@ -291,7 +292,7 @@ class Scenario:
             return call(**given)
 
     def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
-        """Arguments of a verb: a list there is a pair or a choice with parameters, so a tuple."""
+        """Arguments of a function. A list is a pair, or a name with its parameters: a tuple in Python."""
         table = getattr(self, name) or {}
         return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
 
@@ -299,7 +300,7 @@ class Scenario:
 def load(path: PathLike) -> Scenario:
     """Read a scenario file; mesh files are found relative to its folder.
 
-    ValueError names file and line of what is not TOML or not a scenario; FileNotFoundError.
+    ValueError names file and line where the text is not TOML or not a scenario; FileNotFoundError.
     """
     path = Path(path)
     try:
@@ -314,7 +315,7 @@ def load(path: PathLike) -> Scenario:
 
 
 def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scenario:
-    """A scenario from TOML text; `name` stands for the file in messages. Raises as `load` does."""
+    """A scenario from TOML text; messages name the file `name`. Raises as `load` does."""
     from ..io.toml import locate
 
     try:
@@ -330,7 +331,7 @@ def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scena
 
 
 def _syntax(name: str, text: str, message: str) -> str:
-    """tomllib's message with its line where an editor looks for it."""
+    """tomllib's message with file and line in front, the form that editors recognise."""
     match = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)", message)
     line = int(match[1]) if match and match[1] else text.rstrip().count("\n") + 1
     column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
@@ -339,7 +340,7 @@ def _syntax(name: str, text: str, message: str) -> str:
 
 
 def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
-    """`part` on what came before it in the scenario, at place = [x, y] or [x, y, depth]."""
+    """`part` placed on the earlier parts of the scenario, at place = [x, y] or [x, y, depth], m."""
     if ground is None:
         raise ValueError("on has no ground: put the table of the ground before this one")
     if not isinstance(place, list) or len(place) not in (2, 3):
@@ -348,12 +349,12 @@ def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
 
 
 def _argument(key: str, value: Any) -> Any:
-    """A value as its call wants it: pairs of a complex key become complex numbers."""
+    """A value as its call takes it: pairs of a complex key become complex numbers."""
     if key in COMPLEX and isinstance(value, list) and value and all(isinstance(v, list) for v in value):
         for i, pair in enumerate(value):
             if len(pair) != 2 or not all(isinstance(v, (int, float)) for v in pair):
                 raise ValueError(f"{key}[{i}] is {pair}; a complex number is a pair [real, imaginary]")
         return np.asarray(value, np.float64) @ (1, 1j)
-    if key == "values" and np.ndim(value) == 3:  # of an antenna's table
+    if key == "values" and np.ndim(value) == 3:  # gains of an antenna's table
         return np.asarray(value, np.float64) @ (1, 1j)
     return value

@@ -115,7 +115,7 @@ def test_antennas_go_to_files_and_back(antenna):
         ("size =", "sizes =", r":17: \[antenna.rectangular\] unknown key 'sizes'; did you mean 'size'"),
         ("power = 1e3", "power = -1", r":21: \[radar\] radar power is -1; it must be greater than 0"),
         ("point = [10, 0, 0]", "point = [10, 0]", r":14: \[pointing.spotlight\] point has shape \(2,\)"),
-        ("[antenna.rect", "[receiver_antenna.rect", r":16: \[receiver_antenna\] has no \[antenna\] that sends"),
+        ("[antenna.rect", "[receiver_antenna.rect", r":16: \[receiver_antenna\] has no \[antenna\] to transmit"),
         ("[pointing.spotlight]\npoint = [10, 0, 0]\n", "", "the track has no attitude"),
         ("tolerance = 1e-3", "antenna = 3", r"\[echo\] unknown key 'antenna'"),
         ("temperature = 300", "nesz_db = -20\ntemperature = 300", r"\[noise\] noise has one level"),
