@@ -1,12 +1,12 @@
-"""A complex image between its pixels.
+"""Interpolation of a complex image between its pixels.
 
     I(x)     exp(j phi(x)) sum_ab K(i - a) K(j - b) I_ab exp(-j phi(x_ab)),   (i, j) the pixel index of x
     phi(x)   2 pi f (tau(x) - tau(x_0)), the phase of a point's image at mid-aperture: its local spatial
-             frequency is -f (u_T + u_R)/c turns/m, u from x to the antennas; several turns a pixel, which no
-             kernel could follow. Taken exactly, so that its change over the image does not widen the band
-    K        sinc under a Kaiser window of 90 dB, as long as the band that is left asks for
+             frequency is -f (u_T + u_R)/c cycles/m, u from x to the antennas: several cycles per pixel, too many for
+             any kernel. It is computed exactly, so that its change over the image does not widen the band
+    K        sinc with a Kaiser window of 90 dB, as long as the remaining band requires
 
-reference: sarcl/reference/quality.py takes the exact sum instead.
+reference: sarcl/reference/quality.py computes the exact sum instead.
 """
 
 from __future__ import annotations
@@ -18,21 +18,22 @@ import numpy as np
 from ..base import constants
 from ..model.image import Image
 
-CHIP = 32  # pixels on each side of the point whose spectrum tells how much of the sampling rate is filled
-LEAST = 8  # pixels on each side without which no spectrum is worth looking at
-BAND = 0.42  # cycles a pixel that may be filled: the kernel's skirts take the rest of 0.5
-FALL = 1e-3  # the band ends where the spectrum's density stays below this part of its largest
-KAISER = 8.96, 5.715  # shape, and pixels times transition width, of 90 dB by Kaiser's formulas
+CHIP = 32  # pixels on each side of the point from whose spectrum the occupied band is determined
+LEAST = 8  # pixels on each side that a spectrum needs at least
+BAND = 0.42  # cycles per pixel, largest occupied band: the kernel's transition takes the rest of 0.5
+FALL = 1e-3  # of the largest spectral density: the band ends where the density stays below it
+KAISER = 8.96, 5.715  # shape, and pixels times transition width, for 90 dB by Kaiser's formulas
 
 
 @dataclass(frozen=True, eq=False)
-class Surface:
-    """Called with positions m (n, 3) on the grid, returns I, complex128 (n,), to 1e-4 of the nearby peak.
+class ImageInterpolator:
+    """Values of an image between pixels: called with positions m (n, 3) on the grid, it returns I, complex128 (n,).
 
-    origin  x_0, m (3,); the values do not depend on it, their rounding does
-    taps    pixels a side that a value is made of, even
+    origin  x_0, m (3,); the values depend on it by rounding alone
+    taps    pixels along each axis from which a value is interpolated, even
 
-    ValueError where a position lies within taps/2 pixels of the border, or a pixel is NaN or Inf.
+    The error is at most 1e-4 of the nearby peak. Raises ValueError where a position lies within taps/2 pixels of the
+    border, or a pixel is NaN or Inf.
     """
 
     image: Image
@@ -40,11 +41,11 @@ class Surface:
     taps: int
 
     @classmethod
-    def about(cls, image: Image, row: int, column: int) -> Surface:
-        """With taps for the response about one pixel. ValueError for a grid too coarse or too small."""
+    def about(cls, image: Image, row: int, column: int) -> ImageInterpolator:
+        """An interpolator for the response at a pixel. Raises ValueError if the grid is too coarse or too small."""
         origin = image.grid.at(row, column)
         band = max(_bands(image, origin, row, column))
-        # the kernel may fall from the band's edge to its alias, over 1 - 2 band cycles a pixel
+        # transition of the kernel: from the band's edge to its alias, 1 - 2 band cycles per pixel
         return cls(image, origin, 2 * int(np.ceil(KAISER[1] / (1 - 2 * band) / 2)))
 
     def __call__(self, position: np.ndarray) -> np.ndarray:
@@ -53,7 +54,7 @@ class Surface:
         low, high = first.min(axis=0), first.max(axis=0) + self.taps
         if (low < 0).any() or (high > self.image.grid.shape).any():
             raise ValueError(
-                f"a value between pixels is made of {self.taps // 2} pixels on each side; the image of "
+                f"a value between pixels needs {self.taps // 2} pixels on each side; the image of "
                 f"{self.image.grid.shape} ends before that about {index[0].round(1)}: focus a larger grid"
             )
         chip = _baseband(self.image, self.origin, low, high)
@@ -65,7 +66,7 @@ class Surface:
         return values * _carrier(self.image, self.origin, position)
 
     def room(self, position: np.ndarray, axis: np.ndarray) -> float:
-        """How far positions may move along +axis and -axis before pixels are missing, m; <= 0 if they are."""
+        """Largest distance, m, along +axis and -axis at which all pixels exist; 0 or less if some are missing here."""
         here = self.image.grid.index(position)
         slope = np.abs(self.image.grid.index(position + axis) - here)
         ahead = np.array(self.image.grid.shape) - 1 - self.taps // 2 - here
@@ -75,7 +76,7 @@ class Surface:
 
 
 def antennas(image: Image) -> tuple[np.ndarray, np.ndarray]:
-    """Transmitter and receiver at mid-aperture, m (3,); rx None is tx."""
+    """Positions of transmitter and receiver at mid-aperture, m (3,)."""
     assert image.tx is not None
     return image.tx, image.tx if image.rx is None else image.rx
 
@@ -95,7 +96,7 @@ def _kernel(distance: np.ndarray, taps: int) -> np.ndarray:
 
 
 def _baseband(image: Image, origin: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Pixels low ... high - 1 (row, column) without their carrier, complex128; only they are read."""
+    """Pixels low ... high - 1 (row, column) without their carrier, complex128; no others are read."""
     chip = np.asarray(image.data[low[0] : high[0], low[1] : high[1]])
     if not np.isfinite(chip).all():
         i, j = np.argwhere(~np.isfinite(chip))[0]
@@ -105,7 +106,7 @@ def _baseband(image: Image, origin: np.ndarray, low: np.ndarray, high: np.ndarra
 
 
 def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[float]:
-    """Largest frequencies, cycles a pixel, that the response about a pixel fills along rows and columns."""
+    """Largest frequencies, cycles per pixel, of the response at a pixel, along rows and along columns."""
     at, shape = np.array([row, column]), np.array(image.grid.shape)
     half = np.minimum(CHIP, np.minimum(at, shape - 1 - at))
     if half.min() < LEAST:
@@ -114,13 +115,13 @@ def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[floa
             f"from the border; at least {LEAST}, and 3 resolution cells, are needed: focus a larger grid"
         )
     chip = _baseband(image, origin, at - half, at + half + 1)
-    for axis in (0, 1):  # a Hann taper: what the chip cuts off must not leak over the band
+    for axis in (0, 1):  # a Hann taper: truncation must not leak over the band
         taper = np.cos(np.pi / 2 * np.arange(-half[axis], half[axis] + 1) / (half[axis] + 1)) ** 2
         chip *= np.expand_dims(taper, 1 - axis)
     power = np.abs(np.fft.fft2(chip)) ** 2
     bands = []
     for axis, name in ((0, "row"), (1, "column")):
-        density = power.max(axis=1 - axis)  # not the sum: a turned band ends in a thin corner
+        density = power.max(axis=1 - axis)  # not the sum: a rotated band ends in a thin corner
         frequency = np.abs(np.fft.fftfreq(len(density)))
         bands.append(float(frequency[density > FALL * density.max()].max()))
         if bands[-1] > BAND:
@@ -128,7 +129,7 @@ def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[floa
             spacing = image.grid.spacing[axis]
             raise ValueError(
                 f"the grid is coarser than the resolution: at a {name} spacing of {spacing:g} m the response "
-                f"fills +-{bands[-1]:.2f} of +-0.5 cycles a pixel, more than +-{BAND}; focus again with a "
+                f"fills +-{bands[-1]:.2f} of +-0.5 cycles per pixel, more than +-{BAND}; focus again with a "
                 f"{name} spacing of at most {spacing / 2:g} m (or correct image.frequency, tx and rx)"
             )
     return bands

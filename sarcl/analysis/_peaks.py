@@ -1,4 +1,4 @@
-"""Which pixel to measure: the brightest, or the peak near a place."""
+"""The pixel to measure: the brightest, or the peak near a position."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from ..model.image import Image
 
 
 def brightest(image: Image) -> tuple[int, int]:
-    """Pixel of the largest modulus; rows are read in blocks."""
+    """Row and column of the pixel of largest modulus; rows are read in blocks."""
     best, at = 0.0, None
     n_rows, n_columns = image.grid.shape
     block = max(1, 2**22 // n_columns)
@@ -28,13 +28,13 @@ def brightest(image: Image) -> tuple[int, int]:
 
 
 def peak_near(image: Image, near: Any) -> tuple[int, int]:
-    """Pixel of the highest peak within two cells of `near`; a cell is what its own half power spans."""
+    """Row and column of the highest peak within two cells of `near`; the cell is the peak's half-power width."""
     near = validation.array("near", near, np.float64, (3,))
     shape = np.array(image.grid.shape)
     index = image.grid.index(near)
     start = np.rint(index).astype(int)
     if (start < 0).any() or (start >= shape).any():
-        raise ValueError(f"near {place(near)} is pixel {place(index, 1)}, outside of the image of {image.grid.shape}")
+        raise ValueError(f"near {place(near)} is pixel {place(index, 1)}, outside the image of {image.grid.shape}")
     radius = np.array([2, 2])
     while True:
         low, high = np.maximum(start - 4 * radius, 0), np.minimum(start + 4 * radius + 1, shape)
@@ -60,7 +60,7 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
 
 
 def _run(level: np.ndarray, at: int) -> int:
-    """Pixels about `at` in one piece where the power is at least half of that at `at`."""
+    """Number of contiguous pixels about `at` where the power is at least half of that at `at`."""
     below = level**2 < level[at] ** 2 / 2
     after = below[at:].argmax() if below[at:].any() else len(level) - at
     before = below[at::-1].argmax() if below[at::-1].any() else at + 1
@@ -68,5 +68,5 @@ def _run(level: np.ndarray, at: int) -> int:
 
 
 def place(position: np.ndarray, digits: int = 3) -> str:
-    """A position as messages write it; + 0.0 turns a rounded -0 into 0."""
+    """A position as text for messages; + 0.0 replaces a rounded -0 by 0."""
     return "(" + ", ".join(f"{x + 0.0:.{digits}f}" for x in np.round(position, digits)) + ")"

@@ -1,10 +1,10 @@
-"""Point response: where a reflector is, how sharp it is and how high its side lobes stand.
+"""Point response: position, resolution and side lobes of a reflector in an image.
 
-    range        on the grid's plane, where the two-way path grows fastest: its gradient, projected
+    range        on the grid's plane, the direction in which the two-way path grows fastest: its projected gradient
     cross-range  on the plane, perpendicular to range
 
-Cuts along both go through the interpolated peak (_image_interpolator.py). docs/guide/measure.md states every
-convention; sarcl/reference/quality.py measures an exact image by brute force.
+Cuts along both go through the interpolated peak (_image_interpolator.py). docs/guide/measure.md states
+all conventions; sarcl/reference/quality.py measures an exactly computed image.
 """
 
 from __future__ import annotations
@@ -17,27 +17,27 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..model.image import Image
-from ._image_interpolator import Surface, antennas
+from ._image_interpolator import ImageInterpolator, antennas
 from ._peaks import brightest, peak_near, place
 
-REACH = 10.0  # IRW on each side in which side lobes count
-LEAST_REACH = 3.0
-MARGIN = 18  # pixels that the interpolator may want on each side
-STEPS = 32  # points of a cut in one IRW
+REACH = 10.0  # IRW on each side over which side lobes are measured
+LEAST_REACH = 3.0  # IRW on each side that the image must hold
+MARGIN = 18  # pixels that the interpolator may need on each side
+STEPS = 32  # points of a cut per IRW
 NAMES = "range", "cross-range"
 
 
 @dataclass(frozen=True, eq=False)
 class PointResponse:
-    """A point's response; pairs are (range, cross-range) as projected on the grid.
+    """The response of a point; pairs are (range, cross-range), projected on the grid.
 
     position  of the interpolated peak, m (3,)
     irw       width at half power (-3.01 dB), m
     pslr      highest lobe outside the first nulls over the peak, dB
     islr      energy outside the first nulls, within +-`reach` IRW, over the energy between the nulls, dB
-    peak      complex value of the image at `position`, in the unit of its data
+    peak      complex value of the image at `position`, in the unit of the image's data
     gain      the image's gain: |peak/gain|^2 is the point's radar cross section, m^2
-    reach     IRW on each side that pslr and islr cover: 10, or what the image holds
+    reach     IRW on each side that pslr and islr cover: 10, or as far as the image extends
     """
 
     position: NDArray[np.float64]
@@ -70,32 +70,32 @@ class PointResponse:
 def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
     """Position, resolution and side lobes of one point of a complex image on a plane.
 
-    image  with frequency (Hz) and tx, rx (m; rx None is tx); of its data only what is needed is read
+    image  with frequency (Hz) and tx, rx (m; rx None is tx); only the data that are needed are read
     near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it
            is measured. Default: the brightest pixel
 
     Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR the highest
     lobe outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or
-    as far as the image holds both sides. A uniform aperture has -13.26 and -10.22 dB.
+    as far as the image extends on both sides. A uniform aperture has -13.26 and -10.22 dB.
     ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or
-    Inf, a `near` outside of the grid or without a peak, a peak closer than 3 IRW to the border or in the
+    Inf, a `near` outside the grid or without a peak, a peak closer than 3 IRW to the border or in the
     response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
-    than +-0.42 of the +-0.5 cycles a pixel.
+    than +-0.42 of the +-0.5 cycles per pixel.
     Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
     """
-    _refuse(image)
+    _check(image)
     row, column = brightest(image) if near is None else peak_near(image, near)
     axes = _axes(image, row, column)
-    surface = Surface.about(image, row, column)
+    interpolated = ImageInterpolator.about(image, row, column)
     assert image.grid.spacing is not None
     step = min(image.grid.spacing) / 4
-    position = _climb(surface, image.grid.at(row, column), axes, step)
+    position = _ascend(interpolated, image.grid.at(row, column), axes, step)
 
     def cut(axis: np.ndarray, name: str) -> _Cut:
         def power(t: np.ndarray) -> np.ndarray:
-            return np.abs(surface(position + t[:, None] * axis)) ** 2
+            return np.abs(interpolated(position + t[:, None] * axis)) ** 2
 
-        made = _cut(power, surface.room(position, axis), step, name)
+        made = _cut(power, interpolated.room(position, axis), step, name)
         if made.pslr >= 0:
             stronger = position + made.lobe * axis
             raise ValueError(
@@ -111,15 +111,15 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
         irw=(along.irw, across.irw),
         pslr=(along.pslr, across.pslr),
         islr=(along.islr, across.islr),
-        peak=complex(surface(position[None])[0]),
+        peak=complex(interpolated(position[None])[0]),
         gain=image.gain,
         reach=(along.reach, across.reach),
     )
 
 
-def _refuse(image: Image) -> None:
+def _check(image: Image) -> None:
     if not image.is_complex:
-        raise ValueError("the image is detected (multilooked), its phase is gone; measure the complex image")
+        raise ValueError("the image is detected (multilooked), without phase; measure the complex image")
     if not image.grid.is_plane:
         raise ValueError("the grid lists its points; cuts need rows and columns: focus on an ImageGrid.plane")
     wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
@@ -140,22 +140,24 @@ def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     return along / length, np.cross(normal, along / length)
 
 
-def _climb(surface: Surface, start: np.ndarray, axes: tuple[np.ndarray, ...], step: float) -> np.ndarray:
-    """The maximum near `start`, m (3,): parabolas through log |I| at -step, 0, step, on each axis in turn."""
+def _ascend(
+    interpolated: ImageInterpolator, start: np.ndarray, axes: tuple[np.ndarray, ...], step: float
+) -> np.ndarray:
+    """Position of the maximum near `start`, m (3,), from parabolas through log |I| along each axis in turn."""
     x = np.array(start)
     for _ in range(40):
         before = x
         for axis in axes:
-            values = np.abs(surface(x + step * np.array([[-1], [0], [1]]) * axis))
+            values = np.abs(interpolated(x + step * np.array([[-1], [0], [1]]) * axis))
             left, middle, right = np.log(np.maximum(values, 1e-300))
             bend = left - 2 * middle + right
             move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
             x = x + step * float(np.clip(move, -1, 1)) * axis
         if np.linalg.norm(x - before) < 1e-5 * step:
             return x
-        if np.linalg.norm(surface.image.grid.index(x) - surface.image.grid.index(start)) > 3:
+        if np.linalg.norm(interpolated.image.grid.index(x) - interpolated.image.grid.index(start)) > 3:
             break
-    raise ValueError(f"no peak was found at {place(start)}: the image only rises away from it")
+    raise ValueError(f"no peak was found at {place(start)}: the image rises in every direction from it")
 
 
 @dataclass(frozen=True)
@@ -164,11 +166,11 @@ class _Cut:
     pslr: float
     islr: float
     reach: float
-    lobe: float  # where the highest side lobe lies, m from the peak
+    lobe: float  # position of the highest side lobe, m from the peak
 
 
 def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, name: str) -> _Cut:
-    """Figures of a cut; power(t) is |I|^2 at t m from the peak, t (n,), known for |t| <= room."""
+    """Resolution and side lobes of a cut; power(t) is |I|^2 at t m from the peak, t (n,), for |t| <= room."""
     irw = _half_power(power, room, step) + _half_power(lambda t: power(-t), room, step)
     reach = min(REACH, room / irw)
     if not reach >= LEAST_REACH:
@@ -187,7 +189,7 @@ def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, na
     lobes = np.where((t < t[left]) | (t > t[right]), p, 0)
     i = int(lobes.argmax())
     highest, lobe = lobes[i], t[i]
-    if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # the top of a parabola through three points
+    if 0 < i < 2 * n and p[i] >= max(p[i - 1], p[i + 1]):  # maximum of the parabola through three points
         bend = p[i - 1] - 2 * p[i] + p[i + 1]
         highest -= (p[i - 1] - p[i + 1]) ** 2 / (8 * bend)
     decibels = 10 * np.log10(np.array([highest / p[n], _integral(p) / inside - 1]))
@@ -207,7 +209,7 @@ def _half_power(power: Callable[[np.ndarray], np.ndarray], room: float, step: fl
         t = np.minimum(start + step / 2 * np.arange(33), room)
         below = power(t) < level
         if below.any():
-            for _ in range(3):  # ever finer between the last point above and the first one below
+            for _ in range(3):  # ever finer between the last point above half power and the first one below
                 i = int(below.argmax())
                 t = np.linspace(t[i - 1], t[i], 33)
                 below = power(t) < level

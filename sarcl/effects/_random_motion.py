@@ -1,4 +1,4 @@
-"""Smooth random motion as a function of time: sums of cosines, their frequencies drawn from a spectrum."""
+"""Smooth random motion: random processes that are sums of cosines, with frequencies drawn from a spectrum."""
 
 from __future__ import annotations
 
@@ -9,10 +9,11 @@ import numpy as np
 
 from ..base import validation
 
-TERMS = 256  # cosines of a motion: its kurtosis is 3 - 3/(2 TERMS)
+TERMS = 256  # cosines per axis: the kurtosis of the process is 3 - 3/(2 TERMS)
 
 
 def deviation(name: str, value: Any) -> np.ndarray:
+    """Standard deviations (3,) from one number or one per axis; ValueError for a negative one."""
     out = validation.array(name, np.broadcast_to(value, (3,)) if np.ndim(value) == 0 else value, np.float64, (3,))
     if (out < 0).any():
         raise ValueError(f"{name} is {out.tolist()}; a standard deviation is not negative")
@@ -20,7 +21,7 @@ def deviation(name: str, value: Any) -> np.ndarray:
 
 
 def frequencies(correlation_time: Any, spectrum: Any, seed: int) -> np.ndarray:
-    """Frequencies (3, TERMS), Hz, drawn from a spectrum, one from each of TERMS parts of equal power."""
+    """Frequencies (3, TERMS), Hz, drawn from a spectrum: one from each of TERMS parts of equal power."""
     if (correlation_time is None) == (spectrum is None):
         raise ValueError(
             "random motion needs correlation_time=... in s, or spectrum=(frequencies, densities): one of them"
@@ -29,7 +30,7 @@ def frequencies(correlation_time: Any, spectrum: Any, seed: int) -> np.ndarray:
     if spectrum is None:
         from scipy.special import ndtri
 
-        # exp(-(t/T)^2) has a Gaussian spectrum of deviation 1/(sqrt(2) pi T); both signs are alike
+        # exp(-(t/T)^2) has a Gaussian spectrum of deviation 1/(sqrt(2) pi T); cosines do not distinguish signs
         return np.asarray(
             ndtri(0.5 + share / 2)
             / (np.sqrt(2) * np.pi * validation.number("correlation_time", correlation_time, above=0))
@@ -46,10 +47,10 @@ def frequencies(correlation_time: Any, spectrum: Any, seed: int) -> np.ndarray:
     return np.asarray(np.interp(share, power / power[-1], fine))
 
 
-def wander(
+def random_process(
     times: np.ndarray, rms: np.ndarray, frequencies: np.ndarray, seed: int, stream: int
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Random motion (n, 3) and its rate of change."""
+    """A random process (n, 3) of standard deviation rms (3,) at times, s (n,), and its rate of change (n, 3)."""
     phase = np.random.default_rng([seed, stream]).uniform(0, 2 * np.pi, (3, TERMS))
     offset, rate = np.zeros((len(times), 3)), np.zeros((len(times), 3))
     for axis in np.flatnonzero(rms):

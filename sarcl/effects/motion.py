@@ -1,4 +1,4 @@
-"""Motion of antennas and targets: errors of the track, positions known or not, and targets that move.
+"""Motion of antennas and targets: errors of the track, known to the processor or not, and moving targets.
 
 Intra-pulse motion is in stop_and_go.py.
 """
@@ -16,9 +16,9 @@ from ..base import constants, validation
 from ..model.phase_history import PhaseHistory
 from ..model.pointing import turned, velocities
 from ..model.trajectory import Trajectory
-from ._random_motion import deviation, frequencies, wander
+from ._random_motion import deviation, frequencies, random_process
 
-WRAPPED = 0.01  # share of a row's energy that may lie where moving it wraps round: side lobes hold less
+WRAPPED = 0.01  # largest fraction of a row's energy that a shift may wrap around: side lobes hold less
 FRAMES = ("scene", "track")
 
 
@@ -39,20 +39,21 @@ def perturbed(
     spectrum          (frequencies Hz (k,), densities (k,)): their one-sided power spectrum, of any scale, linear
                       between frequencies
     attitude_rms      rad, one or about each body axis (3,)
-    frame             axes are the "scene"'s, or the "track"'s: along, to the left, up
+    frame             axes of the "scene", or of the "track": along it, to its left, up
     seed              errors depend on it and on each pulse's time alone: parts of a track, and tracks of another prf,
-                      see the same motion
+                      have the same motion
 
-    Sums of 256 cosines of random phase, their frequencies drawn from the spectrum (Shinozuka and Deodatis, Appl. Mech.
-    Rev. 44, 1991): the deviation is the ensemble's; errors that are slow against the track are mostly an offset.
+    The errors are sums of 256 cosines of random phase, with frequencies drawn from the spectrum (Shinozuka and
+    Deodatis, Appl. Mech. Rev. 44, 1991). The deviation is that of the ensemble: errors that change slowly over the
+    track are mostly a constant offset.
     """
     validation.instance("track", track, Trajectory)
     seed = validation.count("seed", seed, 0)
     drawn = frequencies(correlation_time, spectrum, seed)
-    offset, rate = wander(track.times, deviation("rms", rms), drawn, seed, 0)
+    offset, rate = random_process(track.times, deviation("rms", rms), drawn, seed, 0)
     out = _moved(track, offset, rate, frame)
     angles = deviation("attitude_rms", attitude_rms)
-    return turned(out, wander(track.times, angles, drawn, seed, 1)[0]) if angles.any() else out
+    return turned(out, random_process(track.times, angles, drawn, seed, 1)[0]) if angles.any() else out
 
 
 def sinusoidal(
@@ -65,21 +66,21 @@ def sinusoidal(
 ) -> Trajectory:
     """The track moved by amplitude sin(2 pi frequency t + phase): m (3,), Hz, rad, one or per axis.
 
-    A motion of amplitude a along the line of sight makes paired echoes of amplitude J_1(4 pi a/lambda) beside a point.
+    A motion of amplitude a along the line of sight causes paired echoes of amplitude J_1(4 pi a/lambda) beside a point.
     """
     validation.instance("track", track, Trajectory)
     size = validation.array("amplitude", amplitude, np.float64, (3,))
-    turns = 2 * np.pi * validation.number("frequency", frequency, above=0)
+    rate = 2 * np.pi * validation.number("frequency", frequency, above=0)
     phase = validation.array("phase", np.broadcast_to(phase, (3,)), np.float64, (3,))
-    angle = turns * track.times[:, None] + phase
-    return _moved(track, size * np.sin(angle), size * turns * np.cos(angle), frame)
+    angle = rate * track.times[:, None] + phase
+    return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
 
 def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory | None = None) -> PhaseHistory:
-    """Echoes as a processor has them that believes in another track: `raw` with the positions of `track`.
+    """Echoes with the positions that a processor assumes: `raw` with those of `track`.
 
-    Samples and reference ranges stay: what was recorded does not change. A track of as many pulses as raw has rows, or
-    of as many as it has times (rows of one time, such as polarisations, share a position). receiver: likewise; default
+    Samples and reference ranges stay as they were recorded. The track has as many pulses as raw has rows, or as many as
+    it has times (rows of one time, such as polarisations, share a position). receiver: likewise; default
     the track where raw has one antenna, raw's own receiver where it has two. ValueError where times do not match.
     """
     validation.instance("raw", raw, PhaseHistory)
@@ -106,13 +107,13 @@ def relative(
     center: ArrayLike = (0.0, 0.0, 0.0),
     epoch: float = 0.0,
 ) -> Trajectory:
-    """The track as a rigid body sees it that moves: its echoes from there are those of the moving body.
+    """The track relative to a moving rigid body: from it, the body at rest has the echoes of the moving body.
 
     A point of the body is at x at `epoch`, s, and at time t at
-        x(t) = c + R(t) (x - c) + v (t - epoch) + a (t - epoch)^2/2,   R(t) a turn by rotation (t - epoch)
+        x(t) = c + R(t) (x - c) + v (t - epoch) + a (t - epoch)^2/2,   R(t) a rotation by rotation (t - epoch)
     velocity m/s, acceleration m/s^2, rotation rad/s about `center` c, m: each (3,). Distances, incidence and beams are
-    exact, pulse by pulse; polarisation is exact unless the body turns about another axis than the vertical that H and V
-    are told from. Shadows between the body and the rest of the scene are not. Add echoes with `combined`.
+    exact, pulse by pulse. Polarisation is exact unless the body rotates about another axis than the vertical that
+    defines H and V. Shadows between the body and the rest of the scene are not modelled. Add echoes with `combined`.
     """
     validation.instance("track", track, Trajectory)
     from scipy.spatial.transform import Rotation
@@ -139,11 +140,11 @@ def relative(
 
 
 def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
-    """Echoes of several parts of a scene in one: the sum of their samples, with the geometry of the first.
+    """The sum of echoes of several parts of a scene, with the geometry of the first.
 
-    Every other part's phase is moved from its reference ranges to the first's. Parts need the same rows, frequencies
-    and polarisations: give `sarcl.echo` the same range_window for all, wide enough for where each part really is.
-    ValueError names what differs, or the row where a part lies outside the first's window.
+    The phases of the other parts are changed from their reference ranges to those of the first. Parts need the same
+    rows, frequencies and polarisations: give `sarcl.echo` the same range_window for all, wide enough for the true
+    ranges of each part. ValueError names what differs, or the row where a part lies outside the window of the first.
     """
     parts = list(parts)
     if not parts:
@@ -183,17 +184,17 @@ def _same_rows(first: PhaseHistory, part: PhaseHistory, i: int) -> None:
 
 
 def _stays(block: np.ndarray, shift: np.ndarray, i: int, start: int) -> None:
-    """ValueError where a row's echoes, moved by `shift` periods, would come round at the window's other end."""
+    """Raise ValueError where echoes of a row, shifted by `shift` periods, would wrap to the window's other end."""
     n = block.shape[1]
     power = np.abs(np.fft.ifft(block, axis=1)) ** 2
     place = np.fft.fftfreq(n) + shift[:, None]
-    # an echo within half a sample of the edge belongs to either end
+    # an echo within half a sample of a limit may lie at either end
     lost = (power * (np.abs(place) > 0.5 + 1 / n)).sum(axis=1) > WRAPPED * power.sum(axis=1)
     if lost.any():
         row = start + int(np.argmax(lost))
         raise ValueError(
             f"part {i} lies outside part 0's range window at row {row}; give both echoes a wider range_window, or "
-            "leave out the pulses from which it is not in it"
+            "leave out the pulses at which it lies outside"
         )
 
 
@@ -209,13 +210,13 @@ def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
     if (off > 1e-9 * (1 + np.abs(raw.time))).any():
         bad = int(np.argmax(off))
         raise ValueError(
-            f"row {bad} was sent at {raw.time[bad]:g} s, when the track has no pulse; give one position per row"
+            f"row {bad} was sent at {raw.time[bad]:g} s, where the track has no pulse; give one position per row"
         )
     return row
 
 
 def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) -> Trajectory:
-    """The track moved by offsets (n, 3) in the frame's axes."""
+    """The track moved by offsets, m (n, 3), along the axes of the frame; rate  of the offsets, m/s (n, 3)."""
     if validation.choice("frame", frame, FRAMES) == "track":
         along = velocities(track)
         left = np.cross((0.0, 0.0, 1.0), along)

@@ -16,7 +16,7 @@ from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 
-STREAM = 0x6E6F697365  # of random numbers: apart from roughness and speckle of the same seed
+STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
 
 
 def add_noise(
@@ -31,20 +31,20 @@ def add_noise(
     cell_area: float | None = None,
     seed: int = 0,
 ) -> PhaseHistory:
-    """Echoes with complex white Gaussian noise, at a level given in one of four ways.
+    """Echoes with complex white Gaussian noise, at a level that is given in one of five ways.
 
     nesz_db, nesz  noise-equivalent sigma zero, dB or m^2/m^2: the mean of |image.data/image.gain|^2 over the
-                   resolution cell's area, focused from the rows of one polarisation. Say where: `grid` (its centre, and
-                   its normal as the ground's), or the cell's area
+                   resolution cell's area, focused from the rows of one polarisation. The cell is that at the centre of
+                   `grid`, on its plane, or has the area `cell_area`
     temperature    K, of the receiving system, where samples are in sqrt(W) (see sarcl.model.radar); radar: a Radar that
                    has one
     variance       mean |noise|^2 of a sample, one or per row
     cell_area      m^2, of the cell of an unweighted image
     seed           noise depends on it, and on a sample's row and column, alone: not on what is read with it
 
-    Samples are noisy when they are read; nothing is loaded. Windows and weights widen the cell and let noise through by
-    one and the same factor, so the NESZ holds for any. Noise has passed the matched filter: it follows
-    |P(f)| where the rows are compressed and their waveform known. ValueError says what is missing.
+    Noise is added when samples are read; nothing is loaded. Windows and weights widen the cell and increase the noise
+    by the same factor, so the NESZ holds for all of them. Noise is filtered as the echoes are: it has the spectrum
+    |P(f)| where the rows are compressed and their waveform is known. ValueError says what is missing.
     Source: docs/theory/radar.md.
     """
     instance("raw", raw, PhaseHistory)
@@ -72,7 +72,7 @@ def add_noise(
 
 
 class Noisy:
-    """Rows of a source plus noise of deviation (n_rows,) times shape (n_samples,); both are made as a slice asks."""
+    """Rows of a source plus noise of deviation (n_rows,) times shape (n_samples,), computed for the rows of a slice."""
 
     def __init__(self, source: np.ndarray | LazyRows, deviation: np.ndarray, shape: np.ndarray, seed: int) -> None:
         self.source, self.deviation, self.profile, self.seed = source, deviation, shape, seed
@@ -112,16 +112,17 @@ def _kelvin(radar: Any) -> float:
 
 
 def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> float:
-    """Area, m^2, of the resolution cell at `point` on a plane: (2 pi)^2 over that of the data's spatial frequencies.
+    """Area, m^2, of the resolution cell at `point` on a plane: (2 pi)^2 over the area of the spatial frequencies.
 
     Range cell on the ground times cross-range cell, both between peak and null of an unweighted image: c/(2 B sin) x
-    lambda/(2 turn), where the track is straight and short. Rows of the first polarisation, which must be one sweep.
+    lambda/(2 angle), where the track is straight and short. Only rows of the first polarisation count; they must pass
+    the point in one direction.
     """
     return float(_density(raw, point, normal) / (_one_image(raw).sum() * raw.n_samples))
 
 
 def _cells(raw: PhaseHistory, grid: ImageGrid | None, area: float | None) -> float:
-    """Sample variance per NESZ: the cell's area times the number of samples in an image."""
+    """Variance of samples per NESZ: the cell's area times the number of samples in an image."""
     if (grid is None) == (area is None):
         raise ValueError("a NESZ needs the area of the resolution cell; give grid=... or cell_area=..., one of them")
     if area is not None:
@@ -134,22 +135,22 @@ def _cells(raw: PhaseHistory, grid: ImageGrid | None, area: float | None) -> flo
 
 
 def _one_image(raw: PhaseHistory) -> np.ndarray:
-    """True for the rows that go into one image: those of the first polarisation."""
+    """True for the rows of one image: those of the first polarisation."""
     if raw.polarization is None:
         return np.ones(raw.n_rows, bool)
     return np.asarray(raw.polarization == raw.polarization[0])
 
 
 def _density(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike) -> float:
-    """(2 pi)^2 x samples per area of spatial frequencies on the plane, mean over the samples of one image.
+    """(2 pi)^2 times samples per area of spatial frequencies on the plane, mean over the samples of an image.
 
-    A sample lies at f g_p, g_p = (2 pi/c) (u_t + u_r) on the plane, and fills f df |g_p x dg_p| there.
+    A sample lies at f g_p, g_p = (2 pi/c) (u_t + u_r) on the plane, and occupies f df |g_p x dg_p| there.
     """
     rows = _one_image(raw)
     for name in ("tx_channel", "rx_channel"):
         value = getattr(raw, name)
         if value is not None and np.ptp(value[rows]):
-            raise ValueError(f"raw has several channels ({name}), whose samples may meet; give cell_area=... in m^2")
+            raise ValueError(f"raw has several channels ({name}), whose samples may overlap; give cell_area=... in m^2")
     point, n = array("point", point, np.float64, (3,)), direction("normal", normal)
     first = np.cross(n, np.eye(3)[int(np.argmin(np.abs(n)))])
     plane = np.stack([first / np.linalg.norm(first), np.cross(n, first / np.linalg.norm(first))])
@@ -163,7 +164,7 @@ def _density(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike) -> float:
     onward = np.diff(angle) * np.sign(angle[-1] - angle[0])
     if not (onward > 0).all() or not sweep.all() or abs(angle[-1] - angle[0]) > 2 * np.pi:
         raise ValueError(
-            "the rows are no single sweep past the point, so their cell is not told; give cell_area=... in m^2"
+            "the rows do not pass the point in one direction, so their cell is not defined; give cell_area=... in m^2"
         )
     f = raw.frequency[rows, None] + raw.frequency_step[rows, None] * np.arange(raw.n_samples)
     filled = f * raw.frequency_step[rows, None] * np.abs(sweep)[:, None]
@@ -171,7 +172,7 @@ def _density(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike) -> float:
 
 
 def _filtered(raw: PhaseHistory) -> np.ndarray:
-    """Modulus (n_samples,) of the matched filter that noise passes before an image is made; 1 where it is unknown."""
+    """Modulus (n_samples,) of the matched filter that the noise has passed; 1 where it is unknown."""
     if raw.waveform is None or np.ptp(raw.frequency) or np.ptp(raw.frequency_step):
         return np.ones(raw.n_samples)
     f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)

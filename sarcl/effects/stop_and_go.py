@@ -1,4 +1,4 @@
-"""What stop and go leaves out: antennas move while a pulse travels, and while it is sent."""
+"""Errors of the stop-and-go approximation: antennas move while a pulse travels, and while it is transmitted."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..model.waveform import Waveform
 
 @dataclass(frozen=True, eq=False)
 class StopAndGo:
-    """What stop and go errs, for every pulse and point (n_pulses, n_points). Made by `stop_and_go_error`.
+    """Errors of the stop-and-go approximation per pulse and point (n_pulses, n_points), from `stop_and_go_error`.
 
-    flight      m: half the true path, to where the receiver is when the echo arrives, less the one echo computes
-    chirp       m: how much farther the echo lies than its half path, because the pulse's Doppler shift looks like delay
-    phase       rad: 4 pi fc flight/c + pi doppler^2/rate, the phase (of exp(-j phase)) at the band's middle
-    smear       rad: phase at the band's edges beyond `phase` and `chirp`
-    doppler     Hz, of the echo
+    flight      m: half the true path, to the receiver's position when the echo arrives, minus the half path of `echo`
+    chirp       m: apparent range minus half the path: the Doppler shift of a chirp acts as a delay
+    phase       rad: 4 pi fc flight/c + pi doppler^2/rate, the phase (of exp(-j phase)) at the centre of the band
+    smear       rad: phase at the edges of the band beyond `phase` and `chirp`
+    doppler     Hz, Doppler frequency of the echo
 
-    A constant, and what is linear in time, only displace the image; `defocus` is what is left.
+    A phase that is constant or linear in time only displaces the image; `defocus` is the rest.
     """
 
     flight: NDArray[np.float64]
@@ -36,7 +36,7 @@ class StopAndGo:
 
     @property
     def defocus(self) -> np.ndarray:
-        """Largest |phase less its best straight line over the pulses|, rad (n_points,)."""
+        """Largest deviation of the phase from its best straight line over the pulses, rad (n_points,)."""
         t = self.times - self.times.mean()
         line = np.stack([np.ones_like(t), t / max(float(np.abs(t).max()), 1e-300)], axis=-1)
         return np.asarray(np.abs(self.phase - line @ np.linalg.lstsq(line, self.phase, rcond=None)[0]).max(axis=0))
@@ -50,17 +50,17 @@ def stop_and_go_error(
     receiver: Trajectory | None = None,
     used: Trajectory | None = None,
 ) -> StopAndGo:
-    """How much a stop-and-go echo errs at points, m (m, 3), of a transmitter on `track`, a receiver on `receiver`.
+    """Errors of a stop-and-go echo at points, m (m, 3), of a transmitter on `track` and a receiver on `receiver`.
 
-    used  the receiver's track that echo is given, default `receiver` itself (or `track`): with
-          `receiver_at_arrival(...)` this tells what is left of the error.
+    used  the receiver's track that `echo` is given, default `receiver` itself (or `track`): with
+          `receiver_at_arrival(...)` the result is the remaining error.
 
     flight: c tau = |T(t) - x| + |x - R(t + tau)| is solved. chirp: the echo of p(t) is p((t - tau)/(1 + tau')), whose
     spectrum is P(f (1 + tau')). For a chirp of rate k = bandwidth/duration, P = exp(-j pi (f - fc)^2/k), that is
-    a delay of tau' fc/k more, and little else (docs/theory/radar.md). ValueError for pulses that are no chirps.
+    an additional delay of tau' fc/k, and little else (docs/theory/radar.md). ValueError for pulses that are not chirps.
     """
     if waveform.kind != "chirp":
-        raise ValueError(f"stop and go's error is told for chirps, not for a {waveform.kind!r} waveform")
+        raise ValueError(f"the error of stop and go is known for chirps, not for a {waveform.kind!r} waveform")
     x = validation.array("points", points, np.float64, ("n", 3))
     moving = track if receiver is None else receiver
     tau, slope = _delays(track, moving, x)
@@ -81,11 +81,11 @@ def stop_and_go_error(
 
 
 def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajectory | None = None) -> Trajectory:
-    """Where the receiver is when echoes from `point`, m (3,), arrive: the receiver's track for an exact flight there.
+    """The receiver's positions when echoes from `point`, m (3,), arrive: a receiver track for exact paths to the point.
 
     sarcl.echo(scene, chirp, track, receiver=receiver_at_arrival(track, center)) has the true two-way path of the point
-    `center`, and elsewhere errs by what `stop_and_go_error(..., used=...)` says. The frame must be inertial: on a
-    turning Earth, give positions in a frame that does not turn (the Sagnac effect is of the same size).
+    `center`; `stop_and_go_error(..., used=...)` gives its error elsewhere. The frame must be inertial: on the rotating
+    Earth, give positions in a frame that does not rotate (the Sagnac effect is of the same size).
     """
     x = validation.array("point", point, np.float64, (3,))
     moving = track if receiver is None else receiver
@@ -96,11 +96,11 @@ def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajec
 
 
 def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> PhaseHistory:
-    """Echoes with the phase that motion during the pulse gives those of `point`, m (3,); undo takes it out.
+    """Echoes with the phase that motion during the pulse causes for `point`, m (3,); undo removes it.
 
-    exp(-j pi ((f (1 + tau') - fc)^2 - (f - fc)^2)/k): range-Doppler coupling, exact for the point; others err by the
-    difference of their `StopAndGo.chirp`. Samples change as they are read. ValueError where raw has no velocities, or
-    no chirp.
+    exp(-j pi ((f (1 + tau') - fc)^2 - (f - fc)^2)/k): range-Doppler coupling, exact for the point; the error at
+    other points is the difference of their `StopAndGo.chirp`. Samples are changed when they are read. ValueError where
+    raw has no velocities, or no chirp.
     """
     validation.instance("raw", raw, PhaseHistory)
     if raw.waveform is None or raw.waveform.kind != "chirp":
@@ -116,7 +116,7 @@ def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> 
 
 
 class _Chirped:
-    """Rows times the phase of motion during the pulse, made as a slice asks."""
+    """Rows times the phase of motion during the pulse, computed for the rows of a slice."""
 
     def __init__(self, raw: PhaseHistory, slope: np.ndarray, sign: float) -> None:
         assert raw.waveform is not None
@@ -148,7 +148,7 @@ class _Path:
         elif len(track) > 3:
             self.spline = CubicSpline(track.times, track.positions)
         elif track.velocities is None:
-            raise ValueError(f"a track of {len(track)} pulses tells no velocity; give Trajectory(..., velocities=...)")
+            raise ValueError(f"a track of {len(track)} pulses has no velocity; give Trajectory(..., velocities=...)")
 
     def __call__(self, times: np.ndarray, derivative: int = 0) -> np.ndarray:
         if self.spline is not None:
@@ -165,7 +165,7 @@ def _delays(track: Trajectory, moving: Trajectory, points: np.ndarray) -> tuple[
     out = _distance(track.positions[:, None], points)
     start = np.broadcast_to(track.times[:, None], out.shape)
     tau = (out + _distance(at(start), points)) / c
-    for _ in range(20):  # every step gains a factor c/speed
+    for _ in range(20):  # each iteration reduces the error by a factor of c/speed
         rx = at(start + tau)
         last, tau = tau, (out + _distance(rx, points)) / c
         if np.abs(tau - last).max() <= 4e-16 * tau.max():

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.analysis._image_interpolator import Surface
+from sarcl.analysis._image_interpolator import ImageInterpolator
 from sarcl.analysis.point_response import _axes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.windows import weights
@@ -177,7 +177,7 @@ def test_the_interpolator_follows_a_sinc_just_above_its_nyquist_rate():
         return np.sinc(0.8 * (row - 34.6)) * np.sinc(0.78 * (column - 35.1)) * carrier
 
     image = sarcl.Image(value(grid.positions), grid, frequency=seen.frequency, tx=middle)
-    surface = Surface.about(image, 35, 35)
+    surface = ImageInterpolator.about(image, 35, 35)
     index = np.random.default_rng(0).uniform(20, 50, (2000, 2))
     position = grid.at(index[:, 0], index[:, 1])
     assert np.abs(surface(position) - value(position)).max() < 1e-4
@@ -310,14 +310,14 @@ def test_what_cannot_be_measured_is_refused(pair):
         with pytest.raises(ValueError, match=message):
             sarcl.measure(broken, near=near)
 
-    refused(r"multilooked\), its phase is gone", image.multilook(2))
+    refused(r"multilooked\), without phase", image.multilook(2))
     points = sarcl.ImageGrid.points(image.grid.positions)
     refused("ImageGrid.plane", replace(image, grid=points))
     refused("image.frequency is None.*centre frequency", replace(image, frequency=None))
     refused("image.tx is None.*mid-aperture", replace(image, tx=None))
     refused("zero everywhere", replace(image, data=np.zeros(image.grid.shape, complex)))
     refused("zero around near", replace(image, data=np.zeros(image.grid.shape, complex)), near=CENTRE)
-    refused(r"outside of the image of \(130, 130\)", image, near=(100, 0, 0))
+    refused(r"outside the image of \(130, 130\)", image, near=(100, 0, 0))
     refused("near", image, near=(0, 0))
     refused("near.*is nan", image, near=(0, np.nan, 0))
     data = image.data.copy()
