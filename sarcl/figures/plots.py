@@ -82,7 +82,7 @@ def curves(
     for i, (name, x, y) in enumerate(curves):
         look = style(i)
         if dots is True:
-            look |= {"linestyle": "none", "markersize": 3, "alpha": 0.6, "markeredgewidth": 0.6}
+            look |= {"linestyle": "none", "markersize": 2, "markerfacecolor": look["color"], "alpha": 0.6}
         elif dots and name in dots:
             look["linestyle"] = "none"
         elif len(x) > ALL_MARKED:

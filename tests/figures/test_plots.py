@@ -87,7 +87,9 @@ def test_a_page_escapes_its_text_and_names_what_made_it():
     assert "".join(tree.find("body/p").itertext()) == f"Made by sarcl {sarcl.__version__}: sarcl 'x'"
     assert tree.find(".//h3").attrib["id"] == "top" and [n.text for n in tree.findall(".//li")] == ["1 < 2", "x"]
     assert [[c.text for c in row] for row in tree.iter("tr")] == [["<h>", "n"], ["a & b", "1.5"], ["c", "d"]]
-    assert tree.findall(".//tr")[2].attrib == {"class": "marked"} and tree.find(".//caption").text == "c < d"
+    assert (
+        tree.findall(".//tr")[2].attrib == {"class": "marked"} and tree.find(".//p[@class='caption']").text == "c < d"
+    )
     figure = tree.find(".//figure")
     assert figure.find("figcaption").text == "caption > 0" and figure.find("img").attrib["alt"] == "y against x: a"
     kind, data = figure.find("img").attrib["src"].split(",")

@@ -33,12 +33,12 @@ def conclusion(results: Sequence[Mapping[str, Any]]) -> list[str]:
         some = "" if len(cases) == len(results) else f" (applies to {len(cases)} of {_cases(len(results))})"
         nulls, usual = _extremes(rows, "null", ".4f"), _extremes(plain, "null", ".4f")
         lobes, normal = _extremes(rows, "pslr_db", ".1f"), _extremes(plain, "pslr_db", ".1f")
+        neither = f", with neither in {found.count(None)}" if None in found else ""
         lines.append(
-            f"{name}{some}: null of the first point {nulls} m (conventional {usual}), highest side lobe {lobes} dB "
-            f"(conventional {normal}), points displaced by at most {at_most(max(worst(row) for row in rows))} m. "
-            f"Compared with the conventional antenna, two points are resolved closer together in {found.count(1)} of "
-            f"{_cases(len(cases))}, equally close in {found.count(0)}, only farther apart or not at all in "
-            f"{found.count(-1)}; by neither in {found.count(None)}."
+            f"{name}{some}: two points resolved closer together in {found.count(1)} of {_cases(len(cases))}, equally "
+            f"close in {found.count(0)}, only farther apart or not at all in {found.count(-1)}{neither}. Null of the "
+            f"first point {nulls} m (conventional {usual}), highest side lobe {lobes} dB (conventional {normal}), "
+            f"points displaced by at most {at_most(max(worst(row) for row in rows))} m."
         )
     if not names:
         return ["No mapping was measured."]
