@@ -37,7 +37,9 @@ Row = dict[str, Any]
 
 def main() -> None:
     """Measure, print the tables, and write the JSON file."""
-    from sarcl.bench import backproject, channels_page
+    import channels_page
+
+    from sarcl.bench import backproject
     from sarcl.opencl.choose_device import open_device
 
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)

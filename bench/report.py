@@ -1,11 +1,125 @@
-"""Write docs/guide/results.md, its pictures and README.md's table from bench/results/*.json: python bench/report.py"""
+"""Write docs/guide/results.md, its plots and README.md's table from bench/results/*.json: python bench/report.py"""
 
+from __future__ import annotations
+
+import json
+import re
 from pathlib import Path
+from typing import Any
 
-from sarcl.bench import page
+import channels_page
+import echo_page
+
+from sarcl.bench import pareto, ratios, tables
+from sarcl.bench.backproject import FORMAT
 
 ROOT = Path(__file__).parents[1]
+INTRODUCTION = """# Results
+
+`make results` writes this page from the JSON files under bench/results; `make bench` measures your machine. How the
+figures are measured: [benchmarks](../developers/benchmarks.md).
+
+"""
+OTHER = {"echo": echo_page.section, "channels": channels_page.section}  # documents that are not about images
+README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "share in kernels"]
+
+
+def write(folder: Path, docs: Path, readme: Path | None = None) -> list[Path]:
+    """Write results.md into the folder `docs`, a picture results-NAME.png beside it for each results/NAME.json, and
+    the README's table.
+
+    Returns the files written. ValueError where there is no JSON file, or one of another format.
+    """
+    documents = {path.stem: read(path) for path in sorted(folder.glob("*.json"))}
+    if not documents:
+        raise ValueError(f"{folder} holds no .json; make one: sarcl bench backproject --json {folder}/1.json")
+    written = []
+    page = f"{INTRODUCTION}## How to read this\n\n{tables.EXPLAINED}\n\n"
+    for name, document in documents.items():
+        if document.get("kind") in OTHER:
+            page += OTHER[document["kind"]](name, document)
+            continue
+        drawn = any(ratios.ran(case) for case in document["cases"])
+        if drawn:
+            picture = docs / f"results-{name}.png"
+            picture.write_bytes(pareto.picture(document["cases"]))
+            written.append(picture)
+        page += section(name, document, drawn)
+    (docs / "results.md").write_text(page.rstrip("\n") + "\n")
+    written.append(docs / "results.md")
+    if readme is not None:
+        block = next((readme_table(d) for d in documents.values() if "cases" in d), "")
+        text = readme.read_text()
+        new = re.sub(
+            r"<!-- results -->.*?<!-- end of results -->",
+            lambda _: f"<!-- results -->\n{block}<!-- end of results -->",
+            text,
+            flags=re.S,
+        )
+        if block and new != text:
+            readme.write_text(new)
+            written.append(readme)
+    return written
+
+
+def read(path: Path) -> dict[str, Any]:
+    """A document of `sarcl bench`; ValueError where the file is not JSON, or not of this format."""
+    try:
+        document = json.loads(path.read_text())
+        found = document.get("format") if isinstance(document, dict) else None
+    except ValueError as exc:
+        raise ValueError(f"{path} is no JSON ({exc}); measure again: sarcl bench backproject --json {path}") from None
+    if found != FORMAT:
+        raise ValueError(
+            f"{path} has format {found}, wanted {FORMAT}; measure again: sarcl bench backproject --json {path}"
+        )
+    return dict(document)
+
+
+def section(name: str, document: dict[str, Any], drawn: bool) -> str:
+    """One document: machine, picture, tables."""
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in tables.machine_text(document)) + "\n"
+    if drawn:
+        text += f"![rate against achieved error, sarcl and its peers](results-{name}.png)\n\n"
+    for case in document["cases"]:
+        text += f"### {tables.title(case)}\n\n{tables.markdown(tables.HEAD, tables.body(case))}\n"
+        text += "".join(f"- {line}\n" for line in tables.missing(case))
+        matches = tables.match_body(case)
+        if matches:
+            text += "\nPeer's seconds over sarcl's, at equal or smaller error:\n\n"
+            text += tables.markdown(tables.MATCH_HEAD, matches) + "\n"
+        plans = _plans(case)
+        if plans:
+            text += f"How sarcl met each tolerance:\n\n{plans}\n"
+    growth = tables.growth_body(document["cases"])
+    if growth:
+        text += f"### {name}: cost against size\n\n{tables.markdown(tables.GROWTH_HEAD, growth)}\n"
+    return text
+
+
+def _plans(case: ratios.Result) -> str:
+    lines = [
+        [tables.name(row), row["setting"], f"{row['predicted']:.1e}", ", ".join(f"{k} {v}" for k, v in plan.items())]
+        for row in ratios.ran(case)
+        if (plan := row.get("plan"))
+    ]
+    return tables.markdown(["", "tolerance", "predicted", "plan"], lines) if lines else ""
+
+
+def readme_table(document: dict[str, Any]) -> str:
+    """sarcl's direct rows of the first case on the first device: whole calls."""
+    case = document["cases"][0]
+    ours = [row for row in ratios.ran(case) if ratios.is_sarcl(row) and row["method"] == "direct"]
+    lines = []
+    for row in ours:
+        call, kernel = ratios.best(row, "call"), ratios.best(row, "kernel")
+        if row["device"] == ours[0]["device"] and call and kernel:
+            rate = ratios.rate(case, row, "call")
+            cells = [row["setting"], f"{row['error']:.1e}", f"{row['predicted']:.1e}", f"{call:.2f}", f"{rate:.2f}"]
+            lines.append([*cells, f"{kernel / call:.0%}"])
+    return tables.markdown(README_HEAD, lines) if lines else ""
+
 
 if __name__ == "__main__":
-    for path in page.write(ROOT / "bench" / "results", ROOT / "docs" / "guide", ROOT / "README.md"):
+    for path in write(ROOT / "bench" / "results", ROOT / "docs" / "guide", ROOT / "README.md"):
         print(path.relative_to(ROOT))

@@ -2,26 +2,23 @@
 
 For other folders:
 
-    backproject     the command
-    once            one image in a process of its own: python -m sarcl.bench.once
-    fastsar_peer    runs in another environment, and imports nothing of sarcl
-    channels_page   tables of bench/channels.py
-    echo_page       tables of bench/echo.py
-    page            docs/guide/results.md and the README's table
-    pareto          rate against achieved error, as a picture
+    backproject    the command
+    fastsar_peer   runs in another environment, and imports nothing of sarcl
+    one_shot       one image in a process of its own: python -m sarcl.bench.one_shot
+    pareto         plot of rate against achieved error; needs the extra `plots`
+    ratios         rates, ratios at equal or smaller error, cost against size
+    tables         measurements as tables
 
 For this folder alone:
 
-    _baseline       backprojection written in NumPy
-    _cases          data of the benchmark
-    _contestant     a program that takes part, and a run of it
-    _exact          the exact sum at some pixels
-    _figures        rates, ratios at equal or smaller error, cost against size
-    _measure        runs and times the contestants, which take turns
-    _ours           sarcl as a contestant
-    _peers          libraries in another environment, over a pipe
-    _quiet          waits until other programs leave the processors alone
-    _table          figures as tables
+    _baseline      backprojection written in NumPy
+    _cases         data of the benchmark
+    _competitor    a program that is measured, and one run of it
+    _exact         the exact sum at some pixels
+    _measure       runs and times the competitors in turns
+    _peers         libraries in another environment, through a pipe
+    _run_sarcl     sarcl as a competitor
+    _wait_idle     waits until other programs leave the processors idle
 """
 
-__all__ = ["backproject", "channels_page", "echo_page", "fastsar_peer", "once", "page", "pareto"]
+__all__ = ["backproject", "fastsar_peer", "one_shot", "pareto", "ratios", "tables"]

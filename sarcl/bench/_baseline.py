@@ -1,4 +1,4 @@
-"""Backprojection as one writes it in NumPy: no tiles, no kernels, float64, one thread; for some of the pulses."""
+"""Backprojection written plainly in NumPy: no tiles, no kernels, float64, one thread; for some of the pulses."""
 
 from __future__ import annotations
 
@@ -9,19 +9,19 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.phase_history import PhaseHistory
 from . import _exact
-from ._cases import Case
-from ._contestant import Contestant, Reading
+from ._cases import BenchCase
+from ._competitor import Competitor, Reading
 
-PAIRS = 8e6  # in one run, about a second
-FINER = 16  # samples of a profile per 1/B
+PAIRS = 8e6  # pulses x pixels of one run, which takes about a second
+FINER = 16  # samples of a range profile per 1/bandwidth
 
 
 def backproject(raw: PhaseHistory, points: np.ndarray) -> np.ndarray:
-    """Profiles by FFT, 16 times oversampled, read by linear interpolation; complex128 (m,) at points, m (m, 3)."""
+    """Image, complex128 (m,), at points, m (m, 3): profiles by FFT, 16 times oversampled, linear interpolation."""
     n, step = raw.n_samples, raw.frequency_step[0]
     length = FINER * n
     middle = raw.frequency[0] + n // 2 * step
-    place = (np.arange(length) - length // 2) / (length * step)  # s, of the profile's samples
+    place = (np.arange(length) - length // 2) / (length * step)  # s, delays of the samples of a profile
     image = np.zeros(len(points), np.complex128)
     for row, antenna, ref in zip(raw.read(0, raw.n_rows), raw.tx, raw.reference_range, strict=True):
         spectrum = np.zeros(length, np.complex128)
@@ -32,8 +32,8 @@ def backproject(raw: PhaseHistory, points: np.ndarray) -> np.ndarray:
     return image
 
 
-def contestants(case: Case) -> list[Contestant]:
-    """The one line; its seconds are those of the pulses it takes, times n over their number."""
+def competitors(case: BenchCase) -> list[Competitor]:
+    """The one competitor. It takes some of the pulses; its seconds are scaled to all n."""
     rows = min(case.n, max(1, round(PAIRS / case.grid.size)))
     raw = case.raw[:rows]
     points = case.grid.at(*np.indices(case.grid.shape)).reshape(-1, 3)
@@ -46,4 +46,4 @@ def contestants(case: Case) -> list[Contestant]:
 
     setting = f"linear, {FINER} x" + (f"; {rows} pulses, seconds times {case.n / rows:.0f}" if rows < case.n else "")
     check = _exact.backproject(raw, case.grid.at(*case.at))
-    return [Contestant("NumPy", "one thread", "direct", setting, run, check=check, share=rows / case.n)]
+    return [Competitor("NumPy", "one thread", "direct", setting, run, check=check, share=rows / case.n)]

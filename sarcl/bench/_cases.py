@@ -28,14 +28,14 @@ WORDS = {
 
 
 @dataclass(frozen=True, eq=False)
-class Case:
-    """Data and the exact sum at some of the pixels.
+class BenchCase:
+    """Echoes, grid, and the exact sum at some of the pixels.
 
     scene, data, n   "spotlight" or "straight"; "noise" or "points"; pulses = samples = pixels a side
-    raw, grid        what is focused, on what
+    raw, grid        echoes, and the grid they are focused on
     at               (rows, columns) of the pixels that are checked, int64 (2, m)
     wanted           exact sum there, complex128 (m,)
-    norm             norm it would have if contributions had random phases
+    norm             norm of the exact sum if contributions had random phases
     """
 
     scene: str
@@ -59,8 +59,8 @@ class Case:
         return wrong / max(own, self.norm), wrong / own
 
 
-def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> Case:
-    """Case `scene` of n pulses of n samples on n x n pixels, checked at `pixels` of them; seeded.
+def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> BenchCase:
+    """BenchCase `scene` of n pulses of n samples on n x n pixels, checked at `pixels` of them; seeded.
 
     data  "noise": white, in every sample, so that most of the energy lies outside the scene of "straight";
           "points": points of random amplitude over the scene, from the formula. None: DATA[scene]
@@ -89,11 +89,11 @@ def make(scene: str, n: int, data: str | None = None, pixels: int = 1024) -> Cas
     raw = PhaseHistory(samples, frequency=FREQUENCY, frequency_step=step, tx=tx, reference_range=reference)
     grid = ImageGrid.plane(shape=(n, n), spacing=spacing)
     at = np.random.default_rng(1).integers(0, n, (2, count("pixels", pixels)))
-    return Case(scene, data, n, raw, grid, at, *_exact.backproject(raw, grid.at(*at)))
+    return BenchCase(scene, data, n, raw, grid, at, *_exact.backproject(raw, grid.at(*at)))
 
 
-def save(case: Case, folder: Path) -> None:
-    """Write what any process needs to make the image: samples.npy, tx.npy, reference_range.npy, case.json."""
+def save(case: BenchCase, folder: Path) -> None:
+    """Write the files from which any process makes the image: samples.npy, tx.npy, reference_range.npy, case.json."""
     np.save(folder / "samples.npy", case.raw.samples)
     np.save(folder / "tx.npy", case.raw.tx)
     np.save(folder / "reference_range.npy", case.raw.reference_range)

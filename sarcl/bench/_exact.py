@@ -1,9 +1,9 @@
-"""The exact sum at some pixels, quick enough for apertures of thousands of pulses.
+"""The exact sum at some pixels, fast enough for apertures of thousands of pulses.
 
 `sarcl.reference.backproject` evaluates exp(j 2 pi f_n delay) for every sample. Here f_n = f_0 + n df is split at
-n = b c + d, so that exp(j 2 pi f_n delay) = coarse[c] fine[d] costs 2 sqrt(n_samples) exponentials a pixel, and
-the sum over samples is a small product of matrices. Float64 throughout, turns reduced in extended precision: the
-two agree to 1e-11.
+n = b c + d, so that exp(j 2 pi f_n delay) = coarse[c] fine[d] costs 2 sqrt(n_samples) exponentials per pixel, and
+the sum over samples is a small product of matrices. All in float64; phases are reduced to one cycle in extended
+precision. The two agree to 1e-11.
 """
 
 from __future__ import annotations
@@ -29,7 +29,7 @@ def phases(delay: np.ndarray, frequency: float, step: float, n_samples: int) -> 
 
 
 def backproject(raw: PhaseHistory, points: np.ndarray) -> tuple[np.ndarray, float]:
-    """I complex128 (m,) at points, m (m, 3), and the norm it would have if contributions had random phases."""
+    """I complex128 (m,) at points, m (m, 3), and its norm if contributions had random phases."""
     image, power = np.zeros(len(points), np.complex128), 0.0
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])

@@ -1,4 +1,4 @@
-"""Libraries that live in another environment: a process that answers over a pipe, kept alive so that runs alternate."""
+"""Libraries in another environment: a process that answers through a pipe, kept alive so that runs can alternate."""
 
 from __future__ import annotations
 
@@ -16,19 +16,19 @@ from typing import Any
 import numpy as np
 
 from ..base.threads import threads
-from ._cases import Case
-from ._contestant import Absent, Contestant, Reading
+from ._cases import BenchCase
+from ._competitor import Absent, Competitor, Reading
 
 SCRIPT = Path(__file__).with_name("fastsar_peer.py")
 PATIENCE = 1800.0  # s for one answer
 
-# Every setting that moves speed or error; others were tried and are dominated by these.
+# Every setting that changes speed or error; other settings were tried and are dominated by these.
 EXACT = [("linear", 4), ("linear", 8), ("linear", 16), ("cubic", 4), ("cubic", 8), ("cubic", 16)]
 FACTORIZED: list[dict[str, Any]] = [{}, {"T": 16}, {"levels": 2}, {"pmax": 0.6}]
 
 
 def environment() -> dict[str, str]:
-    """As many threads as CPU devices get here, set the way fastsar's page says; what is set already stands."""
+    """Environment with as many threads as CPU devices get, as fastsar's page says; variables that are set stay."""
     return {
         "OMP_NUM_THREADS": str(threads()),
         "OMP_PLACES": "cores",
@@ -38,7 +38,7 @@ def environment() -> dict[str, str]:
 
 
 def check_python(path: str | None) -> str:
-    """The interpreter to ask, this one by default; ValueError where there is none at `path`."""
+    """The interpreter to use, this one by default; ValueError where there is none at `path`."""
     import shutil
 
     if path is None:
@@ -52,9 +52,9 @@ def check_python(path: str | None) -> str:
 
 
 class Peer:
-    """A running peer: `name`, `version` and `python` say who it is. Use as a context; `load` a case, then `ask`.
+    """A running peer with `name`, `version` and `python`. Use as a context; `load` a case, then `run`.
 
-    Absent where the interpreter lacks the library or does not run; a peer that dies is started anew by `load`.
+    Absent where the interpreter lacks the library or does not run. `load` starts a peer again that has ended.
     """
 
     def __init__(self, python: str) -> None:
@@ -69,7 +69,7 @@ class Peer:
         self._stop()
 
     def load(self, folder: Path) -> None:
-        """Hand over the case saved in `folder`."""
+        """Load the case saved in `folder`."""
         self.folder = folder
         if self.process.poll() is not None:
             self._stop()
@@ -77,7 +77,7 @@ class Peer:
         self._answer({"do": "load", "folder": str(folder)})
 
     def run(self, spec: dict[str, Any]) -> dict[str, Any]:
-        """An image: {"seconds": {"setup", "form", "cpu"}, "values"}; Absent with its last words if it dies."""
+        """An image: {"seconds": {"setup", "form", "cpu"}, "values"}; Absent with its last output if it ends."""
         if self.process.poll() is not None and self.folder is not None:
             self.load(self.folder)
         return self._answer({"do": "run", "spec": spec})
@@ -122,7 +122,7 @@ class Peer:
         for stream in (self.process.stdin, self.process.stdout, self.stderr):
             try:
                 stream.close()  # type: ignore[union-attr]
-            except OSError:  # what was not flushed to a peer that is gone
+            except OSError:  # data not flushed to a peer that has ended
                 pass
 
     def _answer(self, request: dict[str, Any]) -> dict[str, Any]:
@@ -130,7 +130,7 @@ class Peer:
             self.process.stdin.write(json.dumps(request) + "\n")  # type: ignore[union-attr]
             self.process.stdin.flush()  # type: ignore[union-attr]
         except OSError:
-            pass  # it is gone: reading tells what it said last
+            pass  # the process has ended: reading gives its last output
         answer = self._read()
         if "error" in answer:
             raise Absent(answer["error"])
@@ -149,7 +149,7 @@ class Peer:
                 raise ValueError
             return answer
         except ValueError:
-            if line:  # not a peer: whatever it is, it need not end by itself
+            if line:  # the program is not a peer, and may not end by itself
                 self.process.kill()
             code = self.process.wait()
             self.stderr.seek(0)
@@ -157,22 +157,22 @@ class Peer:
             raise Absent(f"{Path(self.command[0]).name} ended with {code}: {said}") from None
 
 
-def contestants(case: Case, peer: Peer, methods: Sequence[str], backend: str = "cpu") -> list[Contestant]:
-    """fastsar's formers in the settings above; `peer` has the case loaded."""
+def competitors(case: BenchCase, peer: Peer, methods: Sequence[str], backend: str = "cpu") -> list[Competitor]:
+    """fastsar's formers with the settings above; `peer` has the case loaded."""
     found = []
     if "direct" in methods:
         for interp, upsample in EXACT:
             spec = {"former": "exact", "options": {"interp": interp, "upsample": upsample, "backend": backend}}
-            found.append(_contestant(peer, "direct", f"{interp}, {upsample} x", spec, backend))
+            found.append(_competitor(peer, "direct", f"{interp}, {upsample} x", spec, backend))
     if "factorized" in methods:
         for options in FACTORIZED:
             spec = {"former": "factorized", "options": {**options, "backend": backend}}
-            words = ", ".join(f"{k} {v}" for k, v in options.items()) or "as it comes"
-            found.append(_contestant(peer, "factorized", words, spec, backend))
+            words = ", ".join(f"{k} {v}" for k, v in options.items()) or "default"
+            found.append(_competitor(peer, "factorized", words, spec, backend))
     return found
 
 
-def _contestant(peer: Peer, method: str, setting: str, spec: dict[str, Any], backend: str) -> Contestant:
+def _competitor(peer: Peer, method: str, setting: str, spec: dict[str, Any], backend: str) -> Competitor:
     def run() -> Reading:
         answer = peer.run(spec)
         seconds = answer["seconds"]
@@ -183,4 +183,4 @@ def _contestant(peer: Peer, method: str, setting: str, spec: dict[str, Any], bac
             timed["cpu"] = seconds["cpu"]
         return Reading(values[:, 0] + 1j * values[:, 1], timed)
 
-    return Contestant(f"{peer.name} {peer.version}", backend, method, setting, run, lambda: peer.once(spec))
+    return Competitor(f"{peer.name} {peer.version}", backend, method, setting, run, lambda: peer.once(spec))

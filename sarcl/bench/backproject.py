@@ -1,4 +1,4 @@
-"""sarcl bench backproject: run time against ACHIEVED error, sarcl and peers on the same data in one run."""
+"""`sarcl bench backproject`: run time against achieved error, sarcl and peers on the same data in one run."""
 
 from __future__ import annotations
 
@@ -20,8 +20,8 @@ from ..imaging.choose_method import METHODS
 from ..opencl import device_list
 from ..opencl.choose_device import open_device
 from ..opencl.device import Device
-from . import _baseline, _cases, _contestant, _ours, _peers, _table
-from ._contestant import Absent
+from . import _baseline, _cases, _competitor, _peers, _run_sarcl, tables
+from ._competitor import Absent
 from ._measure import Paces, alternate, measure
 
 TOLERANCES = (1e-1, 3e-2, 1e-2, 3e-3, 1e-3, 3e-4, 1e-4, 1e-5, 1e-6)
@@ -49,14 +49,14 @@ def run(
     progress: Callable[[str, int, int], None] = lambda stage, done, total: None,
     keep: Callable[[Document], None] = lambda document: None,
 ) -> Document:
-    """Measure and return everything that was found, ready for JSON.
+    """Measure; returns a document ready for JSON.
 
     scenes, data   see `_cases.make`; sizes: pulses = samples = pixels a side, at least 8
-    devices        as `sarcl.devices` names them; None: every one that works; no_fp64: each once more without float64
+    devices        as `sarcl.devices` names them; None: all that work;  no_fp64: measure each again without float64
     methods        "direct", "factorized", "auto"
     peer_python    an interpreter that has fastsar, default this one; peer_backend: which of its backends
-    repeats        runs of each line, the contestants taking turns; pixels: checked against the exact sum, >= 256
-    limit          s: runs expected to last longer are left out
+    repeats        runs of each row, in turns;  pixels: number of pixels checked against the exact sum, at least 256
+    limit          s; runs expected to last longer are left out
     patience       s to wait before each run until no other program runs
     say, progress  lines of text; progress(stage, done, total); keep(document) after every case
     ValueError for what does not fit, before the work; NoDeviceError.
@@ -84,7 +84,7 @@ def run(
             except Absent as exc:
                 found = {"absent": f"{exc}; --peer-python PATH names a Python that has it"}
             document["peers"].append({"name": "fastsar", **found})
-        for line in _table.machine_text(document):
+        for line in tables.machine_text(document):
             say(line)
         folder = Path(stack.enter_context(tempfile.TemporaryDirectory(prefix="sarcl-bench-")))
         for scene in scenes:
@@ -94,7 +94,7 @@ def run(
                 case = _cases.make(scene, n, data, pixels)
                 _cases.save(case, folder)
                 progress("data", 1, 1)
-                lines = _ours.contestants(case, folder, opened, methods, wanted)
+                lines = _run_sarcl.competitors(case, folder, opened, methods, wanted)
                 others = _others(case, folder, peer, peer_backend, methods) if with_peers else []
                 rows = measure(
                     case,
@@ -117,32 +117,32 @@ def run(
                 document["cases"].append(result)
                 document["machine"]["load"] = [document["machine"]["load"][0], *load()]
                 keep(document)
-                say("\n" + _table.text(result))
-    growth = _table.growth_text(document["cases"])
+                say("\n" + tables.text(result))
+    growth = tables.growth_text(document["cases"])
     if growth:
         say("\n" + growth)
-    say("\n" + _table.EXPLAINED)
+    say("\n" + tables.EXPLAINED)
     return document
 
 
 def _others(
-    case: _cases.Case, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
+    case: _cases.BenchCase, folder: Path, peer: _peers.Peer | None, backend: str, methods: Sequence[str]
 ) -> list[Any]:
-    """The baseline, and the peer where there is one."""
+    """The NumPy baseline, and the peer where there is one."""
     found = []
     if "direct" in methods:
-        found += _baseline.contestants(case)
+        found += _baseline.competitors(case)
     if peer is not None:
         try:
             peer.load(folder)
-            found += _peers.contestants(case, peer, methods, backend)
+            found += _peers.competitors(case, peer, methods, backend)
         except Absent as exc:
             lost = str(exc)
 
             def gone() -> Any:
                 raise Absent(lost)
 
-            found += [_contestant.Contestant(peer.name, backend, method, "any", gone) for method in methods]
+            found += [_competitor.Competitor(peer.name, backend, method, "any", gone) for method in methods]
     return found
 
 
@@ -166,12 +166,12 @@ def _device(device: Device) -> dict[str, Any]:
 
 
 def header(devices: Sequence[Device]) -> Document:
-    """What every document begins with: machine, devices, and room for peers."""
+    """The first entries of every document: machine, devices, an empty list of peers."""
     return {"format": FORMAT, "machine": _machine(), "devices": [_device(d) for d in devices], "peers": []}
 
 
 def load() -> list[float]:
-    """Processes that wait for a processor, averaged over a minute; empty where the system does not say."""
+    """Load average of the last minute, one value; NaN where the system does not say."""
     return [os.getloadavg()[0]] if hasattr(os, "getloadavg") else [float("nan")]
 
 
@@ -203,7 +203,7 @@ def write(document: Document, path: Path) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """What numpy numbers in a plan are."""
+    """NumPy numbers of a plan as plain numbers, lists or text."""
     if isinstance(value, np.generic):
         return value.item()
     if isinstance(value, np.ndarray):

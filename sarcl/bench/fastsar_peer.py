@@ -1,13 +1,13 @@
-"""fastsar, in an interpreter that has it: read requests from stdin, answer on stdout, one JSON object a line.
+"""fastsar, in an interpreter that has it: reads requests from stdin, answers on stdout, one JSON object per line.
 
 Imports nothing of sarcl. Run by sarcl/bench/_peers.py, or as  python fastsar_peer.py once FOLDER SPEC  to make one
 image in a process of its own.
 
 Requests: {"do": "load", "folder": ...}; {"do": "run", "spec": {"former": "exact" or "factorized", "options": {...}}}
-makes a former (seconds "setup") and calls the first that was made so (seconds "form", and "cpu" of all processors
-together); {"do": "stop"}.
+makes a former (seconds "setup") and calls the first former made with this spec (seconds "form"; "cpu", CPU seconds
+of all processors); {"do": "stop"}.
 
-What was found in its source (0.1.8) and is held by the errors that are measured: samples f_n = fmin + n df of phase
+Conventions found in its source (0.1.8), confirmed by the measured errors: samples f_n = fmin + n df of phase
 exp(-j 2 pi f tau), referenced to `ref`, the one-way range; pixel [i, j] at (i - nx/2) spx e1 + (j - ny/2) spy e2, so
 that e1 is our rows' direction and e2 our columns'; no scale factor, window=False turns the Taylor window off.
 """
@@ -56,7 +56,7 @@ def run(data, formers, spec):
 
 
 def hello():
-    """Who answers."""
+    """Name and version of the library."""
     try:
         from importlib.metadata import version
 
@@ -68,7 +68,7 @@ def hello():
 
 
 def serve():
-    """Answer until told to stop; what the library prints goes to stderr."""
+    """Answer requests until one says stop; output of the library goes to stderr."""
     answers = os.fdopen(os.dup(1), "w")
     os.dup2(2, 1)
 
@@ -90,7 +90,7 @@ def serve():
                 answer({})
             else:
                 answer(run(data, formers, request["spec"]))
-        except Exception as exc:  # one setting that fails is one line of the table
+        except Exception as exc:  # a setting that fails is one row of the table
             answer({"error": f"{type(exc).__name__}: {exc}"})
 
 

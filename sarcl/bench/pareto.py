@@ -5,7 +5,7 @@ from __future__ import annotations
 from typing import TYPE_CHECKING, Any
 
 from ..figures import plots
-from . import _figures
+from . import ratios
 
 if TYPE_CHECKING:
     from matplotlib.axes import Axes
@@ -15,15 +15,15 @@ OURS = ("#165294", "#c44418", "#5a96d7", "#e88c5a")
 THEIRS = ("#107c58", "#844696", "#b8860b", "#6e6e6e", "#3ca0aa", "#aa3c6e")
 MARKS = ("s", "D", "^", "x")
 
-Series = dict[str, list[_figures.Row]]
+Series = dict[str, list[ratios.Row]]
 
 
-def picture(cases: list[_figures.Result]) -> bytes:
+def picture(cases: list[ratios.Result]) -> bytes:
     """PNG of a document's cases; cases without a row that ran are left out. Needs the extra `plots`.
 
     ValueError where no case has such a row.
     """
-    drawn = [case for case in cases if _figures.ran(case)]
+    drawn = [case for case in cases if ratios.ran(case)]
     if not drawn:
         raise ValueError("no case has a row that ran; there is nothing to draw")
     columns = 1 if len(drawn) < 4 else 2
@@ -40,12 +40,12 @@ def picture(cases: list[_figures.Result]) -> bytes:
     return plots.png(made, 256)
 
 
-def series(case: _figures.Result) -> Series:
+def series(case: ratios.Result) -> Series:
     """The rows of each curve, by its label; sarcl's first, the exact peers' by kind of interpolation."""
     found: Series = {}
-    for row in sorted(_figures.ran(case), key=lambda row: not _figures.is_ours(row)):
+    for row in sorted(ratios.ran(case), key=lambda row: not ratios.is_sarcl(row)):
         label = f"{row['who']} {row['method']}"
-        if _figures.is_ours(row):
+        if ratios.is_sarcl(row):
             label += f", {row['device']}"
         elif row["method"] == "direct":
             label += f", {row['setting'].split(',')[0]}"
@@ -53,7 +53,7 @@ def series(case: _figures.Result) -> Series:
     return found
 
 
-def _styles(cases: list[_figures.Result]) -> dict[str, dict[str, Any]]:
+def _styles(cases: list[ratios.Result]) -> dict[str, dict[str, Any]]:
     """Options of every curve for matplotlib, the same in all panels."""
     found: dict[str, dict[str, Any]] = {}
     ours = theirs = 0
@@ -61,7 +61,7 @@ def _styles(cases: list[_figures.Result]) -> dict[str, dict[str, Any]]:
         for label, rows in series(case).items():
             if label in found:
                 continue
-            if _figures.is_ours(rows[0]):
+            if ratios.is_sarcl(rows[0]):
                 found[label] = {"color": OURS[ours % len(OURS)], "marker": "o", "linestyle": plots.LINES[ours % 4]}
                 ours += 1
             else:
@@ -73,9 +73,9 @@ def _styles(cases: list[_figures.Result]) -> dict[str, dict[str, Any]]:
     return found
 
 
-def _draw(axes: Axes, case: _figures.Result, styles: dict[str, dict[str, Any]]) -> None:
+def _draw(axes: Axes, case: ratios.Result, styles: dict[str, dict[str, Any]]) -> None:
     for label, rows in series(case).items():
-        x, y = [row["error"] for row in rows], [_figures.rate(case, row) for row in rows]
+        x, y = [row["error"] for row in rows], [ratios.rate(case, row) for row in rows]
         axes.plot(x, y, label=label, linewidth=1.5, markersize=6, **styles[label])
     axes.set_xscale("log")
     axes.set_yscale("log")
@@ -86,12 +86,12 @@ def _draw(axes: Axes, case: _figures.Result, styles: dict[str, dict[str, Any]]) 
     axes.legend(loc="upper left", bbox_to_anchor=(1.01, 1.0), fontsize=9, frameon=False, handlelength=4)
 
 
-def _label(axes: Axes, case: _figures.Result, styles: dict[str, dict[str, Any]]) -> None:
+def _label(axes: Axes, case: ratios.Result, styles: dict[str, dict[str, Any]]) -> None:
     """sarcl's tolerances above the points, the exact peers' upsampling below; the other side where that is taken."""
     taken: list[Any] = []
     for label, rows in series(case).items():
         for row in rows:
-            if _figures.is_ours(row):
+            if ratios.is_sarcl(row):
                 text, sides = row["setting"].replace("e-0", "e-"), (7, -14)
             elif row["method"] == "direct":
                 text, sides = row["setting"].split(";")[0].split(", ")[-1], (-14, 7)
@@ -99,7 +99,7 @@ def _label(axes: Axes, case: _figures.Result, styles: dict[str, dict[str, Any]])
                 continue
             for shift in sides:
                 made = axes.annotate(
-                    text, (row["error"], _figures.rate(case, row)), (0, shift), textcoords="offset points",
+                    text, (row["error"], ratios.rate(case, row)), (0, shift), textcoords="offset points",
                     ha="center", fontsize=8, color=styles[label]["color"],
                 )  # fmt: skip
                 box = made.get_window_extent()

@@ -8,12 +8,13 @@ import os
 
 import numpy as np
 import pytest
+import report as page
 
 import sarcl
 from sarcl.bench import _baseline as numpy_baseline
-from sarcl.bench import _cases, _exact, _figures, _measure, _peers, _quiet, _table, page, pareto
+from sarcl.bench import _cases, _exact, _measure, _peers, _wait_idle, pareto, ratios, tables
 from sarcl.bench import backproject as bench
-from sarcl.bench._contestant import Absent, Contestant, Reading
+from sarcl.bench._competitor import Absent, Competitor, Reading
 from sarcl.cli import parser
 from sarcl.figures import plots
 from sarcl.reference.backproject import backproject as reference
@@ -108,20 +109,20 @@ def test_a_saved_case_is_the_same_data(tmp_path):
 @pytest.mark.parametrize("scene", _cases.SCENES)
 def test_the_baseline_is_an_image_of_the_case(scene):
     case = _cases.make(scene, 48, "noise", pixels=256)
-    contestant = numpy_baseline.contestants(case)[0]
-    wanted, norm = (case.wanted, case.norm) if contestant.share == 1 else contestant.check
-    error = np.linalg.norm(contestant.run().values - wanted) / max(np.linalg.norm(wanted), norm)
+    competitor = numpy_baseline.competitors(case)[0]
+    wanted, norm = (case.wanted, case.norm) if competitor.share == 1 else competitor.check
+    error = np.linalg.norm(competitor.run().values - wanted) / max(np.linalg.norm(wanted), norm)
     assert 1e-4 < error < 4e-3  # the hat at the edge of a 16 times oversampled band, (pi/32)^2/3, is its worst
 
 
 def test_some_pulses_of_the_baseline_stand_for_all(monkeypatch):
     monkeypatch.setattr(numpy_baseline, "PAIRS", 2 * 16**2)
     case = _cases.make("spotlight", 16, pixels=256)
-    contestant = numpy_baseline.contestants(case)[0]
-    assert contestant.share == 1 / 8 and "2 pulses, seconds times 8" in contestant.setting
-    (row,) = _measure.measure(case, [contestant], repeats=1, limit=60, paces={})
+    competitor = numpy_baseline.competitors(case)[0]
+    assert competitor.share == 1 / 8 and "2 pulses, seconds times 8" in competitor.setting
+    (row,) = _measure.measure(case, [competitor], repeats=1, limit=60, paces={})
     assert row["error"] < 4e-3
-    ran = contestant.run().seconds["call"]
+    ran = competitor.run().seconds["call"]
     assert row["seconds"]["call"][0] > 2 * ran
 
 
@@ -129,7 +130,7 @@ def constant(values, seconds, **options):
     def run():
         return Reading(values, {"call": seconds, "form": seconds})
 
-    return Contestant("x", "y", "direct", options.pop("setting", "a"), run, **options)
+    return Competitor("x", "y", "direct", options.pop("setting", "a"), run, **options)
 
 
 def test_errors_are_relative_as_docs_accuracy_says():
@@ -146,10 +147,10 @@ def test_no_speed_without_an_error():
     case = _cases.make("spotlight", 8, pixels=256)
     (row,) = _measure.measure(case, [constant(case.wanted * np.nan, 0.1)], repeats=2, limit=60, paces={})
     assert "NaN" in row["absent"] and "error" in row
-    assert _figures.ran({"rows": [row]}) == []
+    assert ratios.ran({"rows": [row]}) == []
 
 
-def test_contestants_take_turns_and_long_ones_fewer():
+def test_competitors_take_turns_and_long_ones_fewer():
     case = _cases.make("spotlight", 8, pixels=256)
     order = []
 
@@ -158,7 +159,7 @@ def test_contestants_take_turns_and_long_ones_fewer():
             order.append(name)
             return Reading(case.wanted, {"call": seconds, "form": seconds})
 
-        return Contestant(name, "y", "direct", "a", run)
+        return Competitor(name, "y", "direct", "a", run)
 
     lines = _measure.alternate([noted("a", 1.0), noted("b", 40.0)], [noted("c", 1.0)])
     paces = {}
@@ -171,12 +172,12 @@ def test_contestants_take_turns_and_long_ones_fewer():
 
 def test_runs_wait_for_an_idle_machine_but_not_for_ever(monkeypatch):
     ticks = iter([(0, 100), (10, 200), (10, 200), (105, 300)])  # 10 % idle, then 95 %
-    monkeypatch.setattr(_quiet, "_idle_and_all", lambda: next(ticks))
-    monkeypatch.setattr(_quiet, "LOOK", 0.0)
-    assert _quiet.wait(60)
+    monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: next(ticks))
+    monkeypatch.setattr(_wait_idle, "LOOK", 0.0)
+    assert _wait_idle.wait(60)
     busy = itertools.count(0, 100)
-    monkeypatch.setattr(_quiet, "_idle_and_all", lambda: (0, next(busy)))
-    assert not _quiet.wait(0.01)
+    monkeypatch.setattr(_wait_idle, "_idle_and_all", lambda: (0, next(busy)))
+    assert not _wait_idle.wait(0.01)
     case = _cases.make("spotlight", 8, pixels=256)
     (row,) = _measure.measure(case, [constant(case.wanted, 0.1)], repeats=2, limit=60, paces={}, patience=0.01)
     assert row["disturbed"] == 3  # the first run too
@@ -195,15 +196,15 @@ def result(*rows, n=16):
 def test_a_peer_is_matched_with_the_fastest_that_errs_no_more():
     ours = [row("sarcl", 1e-2, 1.0, setting="1e-02"), row("sarcl", 1e-3, 2.0), row("sarcl", 1e-4, 3.0)]
     absent = {"who": "sarcl", "device": "d", "method": "direct", "setting": "x", "absent": "why", "seconds": {}}
-    found = _figures.matches(result(*ours, absent, row("peer", 1e-3, 5.0), row("peer", 1e-5, 5.0)))
-    assert [entry["ours"] and entry["ours"]["error"] for entry in found] == [1e-3, None]
+    found = ratios.matches(result(*ours, absent, row("peer", 1e-3, 5.0), row("peer", 1e-5, 5.0)))
+    assert [entry["sarcl"] and entry["sarcl"]["error"] for entry in found] == [1e-3, None]
     assert found[0]["form"] == 2.5 and found[0]["median form"] == 2.5 and found[0]["process"] is None
 
 
 def test_a_direct_peer_is_matched_with_subapertures_too_but_not_the_other_way():
     rows = [row("sarcl", 1e-3, 1.0, "factorized"), row("sarcl", 1e-3, 4.0), row("peer", 1e-2, 8.0)]
     rows.append(row("peer", 1e-2, 3.0, "factorized"))
-    found = [(e["peer"]["method"], e["method"], e["form"]) for e in _figures.matches(result(*rows))]
+    found = [(e["peer"]["method"], e["method"], e["form"]) for e in ratios.matches(result(*rows))]
     assert found == [("direct", "direct", 2.0), ("direct", "factorized", 8.0), ("factorized", "factorized", 3.0)]
 
 
@@ -213,7 +214,7 @@ def test_the_exponent_of_cost_against_size():
         line, other = row("sarcl", 1e-3 * n, n**2.5), row("sarcl", 1e-3, n**3.0, setting="t")
         line["seconds"]["cpu"] = [n**2.0, 2 * n**2.0]
         results.append(result(line, other, *([row("once", 1e-3, 1.0)] if n == 8 else []), n=n))
-    found = {(entry["who"], entry["setting"]): entry for entry in _figures.growth(results)}
+    found = {(entry["who"], entry["setting"]): entry for entry in ratios.growth(results)}
     line = found["sarcl", "s"]
     assert line["exponent"] == pytest.approx(2.5) and line["cpu_exponent"] == pytest.approx(2)
     assert line["sizes"] == [8, 16, 64] and line["error"] == 0.064
@@ -303,7 +304,7 @@ def test_a_method_that_cannot_is_absent_in_words(monkeypatch):
     document = bench.run(**{**SMALL, "methods": ["factorized"]}, with_peers=False)
     (only,) = document["cases"][0]["rows"]
     assert only["absent"].startswith("tolerance 1.0e-03 cannot be met with sub-apertures")
-    assert "absent: tolerance 1.0e-03 cannot be met" in _table.text(document["cases"][0])
+    assert "absent: tolerance 1.0e-03 cannot be met" in tables.text(document["cases"][0])
     with pytest.raises(ValueError, match="nothing to draw"):
         pareto.picture(document["cases"])
 
@@ -402,7 +403,7 @@ def test_bad_options_end_in_one_line(options, said, capsys):
 
 def test_echo_documents_become_tables(tmp_path):
     """A document of bench/echo.py: spreading, whole echoes and scenes."""
-    from sarcl.bench import backproject, page
+    from sarcl.bench import backproject
 
     spread = [
         {
@@ -432,7 +433,7 @@ def test_echo_documents_become_tables(tmp_path):
 
 def test_documents_of_channels_become_tables(tmp_path):
     """A document of bench/channels.py: ways of the same channels beside one another."""
-    from sarcl.bench import backproject, page
+    from sarcl.bench import backproject
 
     row = {"scene": "points", "n": 45, "contributions": 9_000_000_000, "error": 2e-5, "predicted": 8e-4, "visited": 1}
     rows = [

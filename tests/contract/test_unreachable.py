@@ -347,9 +347,8 @@ def test_a_forecast_looks_elsewhere_only_where_nothing_is_seen(monkeypatch):
 # Files that may catch ValueError, or everything, and why: each gives the error of a foreign library a message.
 MAY_CATCH = {
     "bench/fastsar_peer.py": "a process of its own: what another library raises is a line of the table",
-    "bench/page.py": "text that is no JSON",
     "bench/_peers.py": "text that is no JSON",
-    "bench/_quiet.py": "/proc/stat of a system that has none",
+    "bench/_wait_idle.py": "/proc/stat of a system that has none",
     "base/validation.py": "what numpy, float and int say of input",
     "opencl/_trial_record.py": "text that is no JSON",
     "opencl/device_list.py": "a driver's trial: whatever it raises, the device does not work",

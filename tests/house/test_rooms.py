@@ -16,7 +16,7 @@ FULL = 25  # files of a folder: more are two rooms
 # Plain names although no other folder imports them.
 DOORS_FOR_OTHERS = {
     "sarcl.bench.fastsar_peer": "a program for another environment",
-    "sarcl.bench.once": "a program: python -m sarcl.bench.once",
+    "sarcl.bench.one_shot": "a program: python -m sarcl.bench.one_shot",
     "sarcl.papers.farooq.range_zones": "for users (docs: papers)",
 }
 

@@ -1,16 +1,16 @@
-"""Waiting for other programs to leave the processors alone."""
+"""Waiting until other programs leave the processors idle."""
 
 from __future__ import annotations
 
 import time
 from pathlib import Path
 
-LOOK = 0.2  # s over which idleness is taken
-ENOUGH = 0.93  # of the processors' time idle
+LOOK = 0.2  # s over which the idle share is measured
+ENOUGH = 0.93  # share of the processors' time that must be idle
 
 
 def wait(patience: float) -> bool:
-    """Wait up to `patience` s until the machine is idle; True when it was, or where there is no way to tell."""
+    """Wait up to `patience` s until the machine is idle; True when it is, or where the system does not say."""
     end = time.monotonic() + patience
     while patience > 0:
         before = _idle_and_all()
@@ -26,7 +26,7 @@ def wait(patience: float) -> bool:
 
 
 def _idle_and_all() -> tuple[int, int] | None:
-    """Ticks of all processors since the start: idle, and in all; None where the system does not say."""
+    """Clock ticks of all processors since the system started: idle, total; None where the system does not say."""
     try:
         ticks = [int(v) for v in Path("/proc/stat").read_text().split("\n", 1)[0].split()[1:]]
     except (OSError, ValueError):

@@ -1,10 +1,10 @@
-"""The figures as tables: for the terminal and, in Markdown, for the page. No speed without its error."""
+"""Measurements as tables, for the terminal and, in Markdown, for the page. Every speed stands with its error."""
 
 from __future__ import annotations
 
 from typing import Any
 
-from . import _figures
+from . import ratios
 from ._cases import WORDS
 
 Cells = list[list[str]]
@@ -35,20 +35,20 @@ EXPLAINED = (
 )
 
 
-def title(result: _figures.Result) -> str:
-    """What a case is, in a line."""
+def title(result: ratios.Result) -> str:
+    """Description of a case, one line."""
     return (
         f"{result['scene']}, {result['data']}, n = {result['n']}: {WORDS[result['scene']]}; n pulses of n samples on "
         f"n x n pixels"
     )
 
 
-def name(row: _figures.Row) -> str:
-    """Who ran on what."""
+def name(row: ratios.Row) -> str:
+    """Program and device of a row."""
     return f"{row['who']}, {row['device']}"
 
 
-def body(result: _figures.Result) -> Cells:
+def body(result: ratios.Result) -> Cells:
     """A line for every row that ran, under HEAD."""
     return [
         [
@@ -56,43 +56,43 @@ def body(result: _figures.Result) -> Cells:
             row["method"],
             row["setting"],
             f"{row['error']:.1e}",
-            f"{_figures.decibels(row):.1f} dB",
-            _seconds(_figures.best(row)),
-            _seconds(_figures.middle(row)),
-            *(_seconds(_figures.best(row, key)) for key in ("call", "kernel", "process", "cpu")),
-            f"{_figures.rate(result, row):.3g}",
+            f"{ratios.decibels(row):.1f} dB",
+            _seconds(ratios.best(row)),
+            _seconds(ratios.middle(row)),
+            *(_seconds(ratios.best(row, key)) for key in ("call", "kernel", "process", "cpu")),
+            f"{ratios.rate(result, row):.3g}",
         ]
-        for row in _figures.ran(result)
+        for row in ratios.ran(result)
     ]
 
 
-def match_body(result: _figures.Result) -> Cells:
+def match_body(result: ratios.Result) -> Cells:
     """A line for every peer's row and device of sarcl's, under MATCH_HEAD."""
     lines = []
-    for entry in _figures.matches(result):
-        peer, ours = entry["peer"], entry["ours"]
+    for entry in ratios.matches(result):
+        peer, own = entry["peer"], entry["sarcl"]
         line = [
             f"{peer['who']} {peer['method']}, {peer['setting'].split(';')[0]}",
-            f"{peer['error']:.1e}, {_figures.decibels(peer):.1f} dB",
-            f"{_figures.rate(result, peer):.3g}",
+            f"{peer['error']:.1e}, {ratios.decibels(peer):.1f} dB",
+            f"{ratios.rate(result, peer):.3g}",
         ]
-        if ours is None:
+        if own is None:
             lines.append([*line, f"{entry['method']}: no row with an error as small", *[""] * 7])
             continue
-        ratios = [entry[key] for key in ("form", "median form", "call", "process", "cpu")]
+        times = [entry[key] for key in ("form", "median form", "call", "process", "cpu")]
         lines.append(
             [
                 *line,
-                f"{ours['method']}, {ours['setting']}, {ours['device']}",
-                f"{ours['error']:.1e}, {_figures.decibels(ours):.1f} dB",
-                f"{_figures.rate(result, ours):.3g}",
-                *("" if r is None else f"{r:.2f} x" for r in ratios),
+                f"{own['method']}, {own['setting']}, {own['device']}",
+                f"{own['error']:.1e}, {ratios.decibels(own):.1f} dB",
+                f"{ratios.rate(result, own):.3g}",
+                *("" if r is None else f"{r:.2f} x" for r in times),
             ]
         )
     return lines
 
 
-def growth_body(results: list[_figures.Result]) -> Cells:
+def growth_body(results: list[ratios.Result]) -> Cells:
     """A line for everything measured at two sizes or more, under GROWTH_HEAD."""
     return [
         [
@@ -105,12 +105,12 @@ def growth_body(results: list[_figures.Result]) -> Cells:
             f"n^{entry['exponent']:.2f}",
             "" if entry["cpu_exponent"] is None else f"n^{entry['cpu_exponent']:.2f}",
         ]
-        for entry in _figures.growth(results)
+        for entry in ratios.growth(results)
     ]
 
 
-def missing(result: _figures.Result) -> list[str]:
-    """A line for every row without figures, why it has none, equal reasons together; and one for disturbed runs."""
+def missing(result: ratios.Result) -> list[str]:
+    """A line for every row that did not run, with the reason, equal reasons together; a line for disturbed runs."""
     reasons: dict[tuple[str, str], list[str]] = {}
     for row in result["rows"]:
         if "absent" in row:
@@ -120,8 +120,8 @@ def missing(result: _figures.Result) -> list[str]:
     return lines + ([f"{disturbed} runs began while other programs ran"] if disturbed else [])
 
 
-def text(result: _figures.Result) -> str:
-    """A case for the terminal."""
+def text(result: ratios.Result) -> str:
+    """The tables of a case for the terminal."""
     parts = [title(result), _aligned(HEAD, body(result)), *missing(result)]
     lines = match_body(result)
     if lines:
@@ -129,7 +129,7 @@ def text(result: _figures.Result) -> str:
     return "\n".join(parts)
 
 
-def growth_text(results: list[_figures.Result]) -> str:
+def growth_text(results: list[ratios.Result]) -> str:
     """Cost against size for the terminal; empty where nothing was measured at two sizes."""
     lines = growth_body(results)
     return "cost against size:\n" + _aligned(GROWTH_HEAD, lines) if lines else ""

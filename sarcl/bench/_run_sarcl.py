@@ -1,4 +1,4 @@
-"""sarcl as a contestant: one line a device, method and tolerance."""
+"""sarcl as a competitor: one row for each device, method and tolerance."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from typing import Any, cast
 
 from ..opencl import device_list
 from ..opencl.device import Device
-from ._cases import Case
-from ._contestant import Absent, Contestant, Reading
+from ._cases import BenchCase
+from ._competitor import Absent, Competitor, Reading
 
 BEFORE = ("plan",)  # stages of a report that depend on geometry and tolerance alone
 
 
-def contestants(
-    case: Case, folder: Path, devices: Sequence[Device], methods: Sequence[str], tolerances: Sequence[float]
-) -> list[Contestant]:
+def competitors(
+    case: BenchCase, folder: Path, devices: Sequence[Device], methods: Sequence[str], tolerances: Sequence[float]
+) -> list[Competitor]:
     """sarcl on every device, by every method, at every tolerance; `folder` holds the saved case."""
     return [
-        _contestant(case, folder, device, method, tolerance)
+        _competitor(case, folder, device, method, tolerance)
         for device in devices
         for method in methods
         for tolerance in tolerances
@@ -32,7 +32,7 @@ def contestants(
 
 
 def describe(device: Device) -> str:
-    """A device in a few words, no two alike: platform, processor, and whether it is its twin without float64."""
+    """A short unique description of a device: platform, processor, and whether float64 is disabled."""
     info = device.info
     platform = "PoCL" if info.platform == "Portable Computing Language" else info.platform.split()[0].split("(")[0]
     name = re.sub(r"^(pthread|cpu)-[^ ]*-", "", info.name)  # PoCL puts its target before the processor's name
@@ -41,7 +41,7 @@ def describe(device: Device) -> str:
     return words + (f" ({info.index})" if len(alike) > 1 else "") + ("" if info.fp64 else ", no float64")
 
 
-def _contestant(case: Case, folder: Path, device: Device, method: str, tolerance: float) -> Contestant:
+def _competitor(case: BenchCase, folder: Path, device: Device, method: str, tolerance: float) -> Competitor:
     def run() -> Reading:
         from ..imaging.backproject import backproject
 
@@ -74,7 +74,7 @@ def _contestant(case: Case, folder: Path, device: Device, method: str, tolerance
             "device": device.info.index,
             "fp64": device.info.fp64,
         }
-        command = [sys.executable, "-m", "sarcl.bench.once", str(folder), json.dumps(options)]
+        command = [sys.executable, "-m", "sarcl.bench.one_shot", str(folder), json.dumps(options)]
         start = time.perf_counter()
         done = subprocess.run(command, capture_output=True, text=True)
         seconds = time.perf_counter() - start
@@ -84,4 +84,4 @@ def _contestant(case: Case, folder: Path, device: Device, method: str, tolerance
 
     info = device.info
     facts = {"tolerance": tolerance, "kind": info.kind, "fp64": info.fp64}
-    return Contestant("sarcl", describe(device), method, f"{tolerance:.0e}", run, process, facts)
+    return Competitor("sarcl", describe(device), method, f"{tolerance:.0e}", run, process, facts)

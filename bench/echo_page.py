@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import _table
+from sarcl.bench import tables
 
 Row = dict[str, Any]
 EXPLAINED = """Mpts/s: millions of pairs of scatterer and pulse per second, shortest run. sarcl computes delays and
@@ -15,13 +15,13 @@ given the delays, and sorts for every pulse, because its points move.
 
 def section(name: str, document: Row) -> str:
     """One document: machine, tables."""
-    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in _table.machine_text(document)) + "\n"
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in tables.machine_text(document)) + "\n"
     if document["spread"]:
         pairs = document["points"] * document["pulses"]
         text += f"### Spreading {document['points']:,} points x {document['pulses']} pulses x "
         text += f"{document['samples']} samples\n\n"
         head = ["", "setting", "error achieved", "s", "Mpts/s", "median", "whole call"]
-        text += _table.markdown(head, [_spread(row, pairs) for row in document["spread"]]) + f"\n{EXPLAINED}\n"
+        text += tables.markdown(head, [_spread(row, pairs) for row in document["spread"]]) + f"\n{EXPLAINED}\n"
         text += _matches(document["spread"])
     if document["whole"]:
         fastest = [r for r in document["spread"] if r["name"].startswith("finufft")]
@@ -36,11 +36,11 @@ def section(name: str, document: Row) -> str:
             "finufft's spreading alone, at no larger error",
         ]
         pairs = document["points"] * document["pulses"]
-        text += _table.markdown(head, [_whole(row, fastest, pairs) for row in document["whole"]]) + "\n"
+        text += tables.markdown(head, [_whole(row, fastest, pairs) for row in document["whole"]]) + "\n"
     if document["scenes"]:
         text += "### Whole scenes, one run each, compiling included\n\n"
         head = ["", "tolerance", "error achieved", "pulses x facets", "samples", "s", "a VAX 3100/30 in 1992, s"]
-        text += _table.markdown(head, [_scene(row) for row in document["scenes"]]) + "\n"
+        text += tables.markdown(head, [_scene(row) for row in document["scenes"]]) + "\n"
     return text
 
 
@@ -64,7 +64,7 @@ def _matches(rows: list[Row]) -> str:
     if not lines:
         return ""
     head = ["finufft", "its error", "sarcl", "its error", "finufft's seconds over sarcl's", "medians"]
-    return _table.markdown(head, lines) + "\n"
+    return tables.markdown(head, lines) + "\n"
 
 
 def _whole(row: Row, peers: list[Row], pairs: int) -> list[str]:

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
-from . import _table
+from sarcl.bench import tables
 
 Row = dict[str, Any]
 HEAD = [
@@ -26,7 +26,7 @@ compares shortest runs. "a call a channel" is one call per channel; its error is
 
 def section(name: str, document: Row) -> str:
     """One document: machine, tables."""
-    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in _table.machine_text(document)) + "\n"
+    text = f"## {name}\n\n" + "".join(f"- {line}\n" for line in tables.machine_text(document)) + "\n"
     for part, title in (
         ("growth", f"Carriers of 900 MHz in all x {document['pulses']} pulses"),
         ("one", f"One carrier x {document['pulses']} pulses"),
@@ -34,7 +34,7 @@ def section(name: str, document: Row) -> str:
     ):
         if document[part]:
             text += (
-                f"### {title}\n\n" + _table.markdown(HEAD, [_line(r, document[part]) for r in document[part]]) + "\n"
+                f"### {title}\n\n" + tables.markdown(HEAD, [_line(r, document[part]) for r in document[part]]) + "\n"
             )
     return text + EXPLAINED + "\n"
 

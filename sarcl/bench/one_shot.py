@@ -1,4 +1,4 @@
-"""One image in a process of its own: python -m sarcl.bench.once FOLDER OPTIONS, options as JSON."""
+"""One image in a process of its own: python -m sarcl.bench.one_shot FOLDER OPTIONS, options as JSON."""
 
 from __future__ import annotations
 

@@ -1,4 +1,4 @@
-"""What takes part in a benchmark, and what a run of it gives."""
+"""A program that is measured, and the result of one run."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ import numpy as np
 
 
 class Absent(Exception):
-    """A contestant that cannot take part; the message says why."""
+    """A competitor that cannot be measured; the message says why."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -18,11 +18,11 @@ class Reading:
     """One run.
 
     values   of the image at the case's checked pixels, complex (m,)
-    seconds  "call": data in memory to finished image, with whatever is worked out beforehand;
-             "form": the same without what can be worked out once for a geometry;
-             "kernel": of that in the device's kernels, where it is known;
-             "cpu": of all processors together, of sarcl's call and a peer's form; other programs hardly touch it
-    notes    what the run says of itself: plan, predicted error
+    seconds  "call": data in memory to finished image, preparation included;
+             "form": the same without the preparation that a geometry needs once;
+             "kernel": the part in the device's kernels, where it is known;
+             "cpu": CPU seconds of all processors, of sarcl's call and of a peer's form; other programs hardly change it
+    notes    what the program reports: plan, predicted error
     """
 
     values: np.ndarray
@@ -31,16 +31,16 @@ class Reading:
 
 
 @dataclass(frozen=True, eq=False)
-class Contestant:
-    """One line of the table.
+class Competitor:
+    """One row of the table.
 
     who, device      library; name of the device, or of the peer's backend
     method, setting  "direct" or "factorized"; tolerance or options in words
     run              makes the image: Reading; raises Absent (or ToleranceUnreachable, for what cannot be met)
-    process          seconds of a whole new process that makes the image, or None where there is no such
-    facts            other columns of its row
+    process          seconds of a whole new process that makes the image; None where there is none
+    facts            other entries of its row
     check            (wanted, norm) where the run is of fewer pulses than the case; None: the case's own
-    share            of the case's pulses that a run takes: its seconds are divided by it
+    share            share of the case's pulses that a run takes; its seconds are divided by it
     """
 
     who: str

@@ -1,4 +1,4 @@
-"""What the rows of a benchmark say: rates, ratios at equal or smaller error, cost against size."""
+"""Rates, ratios at equal or smaller error, and cost against size, from the rows of a benchmark."""
 
 from __future__ import annotations
 
@@ -23,13 +23,13 @@ def middle(row: Row, name: str = "form") -> float | None:
 
 
 def ran(result: Result) -> list[Row]:
-    """The rows that have figures: by method, sarcl's before its peers'."""
+    """The rows that ran: by method, sarcl's before its peers'."""
     rows = [row for row in result["rows"] if "absent" not in row and best(row)]
-    return sorted(rows, key=lambda row: (row["method"], not is_ours(row), row["who"], row["device"]))
+    return sorted(rows, key=lambda row: (row["method"], not is_sarcl(row), row["who"], row["device"]))
 
 
-def is_ours(row: Row) -> bool:
-    """A row of sarcl itself."""
+def is_sarcl(row: Row) -> bool:
+    """Whether a row is one of sarcl."""
     return bool(row["who"] == "sarcl")
 
 
@@ -44,17 +44,17 @@ def decibels(row: Row) -> float:
 
 
 def matches(result: Result) -> list[dict[str, Any]]:
-    """Every peer's row beside the fastest of sarcl's that errs no more, on each device: by the peer's method, and
-    by combining pulses where the peer takes all pairs.
+    """Every peer's row with the fastest row of sarcl whose error is no larger, on each device: by the same method, and
+    by sub-apertures too where the peer computes all pairs.
 
-    Entries: peer, ours (rows; None where none of sarcl's errs as little), device, method of ours, and ratios
-    peer/sarcl of the shortest form, call, process and cpu and of the median form.
+    Entries: peer, sarcl (rows; None where no row of sarcl has as small an error), device and method of sarcl's row,
+    ratios peer/sarcl of the shortest form, call, process and cpu and of the median form.
     """
     found = []
     rows = ran(result)
-    for peer in (row for row in rows if not is_ours(row)):
+    for peer in (row for row in rows if not is_sarcl(row)):
         rivals = [
-            row for row in rows if is_ours(row) and (row["method"] == peer["method"] or peer["method"] == "direct")
+            row for row in rows if is_sarcl(row) and (row["method"] == peer["method"] or peer["method"] == "direct")
         ]
         for device, method in dict.fromkeys((row["device"], row["method"]) for row in rivals):
             same = [row for row in rivals if (row["device"], row["method"]) == (device, method)]
@@ -63,21 +63,21 @@ def matches(result: Result) -> list[dict[str, Any]]:
 
 
 def _match(peer: Row, rivals: list[Row], device: str, method: str) -> dict[str, Any]:
-    entry: dict[str, Any] = {"peer": peer, "device": device, "method": method, "ours": None}
+    entry: dict[str, Any] = {"peer": peer, "device": device, "method": method, "sarcl": None}
     able = [row for row in rivals if row["error"] <= peer["error"]]
     if able:
-        ours = min(able, key=lambda row: best(row) or np.inf)
-        entry["ours"] = ours
+        own_row = min(able, key=lambda row: best(row) or np.inf)
+        entry["sarcl"] = own_row
         for name in ("form", "call", "process", "cpu"):
-            theirs, own = best(peer, name), best(ours, name)
+            theirs, own = best(peer, name), best(own_row, name)
             entry[name] = theirs / own if theirs and own else None
-        theirs, own = middle(peer), middle(ours)
+        theirs, own = middle(peer), middle(own_row)
         entry["median form"] = theirs / own if theirs and own else None
     return entry
 
 
 def growth(results: list[Result]) -> list[dict[str, Any]]:
-    """Cost against size: for every line measured at two sizes or more, the exponent k of seconds ~ n^k.
+    """Cost against size: for everything measured at two sizes or more, the exponent k of seconds ~ n^k.
 
     Entries: scene, data, who, device, method, setting, sizes, seconds (shortest form), error (largest); exponent,
     the slope of a least-squares line through the logarithms, and cpu_exponent, that of the processors' seconds (None
