@@ -18,7 +18,7 @@ docs/developers/architecture.md.
 """
 
 import ast
-import pkgutil
+import os
 from importlib import import_module
 from typing import Any
 
@@ -27,7 +27,14 @@ from .base.version import __version__ as __version__
 
 def _public_names() -> dict[str, tuple[str, str]]:
     """Public name -> (module, name in it), as __init__.pyi lists them."""
-    stub = ast.parse(pkgutil.get_data(__name__, "__init__.pyi") or b"")
+    path = os.path.join(os.path.dirname(__file__), "__init__.pyi")
+    try:
+        stub = ast.parse(__loader__.get_data(path))  # as pkgutil.get_data does: in a zip file too
+    except OSError:
+        raise ImportError(
+            f"sarcl cannot start without {path}, the list of its public names. That file is missing: an installer has "
+            "left out type stubs (.pyi). Install all files of sarcl: pip install --force-reinstall --no-deps sarcl"
+        ) from None
     return {
         alias.asname or alias.name: (f".{node.module or ''}", alias.name)
         for node in stub.body if isinstance(node, ast.ImportFrom)

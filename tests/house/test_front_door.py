@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import ast
+import shutil
 import subprocess
 import sys
 from pathlib import Path
@@ -82,3 +83,15 @@ def test_names_are_written_once():
     names = {n for n in sarcl.__all__ if n[0].isupper()}
     constants = {n.value for n in ast.walk(ast.parse(code)) if isinstance(n, ast.Constant) and isinstance(n.value, str)}
     assert not names & constants
+
+
+def test_a_list_of_names_that_an_installer_left_out_is_said(tmp_path):
+    shutil.copytree(PACKAGE / "base", tmp_path / "sarcl" / "base")
+    shutil.copy(PACKAGE / "__init__.py", tmp_path / "sarcl")
+    code = f"import sys; sys.path.insert(0, {str(tmp_path)!r}); import sarcl"
+    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, cwd=tmp_path)
+    assert done.returncode == 1
+    assert done.stderr.splitlines()[-1].startswith(f"ImportError: sarcl cannot start without {tmp_path}")
+    assert "pip install --force-reinstall" in done.stderr and "FileNotFoundError" not in done.stderr
+    shutil.copy(PACKAGE / "__init__.pyi", tmp_path / "sarcl")
+    assert subprocess.run([sys.executable, "-c", code], cwd=tmp_path).returncode == 0
