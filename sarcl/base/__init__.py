@@ -1,4 +1,4 @@
-"""Tools for every room that know nothing of radar.
+"""Tools for every room, without any radar in them.
 
 For other folders:
 

@@ -1,4 +1,4 @@
-"""Random numbers that belong to places: counter-based, so that order, blocks and neighbours do not matter."""
+"""Random numbers computed from positions, independent of the order of points and of their division into blocks."""
 
 from __future__ import annotations
 
@@ -8,10 +8,10 @@ _GOLDEN = 0x9E3779B97F4A7C15
 
 
 def gaussian(places: np.ndarray, seed: int, stream: int = 0) -> np.ndarray:
-    """Standard normal numbers (n,) that depend on the seed, the stream and each place, m (n, 3), alone.
+    """Standard normal numbers (n,) that depend only on the seed, the stream and each position, m (n, 3).
 
-    Two hashes of the place to a micrometre (splitmix64, Steele, Lea and Flood 2014) give one number by Box and
-    Muller. Streams are independent of each other.
+    Two hashes (splitmix64, Steele, Lea and Flood 2014) of the position, rounded to a micrometre, give one number by
+    the method of Box and Muller. Streams are independent of each other.
     """
     with np.errstate(over="ignore"):
         state = np.full(len(places), ((seed + 1) * _GOLDEN + stream * 0xD1342543DE82EF95) % 2**64, np.uint64)

@@ -18,7 +18,7 @@ _HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")
 
 
 class SarclWarning(UserWarning):
-    """Something the user should know about a result that is still right."""
+    """A warning about a result that is correct as it is."""
 
 
 def warn(text: str) -> None:
@@ -93,9 +93,9 @@ class ToleranceUnreachable(ValueError):
 
 
 class NothingSeen(ValueError):
-    """No scatterer adds anything to the echoes of these pulses: out of the beam or range window, dark, or turned away.
+    """No scatterer contributes to the echoes of these pulses. Other pulses may see some.
 
-    Other pulses may see some.
+    Each scatterer lies outside the beam or the range window, lies in shadow, or faces away.
     """
 
 

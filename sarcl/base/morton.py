@@ -8,7 +8,7 @@ from .boxes import box
 
 
 def morton_order(positions: np.ndarray) -> np.ndarray:
-    """Order of points (n, 3) along the Z curve of the cube that holds them (1024 cells a side and more)."""
+    """Order of points (n, 3) along the Z curve of the cube that holds them (2^20 cells along each edge)."""
     low, high = box(positions)
     extent = float((high - low).max()) or 1.0
     cell = ((positions - low) * ((2**20 - 1) / extent)).astype(np.uint64)

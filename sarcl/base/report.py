@@ -1,4 +1,4 @@
-"""Report: what a verb did, to what accuracy, in how long."""
+"""Report: how a result was computed, its errors, and the seconds it took."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from typing import Any
 
 @dataclass(frozen=True, eq=False)
 class Report:
-    """What was done to make a result.
+    """How a result was computed.
 
     plan                   the choices made, name -> value
     tolerance              relative L2 error asked for
@@ -40,11 +40,11 @@ class Report:
 
     @property
     def dynamic_range_db(self) -> float:
-        """How far below the brightest something can be trusted: what is weaker may be error, dB."""
+        """Ratio of the brightest response to the predicted error, dB: a response weaker by more may be an error."""
         return -20 * math.log10(self.predicted_error) if self.predicted_error > 0 else math.inf
 
     def __reduce__(self) -> tuple[Any, ...]:
-        return Report, tuple(self.to_dict().values())  # read-only mappings neither copy nor pickle
+        return Report, tuple(self.to_dict().values())  # a MappingProxyType cannot be copied or pickled
 
     def to_dict(self) -> dict[str, Any]:
         """The report as plain numbers and strings, ready for JSON."""

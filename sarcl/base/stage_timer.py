@@ -14,6 +14,7 @@ class Clock:
         self._last = self._now()
 
     def lap(self, stage: str) -> None:
+        """Add the seconds since the last lap to a stage."""
         now = self._now()
         self.seconds[stage] = self.seconds.get(stage, 0.0) + now - self._last
         self._last = now

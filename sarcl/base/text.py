@@ -4,7 +4,7 @@ from __future__ import annotations
 
 
 def size_text(nbytes: float) -> str:
-    """Bytes as text a person reads: "6.1 GB"."""
+    """A number of bytes with three digits and a unit: "6.1 GB"."""
     units = ("B", "kB", "MB", "GB", "TB")
     power = 0
     while nbytes >= 1000 and power < len(units) - 1:
@@ -19,7 +19,7 @@ def tolerance_text(value: float) -> str:
 
 
 def duration(seconds: float) -> str:
-    """Seconds as text a person reads."""
+    """A duration in seconds, minutes or hours, whichever is shortest to read: "2.5 s", "12 min"."""
     if seconds < 120:
         return f"{seconds:.2g} s"
     return f"{seconds / 60:.0f} min" if seconds < 7200 else f"{seconds / 3600:.1f} h"
@@ -37,6 +37,7 @@ def rate_text(rate: float) -> str:
 
 
 def unknown(key: str, known: list[str], what: str) -> str:
+    """Message for an unknown key: the closest known one as a suggestion, and all that are known."""
     from difflib import get_close_matches
 
     close = get_close_matches(key, known, 1)

@@ -1,4 +1,4 @@
-"""Tolerances that a refusal names: rounded so that the printed number suffices, and tried until one is met."""
+"""Tolerances that an error message suggests: rounded up, and tried until a planner can meet one."""
 
 from __future__ import annotations
 
@@ -11,14 +11,14 @@ _UP = decimal.Context(prec=2, rounding=decimal.ROUND_CEILING)
 
 
 def rounded_up(value: float) -> float:
-    """A positive number rounded up to two digits, so that what is printed is enough."""
+    """A positive number rounded up to two digits, so that the printed number, passed as it is, is large enough."""
     return float(_UP.create_decimal(decimal.Decimal(float(value))))
 
 
 def reachable(plan: Callable[[float], object], above: float) -> float | None:
     """The smallest tolerance found for which `plan` raises no ToleranceUnreachable; None where none below 1 is found.
 
-    Tried are, from `above` on, the best tolerances that `plan` itself names, else tolerances a quarter larger each.
+    The search starts at `above`. The next tolerance is the best one that the planner names, else one a quarter larger.
     """
     best = rounded_up(above)
     while best < 1:

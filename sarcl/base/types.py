@@ -1,4 +1,4 @@
-"""What public parameters take where several modules share it. Names for annotations, which know no radar."""
+"""Types of arguments that several rooms take, for annotations."""
 
 from __future__ import annotations
 

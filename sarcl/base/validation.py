@@ -1,4 +1,4 @@
-"""Checks of user input: every message names the argument, what came, what was wanted and the remedy."""
+"""Checks of user input: every message names the argument, the value given, the value wanted and the remedy."""
 
 from __future__ import annotations
 
@@ -24,7 +24,7 @@ def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np
 
 
 def sealed(made: np.ndarray) -> np.ndarray:
-    """`made` itself, read-only from here on: for arrays that nobody else holds, so that no noun copies it."""
+    """`made` itself, made read-only: for arrays that only the caller holds, so that PhaseHistory need not copy them."""
     made.flags.writeable = False
     return made
 

@@ -1,4 +1,4 @@
-"""File formats: plain arrays in, plain arrays out. sarcl/model/store.py makes objects of them.
+"""File formats, read and written as plain arrays. sarcl/model/store.py makes objects of them.
 
 For other folders:
 
@@ -6,7 +6,7 @@ For other folders:
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
     mesh           meshes through trimesh: triangles, names of parts, repairs
-    output_paths   output files: checked before the work, written whole or not at all
+    output_paths   output files: checked before the computation, written completely or not at all
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
     toml           TOML: line numbers of keys, and values written back as text
 

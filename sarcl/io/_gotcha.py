@@ -1,4 +1,4 @@
-"""AFRL Gotcha volumetric SAR data set, version 1.0: one MATLAB 5 file a degree of azimuth.
+"""AFRL Gotcha volumetric SAR data set, version 1.0: one MATLAB 5 file per degree of azimuth.
 
 Struct `data`: fp complex (n_frequencies, n_pulses), freq Hz, x y z antenna m, r0 m, and optionally
 af.r_correct m and af.ph_correct rad. A return is fp ~ exp(-j 4 pi f dR/c), dR = |p - antenna| - |antenna|,

@@ -1,4 +1,4 @@
-"""An HDF5 file in the making: beside its path until it is whole, never left half-written in its place."""
+"""An HDF5 file that is being written: it lies beside its path, and is moved there when it is complete."""
 
 from __future__ import annotations
 
@@ -20,11 +20,11 @@ log = logging.getLogger(__name__)
 
 
 class Unfinished:
-    """A file of sarcl's that is being filled; `file` is its h5py.File, until `commit` or `abandon`.
+    """A file of sarcl's that is being written; `file` is its h5py.File, until `commit` or `abandon`.
 
-    kind     what it will hold, for hdf5.sign and in messages;  n_bytes  it needs, about
-    claim    one run at a time makes this file, and takes over what a killed one left
-    A write that fails, on a full disk, raises OSError with what would do. Raises what
+    kind     what it will hold, for hdf5.sign and in messages;  n_bytes  about its size
+    claim    one run at a time writes this file, and takes over what a killed run left
+    A write that fails, as on a full disk, raises OSError with the remedy. Raises what
     `output_paths.check_writable` does.
     """
 
@@ -53,7 +53,7 @@ class Unfinished:
 
     @contextmanager
     def writing(self) -> Iterator[None]:
-        """Turn what HDF5 says of a failed write into what to do about it."""
+        """Turn an error of HDF5 about a failed write into one that names the file, the space and the remedy."""
         try:
             yield
         except (OSError, RuntimeError) as exc:  # h5py raises either for the same full disk
@@ -75,7 +75,7 @@ class Unfinished:
             return Filled(self, self.file.create_dataset(name, shape, dtype))
 
     def reserve(self, n_bytes: int) -> None:
-        """Take room for so many more bytes: HDF5 loses what it cannot write as it closes a dataset, or crashes."""
+        """Allocate n_bytes more on the disk. Without them HDF5 may lose data, or crash, when it closes a dataset."""
         if not hasattr(os, "posix_fallocate"):
             return
         with self.writing():
@@ -94,7 +94,7 @@ class Unfinished:
             self.file.flush()
             size = self.file.id.get_filesize()
             self.file.close()
-            os.truncate(self._part, size)  # what was reserved and not used
+            os.truncate(self._part, size)  # releases the bytes that were reserved and not used
         output_paths.commit(self._part, self.path)
         self._part = None
         self._unlock()
@@ -107,14 +107,14 @@ class Unfinished:
                 if hasattr(self, "file") and self.file:
                     self._forget()
                     self.file.close()
-            except (OSError, RuntimeError) as exc:  # HDF5 cannot write what it still holds: nobody wants it
+            except (OSError, RuntimeError) as exc:  # HDF5 cannot write its buffers; the file is removed anyway
                 log.debug("%s could not be closed in order: %s", part, exc)
             finally:
                 part.unlink(missing_ok=True)
                 self._unlock()
 
     def _forget(self) -> None:
-        """Send what is still to be written nowhere: where a disk is full, HDF5 crashes as it closes its file."""
+        """Redirect the remaining writes to the null device: on a full disk HDF5 crashes when it closes its file."""
         try:
             nowhere = os.open(os.devnull, os.O_RDWR)
             os.dup2(nowhere, self.file.id.get_vfd_handle())

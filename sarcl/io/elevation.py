@@ -17,7 +17,7 @@ from ..base import errors, validation, wgs84
 
 log = logging.getLogger(__name__)
 
-MOST_POINTS = 25_000_000  # two facets each: what Scene.split allows too
+MOST_POINTS = 25_000_000  # a point makes two facets; Scene.split has the same limit
 LOWEST, HIGHEST = -1000.0, 9000.0  # m; land lies between -430 and 8849
 METRES = {"metre": 1.0, "meter": 1.0, "m": 1.0, "foot": 0.3048, "us survey foot": 1200 / 3937}
 WGS84 = "EPSG:4326"
@@ -33,7 +33,7 @@ class Tile:
 
 
 def load(path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None) -> Tile:
-    """The points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
+    """Points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
     path = Path(path)
     name = f"DEM {path.name!r}"
     with _opened(path, name) as file:
@@ -89,7 +89,7 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
     if not path.exists():
         raise FileNotFoundError(f"DEM file {str(path)!r} does not exist; check the name and the folder")
     with warnings.catch_warnings():
-        warnings.simplefilter("ignore", NotGeoreferencedWarning)  # it is an error here
+        warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:
             with rasterio.open(path) as file:
                 yield file
@@ -160,7 +160,7 @@ def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
         left, bottom, right, top = transform_bounds(WGS84, file.crs, *bounds) if _warped(file) else bounds
         t = ~file.transform
         corners = [(t.d * x + t.e * y + t.f, t.a * x + t.b * y + t.c) for x in (left, right) for y in (bottom, top)]
-        at = np.array(corners) - 0.5  # points are middles of pixels
+        at = np.array(corners) - 0.5  # points are centres of pixels
         low = np.maximum(np.ceil(at.min(axis=0) - 1e-6), 0)
         high = np.minimum(np.floor(at.max(axis=0) + 1e-6), (file.height - 1, file.width - 1))
     if (high - low < 1).any():
@@ -249,7 +249,7 @@ def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray) -> np.ndarr
         if _warped(file):
             raise ValueError(f"{name} is not in degrees on WGS84; convert it (gdalwarp -t_srs EPSG:4326)")
         t = ~file.transform
-        around = abs(file.width * file.transform.a - 360) < 1e-6  # columns go round the Earth
+        around = abs(file.width * file.transform.a - 360) < 1e-6  # columns cover all longitudes
         west = file.bounds.left
         lon = west + (longitude - west) % 360 if around or (longitude < west).any() else longitude
         column, row = t.a * lon + t.b * latitude + t.c - 0.5, t.d * lon + t.e * latitude + t.f - 0.5

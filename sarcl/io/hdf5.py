@@ -1,4 +1,4 @@
-"""Plain values in HDF5 and back: numbers, words, arrays, a report; blocks of rows."""
+"""Plain values written to HDF5 and read again: numbers, words, arrays, a report; blocks of rows."""
 
 from __future__ import annotations
 
@@ -8,8 +8,8 @@ from typing import Any
 
 import numpy as np
 
-FORMAT = 1
-BLOCK_BYTES = 2**24
+FORMAT = 1  # version of sarcl's HDF5 file
+BLOCK_BYTES = 2**24  # bytes of a block of rows, about
 
 
 def sign(file: Any, kind: str) -> None:
@@ -69,18 +69,20 @@ def get_all(group: Any, leave: Sequence[str] = ()) -> dict[str, Any]:
 
 
 def put_report(file: Any, report: Any) -> None:
+    """A report as a dataset of JSON text; None not at all."""
     if report is not None:  # a dataset: attributes end at 64 KB
         file["report"] = json.dumps(_plain(report.to_dict()))
 
 
 def get_report(file: Any) -> Any:
+    """The report that `put_report` stored, or None."""
     from ..base.report import Report
 
     return Report(**_revive(json.loads(file["report"].asstr()[()]))) if "report" in file else None
 
 
 def _plain(value: Any) -> Any:
-    """A report's value in JSON's types; a tuple stays one, what JSON cannot say becomes its text."""
+    """A value of a report in the types of JSON; a tuple is marked as one, any other type becomes its text."""
     if isinstance(value, Mapping):
         return {str(k): _plain(v) for k, v in value.items()}
     if isinstance(value, tuple):

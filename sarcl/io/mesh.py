@@ -1,4 +1,4 @@
-"""Meshes: whatever trimesh reads, as triangles, the names of their parts, and what had to be repaired."""
+"""Meshes that trimesh reads, as triangles with the names of their parts, and repairs of them."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ SAME_PLACE = 1e-8  # of the mesh's size: corners closer than this are one
 
 @dataclass(frozen=True, eq=False)
 class Mesh:
-    """triangles (k, 3, 3) in the file's units; part (k,): which of `names` each is of; closed: has an outside.
+    """triangles (k, 3, 3) in the file's units; part (k,): index into `names`; closed: the mesh has an outside.
 
     names holds, for each part, the words it can be called by: node, geometry, material.
     """
@@ -33,8 +33,8 @@ class Mesh:
 def load(mesh: Any, repair: bool = True) -> Mesh:
     """A mesh file, a trimesh.Trimesh or a trimesh.Scene, its parts in place.
 
-    repair  drop repeated faces, wind neighbours alike, turn closed bodies outside; the log says how many
-    A mesh whose every edge belongs to two faces wound alike is closed. FileNotFoundError, IsADirectoryError,
+    repair  drop repeated faces, give neighbours one winding, face closed bodies outwards; the log gives the numbers
+    A mesh is closed where every edge belongs to two faces of one winding. FileNotFoundError, IsADirectoryError,
     ValueError: missing, unreadable, no faces, corners not finite. TypeError: no mesh.
     """
     import trimesh
@@ -74,7 +74,7 @@ def _read(path: Path, what: str) -> Any:
         # process=False: merging and reordering corners is not needed and hides what the file holds
         return trimesh.load_scene(path, process=False)
     except Exception as exc:
-        # trimesh takes what is no binary file for text, and guesses its encoding with a package we do not need
+        # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
         guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
         why = "neither a whole binary file nor text" if guess else str(exc) or type(exc).__name__
         raise ValueError(
@@ -98,7 +98,7 @@ def _parts(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[s
         corners, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
         if not np.array_equal(matrix, np.eye(4)):
             corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
-            if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror turns windings round
+            if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror reverses windings
                 triangles = triangles[:, ::-1]
         vertices.append(corners)
         faces.append(triangles + offset)
@@ -110,24 +110,24 @@ def _parts(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[s
 
 
 def _repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -> tuple[np.ndarray, np.ndarray, bool]:
-    """(kept, turned, closed): faces to keep (k,), faces to turn round (k,), and whether there is an outside."""
+    """(kept, turned, closed): faces to keep (k,), faces to reverse (k,), and whether there is an outside."""
     label = _weld(vertices)
-    place = label[faces]  # corners by place: many formats store them once a face
+    place = label[faces]  # corners by position: many formats store a corner once per face
     kept = (place != np.roll(place, 1, axis=1)).all(axis=1)
     if not kept.any():
         raise ValueError(f"all {len(faces)} facets are degenerate (zero area); nothing would reflect: check the {what}")
     turned = np.zeros(len(faces), bool)
     collapsed, repeated, closed = len(faces) - int(kept.sum()), 0, False
-    # bodies that touch are closed as they stand, and would not be any more once their corners are welded
+    # bodies that touch are closed before their corners are merged, and may not be closed afterwards
     for corners in (faces, place):
         if repair:
             turned = _wound(corners, kept, vertices[faces])
-            # closed bodies may share a wall, seen from both sides; elsewhere a face is one whichever way it is wound
+            # closed bodies may share a wall with two faces; elsewhere faces that differ in winding alone are one face
             alike = _closed(_turn(corners, turned)[kept])
             first = _first(_turn(place, turned), kept, alike)
             repeated += int(kept.sum() - first.sum())
             kept = first
-            if not alike:  # what was repeated hid who is whose neighbour
+            if not alike:  # repeated faces have hidden which faces are neighbours
                 turned = _wound(corners, kept, vertices[faces])
         closed = _closed(_turn(corners, turned)[kept])
         if closed:
@@ -145,7 +145,7 @@ def _repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) 
 
 
 def _weld(vertices: np.ndarray) -> np.ndarray:
-    """For each corner a number that corners in the same place share (n,)."""
+    """For each corner (n,) a number that corners at the same position share."""
     size = float(np.ptp(vertices, axis=0).max()) or 1.0
     cell = np.rint((vertices - vertices.min(axis=0)) / (SAME_PLACE * size)).astype(np.int64)
     return np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1)
@@ -190,11 +190,11 @@ def _oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
 
 
 def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Of the faces kept, which to turn round so that neighbours are wound alike and closed bodies face outwards.
+    """Faces to reverse, of those kept, so that neighbours have one winding and closed bodies face outwards.
 
-    Every face is two nodes of a graph, as it is and turned; neighbours link the nodes that agree. The two halves
-    of a body are then two components, of which the one that turns fewer faces is taken; a body that is one
-    component (a Moebius strip) has no sides and stays. (trimesh.repair goes face by face and needs networkx.)
+    Every face is two nodes of a graph, one for each winding; neighbours link the nodes that agree. The two halves of
+    a body are then two components, of which the one that reverses fewer faces is taken. A body that is one component
+    (a Moebius strip) has no sides and stays as it is. (trimesh.repair goes face by face and needs networkx.)
     """
     from scipy.sparse import coo_array
     from scipy.sparse.csgraph import connected_components

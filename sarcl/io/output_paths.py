@@ -1,4 +1,4 @@
-"""Output files: refused before the work when they cannot be written, and never left half-written."""
+"""Output files: checked before the computation starts, and written completely or not at all."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from typing import Any
 
 
 def check_writable(path: Any, n_bytes: int = 0) -> Path:
-    """Return the file `path` stands for (links followed), once it is sure that n_bytes can be written there.
+    """The file that `path` names, links followed, after a check that n_bytes can be written there.
 
-    FileNotFoundError when the folder is missing, NotADirectoryError when a file stands in the folder's place,
+    FileNotFoundError when the folder is missing, NotADirectoryError when the folder is a file,
     IsADirectoryError when `path` is a folder, PermissionError when nothing can be created there or `path` is
     write-protected or a device, OSError when the disk is too full. Nothing that exists is touched.
     """
@@ -58,9 +58,9 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
 
 @contextmanager
 def atomic(path: Any, n_bytes: int = 0) -> Iterator[Path]:
-    """Yield a new, empty file beside `path`; on success it becomes `path`, on any exception it vanishes.
+    """Yield a new, empty file beside `path`; on success it is moved to `path`, on any exception it is removed.
 
-    Whoever has the old `path` open goes on reading the old content. Raises what `check_writable` raises.
+    A process that has the old file open continues to read its content. Raises what `check_writable` raises.
     """
     part = begin(path, n_bytes)
     try:
@@ -87,7 +87,7 @@ def commit(part: Path, path: Any) -> None:
 def claim(path: Any, n_bytes: int = 0) -> tuple[Path, int]:
     """The one work file of `path` and a descriptor that holds its lock: commit or unlink the one, then close the other.
 
-    Its name follows from `path`: what a killed run left there is taken over, so that no such files pile up.
+    Its name follows from `path`, so that a later run takes over the file that a killed run left.
     FileExistsError while another run holds it; else raises what `check_writable` does.
     """
     target = check_writable(path, n_bytes)
@@ -106,7 +106,7 @@ def claim(path: Any, n_bytes: int = 0) -> tuple[Path, int]:
 
 
 def _lock(descriptor: int, path: Any) -> None:
-    """Lock a file without waiting; where the system or the disk knows no locks, nothing happens."""
+    """Lock a file without waiting; without effect where the system or the disk has no locks."""
     try:
         import fcntl
     except ImportError:

@@ -1,4 +1,8 @@
-"""TOML text: where a key stands in a file, and values written back as TOML."""
+"""TOML text: the line of each key, and values written as TOML.
+
+tomli-w and tomlkit are not used for writing: one puts every number of an array on a line of its own, the other all of
+them on one line. Positions and rows of numbers stay readable here.
+"""
 
 from __future__ import annotations
 
@@ -12,7 +16,7 @@ Path = tuple[str | int, ...]
 WIDTH = 80  # characters of the longest array that stays on one line
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
-_SCALAR = re.compile(r"[^\s,\]}#]+(?: \d[^\s,\]}#]*)?")  # a date and its time may stand apart
+_SCALAR = re.compile(r"[^\s,\]}#]+(?: \d[^\s,\]}#]*)?")  # a space may separate date and time
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}' r"|'''.*?'{3,5}" r'|"(?:\\.|[^"\\])*"' r"|'[^']*'", re.DOTALL)
 _FLAT = re.compile(r"""\[[^\[\]{}"'#]*\]""")  # an array of numbers: nothing in it has a path of its own
 _SPACE = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
@@ -24,13 +28,13 @@ def locate(text: str) -> dict[Path, int]:
     """Line, from 1, of every table and key of a valid TOML text, by its path.
 
     The n-th table of [[a.b]] is ("a", "b", n), as is the n-th inline table of an array; a table that is only
-    implied ([a.b] implies a) stands where it is first implied.
+    implied ([a.b] implies a) has the line where it is first implied.
     """
     return _Scanner(text).lines
 
 
 class _Scanner:
-    """Reads a text that tomllib accepts, so it checks nothing."""
+    """Reads a text that tomllib has accepted: it checks nothing."""
 
     def __init__(self, text: str) -> None:
         self.text, self.pos = text, 0
@@ -51,7 +55,7 @@ class _Scanner:
                 self._take("]]")
             elif self._take("["):
                 table = self._resolve(self._key(), start)
-                self.lines[table] = self._line(start)  # its own header, not where it was implied
+                self.lines[table] = self._line(start)  # the line of its own header, not of a header that implied it
                 self._take("]")
             else:
                 self._pair(table)
@@ -144,7 +148,7 @@ def _unquote(text: str) -> str:
 def dumps(tables: Mapping[str, Any]) -> str:
     """TOML text of nested tables of str, bool, int, float, lists and dicts.
 
-    TypeError names the key whose value TOML has no word for (None, complex, an array: give lists).
+    TypeError names a key whose value is of no TOML type (None, complex, NumPy arrays: give lists).
     """
     return "\n".join(_table((), tables)).strip("\n") + "\n"
 

@@ -11,7 +11,7 @@ For other folders:
 For this folder alone:
 
     _trial_record  devices that passed their trial, on disk
-    _programs      kernel files as one text each, and the care that every build of a program needs
+    _programs      source texts of kernels, and precautions for building programs
 """
 
 __all__ = ["choose_device", "device", "device_list", "fft", "memory_budget"]

@@ -1,4 +1,4 @@
-"""Kernel files as one text each, and the care that every build of a program needs."""
+"""Source texts of kernels, and precautions for building programs."""
 
 from __future__ import annotations
 
@@ -11,7 +11,7 @@ from contextlib import contextmanager
 from importlib.resources import files
 from pathlib import Path
 
-STALE = 5.0  # s, after which a lock on the cache of binaries is nobody's
+STALE = 5.0  # s; an older lock on the cache of binaries belongs to a process that was killed
 
 
 @functools.cache
@@ -38,7 +38,7 @@ def source(file: str) -> str:
 
 @contextmanager
 def quiet() -> Iterator[None]:
-    """Round every build. Compilers that succeed may still chat; that is not for the user."""
+    """Context of every build: no warnings of a compiler that succeeds, and no wait for the lock of a killed process."""
     _drop_stale_lock()
     with warnings.catch_warnings():
         warnings.simplefilter("ignore")
@@ -48,7 +48,7 @@ def quiet() -> Iterator[None]:
 def _drop_stale_lock() -> None:
     """Remove the lock that a killed process has left on pyopencl's cache of binaries.
 
-    pyopencl holds it for milliseconds, but waits a minute for one that nobody holds, and then fails.
+    pyopencl holds the lock for milliseconds. It waits a minute for a lock left by a killed process, and then fails.
     """
     import platformdirs
 
@@ -56,5 +56,5 @@ def _drop_stale_lock() -> None:
         try:
             if time.time() - lock.stat().st_mtime > STALE:
                 lock.unlink()
-        except OSError:  # gone already, or somebody else's
+        except OSError:  # removed meanwhile, or of another user
             pass

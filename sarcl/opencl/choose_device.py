@@ -1,4 +1,4 @@
-"""The device that is used: as asked for, as SARCL_DEVICE says, or the best one that works."""
+"""Choice of the device: by the device argument, by SARCL_DEVICE, or the best device that works."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
         text = str(choice or "all").strip()
         names = [""] if text.lower() == "all" else [name for name in text.split(",") if name.strip()]
     order = {"gpu": 0, "accelerator": 1, "cpu": 2}
-    for name in names:  # a device is tried when its turn comes: drivers that nobody asked for are left alone
+    for name in names:  # devices are tried in order of preference until one works; the others are not built for
         matching = [info for info, _ in listed() if _matches(info, name)]
         for info in sorted(matching, key=lambda i: (order[i.kind], -i.units, i.index)):
             if tried(info.index).works:
@@ -58,9 +58,9 @@ def _listing() -> str:
 
 
 def open_devices(choice: Any) -> list[Device]:
-    """The devices `choice` stands for: one as `open_device` takes it, a list of such, or "all" that work.
+    """Open devices for a choice: one as `open_device` takes it, a list of these, or "all" that work.
 
-    "0,1" is a list too, as SARCL_DEVICE may hold it. ValueError for a device named twice.
+    The text "0,1" is a list too, as in SARCL_DEVICE. ValueError for a device named twice.
     """
     choices = split_choice(choice)
     if not choices:
@@ -74,7 +74,7 @@ def open_devices(choice: Any) -> list[Device]:
 
 
 def split_choice(choice: Any) -> list[Any]:
-    """The devices `choice` names, each as `open_device` takes it."""
+    """The single choices in `choice`, each as `open_device` takes it."""
     if choice is None:
         choice = os.environ.get("SARCL_DEVICE") or None
     if isinstance(choice, str) and choice.strip().lower() == "all":

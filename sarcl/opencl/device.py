@@ -16,7 +16,7 @@ from ..base.threads import threads
 from ._programs import quiet, source
 from .device_list import DeviceInfo
 
-GROUP = 16  # work-items of a group on a CPU, or 1, where a kernel does not care
+GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
 
 
 class Device:
@@ -45,7 +45,7 @@ class Device:
 
     @property
     def is_cpu(self) -> bool:
-        """True where buffers can stand in the host's memory."""
+        """True for CPU devices, whose buffers share the host's memory."""
         return self.info.kind == "cpu"
 
     def without_fp64(self) -> Device:
@@ -53,7 +53,7 @@ class Device:
         return _twin(self, fp64=False)
 
     def one_lane(self) -> Device:
-        """The same device, its kernels built with one lane a work-item, as GPUs run them."""
+        """The same device, its kernels built with one lane per work-item, as GPUs run them."""
         return _twin(self, vector_width=1)
 
     def kernel(self, file: str, name: str, **macros: int) -> Any:
@@ -99,7 +99,7 @@ class Device:
         return buffer
 
     def empty(self, nbytes: int) -> Any:
-        """A buffer of `nbytes` bytes of no particular value."""
+        """A buffer of `nbytes` bytes, not initialised."""
         import pyopencl
 
         self._check_size(nbytes)
@@ -117,7 +117,7 @@ class Device:
     def run(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any) -> None:
         """Enqueue a kernel; Python ints become int32, buffers and numpy scalars go as they are.
 
-        group None: the driver's choice, on CPUs one of two sizes: PoCL builds a kernel anew for every size of group.
+        group None: the driver chooses; on CPUs it is GROUP or 1, because PoCL builds a kernel again for each size.
         """
         if group is None and self.is_cpu:
             group = (1 if size[0] % GROUP else GROUP, *(1 for _ in size[1:]))

@@ -21,7 +21,7 @@ class DeviceInfo:
     index, platform, name, kind   as the driver lists them; kind is "gpu", "cpu" or "accelerator"
     works, why                    True when a trial kernel built and gave the right numbers, else the reason
     fp64                          a float64 kernel built and gave the right numbers
-    vector_width                  lanes a work-item computes: 1 on GPUs, 8 on CPUs
+    vector_width                  lanes per work-item: 1 on GPUs, 8 on CPUs
     memory, max_alloc             bytes of the device and of its largest buffer
     units, driver                 compute units; driver version
     """
@@ -64,7 +64,7 @@ def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
 
     try:
         platforms = pyopencl.get_platforms()
-    except pyopencl.Error:  # the loader knows no platform
+    except pyopencl.Error:  # the loader finds no platform
         return ()
     kinds = {pyopencl.device_type.GPU: "gpu", pyopencl.device_type.CPU: "cpu"}
     found: list[tuple[DeviceInfo, Any]] = []

@@ -5,7 +5,7 @@ from __future__ import annotations
 from ..base.validation import number
 from .device import Device
 
-CPU_BYTES = 2**30  # default memory for blocks on a CPU, which shares it with everything else
+CPU_BYTES = 2**30  # bytes, default memory for blocks on a CPU device: other programs share that memory
 
 
 def budget(device: Device, max_bytes: float | None) -> float:

@@ -1,4 +1,4 @@
-"""What facets are made of: permittivity, conductivity, and roughness finer than a facet."""
+"""Materials of facets: permittivity, conductivity, and roughness finer than a facet."""
 
 from __future__ import annotations
 
@@ -15,7 +15,7 @@ from ..base import validation
 VACUUM_PERMITTIVITY = 8.8541878128e-12  # F/m
 Diagram = Literal["smooth", "isotropic", "cos", "cos2", "exp", "sinc"]
 DIAGRAMS = ("smooth", "isotropic", "cos", "cos2", "exp", "sinc")
-COHERENT = ("smooth", "sinc")  # these reflect like a mirror the size of the facet
+COHERENT = ("smooth", "sinc")  # diagrams of a coherent reflection, like that of a mirror of the facet's size
 
 
 @dataclass(frozen=True)
@@ -121,15 +121,15 @@ FacetMaterials = MaterialLike | Sequence[MaterialLike] | Sequence[Sequence[Mater
 
 @functools.lru_cache(maxsize=1024)
 def _solid_angle(material: Material) -> float:
-    """`Material.solid_angle` by Gauss's rule, to 1e-13: kept, since kernels' arguments ask for it per frequency."""
+    """`Material.solid_angle` by Gauss's rule, to 1e-13; cached, because it is needed for every pulse and frequency."""
     nodes, weights = np.polynomial.legendre.leggauss(48)
-    end = min(np.pi / 2, 7 * (material.width or np.inf))  # beyond, exp(-(d/width)^2) is below 1e-21
+    end = min(np.pi / 2, 7 * (material.width or np.inf))  # for larger angles exp(-(d/width)^2) is below 1e-21
     delta = (nodes + 1) * end / 2
     return float(np.pi * end / 2 * (weights * material.lobe(delta) * np.sin(2 * delta)).sum())
 
 
 def _number(name: str, value: Any, inf: bool) -> float:
-    """A float; infinite where that has a meaning. NaN is refused by name."""
+    """A float, which may be infinite where `inf` is True; an error names the argument."""
     if inf and isinstance(value, (float, np.floating)) and value == np.inf:
         return np.inf
     return validation.number(name, value)
@@ -168,12 +168,12 @@ MATERIALS: dict[str, Material] = dict(
 def resolve(
     material: FacetMaterials, materials: Sequence[MaterialLike] | None, shape: tuple[int, ...]
 ) -> tuple[np.ndarray, np.ndarray, tuple[Material, ...]]:
-    """What the keywords `material`, `materials` mean for `shape` facets or cells: (index, reflectivity, table).
+    """The arguments `material` and `materials` as (index, reflectivity, table), of `shape` facets or cells.
 
     material   a name of MATERIALS or `materials`, a Material, an amplitude reflectivity of a perfect conductor
                (0 to 1), or an array of `shape` of one of these; with `materials`, whole numbers index it
     materials  materials in the same words
-    The table's materials have reflectivity 1: theirs is in the second array. ValueError names what is not known.
+    Materials in the table have reflectivity 1: the second array holds it. ValueError names an unknown material.
     """
     listed = None if materials is None else _listed(materials)
     names = {m.name: (m, r) for m, r in listed or () if m.name}
@@ -215,7 +215,7 @@ def resolve(
 
 
 def merge(tables: Sequence[Sequence[Material]]) -> tuple[tuple[Material, ...], list[np.ndarray]]:
-    """Tables as one without repeats, and for each the places of its materials there."""
+    """Tables joined without repeats, and for each table the indices of its materials in the joined one."""
     joined: dict[Material, int] = {}
     places = [np.array([joined.setdefault(m, len(joined)) for m in table], np.int32) for table in tables]
     return tuple(joined), places
@@ -228,7 +228,7 @@ def _array(material: Any) -> np.ndarray:
         out[()] = material
         return out
     out = np.asarray(material)
-    # lists of words and numbers would all become words
+    # NumPy would make strings of the numbers in a list of strings and numbers
     mixed = out.dtype.kind == "U" and not isinstance(material, (str, np.ndarray, np.generic))
     return np.asarray(material, object) if mixed or out.dtype.kind not in "iufU" else out
 
