@@ -126,7 +126,7 @@ def test_two_points_closer_than_the_ordinary_resolution_stay_one():
 
 
 @pytest.mark.parametrize("switched", [False, True])
-def test_channels_told_apart_are_those_kept_apart(switched):
+def test_channels_separated_by_mapping_equal_those_kept_separate(switched):
     array = AntennaArray.linear(9, spacing=0.3, frequency_step=20e6)
     array = array.mirrored(8, 20) if switched else array
     tone, scene = sarcl.Waveform.tone(center=F0, duration=5e-8), sarcl.Scene.points([[0.5, 1, 0]])

@@ -58,7 +58,7 @@ def test_the_line_is_empty_when_a_stage_ends_the_next_begins_or_text_is_printed(
     assert screen(terminal.getvalue()) == ""
 
 
-def test_a_stage_goes_on_after_its_line_was_wiped(terminal):
+def test_a_stage_continues_after_its_line_was_erased(terminal):
     bar = Bar(terminal)
     bar("echo", 0, 10)
     bar("echo", 5, 10)

@@ -193,7 +193,7 @@ def result(*rows, n=16):
     return {"scene": "spotlight", "data": "noise", "n": n, "pairs": n**3, "pixels": 256, "norm": 1.0, "rows": [*rows]}
 
 
-def test_a_peer_is_matched_with_the_fastest_that_errs_no_more():
+def test_a_peer_is_matched_with_the_fastest_of_no_larger_error():
     ours = [row("sarcl", 1e-2, 1.0, setting="1e-02"), row("sarcl", 1e-3, 2.0), row("sarcl", 1e-4, 3.0)]
     absent = {"who": "sarcl", "device": "d", "method": "direct", "setting": "x", "absent": "why", "seconds": {}}
     found = ratios.matches(result(*ours, absent, row("peer", 1e-3, 5.0), row("peer", 1e-5, 5.0)))

@@ -70,7 +70,7 @@ def hold_at_a_thousand_and(n, method, device):
 @pytest.mark.parametrize(
     "method, n", [("direct", 1_000_000), ("factorized", 100_000), pytest.param("factorized", 1_000_000, marks=SLOW)]
 )
-def test_a_million_pulses_err_no_more_than_a_thousand(method, n):
+def test_the_error_of_a_million_pulses_is_that_of_a_thousand(method, n):
     hold_at_a_thousand_and(n, method, None)
 
 

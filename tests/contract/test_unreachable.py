@@ -329,7 +329,7 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
     assert "places" not in interpolated().report.plan
 
 
-def test_a_forecast_looks_elsewhere_only_where_nothing_is_seen(monkeypatch):
+def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
     from sarcl.simulation import echo_forecast
 
     tried = []

@@ -279,7 +279,7 @@ def test_bistatic_and_curved_tracks_meet_the_equation_of_flight():
 
 
 @pytest.mark.parametrize("slope", [3e-5, -1e-5])
-def test_motion_during_a_chirp_shifts_and_smears_it_as_told(slope):
+def test_motion_during_a_chirp_shifts_and_smears_it_as_predicted(slope):
     """The echo p((t - tau)/(1 + tau')) in time, against the phase that pulse_motion gives a point."""
     band, duration, tau = CHIRP.bandwidth, CHIRP.duration, 3e-6
     rate, n = 8 * band, 2**17

@@ -26,7 +26,7 @@ def run(code: str) -> str:
 
 
 @pytest.mark.parametrize("name", sarcl.__all__)
-def test_every_public_name_is_there_and_is_what_it_is_called(name):
+def test_every_public_name_exists_and_has_this_name(name):
     value = getattr(sarcl, name)
     assert value is getattr(sarcl, name)
     if name not in MODULES:
@@ -67,7 +67,7 @@ def test_a_star_import_brings_them_all():
     assert run("from sarcl import *; print(Scene.__name__, shapes.__name__)") == "Scene sarcl.scene.shapes"
 
 
-def test_a_name_that_is_not_there_is_told_with_where_to_look():
+def test_an_unknown_name_is_refused_with_the_place_to_look():
     with pytest.raises(AttributeError, match=r"no attribute 'backprojekt'; dir\(sarcl\) lists the public names"):
         _ = sarcl.backprojekt
     assert not hasattr(sarcl, "cl")

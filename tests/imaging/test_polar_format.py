@@ -287,7 +287,7 @@ def test_bytes_do_not_change_the_image_and_too_few_are_refused(monkeypatch):
         sarcl.polar_format(raw, wide, max_bytes=1e6)
 
 
-def test_it_tells_how_far_it_is():
+def test_progress_of_polar_format_is_reported_up_to_its_end():
     said = []
     sarcl.polar_format(noise_on(ARC), GRID, progress=lambda *a: said.append(a), check=False)
     stages, done, totals = zip(*said, strict=True)
@@ -295,7 +295,7 @@ def test_it_tells_how_far_it_is():
     assert list(done) == sorted(done) and done[-1] == 1000
 
 
-def test_an_image_that_errs_more_than_asked_is_not_handed_out_silently(monkeypatch):
+def test_an_image_of_larger_error_than_its_tolerance_is_an_error(monkeypatch):
     plan = nufft2d.make_plan
 
     def poor(*args):
@@ -307,7 +307,7 @@ def test_an_image_that_errs_more_than_asked_is_not_handed_out_silently(monkeypat
     assert missed.value.measured > 1e-3 and missed.value.image.data.shape == GRID.shape
 
 
-def test_a_dark_image_is_told():
+def test_a_dark_image_is_reported():
     raw = points_seen(ARC, [(60.0, 0, 0)])
     image = sarcl.polar_format(raw, sarcl.ImageGrid.plane(shape=(20, 20), spacing=0.5), tolerance=1e-3)
     assert float(image.report.plan["error of a dark image"]) > image.report.predicted_error

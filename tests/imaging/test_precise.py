@@ -147,7 +147,7 @@ def test_rows_may_have_their_own_frequency_plan(double):
 
 
 @pytest.mark.parametrize("order, bistatic", [(2, False), (3, True), (4, False), (0, True), (WIDE, True)])
-def test_every_order_of_the_range_series_errs_less_than_its_formula(double, order, bistatic):
+def test_the_error_of_every_order_of_the_range_series_is_below_its_formula(double, order, bistatic):
     raw = noise_history(n_rows=5, distance=300.0, bistatic=bistatic)
     kernel = interpolation.deconvolved(14, 4.0, 7, np.float64)
     made, tiling = make_plan(task_of(raw, PLANE), 1e-7)
@@ -159,7 +159,7 @@ def test_every_order_of_the_range_series_errs_less_than_its_formula(double, orde
         assert error(data, raw, PLANE) >= bound / 300
 
 
-def test_coarse_tiles_err_as_their_formula_says(double):
+def test_the_error_of_coarse_tiles_is_that_of_their_formula(double):
     raw = noise_history(n_rows=5, distance=3e6)
     raw = replace(raw, frequency_step=raw.frequency_step / 400)
     grid = sarcl.ImageGrid.plane(shape=(16, 16), spacing=70.0)

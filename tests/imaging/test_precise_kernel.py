@@ -128,7 +128,7 @@ def test_taps_never_leave_their_row(double, monkeypatch):
 
 
 @pytest.mark.parametrize("taps", interpolation.FLOAT64_TAPS)
-def test_kernels_err_no_more_than_they_say(taps):
+def test_errors_of_kernels_are_within_their_prediction(taps):
     random = np.random.default_rng(taps)
     for oversample in interpolation.FLOAT64_OVERSAMPLE:
         made = interpolation.interpolator_float64(taps, float(oversample))

@@ -248,7 +248,7 @@ def test_sub_apertures_with_a_window_and_a_beam():
         assert total(made) == raw.n_rows * grid.size
 
 
-def test_a_beam_that_sees_nothing_says_so(caplog):
+def test_a_beam_without_any_pixel_is_reported(caplog):
     raw = noise_history(n_rows=5)
     with caplog.at_level(logging.WARNING, "sarcl"):
         image = sarcl.backproject(raw, PLANE, beam=(0.01, (0, 0, 1)))
@@ -257,7 +257,7 @@ def test_a_beam_that_sees_nothing_says_so(caplog):
 
 
 @pytest.mark.parametrize("beam", [2 * np.pi, (2 * np.pi, (0, 0, 1)), 0.5, (3.5, (0, 0, -1))])
-def test_a_beam_that_sees_all_changes_nothing(device, beam):
+def test_a_beam_that_contains_every_pixel_changes_nothing(device, beam):
     raw = noise_history(n_rows=12)
     plain = sarcl.backproject(raw, PLANE, tolerance=1e-4, device=device)
     image = sarcl.backproject(raw, PLANE, beam=beam, tolerance=1e-4, device=device)
@@ -285,7 +285,7 @@ def holed(grid, share=0.3, seed=4):
 
 
 @pytest.mark.parametrize("method", ["direct", "factorized"])
-def test_empty_cells_are_zero_counted_and_in_nobodys_way(device, method):
+def test_empty_cells_are_zero_counted_and_change_no_other_pixel(device, method):
     raw = strip_history(n_samples=64)
     positions, gone = holed(ImageGrid.plane(shape=(120, 140), spacing=0.3))
     grid = ImageGrid.points(positions)

@@ -344,7 +344,7 @@ def test_what_is_no_elevation_model_of_a_place_is_refused(tmp_path):
         sarcl.Scene.from_dem(tmp_path / "text.tif")
 
 
-def test_places_that_are_none_are_refused(tmp_path):
+def test_invalid_places_are_refused(tmp_path):
     refuse(tmp_path, r"bounds hold no cell of DEM 'a.tif', which reaches over \(11.99950, ", bounds=(1, 2, 3, 4))
     refuse(tmp_path, r"give \(west, south, east, north\) in degrees", bounds=(13, 42, 12, 43))
     refuse(tmp_path, r"give \(west, south, east, north\) in degrees", bounds=(5e5, 4e6, 6e5, 5e6))
@@ -356,7 +356,7 @@ def test_places_that_are_none_are_refused(tmp_path):
     refuse(tmp_path, "point_roughness reaches -1 m", point_roughness=-1.0)
 
 
-def test_geoids_that_are_none_are_refused(tmp_path):
+def test_invalid_geoids_are_refused(tmp_path):
     for geoid, message in (
         (np.zeros((2, 2)), r"geoid has shape \(2, 2\), wanted \(5, 7\)"),
         (np.nan, "geoid is nan"),

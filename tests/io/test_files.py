@@ -624,7 +624,7 @@ def test_a_file_that_is_not_what_its_name_says_is_refused(tmp_path, name, conten
     assert name in str(caught.value)
 
 
-def test_an_unknown_kind_is_told_what_can_be_read(tmp_path):
+def test_an_unknown_kind_is_refused_with_what_can_be_read(tmp_path):
     (tmp_path / "a.bin").write_bytes(b"12345")
     with pytest.raises(ValueError, match=r"sarcl reads .*HDF5.*Gotcha \.mat"):
         sarcl.read(tmp_path / "a.bin")

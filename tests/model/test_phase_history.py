@@ -285,7 +285,7 @@ def test_reading_past_the_end_raises():
             history().read(start, stop)
 
 
-def test_a_source_that_does_not_keep_its_word_is_found():
+def test_a_source_that_returns_too_few_rows_is_refused():
     source = Source(noise(20))
     source.shape = (30, 5)
     with pytest.raises(ValueError, match=r"samples\[15:25\] gave shape \(5, 5\), wanted \(10, 5\)"):

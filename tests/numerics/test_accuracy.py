@@ -34,7 +34,7 @@ def test_the_hat_errs_by_3_3_nu_squared():
         assert interpolator(2, oversample).error == pytest.approx(interpolation.MARGIN * np.pi**2 / 3 * nu**2, rel=0.03)
 
 
-def test_more_taps_and_finer_profiles_err_less():
+def test_more_taps_and_finer_profiles_reduce_the_error():
     for oversample in (2.0, 4.0):
         errors = [interpolator(t, oversample).error for t in interpolation.TERMS]
         assert errors == sorted(errors, reverse=True)

@@ -95,6 +95,6 @@ def test_a_text_that_names_no_window_is_refused_with_an_example(text):
 
 
 @pytest.mark.parametrize("n", [0, -1, 2.5])
-def test_a_number_of_cells_that_is_none_is_refused(n):
+def test_an_invalid_number_of_cells_is_refused(n):
     with pytest.raises(ValueError, match="n "):
         weights(None, n)

@@ -125,7 +125,7 @@ ERR = {
 
 
 @pytest.mark.parametrize("item", KNOWN)
-def test_figures_are_those_that_are_known(quick, item):
+def test_figures_equal_the_known_ones(quick, item):
     value, tolerance = KNOWN[item]
     assert (np.abs(np.subtract(rows_of(quick[1])[item]["value"], value)) <= tolerance).all()
 
@@ -272,7 +272,7 @@ def test_the_record_is_the_sum_over_absolute_delays():
     assert np.linalg.norm(raw.samples - wanted) < 2e-5 * np.linalg.norm(wanted)
 
 
-def test_four_zones_are_told_apart_by_quarter_turns_and_fold_with_one_carrier():
+def test_four_zones_are_separated_by_quarter_cycles_and_fold_with_one_carrier():
     # the phase error of an element, about 2e-7, is the residual at an exact null
     for apart in (1, 2, 3):
         assert _zones.leak(SHORT, apart) < -100 and range_zones.isolation(SHORT, apart) == -np.inf
@@ -297,7 +297,7 @@ def test_another_direction_turns_over_the_elements_by_itself(degrees):
         assert range_zones.isolation(SHORT, 1, up) == pytest.approx(0, abs=0.02)
 
 
-def test_a_whole_scene_is_told_apart_in_every_zone(quick):
+def test_a_whole_scene_is_separated_in_every_zone(quick):
     found = numbers_of(quick[1], "zones")
     running, one = (np.array(found[name]["levels_db"]) for name in ("running carriers", "one carrier"))
     assert np.abs(np.diag(running)).max() < 1e-3

@@ -140,7 +140,7 @@ ERRORS = {
 
 
 @pytest.mark.parametrize("name", [pytest.param(n, marks=pytest.mark.slow if "peak" in n else []) for n in ERRORS])
-def test_a_phase_error_comes_off(points, name):
+def test_a_phase_error_is_removed(points, name):
     phase = ERRORS[name]
     raw = disturbed(points, phase)
     better, errors = sarcl.autofocus(raw, GRID, range_errors="rms" in name)
@@ -190,7 +190,7 @@ def test_points_in_speckle_and_noise():
     "tied",
     [pytest.param(True, id="from motion", marks=pytest.mark.slow), pytest.param(False, id="beside another phase")],
 )
-def test_a_range_error_of_several_cells_comes_off(tied):
+def test_a_range_error_of_several_cells_is_removed(tied):
     center, n, bandwidth, side = 3e9, 160, 600e6, 12.0
     cell = SPEED_OF_LIGHT / (2 * bandwidth)
     extent = SPEED_OF_LIGHT / center / 2 / 0.25 / np.cos(0.6)
@@ -464,7 +464,7 @@ def test_unwrapping_follows_a_phase_that_climbs_by_more_than_pi_a_pulse():
     assert _phase_smoothing.unwrapped(np.angle(np.exp(1j * phase))) == pytest.approx(phase, abs=1e-6)
 
 
-def test_alignment_undoes_a_shift_and_tells_strangers_apart():
+def test_alignment_removes_a_shift_and_distinguishes_unrelated_curves():
     rng = np.random.default_rng(4)
     n = 150
     t = np.linspace(-1, 1, n)

@@ -62,7 +62,7 @@ def test_physical_optics_comes_closer_as_the_wavelength_falls(differences):
         assert series == sorted(series, reverse=True) and series[-1] < 0.5 * series[0]
 
 
-def test_it_knows_no_polarisation_on_a_conductor_and_lies_between_the_two(differences):
+def test_on_a_conductor_it_is_the_same_in_both_polarisations_and_between_the_two(differences):
     for i in (1, 2, 3, 4):
         azimuth, h = differences[i, "H"]
         broad = (azimuth >= 70) & (azimuth <= 110)

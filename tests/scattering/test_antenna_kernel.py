@@ -62,7 +62,7 @@ def clear_of_edges(antenna, d, ratio):
 
 @pytest.mark.parametrize("ratio", [1.0, 0.875])
 @pytest.mark.parametrize("name", everyone())
-def test_a_device_s_gain_errs_less_than_its_bound(device, name, ratio):
+def test_the_error_of_a_device_s_gain_is_within_its_bound(device, name, ratio):
     antenna = everyone()[name]
     d = directions(20011)
     got, wanted = run(device, antenna, d, ratio), antenna.gain(d, FC * ratio)
@@ -71,7 +71,7 @@ def test_a_device_s_gain_errs_less_than_its_bound(device, name, ratio):
     assert np.abs(got - wanted)[keep].max() < antenna.error(FC * ratio)
 
 
-def test_a_narrow_beam_with_gain_errs_by_its_slope(device):
+def test_the_error_of_a_narrow_beam_grows_with_its_slope(device):
     antenna = Antenna.rectangular(size=(12, 1), gain_db=45, taper=0.3)
     random = np.random.default_rng(6)
     d = np.concatenate([np.ones((20000, 1)), random.normal(size=(20000, 2)) * (0.003, 0.03)], axis=1)

@@ -236,7 +236,7 @@ def test_polarisations_that_there_are_not(bad):
         sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), CHIRP, still([0, 0, 1e3]), polarization=bad)
 
 
-def test_an_antenna_among_facets_says_so():
+def test_an_antenna_among_facets_is_reported():
     ground = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
     with pytest.raises(ValueError, match="split"):
         sarcl.echo(ground, CHIRP, still([0, 0, 0]), shadows=False)

@@ -98,7 +98,7 @@ def test_complex_root_of_numbers_with_real_part_of_at_least_zero(device):
     assert (np.abs(got - wanted) <= 4e-7 * np.abs(wanted)).all()
 
 
-def test_fresnel_coefficients_err_less_than_1e_6(device):
+def test_errors_of_fresnel_coefficients_are_below_1e_6(device):
     random = np.random.default_rng(2)
     cosine = np.concatenate([[0, 1e-30, 1], 10.0 ** random.uniform(-12, 0, 500), random.uniform(0, 1, 500)])
     cosine, eps = (a.ravel() for a in np.meshgrid(cosine.astype(np.float32), PERMITTIVITIES))

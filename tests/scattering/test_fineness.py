@@ -366,7 +366,7 @@ def test_meshes_of_every_kind_are_judged(data_folder):
         assert found.warnings() and found.radius < 10 and 0.02 < found.edge < 2
 
 
-def test_arguments_that_are_none_are_named():
+def test_invalid_arguments_are_named():
     body, wave, here = sphere("geodesic", 4), at_size(10), from_afar(POLE)
     for judge in (facet_error.judge, speckle_contrast.judge):
         with pytest.raises(TypeError, match=r"scene is a ndarray; wanted a sarcl\.Scene"):
@@ -452,7 +452,7 @@ def test_without_resolution_every_facet_shares_a_cell():
     assert speckle_contrast.judge(scene, forward, X_BAND) == speckle_contrast.Speckle()
 
 
-def test_echo_warns_and_reports_what_a_coarse_mesh_errs():
+def test_echo_warns_of_a_coarse_mesh_and_reports_its_error():
     body, wave = sphere("latitudes", 50), at_size(50)
     track = sarcl.Trajectory([0.0], [[0.0, 0.0, 1e7]])
     with pytest.warns(sarcl.SarclWarning, match="mesh too coarse for the wavelength") as found:

@@ -272,7 +272,7 @@ def test_windows_line_ends_count_once():
         loads(TEXT.replace("radius", "radios").replace("\n", "\r\n"), name="f.toml")
 
 
-def test_a_window_that_is_none_is_named_before_echoes_are_made():
+def test_an_invalid_window_is_refused_before_echoes_are_computed():
     def work(*_):
         raise AssertionError("work began")
 

@@ -67,7 +67,7 @@ def test_a_mapped_image_is_planned_and_made_from_one_table(table, rows):
 
 
 @pytest.mark.parametrize("verb", ["focus", "plan_focus"])
-def test_a_mapping_that_is_none_is_named_with_its_line(verb):
+def test_an_unknown_mapping_is_named_with_its_line(verb):
     read = scenario.loads(TEXT + '[backproject]\nmapping = "sideways"\n')
     with pytest.raises(ValueError, match=r"scenario:30: \[backproject\] mapping .*corrected"):
         getattr(read, verb)(read.simulate())

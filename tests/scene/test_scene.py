@@ -266,7 +266,7 @@ def test_bad_mesh_files_are_named_with_what_is_wrong(tmp_path, name):
         mesh_file(tmp_path, file, content)
 
 
-def test_a_missing_file_and_a_folder_are_told_apart(tmp_path):
+def test_a_missing_file_and_a_folder_have_different_errors(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"nowhere\.stl' does not exist; check the name"):
         sarcl.Scene.from_mesh(tmp_path / "nowhere.stl")
     with pytest.raises(IsADirectoryError, match="is a folder; give the name of a file in it"):

@@ -290,7 +290,7 @@ def test_bad_options_say_what_was_wanted(name):
         sarcl.echo(cloud(), CHIRP, circle(), **options)
 
 
-def test_a_scene_that_shows_only_its_back_is_a_clear_statement():
+def test_a_scene_whose_facets_all_face_away_is_an_error():
     below = sarcl.Trajectory([0.0], [[0, 0, -5e3]])
     ground = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
     with pytest.raises(ValueError, match="nothing is left to reflect: facing away"):

@@ -103,7 +103,7 @@ def test_size_is_told_before_the_work(caplog):
 
 
 @pytest.mark.parametrize("name", ARRAYS)
-def test_a_forecast_is_what_comes(name):
+def test_a_forecast_equals_the_run(name):
     array = ARRAYS[name].get("array")
     options = ARRAYS[name] | ({"array": array.mirrored(60, 120)} if array is not None else {})
     options |= {"reference": (0, 0, 0), "range_window": WINDOW, "tolerance": 1e-2}
@@ -116,7 +116,7 @@ def test_a_forecast_is_what_comes(name):
     assert str(told).startswith(f"{raw.n_rows} rows of {raw.n_samples} samples: ")
 
 
-def test_a_forecast_knows_plans_that_come_later():
+def test_a_forecast_includes_later_plans_of_carriers():
     array = line(5, step=20e6).switched(line(5, step=40e6), 10, 120)
     tone = sarcl.Waveform.tone(center=F0, duration=1 / 40e6)
     with pytest.warns(sarcl.SarclWarning, match="centre frequency jumps"):
@@ -169,7 +169,7 @@ for call in (
 """
 
 
-def test_a_forecast_refuses_what_echo_would():
+def test_a_forecast_refuses_what_echo_refuses():
     with pytest.raises(ValueError, match="tolerance"):
         sarcl.plan_echo(SCENE, TONE, passing(), tolerance=0)
     with pytest.raises(ValueError, match="plan names 3 pulses"):

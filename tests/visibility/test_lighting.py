@@ -340,7 +340,7 @@ def test_where_shadows_hardly_move_every_sixteenth_block_is_looked_at(monkeypatc
     assert [list(dict(refine_viewpoints(look, at[:n]))) for n in (1, 2, 3)] == [[0], [0, 1], [0, 1, 2]]
 
 
-def test_lighting_tells_dark_full_and_changing_facets(device):
+def test_lighting_distinguishes_dark_full_and_changing_facets(device):
     scene, tx = np.concatenate([ground(20), pole()]), circle(90)
     found = lit(scene, tx, two_sided=False, tolerance=0.25, device=device)
     all_of_them = np.array([found.share(i) for i in range(len(found))])
@@ -372,14 +372,14 @@ def test_two_antennas_must_both_see_a_facet(device):
     assert 0.3 < min(halves) and max(halves) < 1 and joint == pytest.approx(sum(halves) - 1, abs=1.5 / 255)
 
 
-def test_facets_nobody_asks_for_shadow_all_the_same():
+def test_facets_that_are_not_asked_for_cast_shadows_too():
     scene = np.concatenate([ground(20), pole()])
     wanted = np.arange(len(scene)) < 800
     all_of_them, some = (lit(scene, eye(0, 50)[None], wanted=w).share(0) for w in (None, wanted))
     assert (some[wanted] == all_of_them[wanted]).all() and not some[~wanted].any() and (some[wanted] < 255).any()
 
 
-def test_a_scene_wholly_in_shadow_says_so():
+def test_a_scene_wholly_in_shadow_is_reported():
     under = ground(6, 4.0)
     lid = ground(1, 100.0) + np.array([0, 0, 3])
     wanted = np.arange(len(under) + len(lid)) < len(under)
