@@ -37,8 +37,10 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-MOST_FILES = 64  # blocks an image whose finished tiles are kept
-EDGE = 1e-5  # of a window or beam: pixels nearer may fall to either side, and no error is measured there
+MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
+# Relative distance from the edge of a range window or beam. Pixels closer to it may fall on either side by rounding,
+# and # are left out where the error is measured.
+EDGE = 1e-5
 Progress = Callable[[str, int, int], None]
 Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
 
@@ -90,33 +92,35 @@ def backproject(
 
     raw        PhaseHistory, compressed
     grid       ImageGrid, a plane or any points
-    tolerance  L2 error allowed, relative to the larger of |I| and the norm of randomly phased contributions
+    tolerance  L2 error allowed, relative to the larger of the norm of I and the norm of the same contributions with
+               random phases
     method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
     window     None, "hamming" or ("taylor", sidelobe_db, nbar): over samples and over rows
-    weights    one a row (n_rows,), on top of window and raw.weight
+    weights    one per row (n_rows,), multiplied with window and raw.weight
     beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
                grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
-    mapping    of a frequency-diverse array's echoes: what `sarcl.map_aperture` takes, "corrected", "apparent" or
-               "channels", or a dict of its arguments, such as {"mapping": "apparent", "center": (0, 0, 5)}
-    wrap       False: a row reaches only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats beyond
-    skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data") to leave pairs out
-               unseen instead of finding that they add nothing; the image is the same
-    max_bytes  memory for blocks on each device, default 1 GiB on CPUs, half the memory of a GPU
+    mapping    for echoes of a frequency-diverse array: the mapping that `sarcl.map_aperture` applies first,
+               "corrected", "apparent" or "channels", or a dict of its arguments, such as {"mapping": "apparent",
+               "center": (0, 0, 5)}
+    wrap       False: a row covers only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats with that period
+    skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data"): pairs of rows and
+               pixels that add nothing for these reasons are left out instead of computed; the image is the same
+    max_bytes  memory for blocks on each device; default 1 GiB on a CPU, half the memory of a GPU
     out        None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"
-    resume     finished tiles of an image at a path wait in "PATH.parts", where the same call finds them after a
-               kill. None: from the first second on; True: whatever ends the run; False: none, and those there
-               are thrown away
-    tile       (i, n): make piece i of n alone, 1 <= i <= n, and keep its tiles in "PATH.parts"; the piece that
-               completes the image puts it together and returns it, the others return None
+    resume     whether finished tiles of an image at a path are kept in "PATH.parts", where the same call finds them if
+               the run is killed. None: they are kept from the first second on; True: also when the run ends in an
+               exception; False: they are not kept, and those of earlier runs are deleted
+    tile       (i, n): compute only piece i of n, 1 <= i <= n, and keep its tiles in "PATH.parts"; the run that
+               completes the image assembles and returns it, the others return None
     check      recompute 256 random pixels exactly; None: where that costs less than 2 %
-    device     see `sarcl.devices`; a list of such, or "all", for several at once
-    cluster    a dask.distributed.Client whose workers make the tiles, each on a device of its own
+    device     see `sarcl.devices`; a list of devices, or "all", for several at once
+    cluster    a dask.distributed.Client whose workers compute the tiles, each on a device of its own
     progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
-    Returns an Image. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the best that can.
-    ValueError: data not compressed, arguments that do not fit, tiles of another job in "PATH.parts". ToleranceMissed, a
-    ValueError that holds the finished image: the check measured more than the tolerance. MemoryError: max_bytes too
-    small for a single row.
+    Returns an Image. Raises ToleranceUnreachable, a ValueError, where the tolerance cannot be met; it names the best
+    tolerance that can. ValueError: data not compressed, arguments that do not go together, tiles of another job in
+    "PATH.parts". ToleranceMissed, a ValueError that holds the finished image: the check measured an error above the
+    tolerance. MemoryError: max_bytes too small for a single row.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
@@ -151,7 +155,7 @@ def backproject(
         try:
             output = ImageOutput(grid, chosen.tiling, out, stack, chosen.dtype)
         except FileExistsError:
-            if piece:  # the others' tiles and these are being put together by another run
+            if piece:  # another run is assembling the image from all tiles
                 return None
             raise
         bands = 0, chosen.tiling.n_bands
@@ -203,16 +207,18 @@ def backproject(
 
 
 def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
-    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for what does not go together."""
+    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for arguments that do not go together."""
     if resume is not None:
         instance("resume", resume, bool)
     if (tile is not None or resume) and not is_path(out):
         name = "tile" if tile is not None else "resume"
-        raise ValueError(f'{name} is {tile or resume!r} but out is no path; give out="image.h5": tiles wait beside it')
+        raise ValueError(
+            f'{name} is {tile or resume!r} but out is no path; give out="image.h5": tiles are kept beside it'
+        )
     if tile is None:
         return None
     if resume is False:
-        raise ValueError("tile and resume=False do not go together: a piece would throw away the other pieces' tiles")
+        raise ValueError("tile and resume=False do not go together: a piece would delete the tiles of the other pieces")
     if np.shape(tile) != (2,):
         raise ValueError(f"tile is {tile!r}; wanted (i, n): piece i of n")
     i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
@@ -245,7 +251,8 @@ def _fill(
     clock: Clock,
     progress: Progress | None,
 ) -> tuple[Skipped, int]:
-    """Some bands, into `output` or only into files: (pairs skipped, bands that were in files)."""
+    """Focus a run of bands into `output`, or only into tile files; returns the pairs skipped and the number of bands
+    that files already held."""
     tiling, n_rows = chosen.tiling, task.raw.n_rows
     there, skipped = [], Skipped()
     for run, values, missed in checkpoint.found(*bands) if checkpoint else ():
@@ -285,7 +292,7 @@ def _fill(
 
 
 def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
-    """Relative error at up to 256 random pixels against the exact float64 sum, as the contract defines it."""
+    """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import backproject as exact
 
     index, positions = grid.sample(256, seed=0)

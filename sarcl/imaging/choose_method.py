@@ -1,4 +1,4 @@
-"""Which method makes an image: each offers a plan for the task, the cheapest that meets the tolerance is taken."""
+"""Choice of the method: each plans the task, and the cheapest plan that meets the tolerance is taken."""
 
 from __future__ import annotations
 
@@ -26,18 +26,18 @@ from .focusing_task import FocusingTask
 from .tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
-TINY = 1e-35  # of samples, below which pixels come near complex64's smallest numbers
-ROUNDING = 0.5  # of a tolerance: the most that rounding of what pixels do not see may take
-MOST_TOLERANCE = 0.99  # that is looked for
+TINY = 1e-35  # rms amplitude of the samples of a row below which pixels approach the smallest numbers of complex64
+ROUNDING = 0.5  # largest share of a tolerance for rounding errors from echoes that lie away from the pixels
+MOST_TOLERANCE = 0.99  # largest tolerance that the search for a reachable one tries
 
 
 @dataclass(frozen=True, eq=False)
 class MethodChoice:
-    """A method, its plan and tiling for one task, and what makes its engine on a device.
+    """A method, its plan and tiling for one task, and the class of its engine.
 
     engine           called as engine(device, task, plan, tiling)
-    predicted_error  of the plan, for what the pixels see of the rows' energy
-    cost             of a contribution, relative to one by the hat and float32 ranges
+    predicted_error  bound of the relative error, for the energy of these rows at these pixels
+    cost             per contribution, relative to one with linear interpolation and ranges in float32
     """
 
     method: str
@@ -63,29 +63,30 @@ class MethodChoice:
 
 
 def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> MethodChoice:
-    """The cheapest way to `tolerance` among `method`, or among all for "auto".
+    """The cheapest plan that meets `tolerance` with `method`, or with any method for "auto".
 
     lanes    the devices work on vectors of pixels, as CPUs do
-    float64  they have it, so that what complex64 cannot meet may be met
-    ToleranceUnreachable names the best there is; ValueError for samples or paths that no tolerance fits.
+    float64  the devices have float64, for tolerances that complex64 cannot meet
+    ToleranceUnreachable names the best tolerance that can be met. ValueError for samples or paths with which no
+    tolerance can.
     """
     if method == "factorized":
-        return _merged(task, tolerance, lanes, float64)
-    straight = _straight(task, tolerance, lanes, float64)
-    if method == "direct" or straight.dtype != np.complex64 or task.pairs < cost_model.SEARCH_PAYS:
-        return straight
+        return _factorized(task, tolerance, lanes, float64)
+    direct = _direct(task, tolerance, lanes, float64)
+    if method == "direct" or direct.dtype != np.complex64 or task.pairs < cost_model.SEARCH_PAYS:
+        return direct
     try:
-        fewer = _Float32(task, tolerance).factorized(lanes)
+        merged = _Float32(task, tolerance).factorized(lanes)
     except ToleranceUnreachable:
-        return straight
-    return fewer if fewer.cost < cost_model.MERGING_PAYS * straight.cost else straight
+        return direct
+    return merged if merged.cost < cost_model.MERGING_PAYS * direct.cost else direct
 
 
 class _Float32:
     """Plans in complex64 for one task and tolerance. ValueError where samples are too small for complex64.
 
-    Errors are relative to what interpolation reads and transforms round, a tolerance to what pixels see: `inner` is
-    what is left of it for plans.
+    Errors of interpolation and rounding are proportional to the energy of the range profiles, the tolerance to the
+    energy at the pixels: `inner` is the tolerance that is left for a plan.
     """
 
     def __init__(self, task: FocusingTask, tolerance: float) -> None:
@@ -103,7 +104,7 @@ class _Float32:
         self.inner = (tolerance - self.rounding) / self.near
 
     def direct(self, lanes: bool) -> MethodChoice:
-        """Every pair of row and pixel. ToleranceUnreachable names the best in complex64."""
+        """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
         self._must_round_less("in complex64", self._best())
         try:
             made = direct_method.make_plan(self.task, self.inner, lanes)
@@ -112,7 +113,7 @@ class _Float32:
         return self._offer("direct", made, direct_method.Direct)
 
     def factorized(self, lanes: bool) -> MethodChoice:
-        """With sub-apertures. ToleranceUnreachable says why not, but names no best."""
+        """With sub-apertures. ToleranceUnreachable gives the reason, but no best tolerance, which takes a search."""
         self._must_round_less("with sub-apertures", None)
         try:
             made = factorized_plan.make_plan(self.task, self.inner, lanes)
@@ -121,7 +122,7 @@ class _Float32:
         return self._offer("factorized", made, Factorized)
 
     def _best(self) -> float:
-        """The smallest tolerance that `direct` meets: what rounds takes half of it at most, plans the rest."""
+        """The smallest tolerance that `direct` meets: rounding takes half of it at most, and the plan the rest."""
         least = max(
             LEAST_TOLERANCE,
             numerics_plan.least(self.task.raw.n_samples, tile_kernels.CHUNK) * self.near + self.rounding,
@@ -139,8 +140,8 @@ class _Float32:
         return MethodChoice(name, *made, engine, error, made[0].cost)
 
 
-def _straight(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
-    """By the direct method, in complex64 if that can, else in complex128 if the devices can."""
+def _direct(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
+    """The direct method, in complex64 where that meets the tolerance, else in complex128 where the devices can."""
     if tolerance >= LEAST_TOLERANCE:
         try:
             return _Float32(task, tolerance).direct(lanes)
@@ -148,20 +149,20 @@ def _straight(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) 
             if not float64 or float64_plan.too_long(task):
                 raise
     elif not float64:
-        best = reachable(lambda t: _straight(task, t, lanes, False), LEAST_TOLERANCE)
+        best = reachable(lambda t: _direct(task, t, lanes, False), LEAST_TOLERANCE)
         raise ToleranceUnreachable(tolerance, best, "float32", float64_direct.remedy(), how="without float64")
-    return _precise(task, tolerance)
+    return _float64(task, tolerance)
 
 
-def _merged(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
-    """With sub-apertures, which only complex64 has. Where they cannot, the best that they can takes a search."""
+def _factorized(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
+    """Sub-apertures, in complex64 alone. Where they cannot meet the tolerance, the best one is found by a search."""
     try:
         if tolerance < LEAST_TOLERANCE:
             raise ToleranceUnreachable(tolerance, None, "float32 range profiles", how="with sub-apertures")
         return _Float32(task, tolerance).factorized(lanes)
     except ToleranceUnreachable as refused:
         try:
-            _straight(task, tolerance, lanes, float64)
+            _direct(task, tolerance, lanes, float64)
             remedy = "method='direct' can"
         except ToleranceUnreachable:
             remedy = ""
@@ -170,8 +171,10 @@ def _merged(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) ->
 
 
 def _search(plan: Callable[[float], object], above: float) -> float | None:
-    """A tolerance from `above` on that `plan` meets, at most 1.5 times the smallest; None: none below 1. Plans are slow
-    to make, so few are: at twice the tolerance each time, then halfway back."""
+    """A tolerance of `above` or more that `plan` meets, at most 1.5 times the smallest one; None: none below 1.
+
+    Plans take long, so few are tried: each at twice the tolerance before, then one halfway back.
+    """
 
     def met(tolerance: float) -> bool:
         try:
@@ -189,8 +192,8 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
     return middle if middle < best and met(middle) else best
 
 
-def _precise(task: FocusingTask, tolerance: float) -> MethodChoice:
-    """In float64."""
+def _float64(task: FocusingTask, tolerance: float) -> MethodChoice:
+    """The direct method in float64."""
     plan, tiling = float64_plan.make_plan(task, tolerance)
     cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
     return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, cost)

@@ -95,7 +95,7 @@ class Engine(ABC):
 
 
 class DirectEngine(Engine):
-    """What the direct methods of both number types share: blocks of as many tiles as fit."""
+    """An engine of a direct method, in either number type: its blocks hold as many tiles as fit."""
 
     profiles: RowProfiles
 

@@ -1,4 +1,4 @@
-"""What is to be focused, worked out once: the rows that count, their weights, their geometry."""
+"""The image to be made, prepared once: its rows, their weights and their geometry."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
 
 Skip = Literal["range window", "beam", "zero weight", "no data"]
-BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and where it is centred
+BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and direction of the axis
 SKIPS = ("range window", "beam", "zero weight", "no data")
 
 
@@ -27,8 +27,8 @@ SKIPS = ("range window", "beam", "zero weight", "no data")
 class FocusingTask:
     """One image to be made, whatever the method and the device.
 
-    raw            its rows; those of weight 0 are gone where they are skipped
-    grid           ImageGrid; where empty cells are not skipped, they have positions and no longer count as empty
+    raw            its rows, without those of weight 0 where these are skipped
+    grid           ImageGrid; where empty cells are not skipped, they have positions and do not count as empty
     antennas       geometry of the rows, their range windows and beams
     sample_weight  (n_samples,) and row_weight (n_rows,), float64: window, raw.weight and `weights` together
     wrap           profiles repeat beyond the range window
@@ -45,7 +45,7 @@ class FocusingTask:
 
     @property
     def highest(self) -> float:
-        """No frequency is above it, Hz."""
+        """Upper bound of the frequencies, Hz."""
         return float((self.raw.frequency + self.raw.n_samples * self.raw.frequency_step).max())
 
     @property
@@ -55,7 +55,7 @@ class FocusingTask:
 
     @property
     def pairs(self) -> int:
-        """(row, pixel) pairs of the rows that count."""
+        """Number of (row, pixel) pairs of these rows."""
         return self.raw.n_rows * self.grid.size
 
 
@@ -103,7 +103,7 @@ def make_task(
     skip: bool | Collection[Skip],
     beam: BeamCone | None = None,
 ) -> FocusingTask:
-    """What the options of `backproject` make of the data; ValueError for those that do not fit."""
+    """The task for the options of `backproject`; ValueError for options that do not fit the data."""
     if not raw.compressed:
         raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
     skips = known_skips(skip, SKIPS)

@@ -1,4 +1,4 @@
-"""What an image will take before any work is done: method, time, memory, error."""
+"""Method, run time, memory and error of an image, predicted before the work."""
 
 from __future__ import annotations
 
@@ -27,17 +27,18 @@ from .factorized.plan import FactorPlan, moving_cost
 from .focus_options import FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
 
-PROBE = 0.03  # s a probe of a device takes at least
-MOST_BANDS = 2**16  # of which blocks are listed: what the first takes shows in these
+PROBE = 0.03  # s: shortest run of the kernel from which the speed of a device is measured
+MOST_BANDS = 2**16  # bands that are divided into blocks; the memory of the first block follows from these
 
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
     """What `backproject` would do with the same options.
 
-    method           "direct" or "factorized"; plan: the details, as in a report
-    seconds          about, on these devices as fast as they are now
-    bytes            of memory, about: pixels in memory and blocks on every device
+    method           "direct" or "factorized"
+    plan             details of the plan, as in a report
+    seconds          estimated run time at the present speed of the devices
+    bytes            estimated memory: all pixels, and the blocks on every device
     predicted_error  bound of the relative error
     cheaper          (predicted error, seconds) of the next cheaper plan, or None where there is none
     """
@@ -72,7 +73,7 @@ def plan(
     max_bytes: float | None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
 ) -> Forecast:
-    """How `backproject(raw, grid, ...)` would make the image with these options: a Forecast, before any work.
+    """Predict how `backproject(raw, grid, ...)` would make the image with these options: a Forecast.
 
     Samples are read once, up to 2^28 of them, to estimate how much of their energy lies on the grid; with `mapping`,
     all are read and mapped first. Time is scaled from a short run of the kernel on each device. ValueError and
@@ -83,7 +84,7 @@ def plan(
     devices = open_devices(device)
     chosen = options.choose(task, devices)
     working = sum(_bytes(task, chosen, d, options.budget(d)) for d in devices)
-    # of a pixel in all rows that see it, at cost 1
+    # seconds per pixel, for all rows that see it, at cost 1
     seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
     return Forecast(
         chosen.method,
@@ -96,12 +97,12 @@ def plan(
 
 
 def _work(task: FocusingTask, chosen: MethodChoice) -> float:
-    """What a row costs: pixels to be made, of tiles that reach beyond the grid too, times the cost of each."""
+    """Cost per row: the pixels to be computed, padding of tiles included, times the cost of each."""
     tiling, plan, rows = chosen.tiling, chosen.plan, task.raw.n_rows
     pixels = float(tiling.pixels(0, tiling.n_bands))
     if not isinstance(plan, FactorPlan):
         return pixels * chosen.cost
-    # the plan counts tiles as if they filled the grid
+    # the plan assumes tiles that fill the grid exactly
     sources = [rows, *(len(level.decimation.nodes) for level in plan.levels)]
     extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
     for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
@@ -112,7 +113,7 @@ def _work(task: FocusingTask, chosen: MethodChoice) -> float:
 
 
 def _rate(devices: list[Device]) -> float:
-    """Contributions a second of all devices together; drivers of the same CPU share its cores."""
+    """Contributions per second of all devices together; drivers of the same CPU share its cores."""
     return sum(_speed(d) for d in devices if not d.is_cpu) + max((_speed(d) for d in devices if d.is_cpu), default=0.0)
 
 
@@ -124,7 +125,7 @@ def _cheaper(
         if options.tolerance * factor < 1:
             try:
                 other = options.choose(task, devices, options.tolerance * factor)
-            except ToleranceUnreachable:  # sub-apertures that a tighter tolerance allows may be refused here
+            except ToleranceUnreachable:  # sub-apertures may be possible at the tighter tolerance alone
                 continue
             if _work(task, other) < 0.95 * _work(task, chosen):
                 return other.predicted_error, seconds * _work(task, other)
@@ -132,7 +133,7 @@ def _cheaper(
 
 
 def _bytes(task: FocusingTask, chosen: MethodChoice, device: Device, budget: float) -> float:
-    """What a device holds at a time; its budget is kept."""
+    """Bytes on a device at a time, within its budget."""
     tiling = copy.copy(chosen.tiling)
     tiling.n_bands = min(tiling.n_bands, MOST_BANDS)
     return float(chosen.engine(device, task, chosen.plan, tiling).working(budget))
@@ -140,7 +141,8 @@ def _bytes(task: FocusingTask, chosen: MethodChoice, device: Device, budget: flo
 
 @functools.lru_cache(maxsize=16)
 def _speed(device: Device) -> float:
-    """Contributions a second of the gathering kernel with the hat and ranges in float32: the unit of plans' costs."""
+    """Contributions per second of the per-pixel kernel with linear interpolation and ranges in float32: the unit of the
+    costs of plans."""
     from .direct import direct
 
     n = 256
@@ -155,7 +157,7 @@ def _speed(device: Device) -> float:
         made, tiling = direct.make_plan(task, 0.1, lanes=False)
         engine, out = direct.Direct(device, task, made, tiling), np.empty((side, side), np.complex64)
         clock = Clock()
-        engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)  # builds, warms up
+        engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)  # builds the kernels, warms up
         clock, start = Clock(), time.perf_counter()
         engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)
         if time.perf_counter() - start > PROBE or side >= 4096:

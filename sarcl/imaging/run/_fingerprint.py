@@ -1,4 +1,4 @@
-"""What tells one job from another: all that an image's pixels follow from, in words, numbers and checksums."""
+"""Fingerprint of a job: everything that the pixels of an image depend on, as text, numbers and checksums."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ from ..tiling import Tiling
 def job(
     task: FocusingTask, method: str, tolerance: float, plan: ImagePlan, tiling: Tiling, dtype: Any
 ) -> dict[str, Any]:
-    """All that the pixels follow from, in words and numbers; arrays, and the samples, as checksums.
+    """Everything that the pixels depend on, as text and numbers; arrays, and the samples, as checksums.
 
-    Neither device nor memory: they change nothing but rounding. Reads all samples. TypeError for an option that
-    has no such description.
+    The device and its memory are left out: they change nothing but rounding. Reads all samples. TypeError for an option
+    that cannot be described.
     """
     from ...base.version import __version__
 
@@ -57,17 +57,17 @@ def mark(job: dict[str, Any]) -> str:
 
 
 def difference(there: dict[str, Any], here: dict[str, Any]) -> str:
-    """What tells two jobs apart, as a person says it."""
-    said = []
+    """The differences between two jobs, in words."""
+    differences = []
     for name, value in here.items():
         if there.get(name) != value:
             plain = name in ("sarcl", "method", "tolerance", "pixels", "wrap", "skip")
-            said.append(f"{name} was {there.get(name)}, is {value}" if plain else f"other {name}")
-    return "; ".join(said) or "other options"
+            differences.append(f"{name} was {there.get(name)}, is {value}" if plain else f"other {name}")
+    return "; ".join(differences) or "other options"
 
 
 def checker(*parts: Any) -> Any:
-    """The checksum in the making of `parts`, bytes or views of them."""
+    """A checksum object that has taken `parts`, bytes or views of them."""
     made = hashlib.blake2b(digest_size=32)
     for part in parts:
         made.update(part)
@@ -80,7 +80,7 @@ def as_bytes(values: np.ndarray) -> np.ndarray:
 
 
 def checksum(*values: Any) -> str:
-    """Of arrays, numbers (or tuples of them), words and None, shapes and types included."""
+    """Checksum of arrays, numbers (or tuples of them), strings and None, with shapes and types."""
     made = checker()
     for value in values:
         if value is None or isinstance(value, str):
@@ -93,7 +93,8 @@ def checksum(*values: Any) -> str:
 
 
 def _leaves(value: Any) -> list[Any]:
-    """What `checksum` takes, of a dataclass, a tuple, list or dict of such: names, arrays, numbers, words and None."""
+    """The names, arrays, numbers, strings and None in a dataclass, or in a tuple, list or dict of such, for
+    `checksum`."""
     if is_dataclass(value) and not isinstance(value, type):
         value = {name: getattr(value, name) for name in value.__dataclass_fields__}
     if isinstance(value, Mapping):
@@ -104,12 +105,12 @@ def _leaves(value: Any) -> list[Any]:
         ]
     if value is None or isinstance(value, (str, bool, int, float, complex, np.ndarray, np.generic)):
         return [value]
-    raise TypeError(f"tiles made with a {type(value).__name__} among the options cannot be told from others'")
+    raise TypeError(f"tiles computed with a {type(value).__name__} among the options cannot be identified")
 
 
 @functools.cache
 def _kernels() -> str:
-    """Checksum of the kernels' sources: tiles of two versions are not mixed."""
+    """Checksum of the kernel sources: tiles of two versions are not mixed."""
     from importlib.resources import files
 
     sources = [(p.name, p.read_text()) for p in files("sarcl.kernels").iterdir() if p.name.endswith((".cl", ".clh"))]

@@ -1,4 +1,4 @@
-"""When finished tiles go to files, and what becomes of the files when a run ends."""
+"""When finished tiles are written to files, and when these files are removed."""
 
 from __future__ import annotations
 
@@ -23,8 +23,8 @@ from .tile_files import TileStore, discard, folder_of, gaps
 
 log = logging.getLogger(__name__)
 
-PERIOD = 1.0  # s; a run that is over sooner leaves no files
-WORTH = 60.0  # s of work that are kept when a run fails or is interrupted, unless resume=True
+PERIOD = 1.0  # s: a run that ends sooner writes no tile files
+WORTH = 60.0  # s: a run that fails or is interrupted sooner removes its tile files, unless resume=True
 
 
 def _parts(flat: Any, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
@@ -35,15 +35,15 @@ def _parts(flat: Any, at: slice, row_bytes: int) -> Iterator[np.ndarray]:
 
 
 class Checkpoint:
-    """Keeps the finished tiles of image `path`, by the rule of `resume`.
+    """Keeps the finished tiles of the image `path` in files, as `resume` says.
 
-    True   always, whatever ends the run
-    None   from PERIOD on, so that a killed run loses no finished tile; a run that ends in an exception before
-           WORTH removes the files it began
-    False  not at all; what earlier runs left is thrown away
+    True   always, also where the run ends in an exception
+    None   from PERIOD seconds on, so that a killed run loses no finished tile; a run that ends in an exception before
+           WORTH seconds removes the files that it wrote
+    False  never; the files of earlier runs are deleted
 
-    Making one reads all samples where there are tiles, or are bound to be; ValueError: they are another job's.
-    Used as a context manager, an exception ends the run.
+    The constructor reads all samples where there are tile files, or resume is True. ValueError: the files belong to
+    another job. As a context manager it ends with the run: an exception in its block is one that ended the run.
     """
 
     def __init__(
@@ -64,11 +64,11 @@ class Checkpoint:
 
     @property
     def mark(self) -> str | None:
-        """The job's fingerprint, where it was needed."""
+        """Fingerprint of the job, or None where no tile files were needed."""
         return self.tiles.mark if self.tiles else None
 
     def finished(self) -> Image | None:
-        """The image, where this very job has made it already."""
+        """The image, if this very job has completed it already."""
         if self.mark is None or formats.writer_functions(self.path, "image").job_of(self.path) != self.mark:
             return None
         self.done()
@@ -76,7 +76,7 @@ class Checkpoint:
         return image if isinstance(image, Image) else None
 
     def complete(self) -> bool:
-        """Every band has a file."""
+        """Whether every band has a tile file."""
         return self.tiles is not None and not gaps(self.tiles.runs(), 0, self.chosen.tiling.n_bands)
 
     def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
@@ -98,12 +98,16 @@ class Checkpoint:
         except (OSError, TypeError) as exc:
             if self.resume:
                 raise
-            log.warning("finished tiles cannot be kept in %s: %s; a killed run would start anew", self.folder, exc)
+            log.warning(
+                "finished tiles cannot be kept in %s: %s; a killed run would start again",
+                self.folder,
+                exc,
+            )
             self.resume = False
         self._waiting.clear()
 
     def done(self) -> None:
-        """The image is complete."""
+        """Remove the tile files: the image is complete."""
         if self.tiles is not None:
             self.tiles.clear()
 
@@ -114,7 +118,7 @@ class Checkpoint:
         if kind is None or self.tiles is None:
             return
         if self.resume or not self.fresh or time.monotonic() - self.begun >= WORTH:
-            log.warning("finished tiles are kept in %s; the same call again goes on from there", self.folder)
+            log.warning("finished tiles are kept in %s; the same call continues from them", self.folder)
         else:
             self.tiles.clear()
 

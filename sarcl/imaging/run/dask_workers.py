@@ -1,8 +1,8 @@
-"""Tiles made by the workers of a dask.distributed cluster, each on a device of its own. Needs sarcl[dask].
+"""Workers of a dask.distributed cluster, each with a device of its own. Needs sarcl[dask].
 
-The scheduler is dask's. A worker gets the task once, opens its device in its own process with the first block,
-and sends back the pixels of every block; samples that lie in a file are read from there by each worker, so the
-file has to be where they all find it under one name.
+Dask schedules the blocks. A worker receives the task once, opens its device in its own process with the first block,
+and returns the pixels of every block. Samples in a file are read from the file by each worker, so all workers must
+find the file under the same name.
 """
 
 from __future__ import annotations
@@ -31,7 +31,8 @@ from .workers import FinishedBlock, OutputFor, cut
 
 @dataclass(frozen=True, eq=False)
 class WorkerTask:
-    """What every worker is told once: the task, the plan, which device to take, how much of its memory."""
+    """What every worker receives once: the task, the plan, the choice of its device, and the memory it may use
+    there."""
 
     task: FocusingTask
     chosen: MethodChoice
@@ -41,7 +42,7 @@ class WorkerTask:
 
 
 class DaskWorkers:
-    """The workers of a distributed.Client: see workers.WorkerPool."""
+    """The workers of a distributed.Client; see workers.WorkerPool."""
 
     least_pixels = 0.0
 
@@ -89,7 +90,7 @@ class DaskWorkers:
 
 
 def have_lanes(client: Any, device: Any) -> bool:
-    """Every worker's device works on vectors of pixels, as CPUs do. Opens the devices.
+    """Whether the devices of all workers work on vectors of pixels, as CPUs do. Opens the devices.
 
     ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
     """
@@ -107,14 +108,14 @@ def have_lanes(client: Any, device: Any) -> bool:
 
 
 def _places(client: Any) -> dict[str, int]:
-    """Workers, each with its number on its machine: they take turns at its devices."""
+    """Address of each worker, and its number on its machine, by which it chooses among the devices there."""
     workers = sorted(client.nthreads())
     hosts = [address.rpartition(":")[0] for address in workers]
     return {address: hosts[:i].count(hosts[i]) for i, address in enumerate(workers)}
 
 
 class InFile:
-    """Rows of an HDF5 dataset, opened where they are read."""
+    """Rows of an HDF5 dataset, which is opened in the process that reads it."""
 
     def __init__(self, file: str, name: str, shape: tuple[int, ...], dtype: Any) -> None:
         self.file, self.name, self.shape, self.dtype = file, name, shape, dtype
@@ -140,7 +141,7 @@ class InFile:
 
 
 def portable(samples: Any) -> Any:
-    """Samples that another process can read: arrays as they are, datasets by the name of their file."""
+    """Samples that another process can read: arrays as they are, datasets by the names of file and dataset."""
     if isinstance(samples, Picked):
         return Picked(portable(samples.source), samples.index)
     if isinstance(samples, Stacked):
@@ -150,18 +151,18 @@ def portable(samples: Any) -> Any:
     return samples
 
 
-_lock = threading.Lock()  # a worker with several threads still has one device
+_lock = threading.Lock()  # the threads of a worker share one device
 _engine: tuple[str, Engine, Device] | None = None
 
 
 def _open(choice: Any, place: int) -> Device:
-    """In a worker: the device of number `place` of its machine."""
+    """In a worker: its device, by the number of the worker on its machine."""
     choices = split_choice(choice)
     return open_device(choices[place % len(choices)])
 
 
 def _width(choice: Any, place: int) -> int:
-    """In a worker: how many pixels its device works on at once."""
+    """In a worker: the vector width of its device, pixels."""
     with _lock:
         return _open(choice, place).info.vector_width
 
@@ -177,8 +178,8 @@ def _make(run: Run, *, worker_task: WorkerTask, places: dict[str, int]) -> tuple
             _engine = worker_task.name, worker_task.chosen.on(device, worker_task.task), device
         _, engine, device = _engine
         budget = min(memory_budget.budget(device, worker_task.max_bytes), device.info.memory)
-        strip, skipped = BandBuffer(worker_task.chosen.tiling, *run, worker_task.chosen.dtype), Skipped()
+        pixels, skipped = BandBuffer(worker_task.chosen.tiling, *run, worker_task.chosen.dtype), Skipped()
         ends = {last for _, last in engine.blocks(budget)}
         for first, last in cut(worker_task.chosen.tiling, [run], float("inf"), ends):
-            skipped += engine.fill(first, last, strip, budget, Clock(), lambda _: None)
-        return strip.values, skipped, device.info.name
+            skipped += engine.fill(first, last, pixels, budget, Clock(), lambda _: None)
+        return pixels.values, skipped, device.info.name

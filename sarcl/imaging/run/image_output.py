@@ -1,4 +1,4 @@
-"""Where an image's pixels go."""
+"""Destination of the pixels of an image."""
 
 from __future__ import annotations
 
@@ -17,7 +17,11 @@ from ..tiling import Tiling
 
 
 class ImageOutput:
-    """Where pixels go: memory, the caller's array, or a file that appears only when it is complete."""
+    """Destination of the pixels: memory, an array of the caller's, or a file that appears only when it is complete.
+
+    data  the image, of grid.shape
+    flat  where engines write: the rows of a plane, or the points of a list in their order
+    """
 
     def __init__(self, grid: ImageGrid, tiling: Tiling, out: Any, stack: ExitStack, dtype: Any = np.complex64) -> None:
         self.grid, self.tiling, self.writer = grid, tiling, None
@@ -44,18 +48,18 @@ class ImageOutput:
             if np.dtype(out.dtype).itemsize < np.dtype(dtype).itemsize:
                 raise ValueError(f"out has type {out.dtype}; this tolerance makes {np.dtype(dtype)}; give that")
             self.data = out
-        # rows of a plane go straight to their place; listed points arrive along a curve and go there at the end
+        # engines write rows of a plane to the image itself; listed points are copied at the end
         self.flat = self.data if tiling.in_rows else np.empty(grid.size, dtype)
 
     def finish(self) -> None:
-        """Everything has been written to `flat`."""
+        """Complete `data`: all pixels have been written to `flat`."""
         if self.grid.empty is not None:
             self.flat[self.grid.empty.ravel()] = 0  # where empty cells are not skipped, they were focused
         if not self.tiling.in_rows:
             self.data[...] = self.flat.reshape(self.grid.shape)
 
     def image(self, job: str | None = None, **fields: Any) -> Image:
-        """The finished Image; a file appears under its name, marked with its job, only now."""
+        """The finished Image; a file gets its name, and the fingerprint of its job, only now."""
         if self.writer is not None:
             if job is not None:
                 self.writer.mark(job)
@@ -64,7 +68,8 @@ class ImageOutput:
 
 
 class BandBuffer:
-    """The pixels of some bands alone, written as if they were ImageOutput.flat: where no whole image is at hand."""
+    """Buffer for the pixels of some bands, indexed like ImageOutput.flat, where there is no memory for the whole
+    image."""
 
     def __init__(self, tiling: Tiling, first: int, last: int, dtype: Any) -> None:
         at = tiling.extent(first, last)

@@ -1,8 +1,8 @@
-"""Finished tiles in files beside an image in the making: a killed run goes on, and several runs share one image.
+"""Finished tiles in files beside an unfinished image: a killed run can be continued, and several runs share one image.
 
-IMAGE.parts/ holds job.json, which says what is being made, and bands-FIRST-LAST.tiles, each the pixels of some
-bands of the image's one tiling. A file takes its name when it is whole; it carries the fingerprint of its job
-and a checksum, and what fits neither is not used.
+IMAGE.parts/ holds job.json, which describes the job, and files bands-FIRST-LAST.tiles, each with the pixels of some
+bands of the image's tiling. A file gets its name when it is complete. It holds the fingerprint of its job and a
+checksum; a file where either does not match is not used.
 """
 
 from __future__ import annotations
@@ -33,14 +33,14 @@ DIGEST = 32  # bytes
 
 
 def folder_of(path: Any) -> Path:
-    """Where the tiles of image `path` wait."""
+    """The folder for the tile files of image `path`."""
     return Path(os.path.realpath(os.fspath(path)) + ".parts")
 
 
 class TileStore:
-    """The tiles in files of one job. Made, `folder` exists and is this job's own.
+    """The tile files of one job. The constructor creates `folder` and writes the description of the job there.
 
-    ValueError where it holds another job's tiles; raises OSError where nothing can be made there.
+    ValueError where the folder belongs to another job, OSError where it cannot be created.
     """
 
     def __init__(self, folder: Path, job: dict[str, Any], tiling: Tiling, dtype: Any) -> None:
@@ -55,13 +55,13 @@ class TileStore:
         self._sign(job)
 
     def runs(self) -> list[Run]:
-        """Runs of bands that have a file, by their names."""
+        """Runs of bands that have a file, by the names of the files."""
         return sorted(found for path in _tiles(self.folder) if (found := self._named(path)))
 
     def found(self, first: int, last: int) -> Iterator[tuple[Run, np.ndarray, Skipped]]:
-        """Whole files of this job with any of bands first ... last - 1, none twice: (run, pixels, pairs skipped).
+        """Complete files of this job with any of bands first ... last - 1, no band twice: (run, pixels, pairs skipped).
 
-        A damaged file is removed, another job's left alone; both are warned of.
+        A damaged file is removed, a file of another job is left alone; the log warns of both.
         """
         end = 0
         for a, b in self.runs():
@@ -78,7 +78,7 @@ class TileStore:
             yield (a, b), values, skipped
 
     def save(self, first: int, last: int, parts: Iterable[np.ndarray], skipped: Skipped) -> None:
-        """Put the pixels of bands first ... last - 1, given in parts, in a file, whole or not at all."""
+        """Write the pixels of bands first ... last - 1, given in parts, to a file, completely or not at all."""
         head = {"job": self.mark, "first": first, "last": last, "dtype": self.dtype.str, "skipped": asdict(skipped)}
         text = json.dumps(head).encode()
         check = checker()
@@ -112,7 +112,7 @@ class TileStore:
         return (first, last) if first < last <= self.tiling.n_bands and path == self._path(first, last) else None
 
     def _sign(self, job: dict[str, Any]) -> None:
-        """Write job.json where there is none; refuse a folder whose job.json names another job."""
+        """Write job.json where there is none; ValueError where the job.json of the folder describes another job."""
         path = self.folder / "job.json"
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
         temporary.write_text(json.dumps({"fingerprint": self.mark, **job}, indent=1) + "\n")
@@ -121,26 +121,26 @@ class TileStore:
                 os.link(temporary, path)  # the first of several runs wins
             except FileExistsError:
                 pass
-            except OSError:  # a disk without links
+            except OSError:  # a file system without hard links
                 if not path.exists():
                     os.replace(temporary, path)
             try:
                 there = json.loads(path.read_text())
                 other = there.pop("fingerprint") != self.mark
             except (ValueError, KeyError, TypeError, AttributeError, OSError):
-                log.warning("%s is damaged and written anew; only tiles that fit this job are used", path)
+                log.warning("%s is damaged and written again; only tiles of this job are used", path)
                 os.replace(temporary, path)
                 return
         finally:
             temporary.unlink(missing_ok=True)
         if other:
             raise ValueError(
-                f"{str(self.folder)!r} holds finished tiles of another job: {difference(there, job)}. Give what that "
-                "job was given to continue it, or resume=False (--no-resume) to throw its tiles away"
+                f"{str(self.folder)!r} holds finished tiles of another job: {difference(there, job)}. Give the "
+                "arguments of that job to continue it, or resume=False (--no-resume) to delete its tiles"
             )
 
     def _read(self, path: Path, first: int, last: int) -> tuple[np.ndarray | None, Skipped, str]:
-        """Pixels, pairs skipped and "", or None and why not."""
+        """Pixels, pairs skipped and ""; or None and the reason why the file cannot be used."""
         try:
             data = path.read_bytes()
         except OSError as exc:
@@ -164,7 +164,7 @@ class TileStore:
         return values.reshape(at.stop - at.start, *self.tiling.row_shape), Skipped(**head["skipped"]), ""
 
     def _mark_in(self, path: Path) -> str | None:
-        """The fingerprint in a file's head; None where it has none that can be read."""
+        """The fingerprint in the head of a file; None where it cannot be read."""
         try:
             with open(path, "rb") as file:
                 start = file.read(len(MAGIC) + 8)
@@ -178,7 +178,7 @@ FOREIGN = "belongs to another job"
 
 
 def discard(folder: Path) -> None:
-    """Remove what runs leave in a folder of tiles, whichever job's, and the folder if it is empty then."""
+    """Remove all tile files, of any job, from a folder, and the folder if it is empty then."""
     for path in [*_tiles(folder), *folder.glob(".*.tmp"), folder / "job.json"]:
         path.unlink(missing_ok=True)
     try:
@@ -186,7 +186,7 @@ def discard(folder: Path) -> None:
     except FileNotFoundError:
         pass
     except OSError:
-        log.warning("%s holds files that are not sarcl's and stays", folder)
+        log.warning("%s holds files that are not from sarcl and is not removed", folder)
 
 
 def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
@@ -201,7 +201,7 @@ def share(n_bands: int, i: int, n: int, unit: int = 1) -> Run:
 
 
 def gaps(runs: list[Run], first: int, last: int) -> list[Run]:
-    """What is left of bands first ... last - 1 without `runs`."""
+    """Bands first ... last - 1 that are in none of `runs`, in runs."""
     left = []
     for a, b in sorted(runs):
         if a > first:

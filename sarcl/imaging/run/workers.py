@@ -1,4 +1,4 @@
-"""Who focuses which tiles: one device, or several that take blocks from one queue."""
+"""The workers that focus blocks of tiles: one device, or several that take blocks from one queue."""
 
 from __future__ import annotations
 
@@ -14,16 +14,16 @@ from ..engine import Engine, Skipped
 from ..tiling import Run, Tiling
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
-OutputFor = Callable[[int, int], Any]  # where the pixels of a run go
-BLOCKS_EACH = 4  # blocks a worker, so that none waits long for the slowest
+OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
+BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowest
 
 
 class WorkerPool(Protocol):
-    """Those who focus the tiles of one task.
+    """Workers that focus the tiles of one task.
 
-    size          how many blocks they work on at once
-    names         of the devices
-    least_pixels  smaller blocks cost noticeably more a pixel
+    size          number of blocks that are focused at once
+    names         names of the devices
+    least_pixels  pixels per block below which a pixel costs noticeably more
     """
 
     @property
@@ -36,23 +36,24 @@ class WorkerPool(Protocol):
     def least_pixels(self) -> float: ...
 
     def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """The bands of `todo` in blocks, of about `most` pixels at most where units of bands allow."""
+        """The bands of `todo` in blocks of about `most` pixels at most, which begin at multiples of `unit` bands if
+        possible."""
         ...
 
     def work(
         self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
     ) -> Generator[FinishedBlock, None, None]:
-        """Focus all blocks, each into output_for(first, last); yields each as it is done, in any order.
+        """Focus all blocks, each into output_for(first, last); yields each when it is finished, in any order.
 
-        on_progress  called from the caller's thread with the (row, pixel) pairs done so far
+        on_progress  called from the caller's thread with the number of (row, pixel) pairs done so far
         """
         ...
 
 
 def cut(tiling: Tiling, todo: list[Run], most: float, ends: set[int], unit: int = 1) -> list[Run]:
-    """The bands of `todo` in even blocks of about `most` pixels, none across one of `ends`.
+    """The bands of `todo` in blocks of equal size, of about `most` pixels; none extends across one of `ends`.
 
-    Blocks begin at multiples of `unit` bands where neither `todo` nor `ends` want otherwise.
+    Blocks begin at multiples of `unit` bands, except where `todo` or `ends` begin a block elsewhere.
     """
     blocks = []
     for start, stop in todo:
@@ -103,7 +104,7 @@ class LocalWorkers:
         before: int,
         on_progress: Callable[[int], None],
     ) -> tuple[FinishedBlock, int]:
-        """One block by engine k, and the pairs done after it."""
+        """One block, focused by engine k, and the number of pairs done after it."""
         flat, pixels = output_for(first, last), self.engines[k].tiling.count(first, last)
 
         def rows_done(rows: float) -> None:
@@ -115,7 +116,7 @@ class LocalWorkers:
     def _together(
         self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
     ) -> Generator[FinishedBlock, None, None]:
-        """One thread a device; the caller's thread reports progress and hands on what is done."""
+        """One thread per device; the caller's thread reports progress and yields finished blocks."""
         waiting: queue.SimpleQueue[Run] = queue.SimpleQueue()
         for block in blocks:
             waiting.put(block)
@@ -168,4 +169,4 @@ class LocalWorkers:
 
 
 class _Stop(Exception):
-    """Another thread has failed, or the caller has given up."""
+    """Raised in a thread where another has failed, or where the caller has stopped the run."""
