@@ -206,7 +206,7 @@ def test_what_cannot_be_met_names_the_best_and_the_best_can_be_asked_for():
         make_plan(task, 1e-16)
     named = float(str(caught.value).split()[-1])
     assert make_plan(task, named)[0].predicted_error <= named < 1e-10
-    with pytest.raises(ValueError, match="turns of phase"):
+    with pytest.raises(ValueError, match="cycles of phase"):
         make_plan(task_of(replace(noise_history(n_rows=2), reference_range=1e15), PLANE), 1e-8)
 
 

@@ -23,7 +23,8 @@ from .tile_kernels import CHUNK, kernel_of
 def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    lanes  the devices work on vectors of pixels, so that lines of pixels pay; ValueError names the best there is
+    lanes  the devices work on vectors of pixels, so that lines of pixels pay
+    ToleranceUnreachable names the best tolerance that can be met.
     """
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
@@ -52,7 +53,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
 
 
 class Direct(DirectEngine):
-    """The loops over row blocks and tiles on one device; see engine.Engine."""
+    """The loops over blocks of rows and tiles on one device; see engine.Engine."""
 
     dtype = np.complex64
 
@@ -63,13 +64,13 @@ class Direct(DirectEngine):
         beam = task.antennas.beam is not None
         self.kernels = kernel_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
-        # making a row's profile anew for every block costs as much as this many pixels, ten times over
+        # per row, making the range profile costs a tenth of adding it to this many pixels
         self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
 
     def _shares(self, nbytes: float) -> tuple[float, float, float]:
-        """Bytes for rows' profiles, pixels and tiles' constants: one, two and one parts of four.
+        """Bytes for range profiles, pixels and constants of tiles: a quarter, a half and a quarter of nbytes.
 
-        Rows get more where they need it: half of it at most.
+        Profiles get more where they need it, half of nbytes at most.
         """
         least, chunk = (self.profiles.row_bytes * n for n in (self.kernels.least_rows, self.kernels.chunk))
         if least > nbytes / 2:
@@ -83,7 +84,7 @@ class Direct(DirectEngine):
         return min(rows, alloc), min((nbytes - rows) * 2 / 3, alloc), min((nbytes - rows) / 3, alloc)
 
     def tiles_at_once(self, nbytes: float) -> int:
-        """Tiles whose accumulators, and offsets where each tile has its own, fit in the pixels' share of nbytes."""
+        """See DirectEngine: sums, and offsets where each tile has its own, fit in the share of the pixels."""
         pixel_bytes = 16 + self.tiling.offset_bytes
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
@@ -112,10 +113,10 @@ class Direct(DirectEngine):
     def add_up(
         self, tiles: Tiles, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> tuple[Any, np.ndarray]:
-        """All rows into these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
+        """Add all rows to these tiles: their sums (4, pixels) on the device, and rows left out of each (2, n_tiles)."""
         device, raw, kernels, stride = self.device, self.task.raw, self.kernels, self.profiles.stride
         for_rows, _, for_constants = self._shares(budget)
-        # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
+        # on a CPU few rows at a time, so that the samples that neighbouring tiles read stay in its caches
         most = min(128 if device.is_cpu else 4096, int(for_rows / self.profiles.row_bytes))
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
         image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
@@ -132,7 +133,7 @@ class Direct(DirectEngine):
             for tile in range(0, tiles.n_tiles, step):
                 end = min(tile + step, tiles.n_tiles)
                 kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image)
-                if end < tiles.n_tiles:  # what one step keeps for its tiles is gone before the next begins
+                if end < tiles.n_tiles:  # frees the constants of these tiles before the next are made
                     device.finish()
             device.finish()
             clock.lap("backproject")

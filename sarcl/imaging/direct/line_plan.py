@@ -17,10 +17,10 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tiles import Tiles
 from ..tiling import PlaneTiling, outline
 
-LOCAL_BYTES = 60_000  # of local memory a group of pulses may take
-SIDES = (64, 32, 16)
-FINES = (1, 2, 4, 8)
-GROUP_SIZES = (16, 8, 4)
+LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
+SIDES = (64, 32, 16)  # pixels along a side of a tile
+FINES = (1, 2, 4, 8)  # samples of a line's profile per pixel
+GROUP_SIZES = (16, 8, 4)  # pulses per group
 
 
 def components(beam: bool) -> int:
@@ -30,12 +30,20 @@ def components(beam: bool) -> int:
 
 @dataclass(frozen=True, eq=False)
 class LinePlan:
-    """How lines are computed: tile side, samples a pixel, both interpolators, pulses a group and what they may differ.
+    """How lines of pixels are computed.
 
-    slope       the curvature moves pixels' places too
-    limit_turn  turns, and limit_place samples: a pulse whose curvature differs by more is added pixel by pixel,
-    limit_step  samples a pixel along a line: as is one that sees more
-    cost        of a contribution, relative to one by the hat and float32 ranges
+    side            pixels along a side of a tile
+    fine            samples of a line's profile per pixel
+    group           pulses per group; the pulses of a group share one wavefront curvature
+    line            interpolator from the line's profile to its pixels
+    interpolator    interpolator from the range profile, of `length` samples, to the line's profile
+    order           order of the range series
+    slope           the curvature also shifts the positions of pixels along the line
+    limit_cycles, limit_position, limit_step
+                    a pulse falls back to per-pixel interpolation where its curvature differs from that of its group by
+                    more than limit_cycles cycles or limit_position samples, or its range changes by more than
+                    limit_step samples per pixel along the line
+    cost            per contribution, relative to one with linear interpolation and ranges in float32
     """
 
     side: int
@@ -46,8 +54,8 @@ class LinePlan:
     length: int
     order: int
     slope: bool
-    limit_turn: float
-    limit_place: float
+    limit_cycles: float
+    limit_position: float
     limit_step: float
     predicted_error: float
     cost: float
@@ -104,14 +112,18 @@ def possible(grid: ImageGrid, lanes: bool) -> bool:
 
 
 def steps(grid: ImageGrid) -> np.ndarray:
-    """A column's and a row's step, m (2, 3)."""
+    """Steps from one column and from one row to the next, m (2, 3)."""
     assert grid.spacing is not None and grid.x_axis is not None and grid.y_axis is not None
     return np.stack([grid.spacing[1] * grid.x_axis, grid.spacing[0] * grid.y_axis])
 
 
 @dataclass(frozen=True, eq=False)
 class SampledDirections:
-    """How sampled pulses see sampled tiles: directions along a pixel's steps, m (tiles, n, 2 antennas, 2), and 1/m."""
+    """Geometry of sampled tiles and pulses.
+
+    along    components of the steps between pixels along the lines of sight, m (tiles, n, 2 antennas, 2)
+    inverse  inverse distances from the antennas, 1/m (tiles, n, 2)
+    """
 
     along: np.ndarray
     inverse: np.ndarray
@@ -124,11 +136,12 @@ class SampledDirections:
         return cls(np.einsum("tnac,kc->tnak", d * inverse[..., None], axes), inverse)
 
     def largest_step(self) -> float:
-        """Largest half path a pixel adds along either axis, m."""
+        """Largest change of half the two-way path from one pixel to the next along either axis, m."""
         return float(np.abs(self.along.mean(axis=2)).max(initial=0.0))
 
     def rest(self, side: int, spacing: tuple[float, float]) -> np.ndarray:
-        """rest_ij of kernels/backproject_lines.cl, m (tiles, n, 5 points of a tile's edge, where it is largest)."""
+        """rest_ij of kernels/backproject_lines.cl, m (tiles, n, 5), at 5 points on the edge of a tile, where it is
+        largest."""
         mean = self.along.mean(axis=2)
         turned = np.abs(mean[..., 1]) > np.abs(mean[..., 0])
         u = np.where(turned[..., None, None], self.along[..., ::-1], self.along)
@@ -140,8 +153,9 @@ class SampledDirections:
         return (bend * (self.inverse / 2)[..., None]).mean(axis=2)
 
 
-def moved(rest: np.ndarray) -> float:
-    """Largest part of `rest`, m (..., 5), that is not in a line's place, which is moved by half its ends' mean."""
+def unmodelled_shift(rest: np.ndarray) -> float:
+    """Largest part of `rest`, m (..., 5), that remains after the shift of a line by half its mean at the line's
+    ends."""
     ends = np.stack([rest[..., [0, 1, 2]], rest[..., [4, 1, 3]]])
     middle = ends.mean(axis=0) / 2
     return float(max(np.abs(ends - middle).max(), np.abs(middle).max()))
@@ -164,10 +178,11 @@ def choose(
     source: tuple[Interpolator, int] | None = None,
     sides: tuple[int, ...] = SIDES,
 ) -> LinePlan | None:
-    """The cheapest way by lines whose predicted error is at most `tolerance`, or None.
+    """The cheapest LinePlan whose predicted error is at most `tolerance`, or None.
 
-    highest  frequency, Hz; sides: of tiles, to choose from
-    source   interpolator and profile length where profiles are already made
+    highest  highest frequency, Hz
+    source   interpolator and length of profiles that exist already; None: they are chosen too
+    sides    sides of tiles to choose from, pixels
     """
     assert grid.spacing is not None
     distance = antennas.distance(grid.bounds)
@@ -183,8 +198,8 @@ def choose(
         directions = SampledDirections.at(points, antennas.tx[rows], antennas.rx[rows], steps(grid))
         rest = directions.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
         kappa = 2 * highest / SPEED_OF_LIGHT
-        turn = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
-        off = 1.1 * moved(rest)
+        bend_cycles = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
+        off = 1.1 * unmodelled_shift(rest)
         order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
         fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.position_rounding(
             radius, bandwidth, False
@@ -193,16 +208,17 @@ def choose(
         fixed += error_bounds.curvature_rounding(radius, distance, highest)
         if fixed > 0.7 * tolerance:
             continue
-        fixed += 2 * np.pi * turn + error_bounds.sum_rounding(group, n_samples)
-        misplaced = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
-        cells = directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells a pixel
+        fixed += 2 * np.pi * bend_cycles + error_bounds.sum_rounding(group, n_samples)
+        position_phase = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
+        cells = directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells per pixel
         for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
             size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
             if cells * 1.2 >= fine or size > LOCAL_BYTES:
                 continue
             line = interpolation.line_interpolator(taps, fine / cells)
-            # the slope's own weights err too, by a few times what the weights do
-            error = fixed + line.error + (misplaced**2 / 2 + 8 * misplaced * line.error if slope else misplaced)
+            # the error of the weights' slopes is a few times that of the weights
+            shifted = position_phase**2 / 2 + 8 * position_phase * line.error if slope else position_phase
+            error = fixed + line.error + shifted
             if error > 0.9 * tolerance:
                 continue
             vectors = fine * (1.3 * side + 8)
@@ -213,7 +229,7 @@ def choose(
                 reads = grid.size * cost_model.LINE_SAMPLE * vectors / side**2
                 try:
                     made, length, cost = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
-                except ToleranceUnreachable:  # other lines may leave more to the interpolator
+                except ToleranceUnreachable:  # other lines may leave more of the tolerance to the interpolator
                     continue
                 per_pair += (cost - cost_model.TAPS[2]) * reads / grid.size
             else:
@@ -223,7 +239,7 @@ def choose(
             if best is None or per_pair < best.cost:
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 best = LinePlan(
-                    side, fine, group, line, made, length, order, slope, turn, max(off * sigma, 1e-6),
+                    side, fine, group, line, made, length, order, slope, bend_cycles, max(off * sigma, 1e-6),
                     cells * length / n_samples * (1 + 1e-5), error + made.error, per_pair,
                 )  # fmt: skip
     return best

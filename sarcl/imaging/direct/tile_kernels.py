@@ -1,7 +1,7 @@
-"""What a block of pulses adds to tiles of pixels: the two kernels of backprojection, and what each keeps on the device.
+"""The two kernels that add a block of pulses to tiles of pixels, with their buffers on the device.
 
-Both serve the direct method, where pulses bring their own range profiles, and the factorised one (`local`), where every
-tile has profiles of its own, about its reference point.
+Both serve the direct method, where each pulse has one range profile, and the factorised method (`local`), where every
+tile has profiles of its own, relative to its reference point.
 """
 
 from __future__ import annotations
@@ -19,14 +19,14 @@ from . import line_plan
 from .line_plan import LinePlan, LineTiling, steps
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
-VECTORS = 4  # vectors of pixels a work-item of the gathering kernel
+VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
-# pulses on the device: the packed array, its padded length, and how many are real
+# pulses on the device: the packed array, its length with padding, and the number of pulses
 Pulses = tuple[Any, int, int]
 
 
 class GatherKernel:
-    """Any tiles, each pixel by interpolation of its own: kernels/backproject.cl."""
+    """Per-pixel backprojection of any tiles: kernels/backproject.cl."""
 
     chunk, least_rows = CHUNK, 1
 
@@ -44,7 +44,7 @@ class GatherKernel:
         self.table = device.upload(plan.interpolator.table)
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
-        """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
+        """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
         device = self.device
         parts = [float_pairs.wide(tiles.references.T), tiles.radius.astype(np.float32), tiles.offsets]
         return TilesOnDevice(device, tiles, skip, [device.upload(p) for p in parts], self.beam)
@@ -53,7 +53,7 @@ class GatherKernel:
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
         offset: int, image: Any,
     ) -> None:  # fmt: skip
-        """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         centers, radius, offsets = on.buffers
         constants = device.empty(4 * self.components * n * (high - low))
@@ -71,7 +71,7 @@ class GatherKernel:
 
 
 class LineKernel:
-    """Square tiles of a plane, a line at a time: kernels/backproject_lines.cl."""
+    """Backprojection of square tiles of a plane, line by line: kernels/backproject_lines.cl."""
 
     def __init__(
         self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
@@ -79,7 +79,7 @@ class LineKernel:
     ) -> None:  # fmt: skip
         self.device, self.tiling, self.beam = device, tiling, beam
         self.components = line_plan.components(beam)
-        # a group's pulses share their curvature: blocks of rows are whole groups, whatever the memory
+        # the pulses of a group share one curvature, so blocks of rows are whole groups
         self.chunk = self.least_rows = plan.group
         self.lanes = device.info.vector_width
         macros = {**plan.macros(bistatic, wrap, local), "BEAM": int(beam)}
@@ -87,10 +87,10 @@ class LineKernel:
         self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **macros)
         self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
-        self.limits = [np.float32(v) for v in (plan.limit_turn, plan.limit_place, plan.limit_step)]
+        self.limits = [np.float32(v) for v in (plan.limit_cycles, plan.limit_position, plan.limit_step)]
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
-        """What these tiles need on the device; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
+        """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
         return TilesOnDevice(
             self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
         )
@@ -99,7 +99,7 @@ class LineKernel:
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
         offset: int, image: Any,
     ) -> None:  # fmt: skip
-        """Add to `image` (4, pixels) what tiles low ... high - 1 see; profiles begin at complex number `offset`."""
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         assert self.tiling.grid.spacing is not None
         dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
@@ -116,9 +116,8 @@ class LineKernel:
 
 
 class TilesOnDevice:
-    """Tiles on the device: buffers of a pass, and counts a tile: of pulses that miss it, and of those that do not
-    light it where there is a beam.
-    """
+    """Tiles on the device, with the buffers of a kernel, and two counts per tile: the pulses whose range window misses
+    the tile, and those whose beam does."""
 
     def __init__(self, device: Device, tiles: Tiles, skip: int, buffers: list[Any], beam: bool) -> None:
         self.device, self.tiles, self.skip, self.buffers, self.beam = device, tiles, int(skip), buffers, beam
@@ -126,13 +125,13 @@ class TilesOnDevice:
         self.missed = device.zeros(4 * self.counts * tiles.n_tiles)
 
     def skipped(self) -> np.ndarray:
-        """Pulses left out of every tile, (2, n_tiles) int64: outside their range window, and outside their beam."""
+        """Numbers of pulses left out of every tile, (2, n_tiles) int64: by their range window, and by their beam."""
         counts = self.device.download(self.missed, np.empty((self.counts, self.tiles.n_tiles), np.int32))
         return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
 
 
 def kernel_of(device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: bool) -> GatherKernel | LineKernel:
-    """The pass that a plan means; how: bistatic, wrap, local, beam."""
+    """The kernel for a plan; how: bistatic, wrap, local, beam."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)
         return LineKernel(device, plan, tiling, **how)

@@ -1,4 +1,7 @@
-"""Sub-apertures: smooth runs of pulses, thinned out level by level to nodes. Geometry and errors, no device."""
+"""Sub-apertures: smooth runs of pulses, decimated level by level. Geometry and errors, without a device.
+
+The decimated pulses are called nodes: antenna positions at which the profiles of a tile are kept.
+"""
 
 from __future__ import annotations
 
@@ -13,11 +16,14 @@ from ...model.phase_history import PhaseHistory
 from ...numerics import interpolation
 from ...numerics.pulse_geometry import PulseGeometry
 
-GAP = 5.0  # a step of the track so many times longer than the median begins a new run
+GAP = 5.0  # a step between pulses that is this many times longer than the median begins a new run
 
 
 def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
-    """An order of the rows, (n,), in which each smooth run of alike rows is consecutive; and the runs."""
+    """An order of the rows, (n,), in which the rows of a run are consecutive; and the runs (first, last).
+
+    A run is smooth: its rows share channel and frequency, and follow one another without a gap in the track.
+    """
     keys: list[np.ndarray] = [raw.frequency, raw.frequency_step]
     keys += [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
     group = np.zeros(raw.n_rows, np.int64)
@@ -35,41 +41,41 @@ def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
 
 @dataclass(frozen=True, eq=False)
 class Decimation:
-    """From a track to every `thin`-th of its positions: the nodes, and how pulses are spread over them.
+    """Decimation of the pulses of a track to every `ratio`-th position, the nodes.
 
     nodes   the positions that are kept, with the range to the origin as reference and no window: profiles at nodes
             are made about tiles, whose centres are their reference
-    blocks  (n_blocks, 4) int32: first pulse, pulses, first node, first row of the filter
-    filter  (thin, taps) float32: weight of each of the nodes around a pulse at this fraction of the way
-    error   of the filter, relative, at the oversampling it was made for
+    blocks  (n_blocks, 4) int32: first pulse, number of pulses, first node, first row of the filter
+    filter  (ratio, taps) float32: weights of the nodes around a pulse, by its position between two nodes
+    error   relative error of the filter at the oversampling it was made for
     """
 
     nodes: PulseGeometry
-    thin: int
+    ratio: int
     blocks: np.ndarray
     filter: np.ndarray
     error: float
 
 
-def decimated(track: PulseGeometry, thin: int, taps: int, oversample: float) -> Decimation:
-    """Every `thin`-th position of each run, and beyond its ends as many as the filter of `taps` needs."""
+def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) -> Decimation:
+    """Decimate each run by `ratio`; beyond its ends there are as many nodes as the filter of `taps` needs."""
     runs, parts, first = [], [], 0
     blocks: list[np.ndarray] = []
     rx_parts, rows = [], []
     for begin, end in track.runs:
         n = end - begin
-        n_blocks = -(-n // thin)
+        n_blocks = -(-n // ratio)
         at = np.arange(n_blocks + taps - 1) - (taps // 2 - 1)
         b = np.arange(n_blocks)
-        blocks.append(np.stack([begin + b * thin, np.minimum(thin, n - b * thin), first + b, 0 * b], axis=1))
-        places = at * thin
+        blocks.append(np.stack([begin + b * ratio, np.minimum(ratio, n - b * ratio), first + b, 0 * b], axis=1))
+        places = at * ratio
         parts.append(_positions(track.tx[begin:end], places))
         if not track.is_monostatic:
             rx_parts.append(_positions(track.rx[begin:end], places))
         rows += [begin] * len(at)
         runs.append((first, first + len(at)))
         first += len(at)
-    z = np.arange(thin) / thin - 0.5
+    z = np.arange(ratio) / ratio - 0.5
     weights = interpolation.least_squares_weights(taps, oversample, z)
     tx = np.concatenate(parts)
     nodes = PulseGeometry(
@@ -81,11 +87,11 @@ def decimated(track: PulseGeometry, thin: int, taps: int, oversample: float) -> 
     )
     nodes = replace(nodes, reference_range=nodes.half_path(np.zeros(3)))
     error = interpolation.line_interpolator(taps, oversample).error
-    return Decimation(nodes, thin, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
+    return Decimation(nodes, ratio, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
 
 
 def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """Positions m (n, 3) of a run at whole indices, which beyond its ends follow the parabola through its last."""
+    """Positions, m (n, 3), of a run at whole indices; beyond its ends on the parabola through its last positions."""
     n = len(run)
     inside = np.clip(at, 0, n - 1)
     out = run[inside]
@@ -100,9 +106,9 @@ def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
 
 
 def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> float:
-    """Largest change, from one row to the next, of the range's gradient at points, m (n, 3): per row, no unit.
+    """Largest change of the gradient of range at points, m (n, 3), from one row to the next; no unit.
 
-    axes  unit vectors (2, 3) of the plane that the points around lie in, or None for points anywhere
+    axes  unit vectors (2, 3) of the plane that the pixels lie in, or None for pixels anywhere
     """
     worst = 0.0
     for begin, end in track.runs:
@@ -129,10 +135,10 @@ def filter_error(
     frequency: float,
     axes: np.ndarray | None,
 ) -> float:
-    """Largest error of what the nodes make of a pulse, at points `radius` from each of `centers`, m (m, 3).
+    """Largest relative error of a pulse as its nodes represent it, `radius` m away from each of `centers`, m (m, 3).
 
-    This is the thinning itself, computed for the track as it is, not as a smooth one would be: for pulses of 32 blocks
-    spread over it, and for the 1024 pulses where it is roughest.
+    Computed for the track as it is, not for a smooth one: for the pulses of 32 blocks spread over the track, and for
+    the 1024 pulses where the track deviates most from a smooth one.
     """
     directions = np.concatenate([np.eye(3), -np.eye(3)])
     if axes is not None:
@@ -140,7 +146,7 @@ def filter_error(
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
     blocks = made.blocks
     spread = np.unique(np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int))
-    within = np.unique(np.linspace(0, made.thin - 1, min(64, made.thin)).astype(int))
+    within = np.unique(np.linspace(0, made.ratio - 1, min(64, made.ratio)).astype(int))
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
     pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
@@ -155,9 +161,9 @@ def filter_error(
 
 
 def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
-    """Pulses to which directions from `center` leave the line between the nodes about them the most."""
+    """Pulses whose direction from `center` deviates most from linear interpolation between the nodes around them."""
     first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
-    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.thin)[:, None]
+    way = ((np.arange(len(track)) - np.repeat(first, count)) / made.ratio)[:, None]
     node, off = np.repeat(node, count), np.zeros(len(track))
     for antenna, ends in zip(track.ends, made.nodes.ends, strict=True):
         pulses, nodes = _directions(antenna, center), _directions(ends, center)
@@ -174,7 +180,7 @@ def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:
 def _phases(
     track: PulseGeometry, rows: np.ndarray, points: np.ndarray, center: np.ndarray, frequency: float
 ) -> np.ndarray:
-    """exp(j 2 pi f (tau(x) - tau(center))) of rows (...) at points (m, 3): (..., m)."""
+    """exp(j 2 pi f (tau(x) - tau(center))) for rows (...) at points (m, 3): (..., m)."""
     path = np.zeros((*rows.shape, len(points)))
     x = points - center
     for antenna in track.ends:
@@ -187,7 +193,7 @@ def _phases(
 
 
 def chains(leaf: int, largest: int) -> Iterator[tuple[int, ...]]:
-    """Sides of tiles from the first level to the leaf: ratios of 2 to 16, at most four levels."""
+    """Sides of the tiles of each level, from the root to the leaf: ratios of 2 to 16, at most four levels."""
     yield (leaf,)
     for ratio in (2, 4, 8, 16):
         if leaf * ratio >= 2 * largest:

@@ -1,4 +1,4 @@
-"""Which rows see which of the factorised method's largest tiles: whole, in part, or not at all."""
+"""Coverage of the roots, the largest tiles of the factorised method, by rows: whole, in part, or not at all."""
 
 from __future__ import annotations
 

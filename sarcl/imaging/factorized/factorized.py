@@ -1,9 +1,8 @@
-"""Factorised backprojection: pulses are thinned out on smaller and smaller tiles, then focused on the smallest.
+"""Factorised backprojection: pulses are decimated on smaller and smaller tiles, then focused on the smallest.
 
-About the centre of a small tile, what its pixels see changes slowly from pulse to pulse, so fewer pulses carry it
-(kernels/merge_subapertures.cl). Cost grows as N^2 log N for N pulses of N samples and N x N pixels.
-Source: McCorkle and Rofheart
-1996 (quadtree); docs/theory/accuracy.md.
+Relative to the centre of a small tile, the ranges of its pixels change slowly from pulse to pulse, so that fewer pulses
+represent them (kernels/merge_subapertures.cl). Cost grows as N^2 log N for N pulses of N samples and N x N pixels.
+Source: McCorkle and Rofheart 1996 (quadtree); docs/theory/accuracy.md.
 """
 
 from __future__ import annotations
@@ -28,12 +27,12 @@ from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level
 
-SPAN = 32  # vectors of a profile a work-item
+SPAN = 32  # vectors of a profile per work-item
 
 
 @dataclass(frozen=True, eq=False)
 class _Descent:
-    """A tree of tiles on the device: sums of pixels, and per level the tiles' centres and which tile they lie in."""
+    """A tree of tiles on the device: sums of pixels, and for each level the centres of the tiles and their parents."""
 
     tree: Tree
     image: Any
@@ -53,7 +52,7 @@ class Factorized(Engine):
         if (plan.order != np.arange(len(plan.order))).any():
             raw, antennas, order = task.raw[plan.order], task.antennas, plan.order
             self.task = replace(task, raw=raw, row_weight=task.row_weight[order], antennas=antennas.picked(order))
-        # which tiles a beam lights is found out here: the kernels never see one
+        # coverage_of decides which tiles lie in a beam, so that the kernels need no beam
         self.antennas = self.task.antennas
         self.task = replace(self.task, antennas=replace(self.antennas, beam=None))
         self.lanes = device.info.vector_width
@@ -80,17 +79,17 @@ class Factorized(Engine):
         self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
         self.filters = [device.upload(v.decimation.filter) for v in plan.levels]
         self.blocks_of = [device.upload(v.decimation.blocks) for v in plan.levels]
-        # nodes of each level as the kernels want them, about the scene's centre
+        # nodes of each level in the layout of the kernels, about the scene's centre
         self.nodes = []
         for v in plan.levels:
             antennas = v.decimation.nodes
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas), self.lanes)
             self.nodes.append((device.upload(packed), packed.shape[2], len(antennas)))
         self.strides = [self._stride(v) for v in plan.levels]
-        # a tile that lies in the window may reach beyond it with what its profiles have to spare
-        top = plan.levels[0]
+        # a root inside the range window still needs guard samples beyond the window for interpolation
+        root = plan.levels[0]
         sigma = 2 * float(task.raw.frequency_step.min()) * plan.length / SPEED_OF_LIGHT
-        pad = top.reach - (0 if task.wrap else int(top.radius * sigma)) + 2 * GUARD
+        pad = root.reach - (0 if task.wrap else int(root.radius * sigma)) + 2 * GUARD
         self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
         self.least_pixels = 1000.0 * plan.length
         self.memory = MemoryPlan(
@@ -99,7 +98,7 @@ class Factorized(Engine):
         )  # fmt: skip
 
     def _stride(self, level: Level) -> int:
-        """Complex samples of a profile of this level: whole vectors."""
+        """Complex samples of a profile of this level, rounded up to whole vectors."""
         whole = max(self.lanes // 2, 1)
         return -(-(2 * level.reach + 1) // whole) * whole
 
@@ -143,13 +142,13 @@ class Factorized(Engine):
         down = _Descent(tree, image, [device.upload(float_pairs.wide(c.T)) for c in tree.centers],
                         [None, *(device.upload(p) for p in tree.parents)], self.leaves.ready(leaves, 0))  # fmt: skip
         count = np.array([[reason in self.whole.skips] for reason in ("range window", "beam")])
-        n_tops = len(tree.centers[0])
-        each = [b - a for a, b in map(tree.leaves_of, range(n_tops))]
+        n_roots = len(tree.centers[0])
+        each = [b - a for a, b in map(tree.leaves_of, range(n_roots))]
         missed = np.repeat(coverage.missed, each, axis=1) * count
         clock.lap("prepare")
-        # directly first: the sums are put in place, and what is merged is added to them
-        for tops, rows in coverage.directly:
-            picked, skipped = self._add_directly(down, tops, rows, budget / 2, clock)
+        # rows that are added directly come first: their sums are stored, and merged rows are added to them
+        for roots, rows in coverage.directly:
+            picked, skipped = self._add_directly(down, roots, rows, budget / 2, clock)
             missed[:, picked] += skipped
         step, within, below = self.memory.at_once(tree, budget)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], coverage.merged, [False]])))
@@ -157,14 +156,14 @@ class Factorized(Engine):
             gathered = device.zeros(8 * (high - low) * self.nodes[0][2] * self.strides[0])
 
             def rows_done(rows: float, low: int = low, high: int = high) -> None:
-                on_progress((low * n_rows + (high - low) * rows / 2) / n_tops)
+                on_progress((low * n_rows + (high - low) * rows / 2) / n_roots)
 
             self._gather(down, low, high, coverage.left_out, gathered, budget, clock, rows_done)
             queued = 0.0
-            for top in range(low, high, step):
-                self._descend(down, 0, top, min(top + step, high), gathered, low, within)
+            for root in range(low, high, step):
+                self._descend(down, 0, root, min(root + step, high), gathered, low, within)
                 queued += step * below
-                if queued > budget / 8:  # what is queued holds its profiles
+                if queued > budget / 8:  # queued kernels hold the memory of their profiles
                     device.finish()
                     queued = 0.0
             device.finish()
@@ -175,22 +174,22 @@ class Factorized(Engine):
     def _coverage(self, roots: Roots) -> TileCoverage:
         """Coverage of roots by all rows."""
         plan = self.plan
-        # merging costs the same for any number of rows
+        # the cost of merging does not depend on the number of rows that are merged
         least = self.task.raw.n_rows * plan.cost / plan.edge.cost
         return coverage_of(self.antennas, roots, self.tiling.center, plan.levels[0].radius, least)
 
     def _add_directly(
-        self, down: _Descent, tops: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
+        self, down: _Descent, roots: np.ndarray, rows: np.ndarray | None, budget: float, clock: Clock
     ) -> tuple[np.ndarray, np.ndarray]:
-        """Leaves of these largest tiles get what rows (indices; None: all) add to them, directly, and nothing else.
+        """Store in the leaves of these roots the sums of rows (indices; None: all), by the direct method.
 
-        Returns the leaves, and rows skipped in each (2, n).
+        Returns the leaves, and the rows skipped in each (2, n).
         """
         tree, task = down.tree, self.whole
         if rows is not None:
             raw, antennas, weight = self.task.raw[rows], self.antennas.picked(rows), self.task.row_weight[rows]
             task = replace(self.task, raw=raw, antennas=antennas, row_weight=weight)
-        picked = np.concatenate([np.arange(*tree.leaves_of(top)) for top in tops])
+        picked = np.concatenate([np.arange(*tree.leaves_of(root)) for root in roots])
         engine = Direct(self.device, task, self.plan.edge, self.tiling)
         some = tree.leaves.picked(picked)
         image, missed = engine.add_up(some, budget, clock, lambda rows: None)
@@ -208,16 +207,16 @@ class Factorized(Engine):
         self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
         clock: Clock, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
-        """First level: profiles of all pulses become those of nodes about the largest tiles low ... high - 1.
+        """First level: add the profiles of all pulses to the nodes of roots low ... high - 1.
 
-        left_out  by tile: rows that have no part in it (n_rows,) bool, or None
+        left_out  for each root: rows that are not merged into it (n_rows,) bool, or None
         """
         device, plan, task = self.device, self.plan, self.task
         level, raw = plan.levels[0], task.raw
         stride = self.profiles.stride
         shifts, merge = self.merges[0]
-        tops, centers = len(down.tree.centers[0]), down.centers[0]
-        nowhere = device.upload(np.zeros(tops, np.int32))
+        roots, centers = len(down.tree.centers[0]), down.centers[0]
+        nowhere = device.upload(np.zeros(roots, np.int32))
         blocks, n_shift = level.decimation.blocks, 2 + 2 * plan.first.taps
         rows = self.memory.rows(budget)
         for start in range(0, raw.n_rows, rows):
@@ -226,12 +225,12 @@ class Factorized(Engine):
             packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
             pulse, n, used = device.upload(packed), packed.shape[2], stop - start
             clock.lap("profiles")
-            # blocks of pulses that share their nodes, cut where this block of rows begins and ends
+            # blocks of pulses with the same nodes, cut at the ends of this block of rows
             begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
             cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
             step = max(1, int(min(budget / 8, device.info.max_alloc) / (4 * n_shift * used)))
             records = device.empty(4 * n_shift * used * min(step, high - low))
-            kept = []  # a buffer on a CPU is the host's memory: it must last until it has been used
+            kept = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
             for tile, count, without_rows in same_coverage(left_out, low, high, step):
                 seen = cut if without_rows is None else without(cut, without_rows[start:stop])
                 if len(seen) == 0:
@@ -240,7 +239,7 @@ class Factorized(Engine):
                 kept.append(cut_buffer)
                 device.run(
                     shifts, (n // self.lanes, count), None,
-                    pulse, centers, tops, centers, nowhere, self.tables[0], n, used, tops, tile, level.reach,
+                    pulse, centers, roots, centers, nowhere, self.tables[0], n, used, roots, tile, level.reach,
                     self.strides[0], stride, stride // 2, records,
                 )  # fmt: skip
                 device.run(
@@ -256,9 +255,11 @@ class Factorized(Engine):
         return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))
 
     def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
-        """Tiles low ... high - 1 of a level, whose profiles begin with tile `first` in `source`, and all below them.
+        """From the profiles of tiles low ... high - 1 of a level to their pixels, through all levels below.
 
-        within  bytes that every level below may take at a time
+        source, first  profiles of the level, of which the first is that of tile `first`
+
+        within  bytes per level below at a time
         """
         device, plan, tree = self.device, self.plan, down.tree
         pulse, n, used = self.nodes[level]
@@ -298,7 +299,7 @@ class Factorized(Engine):
 
 
 def _runs(low: int, high: int, most: float) -> Iterator[tuple[int, int]]:
-    """low ... high - 1 in runs of `most`, one at least."""
+    """low ... high - 1 in runs of `most`, of one at least."""
     step = max(1, int(min(most, high - low)))
     for begin in range(low, high, step):
         yield begin, min(begin + step, high)

@@ -1,4 +1,4 @@
-"""Plans of factorised backprojection: how pulses are thinned out, level by level, within a tolerance."""
+"""Plans of factorised backprojection: decimation of the pulses, level by level, within a tolerance."""
 
 from __future__ import annotations
 
@@ -23,19 +23,22 @@ from ..tiling import Tiling, tiling_of
 from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
 
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
-TAPS = (4, 6, 8)
-TRIES = 8  # candidates worked out in full
-THINNEST = 4096  # pulses a node at most: more would save nothing
-GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may touch
+TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
+TRIES = 8  # candidates whose errors are computed in full
+MOST_MERGED = 4096  # pulses per node at most: more would not reduce the cost
+GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may read
 
 
 @dataclass(frozen=True, eq=False)
 class Level:
-    """One level: tiles `side` pixels (or so many leaves' points) wide, `radius` m, whose pulses are thinned out."""
+    """One level of the tree: tiles of side x side pixels and `radius` m, and the decimation of the pulses there.
+
+    reach  samples of a profile on each side of the tile's centre
+    """
 
     side: int
     radius: float
-    reach: int  # samples of a profile on each side of the tile's centre
+    reach: int
     decimation: Decimation
 
     def n_bytes(self, stride: int) -> int:
@@ -45,11 +48,14 @@ class Level:
 
 @dataclass(frozen=True, eq=False)
 class FactorPlan:
-    """Levels from large tiles to leaves, the interpolators between them, and how leaves become pixels.
+    """How the factorised method makes an image: the levels from roots to leaves, and the step from leaves to pixels.
 
-    factors  leaves a side in a tile of each level; length: samples of a profile of the rows' whole window
-    leaf     from profiles about leaves to pixels; edge: the direct plan of tiles that cross a range window's edge
-    order    of the rows, (n_rows,), in which smooth runs are consecutive; cost of a contribution, relative
+    factors  leaves along a side of a tile, for each level
+    first    interpolator of the range profiles of the rows, `length` samples long; between: that between two levels
+    leaf     plan from the profiles of a leaf to its pixels
+    edge     direct plan for roots that a row sees only in part
+    cost     per contribution, relative to one with linear interpolation and ranges in float32
+    order    (n_rows,): order of the rows in which those of a smooth run are consecutive
     """
 
     levels: tuple[Level, ...]
@@ -81,7 +87,8 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     """The cheapest plan whose predicted error is at most `tolerance`.
 
     lanes  the devices work on vectors of pixels, so that lines of pixels pay
-    ToleranceUnreachable where sub-apertures cannot meet it: it says why, but no best tolerance, which takes a search.
+    ToleranceUnreachable where sub-apertures cannot meet it, with the reason, but without a best tolerance, which takes
+    a search.
     """
     order, runs = runs_of(task.raw)
     track = replace(task.antennas.picked(order), runs=tuple(runs))
@@ -101,12 +108,12 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
 
 
 def _spacing(taps: int, error: float) -> float | None:
-    """The widest spacing at which so many taps err by at most `error`."""
+    """The widest spacing at which the error of so many taps is at most `error`; None: none."""
     return next((s for s in SPACINGS if interpolation.line_interpolator(taps, s).error <= error), None)
 
 
 class _Case:
-    """One task at one tolerance: what candidates share."""
+    """A task at a tolerance, with what all candidates of its plan share."""
 
     def __init__(
         self, task: FocusingTask, track: PulseGeometry, order: np.ndarray, tolerance: float, lines: bool
@@ -123,7 +130,7 @@ class _Case:
         )  # cycles per row and metre
 
     def candidates(self) -> Iterator[tuple[float, tuple[Any, ...]]]:
-        """(about its cost, arguments of `build`) of every way worth trying."""
+        """Estimated cost, and arguments of `build`, of every candidate."""
         for leaf in self.leaves:
             for chain in chains(leaf, self.largest):
                 share = 0.75 * self.tolerance / (2 * len(chain) + 1)
@@ -136,11 +143,11 @@ class _Case:
                         yield made[0], (chain, taps, spacing, nodes, fine, made[1], share)
 
     def untried(self) -> str:
-        """Why there is no candidate at all."""
-        share = 0.75 * self.tolerance / 3  # of a chain of one level, the least there is
+        """The reason why there is no candidate at all."""
+        share = 0.75 * self.tolerance / 3  # of a tree of one level, which has the fewest errors
         fine = [s for s in (_spacing(nodes, share) for nodes in TAPS) if s is not None]
         if not fine:
-            return f"interpolation with {TAPS[-1]} taps between nodes errs by more than its share of the tolerance"
+            return f"interpolation with {TAPS[-1]} taps between nodes has an error above its share of the tolerance"
         n_rows, leaf = self.task.raw.n_rows, min(self.leaves.values())
         if n_rows < 4:
             return f"the aperture has {n_rows} pulses; at least 4 are needed to merge any"
@@ -152,56 +159,58 @@ class _Case:
     def _cost(
         self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float
     ) -> tuple[float, list[int]] | None:
-        """Contributions' worth of work, and how far each level thins out; None where it does not."""
+        """Cost in contributions, and the decimation ratio of each level; None where a level cannot decimate."""
         n_rows, size = self.task.raw.n_rows, self.task.grid.size
         sigma = 2 * self.bandwidth / SPEED_OF_LIGHT * spacing
-        sources, total, spaced, thins = float(n_rows), 0.0, 1.0, []
+        sources, total, spaced, ratios = float(n_rows), 0.0, 1.0, []
         for side in chain:
             radius = self.leaves[chain[-1]] * side / chain[-1]
-            thin = int(min(1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced), max(1, sources // 2), THINNEST))
-            if thin < 2:
+            resolved = 1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced)
+            ratio = int(min(resolved, max(1, sources // 2), MOST_MERGED))
+            if ratio < 2:
                 return None
-            thins.append(thin)
+            ratios.append(ratio)
             total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, nodes)
-            sources, spaced = sources / thin + nodes, spaced * thin
+            sources, spaced = sources / ratio + nodes, spaced * ratio
         leaf = cost_model.LEAF[chain[-1]] if self.lines else cost_model.TAPS[taps] + cost_model.LEAF_PIXELS
         total += size * sources * leaf
-        return total + n_rows * cost_model.MERGED_PROFILE * spacing * self.task.raw.n_samples, thins
+        return total + n_rows * cost_model.MERGED_PROFILE * spacing * self.task.raw.n_samples, ratios
 
     def build(
-        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, thins: list[int], share: float
+        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, ratios: list[int],
+        share: float,
     ) -> tuple[FactorPlan, Tiling] | str:  # fmt: skip
-        """The plan of a candidate, its errors computed for the track as it is; where they are too large, which are."""
+        """The plan of a candidate, its errors computed for the track as it is; or the reason why they are too large."""
         raw, grid = self.task.raw, self.task.grid
         between = interpolation.line_interpolator(taps, spacing)
         length = 2 * fft.good_length(int(np.ceil(spacing * raw.n_samples / 2)))
         sigma = 2 * float(raw.frequency_step.max()) * length / SPEED_OF_LIGHT
-        made = (interpolation.interpolator(t, length / raw.n_samples) for t in interpolation.TERMS)
-        first = next((i for i in made if i.error <= share), None)
+        fits = (interpolation.interpolator(t, length / raw.n_samples) for t in interpolation.TERMS)
+        first = next((i for i in fits if i.error <= share), None)
         if first is None:
-            return f"interpolation of range profiles with {max(interpolation.TERMS)} taps errs by more than its share"
+            return f"interpolation of range profiles with {max(interpolation.TERMS)} taps has an error above its share"
         tiling = LineTiling(grid, chain[-1]) if self.lines else tiling_of(grid, chain[-1])
         factors = tuple(side // chain[-1] for side in chain)
         radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
-        for radius, thin in zip(radii, thins, strict=True):
+        for radius, ratio in zip(radii, ratios, strict=True):
             while True:
-                thinned_out = decimated(source, thin, nodes, fine)
-                worst = filter_error(source, thinned_out, self.points, radius, self.highest, self.axes)
-                if worst <= 1.3 * share or thin <= 2:
+                made = decimated(source, ratio, nodes, fine)
+                worst = filter_error(source, made, self.points, radius, self.highest, self.axes)
+                if worst <= 1.3 * share or ratio <= 2:
                     break
-                thin = max(2, int(thin * 0.75))
+                ratio = max(2, int(ratio * 0.75))
             error += worst + (between.error if decimations else 0.0)
-            decimations.append(thinned_out)
-            source = thinned_out.nodes
+            decimations.append(made)
+            source = made.nodes
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
-            return "thinning out the pulses leaves too little of the tolerance for the pixels"
+            return "decimation of the pulses leaves too small a share of the tolerance for the pixels"
         edge = self._edge(tiling)
         if edge is None:
             return f"tiles at the edge of the range window cannot be focused{' by lines' if self.lines else ''}"
-        # from the leaves up: a tile's profiles hold those of its children, and what their interpolation touches
+        # from the leaves up: the profiles of a tile cover those of its children and what their interpolation reads
         reach = [int(np.ceil(radii[-1] * sigma)) + LEAF_GUARD]
         for below, radius in zip(radii[:0:-1], radii[-2::-1], strict=True):
             apart = tiling.child_distance(radius, below)
@@ -222,7 +231,7 @@ class _Case:
     def _leaf(
         self, tolerance: float, nodes: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
     ) -> LinePlan | Plan | None:
-        """How leaves become pixels within a tolerance."""
+        """Plan from leaves to pixels within a tolerance; None: there is none."""
         raw, n_samples = self.task.raw, self.task.raw.n_samples
         if tolerance <= 0:
             return None
@@ -244,7 +253,7 @@ class _Case:
         return best
 
     def _edge(self, tiling: Tiling) -> LinePlan | Plan | None:
-        """For tiles that some pulse sees only in part: directly, on the same leaves. None where nothing can."""
+        """Direct plan, on the same leaves, for tiles that a pulse sees only in part; None: there is none."""
         raw = self.task.raw
         if self.lines:
             return line_plan.choose(
@@ -262,5 +271,5 @@ class _Case:
 
 
 def moving_cost(samples: float, taps: int, nodes: int) -> float:
-    """Cost of a pulse moved to a new tile and spread over nodes."""
+    """Cost of moving the profile of a pulse to a new tile and adding it to the nodes there."""
     return samples * (taps * cost_model.MOVE_TAP + nodes * cost_model.MOVE_NODE) + cost_model.MOVE_PULSE

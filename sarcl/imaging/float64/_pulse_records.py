@@ -1,4 +1,4 @@
-"""Geometry of rows as kernels/backproject_float64.cl reads it: float64, and pairs of float64."""
+"""Geometry of the rows for kernels/backproject_float64.cl, in float64 and pairs of float64."""
 
 from __future__ import annotations
 
@@ -11,9 +11,8 @@ from ...numerics.pulse_geometry import PulseGeometry
 
 
 def packed(raw: PhaseHistory, antennas: PulseGeometry, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
-    """Per-pulse array (components, n) of rows start ... stop - 1 for profiles of `length` samples.
-
-    kernels/backproject_float64.cl has their order.
+    """Array per pulse (components, n) of rows start ... stop - 1 for profiles of `length` samples, in the order of
+    kernels/backproject_float64.cl.
 
     n is rounded up to whole vectors of `lanes` by repeating the last row. Positions and reference ranges are float64
     as given, so exact; what is derived from frequencies comes in pairs: kappa = 2 fc/c with fc the frequency of

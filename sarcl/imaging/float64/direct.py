@@ -1,4 +1,4 @@
-"""Direct backprojection in float64, for tolerances that complex64 cannot hold."""
+"""Direct backprojection in float64, for tolerances that complex64 cannot meet."""
 
 from __future__ import annotations
 
@@ -18,11 +18,11 @@ from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
 N_CONST = 16  # of kernels/backproject_float64.cl
-PIXEL_BYTES = 56  # positions, totals and their errors
+PIXEL_BYTES = 56  # bytes per pixel: position, sum, and the compensation of the sum
 
 
 class DirectFloat64(DirectEngine):
-    """The loops over row blocks and tiles; see engine.Engine. ValueError on a device without float64."""
+    """The loops over blocks of rows and tiles; see engine.Engine. ValueError on a device without float64."""
 
     dtype = np.complex128
     least_pixels = np.inf
@@ -57,7 +57,7 @@ class DirectFloat64(DirectEngine):
         orders = tiling.bands(first, last)[1]
         positions, lanes = by_range(tiling.positions(first, last, orders), raw.tx[middle], raw.rx[middle])
         values, missed = np.empty(positions.shape[:2], np.complex128), np.empty((2, len(positions)), np.int64)
-        # as few runs of tiles as fit; every one reads all rows anew
+        # as few runs of tiles as fit in memory: every one reads all rows again
         runs = -(-len(positions) // self.tiles_at_once(budget))
         for i in range(runs):
             run = slice(i * len(positions) // runs, (i + 1) * len(positions) // runs)
@@ -76,7 +76,7 @@ class DirectFloat64(DirectEngine):
     ) -> tuple[np.ndarray, np.ndarray]:
         """Pixels (n_tiles, per_tile) at positions, m (n_tiles, per_tile, 3), and rows left out of each (2, n_tiles)."""
         device, raw, plan, n_tiles = self.device, self.task.raw, self.plan, len(positions)
-        # few enough rows on a CPU that what neighbouring tiles read of them stays in its caches
+        # on a CPU few rows at a time, so that the samples that neighbouring tiles read stay in its caches
         most = (2 if device.is_cpu else 64) * CHUNK
         fit = int(budget / 4 / self.profiles.row_bytes)
         rows = min(most, fit // CHUNK * CHUNK or max(1, fit))
@@ -126,9 +126,9 @@ def remedy() -> str:
 
 
 def by_range(positions: np.ndarray, tx: np.ndarray, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Points (n_tiles, per_tile, 3) of each tile in order of their path from tx to rx, and that order.
+    """Points (n_tiles, per_tile, 3) of each tile sorted by their path from tx to rx, and that order.
 
-    Lanes of a vector, and work-items of a group, then read nearly the same samples for all rows that look alike.
+    Lanes of a vector, and work-items of a group, then read nearly the same samples, for all rows of similar direction.
     """
     path = sum(np.sqrt(((positions - end) ** 2).sum(axis=-1)) for end in (tx, rx))
     order = np.argsort(path, axis=1, kind="stable")

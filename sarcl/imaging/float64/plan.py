@@ -1,4 +1,4 @@
-"""Plans of float64 backprojection: the cheapest that meets a tolerance, and what it is predicted to err."""
+"""Plans of float64 backprojection: the cheapest that meets a tolerance, and its predicted error."""
 
 from __future__ import annotations
 
@@ -18,18 +18,20 @@ from ..focusing_task import FocusingTask
 from ..profile_energy import ProfileEnergy
 from ..tiling import Tiling, tiling_of
 
-CHUNK = 64  # rows added plainly before the compensated total; blocks of rows are multiples of it
-SIDES = (16, 8)  # of tiles, pixels
-MOST_TURNS = 2.0**44  # of a path; places among samples, up to 32 a turn, still count below 2^51
-WIDE = -1  # the order of plans that compute every path in pairs of float64
+CHUNK = 64  # rows added without compensation before the compensated total; blocks of rows are multiples of it
+SIDES = (16, 8)  # pixels along a side of a tile
+MOST_CYCLES = 2.0**44  # cycles of a path; sample positions, up to 32 per cycle, are still exact below 2^51
+WIDE = -1  # order of plans that compute every path in pairs of float64
 
 
 @dataclass(frozen=True, eq=False)
 class Float64Plan:
-    """How an image is computed: interpolator and profile length, points a tile, order of the range series.
+    """How an image is computed in float64.
 
-    order         2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
-    cost          relative, of a row
+    length        samples of a range profile
+    per_tile      pixels of a tile
+    order         order of the range series: 2, 3, 4; 0: exact differences; WIDE: exact, in pairs of float64
+    cost          per row, in units of cost_model
     next_cheaper  the most accurate of the plans that cost less, or None
     """
 
@@ -74,7 +76,7 @@ class Float64Plan:
 def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    ToleranceUnreachable names the best tolerance there is; ValueError for paths that are too long (`too_long`).
+    ToleranceUnreachable names the best tolerance that can be met. ValueError for paths that are too long (`too_long`).
     """
     long = too_long(task)
     if long:
@@ -85,7 +87,7 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
     good = next((p for p in plans if p.predicted_error <= tolerance), None)
     if good is None:
         ratio = 20 * np.log10(energy.near_pixels)
-        dark = f": these pixels are {ratio:.0f} dB darker than what lies beside them in their rows"
+        dark = f": these pixels are {ratio:.0f} dB darker than their surroundings in the same rows"
         raise ToleranceUnreachable(
             tolerance, rounded_up(min(p.predicted_error for p in plans)), "float64 range profiles",
             how=f"in complex128{dark if energy.near_pixels > 10 else ''}",
@@ -99,13 +101,13 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
 
 
 def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy) -> Iterator[Float64Plan]:
-    """Every plan there is. Memory plays no part: neither plan nor image depends on it."""
+    """All plans. They do not depend on the memory of a device."""
     raw, grid = task.raw, task.grid
     frequency = float((raw.frequency + raw.n_samples * raw.frequency_step).max())
     distance = task.antennas.distance(grid.bounds)
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
     cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
-    # errors scale with the rows' energy, a tolerance with what pixels see of it: in these data, and at rare nulls
+    # ratio of the energy in the profiles to that at the pixels: in these data, or at the nulls to be expected
     dark = max(energy.near_pixels, error_bounds.darkness(float(cells)))
     ranges = [
         (
@@ -134,17 +136,17 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
 
 
 def too_long(task: FocusingTask) -> str | None:
-    """What is wrong with paths whose cycles pairs of float64 cannot split into whole ones and the rest; None: nothing.
+    """The reason why paths are too long for complex128 at any tolerance, or None.
 
-    No tolerance is met in complex128 then.
+    Pairs of float64 must split the phase of a path into whole cycles and a fraction.
     """
     raw, grid = task.raw, task.grid
     ends = (raw.tx, raw.rx, grid.bounds)
     longest = 2 * sum(float(np.abs(x).max()) for x in ends) + float(np.abs(raw.reference_range).max())
-    turns = 2 * float(raw.frequency.max()) / SPEED_OF_LIGHT * longest
-    if turns <= MOST_TURNS:
+    cycles = 2 * float(raw.frequency.max()) / SPEED_OF_LIGHT * longest
+    if cycles <= MOST_CYCLES:
         return None
     return (
-        f"paths of up to {longest:.1e} m are {turns:.1e} turns of phase, float64 counts {MOST_TURNS:.1e}; give "
+        f"paths of up to {longest:.1e} m are {cycles:.1e} cycles of phase, float64 counts {MOST_CYCLES:.1e}; give "
         "positions about a nearer origin"
     )
