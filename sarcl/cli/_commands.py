@@ -60,7 +60,7 @@ def devices(args: argparse.Namespace, job: Job) -> int:
 
 
 def demo(args: argparse.Namespace, job: Job) -> int:
-    """The demo scene, its picture and how long each step took."""
+    """Simulate and focus the demo scene; print how long each step took."""
     from ..experiments import demo as demo_scene
 
     for path in demo_scene.outputs(args.out):
@@ -117,7 +117,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
 
 
 def focus(args: argparse.Namespace, job: Job) -> int:
-    """An image from echoes."""
+    """Focus echoes."""
     from ..imaging.focus_options import FocusOptions
     from ..model.phase_history import PhaseHistory
     from ..model.store import read
@@ -127,7 +127,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     for name in ("tile", "resume"):
         if getattr(args, name) and all(formats.named(p, formats.writing("picture")) for p in outputs):
-            raise ValueError(f"--{name} keeps tiles beside an image in a file; give -o IMAGE.h5")
+            raise ValueError(f"--{name} keeps tiles beside an image file; give -o IMAGE.h5")
     _expect(job, outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     given = _grid_options(args)
@@ -170,7 +170,7 @@ def measure(args: argparse.Namespace, job: Job) -> int:
 
 
 def fda(args: argparse.Namespace, job: Job) -> int:
-    """The page and the numbers of an experiment on frequency-diverse apertures."""
+    """Run an experiment on frequency-diverse apertures: a page and its numbers."""
     import json
 
     from ..experiments.fda import experiment
@@ -249,7 +249,7 @@ def _write(path: str | Path, text: str) -> None:
 
 
 def bench(args: argparse.Namespace, job: Job) -> int:
-    """Run time against achieved error: a table, and where asked JSON and a picture."""
+    """Measure run time against achieved error: tables and, if asked for, JSON and a plot."""
     from ..bench import backproject
     from ..figures import plots
     from ..io import output_paths
@@ -278,7 +278,7 @@ def bench(args: argparse.Namespace, job: Job) -> int:
 
 
 def _expect(job: Job, paths: list[str], among: list[formats.Format], inputs: list[str]) -> None:
-    """Refuse outputs that cannot be written, or would be written over what is read or over one another."""
+    """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
     taken = {Path(p).resolve() for p in inputs}
     for path in paths:
         if Path(path).resolve() in taken:
@@ -329,7 +329,7 @@ def _compressed(raw: PhaseHistory, job: Job) -> PhaseHistory:
         return raw
     from ..imaging.compress import compress
 
-    job.say("the echoes still have the pulse's spectrum: compressing them first")
+    job.say("the echoes are not compressed: compressing them first")
     return compress(raw)
 
 

@@ -15,7 +15,7 @@ Outputs = dict[str, tuple[int, int] | None]
 
 
 def identity(path: Any) -> tuple[int, int] | None:
-    """What tells a file from the one that takes its place; None where there is none."""
+    """Inode and time of a file, which change when another file replaces it; None where there is no file."""
     try:
         found = os.stat(path)
     except OSError:
@@ -24,16 +24,16 @@ def identity(path: Any) -> tuple[int, int] | None:
 
 
 def complete(outputs: Outputs) -> list[str]:
-    """The paths that hold a new file: they are put in place whole, so it is complete."""
+    """The output paths that hold a new file. Files are put in place whole, so these are complete."""
     return [path for path, before in outputs.items() if identity(path) not in (None, before)]
 
 
 class Job:
     """Used as `with Job(outputs) as job`; outputs gets the `identity` each output path has before the work.
 
-    Ctrl-C raises KeyboardInterrupt at once, as ever, except while an output file is begun or put in its
-    place: then the next report of progress or line does. So it does where Python drops it, in a destructor or
-    a C library's callback; an error that follows from that is a KeyboardInterrupt too.
+    Ctrl-C raises KeyboardInterrupt at once, except while an output file is begun or put in its place: then the next
+    report of progress or printed line raises it. The same happens where Python drops the exception, in a destructor or
+    a callback of a C library; an error that follows from that becomes a KeyboardInterrupt too.
     """
 
     def __init__(self, outputs: Outputs) -> None:
@@ -44,7 +44,7 @@ class Job:
         self._hook = sys.unraisablehook
 
     def __enter__(self) -> Job:
-        # not where Ctrl-C is ignored (nohup, background jobs of a shell), nor in a program that handles it
+        # Left alone: processes in which Ctrl-C is ignored (nohup, background jobs), programs that handle it themselves.
         if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
             try:
                 self._before = signal.signal(signal.SIGINT, self._interrupt)
@@ -67,18 +67,18 @@ class Job:
             raise KeyboardInterrupt
 
     def progress(self, stage: str, done: int, total: int) -> None:
-        """What verbs call: the bar, and a place to stop."""
+        """The progress callback of verbs: draws the bar, and raises a KeyboardInterrupt that is due."""
         self.check()
         self.bar(stage, done, total)
 
     def say(self, text: str) -> None:
-        """Print a line, the bar out of its way."""
+        """Print a line; the bar is removed before."""
         self.check()
         self.bar.wipe()
         print(text, flush=True)
 
     def expect(self, path: Any) -> None:
-        """This path is going to be written; raises what `output_paths.check_writable` does where it cannot be."""
+        """Register an output path; raises what `output_paths.check_writable` raises where it cannot be written."""
         output_paths.check_writable(path)
         self.outputs[str(path)] = identity(path)
 
@@ -86,7 +86,7 @@ class Job:
         self.interrupted = True
         while frame is not None:
             if frame.f_code.co_filename == output_paths.__file__:
-                return  # a file is being begun or put in its place: not to be cut in two
+                return  # a file is being begun or put in its place, which must not be interrupted
             frame = frame.f_back
         raise KeyboardInterrupt
 

@@ -1,7 +1,6 @@
-"""The command line: sarcl devices | demo | simulate FILE.toml | focus RAW | measure IMAGE | fda FILE.toml | papers |
-bench.
+"""The parser of the command line: sarcl devices | demo | simulate | focus | measure | fda | papers | bench.
 
-Only the parser is here, so that --help answers at once; sarcl/cli/_commands.py does the work.
+It imports nothing that takes time, so that --help answers at once; sarcl/cli/_commands.py does the work.
 """
 
 from __future__ import annotations
@@ -22,8 +21,8 @@ EPILOG = """examples:
   sarcl focus raw.h5 -o image.png -o image.h5 --window taylor:35:5
   sarcl measure image.h5 --near 10 0 0
 
-environment: SARCL_DEVICE (as --device), SARCL_THREADS (of CPU devices).
-exit status: 0 done, 1 something failed, 2 bad input, 3 no OpenCL device that works, 130 interrupted."""
+environment: SARCL_DEVICE (default of --device), SARCL_THREADS (threads of CPU devices).
+exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted."""
 
 FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED = 1, 2, 3, 130
 
@@ -48,7 +47,7 @@ def parser() -> argparse.ArgumentParser:
     top.add_argument("--version", action=_Version, nargs=0, help="print the version and stop")
     common = _Parser(add_help=False)
     common.add_argument("--debug", action="store_true", help="show the traceback of an error")
-    common.add_argument("-v", "--verbose", action="store_true", help="say more about what is done")
+    common.add_argument("-v", "--verbose", action="store_true", help="print more about the run")
     device = _Parser(add_help=False)
     device.add_argument(
         "--device", metavar="NAME", help="part of a device's name, its number, cpu or gpu (see sarcl devices)"
@@ -60,7 +59,7 @@ def parser() -> argparse.ArgumentParser:
             name, help=text, description=text[0].upper() + text[1:] + ".", parents=[common, *parents]
         )
 
-    command("devices", "list the OpenCL devices: what works, what does not and why")
+    command("devices", "list the OpenCL devices: which work, which do not and why")
     _demo(command("demo", "simulate the echoes of a scene, focus them and write the picture", device))
     _simulate(command("simulate", "make the echoes that a scenario file describes", device))
     _focus(command("focus", "turn echoes into an image", device))
@@ -69,9 +68,19 @@ def parser() -> argparse.ArgumentParser:
         "image", metavar="IMAGE", help=f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})"
     )
     measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
-    _fda(command("fda", "measure what aperture mappings of frequency-diverse arrays gain: a page and a JSON", device))
+    _fda(
+        command(
+            "fda",
+            "compare aperture mappings of frequency-diverse arrays with a conventional antenna: page and JSON",
+            device,
+        )
+    )
     _papers(
-        command("papers", "list the papers done again, or do one: published beside measured, a page and a JSON", device)
+        command(
+            "papers",
+            "list the reproduced papers, or reproduce one: published and measured values, page and JSON",
+            device,
+        )
     )
     _bench(command("bench", "measure run time against achieved error, with peers on the same data"))
     return top
@@ -79,8 +88,8 @@ def parser() -> argparse.ArgumentParser:
 
 def _demo(p: argparse.ArgumentParser) -> None:
     p.add_argument("--out", default="out", metavar="DIR", help="folder for the results, made if missing (default out)")
-    p.add_argument("--quick", action="store_true", help="coarser and smaller, in a few seconds")
-    p.add_argument("--seed", type=int, default=0, help="of the ground's random heights (default 0)")
+    p.add_argument("--quick", action="store_true", help="half the resolution, in a few seconds")
+    p.add_argument("--seed", type=int, default=0, help="seed of the random scene (default 0)")
 
 
 def _simulate(p: argparse.ArgumentParser) -> None:
@@ -95,7 +104,7 @@ def _simulate(p: argparse.ArgumentParser) -> None:
         help=f"focus too and write {images}; repeatable (default, where there is a grid: FILE.png)",
     )
     p.add_argument("--tolerance", type=float, help="relative error allowed, instead of the scenario's")
-    p.add_argument("--dry-run", action="store_true", help="say what the echoes will take, and write nothing")
+    p.add_argument("--dry-run", action="store_true", help="print size, time and error of the echoes, and write nothing")
     _picture(p)
 
 
@@ -111,11 +120,15 @@ def _focus(p: argparse.ArgumentParser) -> None:
         help=f"image to write, {images}; repeatable (default: RAW's name with .png, here)",
     )
     where = p.add_argument_group("grid", "default: chosen from the data, and printed")
-    where.add_argument("--grid", metavar="FILE.toml", help="the [grid.*] table of a scenario file")
-    where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m")
-    where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="pixels")
-    where.add_argument("--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="of rows and columns, m")
-    where.add_argument("--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="of the plane (default 0 0 1)")
+    where.add_argument("--grid", metavar="FILE.toml", help="take the grid from the [grid.*] table of a scenario file")
+    where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="centre of the grid, m")
+    where.add_argument("--shape", nargs=2, type=int, metavar=("ROWS", "COLUMNS"), help="number of pixels")
+    where.add_argument(
+        "--spacing", nargs=2, type=float, metavar=("DY", "DX"), help="distance of rows and of columns, m"
+    )
+    where.add_argument(
+        "--normal", nargs=3, type=float, metavar=("NX", "NY", "NZ"), help="normal of the plane (default 0 0 1)"
+    )
     where.add_argument(
         "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
     )
@@ -124,7 +137,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     how.add_argument(
         "--method", choices=["auto", "direct", "factorized"], default="auto", help="default auto: the cheapest"
     )
-    how.add_argument("--dry-run", action="store_true", help="say what it will take, and do nothing")
+    how.add_argument("--dry-run", action="store_true", help="print method, time, memory and error, and focus nothing")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
     how.add_argument(
         "--beam", type=degrees, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
@@ -134,7 +147,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
         choices=["corrected", "apparent", "channels"],
         help="map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
     )
-    how.add_argument("--wrap", action="store_true", help="let ranges repeat outside the unambiguous swath")
+    how.add_argument("--wrap", action="store_true", help="repeat ranges outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
     large = p.add_argument_group(
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
@@ -148,7 +161,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
         help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start anew",
     )
     rows = p.add_argument_group("data")
-    rows.add_argument("--polarization", metavar="PQ", help="only rows of this one, e.g. HV")
+    rows.add_argument("--polarization", metavar="PQ", help="only rows of this polarisation, e.g. HV")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
     rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
     _picture(p)
@@ -174,7 +187,7 @@ def _fda(p: argparse.ArgumentParser) -> None:
 
 def _papers(p: argparse.ArgumentParser) -> None:
     p.add_argument(
-        "paper", nargs="?", metavar="NAME", help="the paper to do again (docs/guide/papers.md); none: list them"
+        "paper", nargs="?", metavar="NAME", help="the paper to reproduce (docs/guide/papers.md); none: list the papers"
     )
     p.add_argument(
         "-o",
@@ -183,16 +196,16 @@ def _papers(p: argparse.ArgumentParser) -> None:
         help="the page, or a folder for it, default NAME.html, with NAME.json beside it",
     )
     p.add_argument(
-        "--quick", action="store_true", help="without arrays of more than 100 elements, in a fifth of the time"
+        "--quick", action="store_true", help="leave out arrays of more than 100 elements; takes a fifth of the time"
     )
 
 
 def _bench(p: argparse.ArgumentParser) -> None:
     p.add_argument("what", nargs="?", choices=["backproject"], default="backproject", help="what to measure")
-    p.add_argument("--json", metavar="FILE", help="write every figure, .json")
-    p.add_argument("--picture", metavar="FILE", help="draw rate against error, .png")
+    p.add_argument("--json", metavar="FILE", help="write all measurements, .json")
+    p.add_argument("--picture", metavar="FILE", help="plot rate against error, .png (needs the extra plots)")
     what = p.add_argument_group("what is measured")
-    what.add_argument("--scenes", nargs="+", choices=["spotlight", "straight"], help="apertures (default both)")
+    what.add_argument("--scenes", nargs="+", choices=["spotlight", "straight"], help="tracks (default both)")
     what.add_argument("--data", choices=["noise", "points"], help="default noise for spotlight, points for straight")
     what.add_argument("--sizes", nargs="+", type=int, metavar="N", help="pulses, samples, image side (default 1024)")
     what.add_argument("--tolerances", nargs="+", type=float, metavar="T", help="default 1e-1 to 1e-6")
@@ -200,18 +213,20 @@ def _bench(p: argparse.ArgumentParser) -> None:
         "--methods", nargs="+", choices=["direct", "factorized", "auto"], help="default direct factorized"
     )
     what.add_argument("--devices", nargs="+", metavar="NAME", help="as --device elsewhere (default all that work)")
-    what.add_argument("--no-fp64", action="store_true", help="each device once more as if it had no float64")
+    what.add_argument("--no-fp64", action="store_true", help="measure each device again without float64")
     peer = p.add_argument_group("peers")
     peer.add_argument("--peer-python", metavar="PATH", help="a Python that has fastsar (default this one)")
     peer.add_argument("--peer-backend", choices=["cpu", "cuda", "jax", "auto"], help="fastsar's (default cpu)")
-    peer.add_argument("--no-peers", action="store_true", help="sarcl alone, without NumPy and fastsar")
+    peer.add_argument("--no-peers", action="store_true", help="measure sarcl alone, without NumPy and fastsar")
     how = p.add_argument_group("how")
-    how.add_argument("--repeats", type=int, metavar="K", help="runs of each, in turns (default 5)")
+    how.add_argument("--repeats", type=int, metavar="K", help="runs of each, alternating (default 5)")
     how.add_argument(
-        "--pixels", type=int, metavar="K", help="checked against the exact sum, at least 256 (default 1024)"
+        "--pixels", type=int, metavar="K", help="pixels checked against the exact sum, at least 256 (default 1024)"
     )
-    how.add_argument("--limit", type=float, metavar="S", help="leave out what would run longer, s (default 120)")
-    how.add_argument("--patience", type=float, metavar="S", help="wait so long for an idle machine, s (default 0)")
+    how.add_argument("--limit", type=float, metavar="S", help="leave out runs that would take longer, s (default 120)")
+    how.add_argument(
+        "--patience", type=float, metavar="S", help="wait up to so long for an idle machine, s (default 0)"
+    )
 
 
 class _Version(argparse.Action):
@@ -243,7 +258,7 @@ def size(text: str) -> float:
     except ValueError:
         value = 0.0
     if not 0 < value < float("inf"):
-        raise argparse.ArgumentTypeError(f"{text!r} is no size; give bytes, e.g. 2G, 500M or 1.5GiB")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a size; give bytes, e.g. 2G, 500M or 1.5GiB")
     return value
 
 
@@ -257,7 +272,7 @@ def piece(text: str) -> tuple[int, int]:
     match = re.fullmatch(r"\s*(\d+)\s*/\s*(\d+)\s*", text)
     i, n = (int(match[1]), int(match[2])) if match else (1, 0)
     if not i <= n:
-        raise argparse.ArgumentTypeError(f"{text!r} is no piece; give I/N with I from 1 to N, such as 2/8")
+        raise argparse.ArgumentTypeError(f"{text!r} is not a piece; give I/N with I from 1 to N, such as 2/8")
     return i, n
 
 
@@ -276,7 +291,7 @@ def main(argv: list[str] | None = None) -> int:
             raise
         print(f"sarcl: interrupted; {_kept(outputs)}", file=sys.stderr)
         return INTERRUPTED
-    except BrokenPipeError:  # whoever read our output has left: `sarcl devices | head -1`
+    except BrokenPipeError:  # the reader of our output has ended: `sarcl devices | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED
     except Exception as exc:
@@ -305,6 +320,8 @@ def _kept(outputs: Any) -> str:
 
 
 def _status(exc: Exception) -> int:
-    if any(c.__name__ == "NoDeviceError" for c in type(exc).__mro__):  # its module need not be loaded for this
+    if any(
+        c.__name__ == "NoDeviceError" for c in type(exc).__mro__
+    ):  # found by name, so that its module need not be loaded
         return NO_DEVICE
     return BAD_INPUT if isinstance(exc, (ValueError, TypeError, OSError, MemoryError)) else FAILED

@@ -7,7 +7,7 @@ For other folders:
 
 For this folder alone:
 
-    _demo_scene   the airfield
+    _demo_scene   the scene of the demo, an airfield
 """
 
 __all__ = ["demo", "fda"]

@@ -1,4 +1,4 @@
-"""The demo's scene, made by code: an airfield with an aeroplane, a tank, a hangar, a control tower and trees.
+"""The demo's scene, made by code: an airfield with an aeroplane, two tanks, a hangar, a control tower and trees.
 
 Metres; x to the right of the picture, y up in it, z up. Each object is made about the origin, standing on
 z = 0 and heading along +x, then turned and placed.
@@ -14,10 +14,10 @@ import numpy as np
 from ..scene.material import Material
 from ..scene.scene import Scene
 
-HALF = 26.5  # of the ground's side
-# Amplitude reflectivities that look like an airfield at X band
+HALF = 26.5  # m, half the side of the ground
+# Amplitude reflectivities, chosen to look like an airfield at X band
 METAL, CONCRETE, GRASS, PAINT, ASPHALT = 0.9, 0.6, 0.22, 0.22, 0.07
-ROUGH = Material(diagram="cos")  # below a facet's size, so that every surface speckles
+ROUGH = Material(diagram="cos")  # rough on a scale below the facets, so that every surface has speckle
 
 
 def scene(edge: float, seed: int = 0) -> Scene:
@@ -46,7 +46,7 @@ def rough(level: float) -> Material:
 
 
 def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, material: Material) -> Scene:
-    """Meshes turned by a heading and set on the ground."""
+    """Meshes turned by a heading and placed on the ground."""
     position = (*at, float(relief(*at)))
     c, s = np.cos(np.radians(heading_deg)), np.sin(np.radians(heading_deg))
     turn = np.array([[c, -s, 0], [s, c, 0], [0, 0, 1]])
@@ -57,7 +57,7 @@ def place(meshes: list[Any], at: tuple[float, float], heading_deg: float, materi
 
 
 def relief(x: Any, y: Any) -> Any:
-    """Height of the ground, m: level by the taxiway, gentle swells away from it."""
+    """Height of the ground, m: flat near the taxiway, gently undulating away from it."""
     away = 1 - np.exp(-((taxiway(x, y) / 12) ** 2))
     return away * (0.5 * np.sin(x / 6.5 + 1) * np.cos(y / 8.0) + 0.25 * np.sin((x + 2 * y) / 5.1))
 
@@ -84,7 +84,7 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
 
 
 def relief_edge(x: np.ndarray) -> np.ndarray:
-    """Where the field at the bottom ends, y in m."""
+    """Upper edge of the field at the bottom of the picture, y in m."""
     return -12.5 - 0.3 * x
 
 
@@ -99,7 +99,7 @@ def patches(x: np.ndarray, y: np.ndarray, random: np.random.Generator) -> np.nda
 
 
 def tree(foot: tuple[float, float, float], height: float, random: np.random.Generator, leaves: int = 3500) -> Scene:
-    """A crown of leaves: small facets at random in an egg, denser towards its skin."""
+    """A crown of leaves: small facets at random in an ellipsoid, denser towards its surface."""
     direction = random.normal(size=(leaves, 3))
     direction /= np.linalg.norm(direction, axis=1)[:, None]
     radius = np.cbrt(random.uniform(0.25, 1, leaves))
@@ -114,7 +114,7 @@ def aeroplane() -> list[Any]:
     """A small airliner, 22 m long and 22 m across."""
     import trimesh
 
-    up = 2.7  # of the fuselage's axis
+    up = 2.7  # m, height of the fuselage axis
     profile = [
         (0, -11),
         (0.25, -10.6),

@@ -25,13 +25,13 @@ GRAZING_DEG = 35.0
 DISTANCE = 10e3  # m
 EXTENT = 50.0  # m of the picture's side
 TOLERANCE = 1e-2
-WINDOW: Window = ("taylor", 35, 5)  # side lobes would fill the shadows
+WINDOW: Window = ("taylor", 35, 5)  # without a window side lobes would fill the shadows
 FLOOR_DB, PERCENTILE = -40.0, 99.9  # black, dB below white; white, per cent of the pixels
 
 
 @dataclass(frozen=True)
 class Setting:
-    """How finely the scene is looked at: bandwidth Hz, arc rad, pulses, pixels along a side."""
+    """Resolution of the demo: bandwidth Hz, arc rad, number of pulses, pixels along a side."""
 
     bandwidth: float
     arc: float
@@ -39,13 +39,13 @@ class Setting:
     n_pixels: int
 
     def waveform(self) -> Waveform:
-        """The pulse."""
+        """The transmitted pulse."""
         from ..model.waveform import Waveform
 
         return Waveform.chirp(center=CENTER, bandwidth=self.bandwidth, duration=2e-6)
 
     def track(self) -> Trajectory:
-        """A circle's arc beyond the top of the picture, so that shadows fall down the picture."""
+        """An arc of a circle beyond the top of the picture, so that shadows fall towards its bottom."""
         from ..model.trajectory import Trajectory
 
         grazing = np.radians(GRAZING_DEG)
@@ -59,14 +59,14 @@ class Setting:
         )
 
     def grid(self) -> ImageGrid:
-        """The ground about the origin."""
+        """Pixels on the ground about the origin."""
         from ..model.image_grid import ImageGrid
 
         return ImageGrid.plane(shape=(self.n_pixels, self.n_pixels), spacing=(EXTENT / self.n_pixels,) * 2)
 
     @property
     def edge(self) -> float:
-        """Half a resolution cell, m: longer facets are cut."""
+        """Half a resolution cell, m, the longest edge of the ground's facets."""
         cross = SPEED_OF_LIGHT / CENTER / (2 * self.arc * np.cos(np.radians(GRAZING_DEG)))
         return min(SPEED_OF_LIGHT / (2 * self.bandwidth), cross) / 2
 
@@ -86,7 +86,7 @@ def run(
 ) -> Image:
     """Simulate and focus the demo scene; write demo.png and demo_raw.h5 into the folder `out`.
 
-    say   is called with each line of what happened
+    say   called with each line of the report of the run
     Returns the image. OSError, before any work, when `out` cannot be made or written.
     """
     from ..imaging.backproject import backproject
@@ -139,7 +139,7 @@ def outputs(out: Any) -> tuple[Path, Path]:
 
 
 def _rate(result: PhaseHistory | Image, unit: str) -> str:
-    """The report's error and rate in words."""
+    """Rate and error of a report as text."""
     report = result.report
     if report is None:
         return ""
@@ -153,7 +153,7 @@ def _rate(result: PhaseHistory | Image, unit: str) -> str:
 
 
 class _Clock:
-    """Says how long each step took."""
+    """Reports how long each step took."""
 
     def __init__(self, say: Callable[[str], None]) -> None:
         self.say = say

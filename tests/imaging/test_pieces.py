@@ -745,7 +745,7 @@ def test_tiles_on_the_command_line(raw, tmp_path):
 @pytest.mark.parametrize("text", ["5/4", "1", "a/b", "1/0", "-1/3", "1/2/3"])
 def test_invalid_pieces_are_refused(text, tmp_path):
     status, said = focus("raw.h5", "--tile", text, folder=tmp_path)
-    assert status == 2 and ("is no piece; give I/N" in said or "expected one argument" in said)
+    assert status == 2 and ("is not a piece; give I/N" in said or "expected one argument" in said)
 
 
 def test_pieces_need_a_file_to_come_together(raw, tmp_path):

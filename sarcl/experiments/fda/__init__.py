@@ -2,17 +2,17 @@
 
 For other folders:
 
-    case         Case: array, path, receiver, and what is compared with what
-    experiment   run(), measure(): effects of a mapping on one point, on two points and on spatial frequencies
+    case         Case: array, track, receiver, and the conventional antenna for comparison
+    experiment   run(), measure(): what mappings do to single points, pairs of points and spatial frequencies
     file         experiment files
     page         the report page
-    text         the report's sentences
+    text         the sentences of the page and of the command
 
 For this folder alone:
 
     _array       arrays of experiments
     _sweep       every combination of swept values
-    _trends      tables and drawings of sweeps
+    _trends      plots and tables of sweeps
 """
 
 from ._sweep import sweep

@@ -16,7 +16,7 @@ DOWN = (0.0, 0.0, -1.0)
 
 
 def size(progression: str, n: Any, frequency_step: Any) -> tuple[Any, Any]:
-    """n and frequency_step as whole and real numbers, pairs of a planar array. ValueError for others, and no steps."""
+    """n as integers and frequency_step as numbers, pairs for a planar array. ValueError for others, and for no step."""
     pair = progression == "planar"
     for name, value in (("n", n), ("frequency_step", frequency_step)):
         if (np.shape(value) == (2,)) != pair:
@@ -26,14 +26,14 @@ def size(progression: str, n: Any, frequency_step: Any) -> tuple[Any, Any]:
     steps = [validation.number("frequency_step", value) for value in (frequency_step if pair else (frequency_step,))]
     if all(step == 0 or count == 1 for count, step in zip(counts, steps, strict=True)):
         raise ValueError(
-            "frequency_step is 0: a constant-frequency array has nothing to map; the conventional antenna that is run "
-            "beside every case is that"
+            "frequency_step is 0: a constant-frequency array has nothing to map; the conventional antenna of "
+            "every case is that already"
         )
     return (tuple(counts), tuple(steps)) if pair else (counts[0], steps[0])
 
 
 def groups_of(progression: str, groups: Any, steer: float, receive: str) -> int | None:
-    """The number of groups, None where there are none. ValueError for what does not go together."""
+    """The number of groups, None without groups. ValueError for options that exclude each other."""
     if progression != "subarrays":
         if groups is not None or steer:
             raise ValueError(f"groups and steer go with progression 'subarrays', not {progression!r}; leave them out")
@@ -42,8 +42,8 @@ def groups_of(progression: str, groups: Any, steer: float, receive: str) -> int 
         raise ValueError("progression 'subarrays' needs groups: give a divisor of n")
     if receive != "reference":
         raise ValueError(
-            f"receive is {receive!r}, but a row holds a whole group: subarrays are heard at the reference element; "
-            "give each group as one element of a linear array, with the spacing of the groups"
+            f"receive is {receive!r}, but a row holds a whole group: subarrays are received at the reference "
+            "element; give each group as one element of a linear array, with the spacing of the groups"
         )
     return validation.count("groups", groups, 2)
 
@@ -55,7 +55,7 @@ def highest(n: Any, frequency_step: Any, groups: int | None) -> float:
 
 
 def make(progression: str, n: Any, frequency_step: Any, spacing: float, ahead: np.ndarray) -> AntennaArray:
-    """Element i at -i spacing, m, along `ahead` (3,) or z; lines are not yet in groups."""
+    """The array with element i at -i spacing, m, along `ahead` (3,) or z; subarrays are not yet formed."""
     if progression == "planar":
         steps = (spacing, spacing)
         return AntennaArray.planar(n, spacing=steps, frequency_step=frequency_step, axes=(-ahead, DOWN))
@@ -65,9 +65,9 @@ def make(progression: str, n: Any, frequency_step: Any, spacing: float, ahead: n
 
 
 def subarrays(line: AntennaArray, groups: int, center: float, look: np.ndarray) -> AntennaArray:
-    """Groups of a line, the middle of the first at the reference point, steered along `look` (3,) about their middles.
+    """Subarrays of a line, each steered along `look` (3,) about its middle; the first middle is the reference point.
 
-    A group's weights add up to 1 along `look`, so that it is there as strong as one element.
+    The weights of a subarray add up to 1 along `look`, so that it is as strong as one element there.
     """
     made, each = line.subarrays(groups), line.n // groups
     places = made.positions - made.positions[:each].mean(axis=0)
@@ -77,7 +77,7 @@ def subarrays(line: AntennaArray, groups: int, center: float, look: np.ndarray) 
 
 
 def as_channels(array: AntennaArray, groups: int) -> AntennaArray:
-    """One element a group, at its middle."""
+    """One element per group, at its middle."""
     each = array.n // groups
     return AntennaArray(
         positions=_middles(array.positions, groups), offsets=array.offsets[:, ::each], plan=array.plan

@@ -12,7 +12,7 @@ import numpy as np
 from ...base import text, validation
 from .case import Case
 
-MOST = 64  # cases of one sweep
+MOST = 64  # cases in one sweep
 NOT_SWEPT = ("name", "mappings", "points", "separations", "series", "swept")
 KEYS = (*(name for name in Case.__dataclass_fields__ if name not in NOT_SWEPT), "bandwidth")
 UNITS = {
@@ -23,26 +23,28 @@ UNITS = {
 
 
 def sweep(case: Case, **values: float | Sequence[object] | np.ndarray) -> list[Case]:
-    """`case` at every combination of the values of its fields, the last key's running fastest.
+    """`case` at every combination of the values of its fields; the values of the last key change fastest.
 
-    values     lists, one a field:  sweep(case, frequency_step=[20e6, 2e6], aperture=[200.0, 400.0])
-    bandwidth  Hz, a number or a list: what n |frequency_step| is kept at: n follows where frequency_step is swept or
-               fixed, frequency_step where n is swept
+    values     lists, one per field:  sweep(case, frequency_step=[20e6, 2e6], aperture=[200.0, 400.0])
+    bandwidth  Hz, a number or a list: n |frequency_step| is kept at this value; n follows from frequency_step, or
+               frequency_step from n where n is swept
 
-    ValueError names a key that no case has, a list without values, more than 64 cases, a band that is no whole number
-    of steps, and the combination that does not make a case.
+    ValueError for a key that no case has, a list without values, more than 64 cases, a band that is not a whole number
+    of steps, and a combination that is not a valid case.
     """
     validation.instance("case", case, Case)
     return cases({name: getattr(case, name) for name in Case.__dataclass_fields__}, values)
 
 
 def cases(fields: Mapping[str, Any], values: Mapping[str, Any]) -> list[Case]:
-    """What `sweep` returns, of the fields of a case that need be none without the values; Case's own where left out."""
+    """The cases of `sweep`, from fields that need not be a valid case alone; missing fields have Case's defaults."""
     lists = {name: _list(name, given) for name, given in values.items()}
     if not lists:
-        raise ValueError(f"a sweep without keys is no sweep; give a list of values for any of {', '.join(KEYS)}")
+        raise ValueError(f"a sweep without keys sweeps nothing; give a list of values for any of {', '.join(KEYS)}")
     if "bandwidth" in lists and {"n", "frequency_step"} <= set(lists):
-        raise ValueError("bandwidth, n and frequency_step say each other; sweep bandwidth with one of the other two")
+        raise ValueError(
+            "bandwidth, n and frequency_step depend on each other; sweep bandwidth with one of the other two"
+        )
     varied = [name for name in lists if name != "bandwidth" or np.ndim(values["bandwidth"])]
     if not varied:
         raise ValueError("bandwidth alone sweeps nothing; give frequency_step or n a list of values")
@@ -65,7 +67,7 @@ def cases(fields: Mapping[str, Any], values: Mapping[str, Any]) -> list[Case]:
 
 
 def shown(name: str, value: Any) -> str:
-    """A value with its unit, or a word."""
+    """A value with its unit as text, or a word."""
     unit, scale = UNITS.get(name, ("", 1.0))
     if value is None or isinstance(value, (bool, str)):
         return str(value).lower()
@@ -87,7 +89,7 @@ def _list(name: str, given: Any) -> list[Any]:
 
 
 def _whole(fields: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
-    """The fields that one combination sets: the band told in n and frequency_step."""
+    """The fields set by one combination, with bandwidth replaced by n and frequency_step."""
     if "bandwidth" not in given:
         return given
     given = dict(given)
@@ -101,7 +103,7 @@ def _whole(fields: Mapping[str, Any], given: dict[str, Any]) -> dict[str, Any]:
     n = band / abs(step) if step else 0.0
     if n < 1.5 or abs(n - round(n)) > 1e-6:
         raise ValueError(
-            f"bandwidth is {band:g} Hz and frequency_step {step:g} Hz: {n:.4g} elements; give a step that the band "
-            "holds a whole number of times, twice at least"
+            f"bandwidth is {band:g} Hz and frequency_step {step:g} Hz: {n:.4g} elements; give a step of which the "
+            "band is a whole multiple, at least twice"
         )
     return {**given, "n": round(n)}

@@ -1,4 +1,4 @@
-"""What an experiment on frequency-diverse apertures flies: an array, a path, a receiver, and what it is set beside."""
+"""A case of an experiment on frequency-diverse apertures: array, track, receiver, conventional antenna beside it."""
 
 from __future__ import annotations
 
@@ -24,35 +24,35 @@ from ._array import PROGRESSIONS, as_channels, groups_of, highest, make, size, s
 
 RAW = "unmodified"
 PATHS = ("line", "circle")
-REACH = 12.0  # null widths on each side of a cut
-WIDE = 0.05  # of the aperture: phase centres spread over less widen nothing by more than a thousandth
-STEEPEST = 1.55  # rad of squint
+REACH = 12.0  # length of a cut on each side of a point, in nulls of the conventional antenna
+WIDE = 0.05  # share of the aperture; phase centres spread over less change widths by at most a thousandth
+STEEPEST = 1.55  # rad, largest squint
 
 
 @dataclass(frozen=True)
 class Case:
-    """An array, its carriers, its track and the points it looks at: x along the line of sight from mid-aperture in the
-    ground plane, y across it, z up, the scene's centre at the origin.
+    """An array, its carriers, its track and the points it observes. x is along the line of sight from mid-aperture in
+    the ground plane, y across it, z up, the scene's centre at the origin.
 
-    n, spacing m, frequency_step Hz   elements at -i spacing along the track, as Farooq's; spacing None: half a wave of
-                                      the centre frequency
+    n, spacing m, frequency_step Hz   elements at -i spacing along the track, as in Farooq 2009; spacing None: half a
+                                      wavelength at the centre frequency
     center                            f0, Hz;  distance of mid-aperture m;  aperture, length of the track m;  n_pulses
-    mirrored                          the carriers run in reverse from mid-aperture on, the centre frequency stays
+    mirrored                          from mid-aperture on the carriers run in reverse; the centre frequency stays
     mappings                          of `sarcl.map_aperture`, and "unmodified"
-    points                            cross-range places y of lone points, m
+    points                            cross-range positions y of single points, m
     separations                       of two points about the centre, m
     progression  "linear"; "costas": carriers in a Costas order; "vertical": elements at -i spacing along z; "planar":
                  n (ny, nz), frequency_step (dfy, dfz), elements along the track and z; "subarrays": a line in `groups`,
                  each sending the carrier of its first element, the middle of the first at the reference point
-    steer        of subarrays: off the scene's centre as mid-aperture sees it, rad from x towards y
-    path         "line"; "circle": an arc about the scene's centre, the array turning with the track
-    squint       of the line of sight ahead of broadside, in the ground plane, rad;  height  of the track, m
+    steer        direction of subarrays from the scene's centre, seen from mid-aperture, rad from x towards y
+    path         "line"; "circle": an arc about the scene's centre, along which the array turns
+    squint       angle of the line of sight ahead of broadside, in the ground plane, rad;  height: of the track, m
     receive      "reference": one receiver, at the reference element, channels added up; "own": every element its own
-                 channel; "all": every element all of them, kept apart
-    series, swept  what `sarcl.fda.sweep` made it of: a case's name, and (key, value) pairs
+                 channel; "all": every element all channels; both kept separate
+    series, swept  of a case made by `sarcl.fda.sweep`: name of the original case, (key, value) pairs
 
-    Where phase centres spread over more than 5 % of the aperture, their mean follows the track, else the reference
-    element does. ValueError names the key that does not fit.
+    Where phase centres spread over more than 5 % of the aperture, their mean follows the track, otherwise the
+    reference element does. ValueError names the key that does not fit.
     """
 
     name: str
@@ -90,7 +90,7 @@ class Case:
             values = validation.array(name, getattr(self, name), np.float64, ("n",))
             self._put(name, tuple(values.tolist()))
         if any(s <= 0 for s in self.separations):
-            raise ValueError(f"separations are {self.separations}; two points need to be some way apart")
+            raise ValueError(f"separations are {self.separations}; two points must be some distance apart")
         if not isinstance(self.name, str):
             raise ValueError(f"name is {self.name!r:.60}; give a text")
         if not isinstance(self.mirrored, bool):
@@ -115,11 +115,11 @@ class Case:
             raise ValueError(f"height is {self.height:g} m, but mid-aperture is {self.distance:g} m away; give less")
         if abs(self.squint) > STEEPEST:
             raise ValueError(
-                f"squint is {self.squint:g} rad; a track straight at the scene, pi/2, resolves nothing across: give at "
-                f"most {STEEPEST}"
+                f"squint is {self.squint:g} rad; a track that points at the scene, pi/2, resolves nothing across: give "
+                f"at most {STEEPEST}"
             )
         if self.path == "circle" and self.squint:
-            raise ValueError("squint goes with path 'line': on a circle the scene's centre is always abeam")
+            raise ValueError("squint goes with path 'line': on a circle the scene's centre is always at broadside")
         around = 2 * np.pi * self.ground
         if self.path == "circle" and self.aperture >= around:
             raise ValueError(f"aperture is {self.aperture:g} m, the whole circle {around:g} m; give less")
@@ -129,8 +129,8 @@ class Case:
         if low > 0:
             if spacing(np.unique(self.array().offsets)) is None:
                 raise ValueError(
-                    f"frequency_step is {self.frequency_step}: these carriers are no whole multiples of one step apart "
-                    "and share no samples; give steps that are multiples of one another"
+                    f"frequency_step is {self.frequency_step}: the differences of these carriers are no whole "
+                    "multiples of one step, so that they share no samples; give steps that are multiples of one another"
                 )
             low = self.middle - self.bandwidth / 2
         if low <= 0:
@@ -140,13 +140,13 @@ class Case:
             )
 
     def _window(self) -> None:
-        """Refuse what would be measured wrongly: separations beyond the cut, and points whose echoes leave the range
-        window and would be gated out, pulse by pulse."""
+        """Refuse what cannot be measured: separations beyond the cut, and points whose echoes leave the range window in
+        some pulses."""
         reach = REACH * self.null
         if max(self.separations) > reach:
             raise ValueError(
                 f"separations reach {max(self.separations):g} m, but the cut {reach:.3g} m to each side, {REACH:g} "
-                "null widths; give smaller ones"
+                "nulls; give smaller ones"
             )
         track, centers = self.track(), self.phase_centers
         ends = [_moved(track, centers[i]).positions for i in (0, -1)]
@@ -154,18 +154,18 @@ class Case:
             off = max(np.abs(np.linalg.norm(p - (0, y, 0), axis=1) - np.linalg.norm(p, axis=1)).max() for p in ends)
             if off >= self.window:
                 raise ValueError(
-                    f"the point at {y:g} m comes up to {off:.3g} m nearer or farther than the centre, but one sample a "
-                    f"channel leaves {self.window:.3g} m; move it in, or lower frequency_step"
+                    f"the point at {y:g} m is up to {off:.3g} m nearer or farther than the centre, but one sample "
+                    f"per channel covers {self.window:.3g} m; move the point inwards, or lower frequency_step"
                 )
 
     @property
     def channel_step(self) -> float:
-        """Hz from one carrier to the next."""
+        """Difference of neighbouring carriers, Hz."""
         return float(spacing(np.unique(self.array().offsets)) or 0.0)
 
     @property
     def bandwidth(self) -> float:
-        """From the lowest carrier to the highest and half a step on each side, Hz: n |frequency_step| of a line."""
+        """From the lowest to the highest carrier plus half a step on each side, Hz: n |frequency_step| of a line."""
         return self.array().span + self.channel_step
 
     @property
@@ -185,7 +185,7 @@ class Case:
 
     @property
     def null(self) -> float:
-        """How far the first null of the track's aperture lies off the peak, across, m: a wave over twice the spread
+        """Distance across from the peak to the first null of the track's aperture, m: wavelength over twice the spread
         of sines, L cos(squint)/R on a line and 2 sin(arc/2) ground/R on a circle."""
         if self.path == "line":
             spread = self.aperture * np.cos(self.squint) / self.distance
@@ -195,7 +195,7 @@ class Case:
 
     @property
     def window(self) -> float:
-        """Range on each side of the centre that one sample a channel holds, m."""
+        """Range on each side of the centre that one sample per channel covers, m."""
         return 0.49 * SPEED_OF_LIGHT / (2 * self.channel_step)
 
     @property
@@ -205,16 +205,16 @@ class Case:
 
     @property
     def phase_centers(self) -> np.ndarray:
-        """Of the channels, off the reference point in the axes of mid-aperture, m (n, 3); of "all" senders' places."""
+        """Phase centres of the channels from the reference point in axes of mid-aperture, m (n, 3); "all": senders."""
         return np.asarray(self.channels().positions / (2 if self.receive == "reference" else 1))
 
     @property
     def is_wide(self) -> bool:
-        """Whether phase centres spread so far that one antenna at their mean does not stand for them."""
+        """Whether phase centres spread so far that one antenna at their mean cannot represent them."""
         return bool(np.linalg.norm(np.ptp(self.phase_centers, axis=0)) > WIDE * self.aperture)
 
     def track(self) -> Trajectory:
-        """Of the reference point."""
+        """Positions of the reference point."""
         along = self.aperture * (np.arange(self.n_pulses) / (self.n_pulses - 1) - 0.5)
         middle, times = np.array([-self.ground, 0.0, self.height]), np.arange(self.n_pulses)
         if self.path == "line":
@@ -225,7 +225,7 @@ class Case:
         return _moved(made, -self.phase_centers.mean(axis=0)) if self.is_wide else made
 
     def array(self) -> AntennaArray:
-        """The array, over all pulses."""
+        """The array and its carriers in all pulses."""
         made = make(self.progression, self.n, self.frequency_step, self.step, self.ahead)
         if self.groups is not None:
             level, turn = self.ground / self.distance, self.steer
@@ -234,21 +234,21 @@ class Case:
         return made.mirrored(self.n_pulses // 2, self.n_pulses) if self.mirrored else made
 
     def channels(self) -> AntennaArray:
-        """One element a channel: the array, or of subarrays each group as one element at its middle."""
+        """One element per channel: the array; of subarrays each group as one element at its middle."""
         return self.array() if self.groups is None else as_channels(self.array(), self.groups)
 
     def collect(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
-        """Echoes of unit points at (0, y, 0): channels added up at the reference element, or kept apart."""
+        """Echoes of unit points at (0, y, 0): channels added up at the reference element, or kept separate."""
         tone = Waveform.tone(center=self.center, duration=1 / self.channel_step)
         kept = "simultaneous" if self.receive == "reference" else "separated"
         raw = self._echo(places, tone, self.track(), device, array=self.array(), channels=kept, receive=self.receive)
         return raw if self.groups is None else replace(raw, array=self.channels())
 
     def conventional(self, places: Sequence[float], device: DeviceChoice | None = None) -> PhaseHistory:
-        """The same points as a conventional antenna sees them: the same phase centres and track, a chirp of the band.
+        """Echoes of the same points with a conventional antenna: the same phase centres and track, a chirp of the band.
 
-        One antenna at the mean phase centre; where they spread (`is_wide`), an element for each channel, all sending
-        the chirp, told apart, and received as the array's channels are.
+        One antenna at the mean phase centre; where phase centres spread (`is_wide`), an element for each channel. All
+        send the chirp; their echoes are kept separate, and received as the array's channels are.
         """
         chirp = Waveform.chirp(center=self.middle, bandwidth=self.bandwidth, duration=1 / self.channel_step)
         if not self.is_wide:
@@ -269,7 +269,7 @@ class Case:
 
 
 def _moved(track: Trajectory, offset: np.ndarray) -> Trajectory:
-    """Of a point off the reference point, m (3,) in the axes of mid-aperture."""
+    """Track of a point at `offset`, m (3,) in the axes of mid-aperture, from the reference point."""
     turned = offset if track.attitude is None else track.attitude @ offset
     return replace(track, positions=track.positions + turned)
 

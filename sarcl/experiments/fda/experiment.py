@@ -1,7 +1,7 @@
-"""Experiments on frequency-diverse apertures: what a mapping does to a point, to its neighbours, and to the data.
+"""Experiments on frequency-diverse apertures: effects of mappings on points, pairs of points and spatial frequencies.
 
-Every case is collected once, mapped in every way asked for, and set beside a conventional antenna with the same phase
-centres, band and track. What is flown: case.py; what is measured: docs/guide/fda.md.
+The echoes of every case are made once, mapped in every way asked for, and compared with a conventional antenna of the
+same phase centres, band and track. Array and track: case.py; quantities: docs/guide/fda.md.
 """
 
 from __future__ import annotations
@@ -23,11 +23,11 @@ from .case import RAW, REACH, Case
 __all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "run", "sweep", "told_apart"]
 
 CONVENTIONAL = "conventional"
-STEPS = 24  # places in a null width of the conventional aperture
-DRAWN = 2000  # spatial frequencies
-RESOLVED = 3.0  # dB between two points that are told apart
-ALIKE = 0.2  # dB by which dips may differ that say the same
-NEAR = 0.25  # of a null width: how far their peaks may stand from them
+STEPS = 24  # samples of a cut per null of the conventional antenna
+DRAWN = 2000  # spatial frequencies that are kept, for plots
+RESOLVED = 3.0  # dB, dip between two points that are resolved
+ALIKE = 0.2  # dB; dips that differ by less count as equal
+NEAR = 0.25  # of the null: distance from two points within which their peaks must lie
 
 
 def run(
@@ -36,7 +36,7 @@ def run(
     device: DeviceChoice | None = None,
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
-    """What was measured of each case: plain numbers, ready for JSON."""
+    """Measurements of each case: plain numbers, ready for JSON."""
     out = []
     for i, case in enumerate(cases):
         if progress:
@@ -48,9 +48,9 @@ def run(
 
 
 def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
-    """Responses at every place, dips at every separation and the data's support, of every mapping that applies.
+    """Responses of every point, dips at every separation and spatial frequencies, for every mapping that applies.
 
-    "not_applicable" holds the others, with the reason. "collected" is the support of the channels themselves.
+    "not_applicable" holds the other mappings, with the reason; "collected" the spatial frequencies of the channels.
     """
     rows: dict[str, dict[str, Any]] = {}
     refused: dict[str, str] = {}
@@ -76,7 +76,7 @@ def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
 def _mapped(
     case: Case, places: Sequence[float], refused: dict[str, str], device: Any
 ) -> Iterator[tuple[str, PhaseHistory]]:
-    """The conventional data and those of every mapping that applies; `refused` gains the others, with the reason."""
+    """Name and echoes of the conventional antenna and of every mapping that applies; `refused` gets the others."""
     yield CONVENTIONAL, case.conventional(places, device)
     raw = case.collect(places, device)
     for name in case.mappings:
@@ -93,13 +93,15 @@ def _mapped(
 def _map(case: Case, raw: PhaseHistory, name: str) -> PhaseHistory:
     if raw.tx_channel is not None and name in (RAW, "channels"):
         if name == RAW:
-            raise NotApplicable("every row holds its own channel's place and carrier as it is: that is 'channels'")
+            raise NotApplicable(
+                "every row already holds the position and carrier of its own channel: that is 'channels'"
+            )
         return raw
     return raw if name == RAW else map_aperture(raw, cast(MapKind, name), attitude=case.track().attitude)
 
 
 def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = None) -> tuple[np.ndarray, np.ndarray]:
-    """Image along cross-range about (0, y, 0): places, m (n,), and amplitudes (n,), 1 for a focused unit point."""
+    """Image along cross-range about (0, y, 0): positions, m (n,), and amplitudes (n,), 1 for a focused unit point."""
     from ...imaging.backproject import backproject
     from ...model.image_grid import ImageGrid
 
@@ -111,9 +113,9 @@ def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = N
 
 
 def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:
-    """Of one point: error of the peak's place and its level, null and half-power widths, m, PSLR and ISLR, dB.
+    """Response of a point: error of the peak's position, m; its level, dB; null, half-power width, m; PSLR, ISLR, dB.
 
-    "inside" is False where the highest value is the cut's first or last: what was measured is then no peak.
+    "inside" is False where the highest value is the first or last of the cut, and therefore no peak.
     """
     from scipy.interpolate import CubicSpline
 
@@ -138,7 +140,7 @@ def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, floa
 
 
 def _vertex(x: np.ndarray, y: np.ndarray, i: int) -> float:
-    """Where the parabola through an extreme sample and its neighbours has its own."""
+    """Position of the vertex of the parabola through an extreme sample and its neighbours."""
     if not 0 < i < len(y) - 1:
         return float(x[i])
     bend, slope = y[i - 1] - 2 * y[i] + y[i + 1], (y[i - 1] - y[i + 1]) / 2
@@ -146,7 +148,7 @@ def _vertex(x: np.ndarray, y: np.ndarray, i: int) -> float:
 
 
 def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
-    """Where power falls through half its peak, next to sample i."""
+    """Position, next to sample i, at which the power falls through half its peak."""
     if not 0 <= i + side < len(power):
         return float(x[i])
     share = (power[i] - power.max() / 2) / max(power[i] - power[i + side], 1e-300)
@@ -154,18 +156,18 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
-    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is but one peak."""
+    """How far the image falls between two points, dB below the lower of their peaks; 0 where there is only one peak."""
     return pair(at, values, separation)["dip_db"]
 
 
 def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, float]:
-    """Of two points about 0: the `dip`, dB; shift, how far the worse of their peaks stands from its point, m; false_db,
-    the highest other peak over the lower of the two, dB. Zeros where there is but one peak."""
+    """Two points about 0: the `dip`, dB; shift, the larger distance of their peaks from the points, m; false_db, the
+    highest other peak relative to the lower of the two, dB. Zeros where there is only one peak."""
     found = []
     for side in (-1, 1):
         near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
         peak = int(near[values[near].argmax()])
-        if peak in (near[0], near[-1]):  # it only rises towards the middle, or goes on rising outwards
+        if peak in (near[0], near[-1]):  # no peak: the level only rises, towards the middle or outwards
             return {"dip_db": 0.0, "shift": 0.0, "false_db": 0.0}
         found.append(peak)
     lower, between = float(values[found].min()), float(values[found[0] : found[1] + 1].min())
@@ -179,9 +181,9 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, flo
 
 
 def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = RESOLVED) -> float | None:
-    """The smallest separation, m, from which on two points are told apart; None: not even at the largest.
+    """The smallest separation, m, from which on two points are resolved; None: not even at the largest.
 
-    That is a dip of `least` dB, peaks within a quarter of the null width, m, of the points, no other within 3 dB.
+    Resolved: a dip of `least` dB, peaks within a quarter of `null`, m, of the points, no other peak within 3 dB.
     """
     out = None
     for row in sorted(dips, key=lambda d: -d["separation"]):
@@ -192,8 +194,8 @@ def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = 
 
 
 def nearer(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> int | None:
-    """1 where `row` tells two points apart nearer together than `plain` does, -1 only farther apart or not at all, 0 at
-    the same separation (dips that differ by less than 0.2 dB are one), None where neither does."""
+    """1 where `row` resolves two points closer together than `plain`, -1 only farther apart or not at all, 0 at the
+    same separation (dips that differ by less than 0.2 dB count as equal), None where neither resolves them."""
     mine, other = (_no_less(row["told_apart"]), _no_less(plain["told_apart"]))
     if mine == other:
         return None if mine == np.inf else 0
@@ -208,7 +210,7 @@ def _no_less(separation: float | None) -> float:
 
 
 def _described(raw: PhaseHistory, case: Case) -> dict[str, Any]:
-    """Lengths of the phase centres backprojected from, and the spatial frequencies that they claim, turns/m."""
+    """Length and largest gap of the phase centres, m, and the spatial frequencies that they imply, cycles/m."""
     centers = (raw.tx + raw.rx) / 2
     if case.path == "line":
         along = centers @ case.ahead
@@ -227,7 +229,7 @@ def _support(found: np.ndarray) -> dict[str, Any]:
 
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
-    """K = f/c (u_T + u_R) at the origin, of up to `most` samples of every row, turns/m (n, 2): along x and y."""
+    """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y."""
     some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
     look = unit(raw.tx) + unit(raw.rx)
@@ -235,7 +237,7 @@ def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
 
 
 def collected(case: Case, most: int = 101) -> dict[str, Any]:
-    """Spread across, turns/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
+    """Spread across, cycles/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
     pulses."""
     array, track = case.channels(), case.track()
     pulses = np.unique(np.linspace(0, case.n_pulses - 1, most).astype(int))

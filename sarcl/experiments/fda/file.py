@@ -1,4 +1,4 @@
-"""Experiment files of `sarcl fda`: what all cases share, what differs from case to case, and what is swept."""
+"""Experiment files of `sarcl fda`: keys shared by all cases, keys of each case, and swept keys."""
 
 from __future__ import annotations
 
@@ -19,10 +19,10 @@ TABLES = ["fda", "case", "sweep"]
 
 
 def load(path: Any) -> tuple[str, list[Case]]:
-    """Title and cases of a TOML file: [fda] holds `title` and what all cases share, every [[case]] the rest.
+    """Title and cases of a TOML file: [fda] holds `title` and the keys that all cases share, each [[case]] its own.
 
-    Without a [[case]] the shared table is the only one. [sweep] makes each into as many as its lists have combinations
-    (`sarcl.fda.sweep`). squint_deg and steer_deg are degrees. ValueError names file and key of what does not fit.
+    Without a [[case]] the shared table is the only case. [sweep] makes of each case one case per combination of its
+    lists (`sarcl.fda.sweep`). squint_deg and steer_deg are in degrees. ValueError names the file and the key.
     """
     path = Path(path)
     try:
@@ -58,7 +58,7 @@ def load(path: Any) -> tuple[str, list[Case]]:
 
 
 def _plain(table: dict[str, Any], known: tuple[str, ...], where: str) -> dict[str, Any]:
-    """Keys and values as Case has them: tuples for lists, radians for degrees."""
+    """Keys and values for Case: tuples instead of lists, radians instead of degrees."""
     degrees = {f"{name}_deg": name for name in ANGLES}
     out: dict[str, Any] = {}
     for key, value in table.items():
