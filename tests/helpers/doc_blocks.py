@@ -1,6 +1,7 @@
 """How Sybil runs the code blocks of README.md and docs: those of a page in order, in one namespace, in a fresh folder.
 
-    python   is executed. A block that begins with >>> is compared with the output that it shows.
+    python   is executed. A block that begins with >>> is compared with the output or error that it shows, numbers
+             to one unit of the last digit shown.
     toml     names its file in its first line: "# scene.toml", or "# scene.toml, continued" for lines to be appended.
              The file is written, and must load as a scenario or, with a table [fda], as an experiment.
     sh       is executed by bash, with the programs of this Python first on the path. A block whose first word is in
@@ -17,7 +18,7 @@ import re
 import subprocess
 import sys
 from collections.abc import Iterable
-from doctest import ELLIPSIS, IGNORE_EXCEPTION_DETAIL, NORMALIZE_WHITESPACE
+from doctest import ELLIPSIS, NORMALIZE_WHITESPACE
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import Any
@@ -92,7 +93,7 @@ _FOLDERS = _Folders()
 SYBIL = Sybil(
     parsers=[
         SkipParser(),
-        PythonCodeBlockParser(doctest_optionflags=ELLIPSIS | NUMBER | NORMALIZE_WHITESPACE | IGNORE_EXCEPTION_DETAIL),
+        PythonCodeBlockParser(doctest_optionflags=ELLIPSIS | NUMBER | NORMALIZE_WHITESPACE),
         CodeBlockParser("toml", _load_toml),
         _shell_blocks,
     ],
