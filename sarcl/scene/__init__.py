@@ -1,12 +1,12 @@
-"""What reflects: points, facets, materials.
+"""Reflecting objects: points, facets, materials.
 
 For other folders:
 
     material    Material: permittivity, conductivity, roughness below the size of a facet
     scene       Scene: point scatterers and triangular facets
     shapes      solids of exact dimensions as facets: sphere, box, cone ...
-    terrain     facets over grids of heights
-    triangles   areas, normals and centroids of triangles; rotations
+    terrain     facets over grids of heights, and heights above them
+    triangles   areas, normals and centroids of triangles; cutting; rotations
 """
 
 __all__ = ["material", "scene", "shapes", "terrain", "triangles"]

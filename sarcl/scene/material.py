@@ -25,15 +25,15 @@ class Material:
     eps_r         real part of the relative permittivity, at least 1
     conductivity  S/m; inf is a perfect conductor
     height        rms height of the roughness finer than a facet, m: the coherent reflection falls by
-                  exp(-(q.n height)^2/2); inf: none is left. Default 0, with a diagram inf
-    diagram       how the incoherent rest re-radiates, d the angle between the normal and the bisector of the two
-                  lines of sight: "isotropic", "cos", "cos2" (cos^2 d), "exp" (exp(-(d/width)^2)); none for "smooth",
-                  alias "sinc", the deterministic lobe of a flat facet
-    width         d at which "exp" has fallen to 1/e, rad
+                  exp(-(q.n height)^2/2); inf: there is none. Default 0, with a diagram inf
+    diagram       re-irradiation of the incoherent part, d the angle between the normal and the bisector of the two
+                  lines of sight: "isotropic", "cos", "cos2" (cos^2 d), "exp" (exp(-(d/width)^2)). "smooth", alias
+                  "sinc", has no incoherent part, only the deterministic lobe of a flat facet
+    width         rad, angle d at which "exp" is 1/e
     reflectivity  factor on the amplitude, 0 to 1
     name          for messages and scenario files
 
-    `Material()` is a perfect conductor; eps_r alone a lossless dielectric. ValueError says what cannot be.
+    `Material()` is a perfect conductor; eps_r alone gives a lossless dielectric. ValueError for impossible values.
     Source: Franceschetti et al. 1992 (SARAS), eq. (11) and appendix.
     """
 
@@ -71,7 +71,7 @@ class Material:
         if self.diagram in COHERENT and self.height == np.inf:
             raise ValueError(
                 f"height is inf with diagram {self.diagram!r}: nothing would be reflected; take a diagram such as "
-                "'isotropic' for what is reflected incoherently"
+                "'isotropic' for incoherent reflection"
             )
         if (self.diagram == "exp") != (self.width > 0):
             raise ValueError(
@@ -101,7 +101,7 @@ class Material:
     def permittivity(self, frequency: ArrayLike) -> Any:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
-        Its imaginary part is negative: fields go as exp(+j 2 pi f t). inf for a perfect conductor.
+        Its imaginary part is negative: fields vary as exp(+j 2 pi f t). inf for a perfect conductor.
         """
         frequency = np.asarray(frequency, np.float64)
         if not (frequency > 0).all():
@@ -184,12 +184,12 @@ def resolve(
     if whole and listed is not None:
         if given.size and not 0 <= given.min() <= given.max() < len(listed):
             bad = given.min() if given.min() < 0 else given.max()
-            raise ValueError(f"material holds {bad}; whole numbers are places in materials, 0 to {len(listed) - 1}")
+            raise ValueError(f"material holds {bad}; whole numbers are indices into materials, 0 to {len(listed) - 1}")
         index, kinds = given, listed
     elif whole and given.ndim:
         raise ValueError(
-            "material is an array of whole numbers; give the materials=[...] they are places in, or floats from 0 to 1 "
-            "for reflectivities"
+            "material is an array of whole numbers; give the materials=[...] they are indices into, or floats from 0 "
+            "to 1 for reflectivities"
         )
     elif given.dtype.kind in "iuf":
         value = _reflectivity(given)
@@ -219,6 +219,23 @@ def merge(tables: Sequence[Sequence[Material]]) -> tuple[tuple[Material, ...], l
     joined: dict[Material, int] = {}
     places = [np.array([joined.setdefault(m, len(joined)) for m in table], np.int32) for table in tables]
     return tuple(joined), places
+
+
+def checked_table(materials: Sequence[Material], index: np.ndarray) -> tuple[tuple[Material, ...], np.ndarray | None]:
+    """Materials of reflectivity 1 that index, (k,), refers to, default metal; and the reflectivity of each facet (k,).
+
+    None in place of reflectivities that are all 1. Raises ValueError for an index outside the table.
+    """
+    table = tuple(materials) or ((METAL,) if len(index) else ())
+    for m in table:
+        validation.instance("materials", m, Material)
+    if index.size and not 0 <= index.min() <= index.max() < len(table):
+        bad = index.min() if index.min() < 0 else index.max()
+        raise ValueError(f"scene material holds {bad}; it is an index into materials, 0 to {len(table) - 1}")
+    if all(m.reflectivity == 1 for m in table):
+        return table, None
+    factor = np.array([m.reflectivity for m in table])[index]
+    return tuple(replace(m, reflectivity=1.0) for m in table), factor
 
 
 def _array(material: Any) -> np.ndarray:
@@ -277,6 +294,6 @@ def _reflectivity(value: np.ndarray) -> np.ndarray:
     if value.max(initial=0) > 1:
         raise ValueError(
             f"material is {value.max():g}; an amplitude reflectivity lies between 0 and 1: a number stands for a "
-            "perfect conductor that returns so much"
+            "perfect conductor of that reflectivity"
         )
     return value.astype(np.float64)

@@ -15,8 +15,7 @@ from ..base import validation
 from ..base.boxes import box
 from . import terrain
 from . import triangles as geometry
-from .material import METAL, FacetMaterials, Material, MaterialLike, merge, resolve
-from .triangles import areas, edges
+from .material import FacetMaterials, Material, MaterialLike, checked_table, merge, resolve
 
 if TYPE_CHECKING:
     import trimesh
@@ -26,7 +25,7 @@ if TYPE_CHECKING:
 
 log = logging.getLogger(__name__)
 
-POINT_HEIGHTS = 1  # stream of random numbers; 0 is that of the facets' heights
+POINT_HEIGHTS = 1  # stream of random numbers; stream 0 is that of the facets' heights
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,16 +35,16 @@ class Scene:
     positions        points, m (n, 3)
     amplitudes       complex (n,); |amplitude|^2 is the radar cross section, m^2
     triangles        facet corners, m (k, 3, 3), counter-clockwise seen from outside
-    reflectivity     factor on each facet's amplitude, 0 to 1 (k,); that of its material is part of it
+    reflectivity     factor on each facet's amplitude, 0 to 1 (k,), which includes that of its material
     roughness        standard deviation of each facet's height, m (k,): `echo` moves every facet along its normal
-                     by a seeded Gaussian height, which makes speckle once it exceeds about a quarter wavelength
+                     by a seeded Gaussian height, which causes speckle above about a quarter of a wavelength
     two_sided        facets that reflect from both sides (k,): open sheets, and meshes that are not watertight
-    material         each facet's place in materials, int32 (k,), default 0
+    material         index of each facet's material in `materials`, int32 (k,), default 0
     materials        tuple of sarcl.Material, default a perfect conductor; their own reflectivity is moved into
                      `reflectivity`
-    point_roughness  how far one standard deviation moves each corner, m (k, 3, 3); `realized` moves them
-    heights          (x, y, z) of the largest terrain in it, as of from_heights, where it has one: `echo` finds what
-                     that hides by horizons, as long as its facets are all there, cut or not
+    point_roughness  displacement of each corner by one standard deviation, m (k, 3, 3); `realized` applies it
+    heights          (x, y, z) of the largest terrain of from_heights in the scene, if any: `echo` computes its shadows
+                     from horizons, as long as all its facets are present, cut or not
     """
 
     positions: NDArray[np.float64]
@@ -87,31 +86,22 @@ class Scene:
         dtypes = {"amplitudes": np.complex128, "two_sided": np.bool_, "material": np.int32}
         for name in _ARRAYS:
             value, dtype = getattr(self, name), dtypes.get(name, np.float64)
-            # What is read-only already needs no copy.
+            # read-only arrays are not copied
             if not isinstance(value, np.ndarray) or value.flags.writeable or value.dtype != dtype:
                 value = validation.sealed(validation.converted(f"scene {name}", value, dtype))
             wanted = shapes.get(name, (k,))
             if value.shape != wanted:
                 raise ValueError(f"scene {name} has shape {value.shape}, wanted {wanted}")
-            validation.finite(f"scene {name}", value if any(value.strides) else value[:1])  # one number for all
+            validation.finite(
+                f"scene {name}", value if any(value.strides) else value[:1]
+            )  # broadcast: one number for all
             object.__setattr__(self, name, value)
         if (self.roughness < 0).any():
             bad = int(np.argmin(self.roughness))
             raise ValueError(f"roughness[{bad}] is {self.roughness[bad]:g} m; a standard deviation cannot be negative")
-        self._check_materials()
-
-    def _check_materials(self) -> None:
-        """One table of materials of reflectivity 1, which every facet's index falls into."""
-        table = tuple(self.materials) or ((METAL,) if len(self.triangles) else ())
-        for m in table:
-            validation.instance("materials", m, Material)
-        if self.material.size and not 0 <= self.material.min() <= self.material.max() < len(table):
-            bad = self.material.min() if self.material.min() < 0 else self.material.max()
-            raise ValueError(f"scene material holds {bad}; it is a place in materials, 0 to {len(table) - 1}")
-        if any(m.reflectivity != 1 for m in table):
-            factor = np.array([m.reflectivity for m in table])[self.material]
+        table, factor = checked_table(self.materials, self.material)
+        if factor is not None:
             object.__setattr__(self, "reflectivity", validation.sealed(self.reflectivity * factor))
-            table = tuple(replace(m, reflectivity=1.0) for m in table)
         object.__setattr__(self, "materials", table)
 
     @classmethod
@@ -135,14 +125,14 @@ class Scene:
         point_roughness: ArrayLike | None = None,
         two_sided: ArrayLike = True,
     ) -> Scene:
-        """Facets from their corners, m (k, 3, 3). Facets of no area are left out and counted in the log.
+        """Facets from their corners, m (k, 3, 3). Facets without area are left out; their number is logged.
 
         material      a name of sarcl.scene.material.MATERIALS, a sarcl.Material, a number (a perfect conductor of this
                       amplitude reflectivity, 0 to 1), or one of these for each facet (k,)
-        materials     a list of materials that `material` names, or that its whole numbers are places in
+        materials     a list of materials that `material` refers to by name, or by whole numbers as indices
         reflectivity  another factor, 0 to 1, one or (k,)
         roughness, two_sided   as in Scene, one or (k,);  point_roughness  as in Scene (k, 3, 3)
-        ValueError when there are none, a corner is not finite, or every facet has zero area.
+        Raises ValueError when there are none, a corner is not finite, or every facet has zero area.
         """
         triangles = validation.array("triangles", triangles, np.float64, ("n_facets", 3, 3))
         k = len(triangles)
@@ -189,19 +179,20 @@ class Scene:
         position  m (3,)
         rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
-        repair    drop repeated faces, wind neighbours alike, turn closed bodies outside (said in the log)
+        repair    remove repeated faces, wind neighbours consistently and closed bodies outwards; what is done is logged
 
         A mesh that is not watertight reflects from both sides of its facets, so that its winding does not
-        matter. FileNotFoundError, ValueError: file missing, unreadable, without faces, corners not finite.
+        matter. Raises FileNotFoundError or ValueError for a file that is missing, unreadable or without faces, and for
+        corners that are not finite.
         """
         from ..io.mesh import load, part_materials
 
         scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
-        turn = geometry.rotation(rotation)
+        rotate = geometry.rotation(rotation)
         loaded = load(mesh, repair)
         scene = cls.facets(
-            loaded.triangles * scale @ turn.T + position,
+            loaded.triangles * scale @ rotate.T + position,
             **part_materials(material, loaded),
             roughness=roughness,
             two_sided=not loaded.closed,
@@ -220,13 +211,13 @@ class Scene:
         roughness: ArrayLike = 0.0,
         point_roughness: ArrayLike = 0.0,
     ) -> Scene:
-        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets a cell, facing up.
+        """Terrain of heights z (n_y, n_x) over increasing x (n_x,), y (n_y,), m: two facets per cell, facing up.
 
         z                or a function z(x, y) of two arrays (n_y, n_x)
-        material         one, or one a cell (n_y - 1, n_x - 1); materials  as in Scene.facets
-        roughness        m, one number or one per cell: moves the cell's facets along their normals
-        point_roughness  m, one number or one per grid point (n_y, n_x): standard deviation of its height; moves
-                         centres and tilts facets, the surface stays closed (`Scene.realized`)
+        material         one, or one per cell (n_y - 1, n_x - 1); materials  as in Scene.facets
+        roughness        m, one number or one per cell: the cell's facets are moved along their normals
+        point_roughness  m, one number or one per grid point (n_y, n_x): standard deviation of its height;
+                         facets are moved and tilted, the surface stays closed (`Scene.realized`)
         """
         points = terrain.grid(x, y, z)
         up = np.array([0.0, 0.0, 1.0])
@@ -252,19 +243,18 @@ class Scene:
         """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[dem].
 
         bounds   (west, south, east, north), degrees, default the whole file
-        center   (longitude, latitude[, height]), degrees and m: origin of the local frame, default the middle of
-                 what is read at height 0 of the ellipsoid
+        center   (longitude, latitude[, height]), degrees and m: origin of the local frame, default the centre of the
+                 area that is read, at height 0 above the ellipsoid
         frame    "local": x east, y north, z up at center; "ecef": Earth-centred, Earth-fixed
-        heights  what the heights are above where the file does not say: "ellipsoid", or the geoid's name
-                 ("EGM96", "EGM2008")
+        heights  vertical reference, where the file does not say: "ellipsoid", or the geoid's name ("EGM96", "EGM2008")
         geoid    height of that geoid above the ellipsoid, m: a number, an array of the points read, a function
-                 of longitude and latitude in degrees, or a raster file of it; 0 takes heights above the geoid for
+                 of longitude and latitude in degrees, or a raster file of it; 0 uses heights above the geoid as
                  heights above the ellipsoid, with a warning
-        nodata   a height that means none, where the file does not say
+        nodata   height that marks missing data, where the file does not say
         material, materials, roughness, point_roughness   as in from_heights, rows as in the file
 
-        Cells without data have no facets (counted in the log). FileNotFoundError, ImportError; ValueError: no CRS,
-        no vertical reference, nothing in bounds, only nodata, heights that are no heights.
+        Cells without data have no facets; their number is logged. Raises FileNotFoundError, ImportError, and ValueError
+        where there is no CRS, no vertical reference, nothing in bounds, only nodata, or heights that are not finite.
         """
         from ..io import elevation
 
@@ -290,12 +280,12 @@ class Scene:
 
     @property
     def has_random_points(self) -> bool:
-        """True where point_roughness is still to be realized."""
+        """Whether point_roughness is not yet realized."""
         return any(self.point_roughness.strides) and bool(self.point_roughness.any())
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of the box that holds everything, m (2, 3)."""
+        """Lower and upper corner of the box that holds all points and facets, m (2, 3)."""
         corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
         return box(corners)
 
@@ -336,10 +326,10 @@ class Scene:
         return replace(self, positions=positions, triangles=triangles, heights=heights)
 
     def realized(self, seed: int = 0) -> Scene:
-        """One surface of those that point_roughness describes: every corner moved by a seeded Gaussian number.
+        """One realization of the surface that point_roughness describes: corners are moved by seeded Gaussian numbers.
 
-        The number is a hash of the seed and the corner's own place, so facets that share a corner stay joined,
-        and neither order nor neighbours matter. Scenes without point_roughness are returned as they are.
+        The number is a hash of the seed and the corner's position, so facets that share a corner stay joined, and
+        neither order nor neighbours matter. Scenes without point_roughness are returned as they are.
         """
         seed = validation.count("seed", seed, 0)
         if not self.has_random_points:
@@ -352,43 +342,24 @@ class Scene:
         return replace(self, triangles=moved, point_roughness=_none(len(moved)), heights=heights)
 
     def part(self, which: np.ndarray) -> Scene:
-        """The scene with some of its facets alone, bool (k,)."""
+        """The scene with only those of its facets for which `which`, bool (k,), is True."""
         parts: dict[str, Any] = {n: validation.sealed(getattr(self, n)[which]) for n in _FACET_ARRAYS}
         return replace(self, **parts)
 
     def split(self, max_edge: float, max_facets: int = 50_000_000) -> Scene:
         """The same surface with facets bisected at their longest edge until none is longer than max_edge, m.
 
-        MemoryError when more than `max_facets` would be needed; ValueError for point_roughness not yet realized.
+        Raises MemoryError when more than `max_facets` would result, ValueError for point_roughness not yet realized.
         """
         max_edge = validation.number("max_edge", max_edge, above=0)
         if len(self.triangles) == 0:
             return self
         if self.has_random_points:
             raise ValueError(
-                "point_roughness is one random height for each grid point, which cutting facets would add points to; "
+                "point_roughness is one random height per grid point, and cutting facets would add points; "
                 "call scene.realized(seed) first"
             )
-        too_many = (
-            f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
-            "take a smaller scene, a larger max_edge or a coarser resolution"
-        )
-        # No facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory.
-        if areas(self.triangles).sum() > max_facets * np.sqrt(3) / 4 * max_edge**2:
-            raise MemoryError(too_many)
-        triangles, row = self.triangles, np.arange(len(self.triangles))
-        done: list[tuple[np.ndarray, np.ndarray]] = []
-        n_done = 0
-        while len(triangles):
-            lengths = edges(triangles)
-            long = np.maximum.reduce(lengths) > max_edge
-            done.append((triangles[~long], row[~long]))
-            n_done += len(done[-1][0])
-            if n_done + 2 * long.sum() > max_facets:
-                raise MemoryError(too_many)
-            triangles = np.concatenate(geometry.bisect(triangles[long], lengths[:, long]))
-            row = np.tile(row[long], 2)
-        triangles, row = (np.concatenate(a) for a in zip(*done, strict=True))
+        triangles, row = geometry.cut(self.triangles, max_edge, max_facets)
         belongs: dict[str, Any] = {
             n: validation.sealed(getattr(self, n)[row]) for n in ("reflectivity", "roughness", "two_sided", "material")
         }
@@ -400,5 +371,5 @@ _FACET_ARRAYS = tuple(n for n in _ARRAYS if n not in ("positions", "amplitudes")
 
 
 def _none(k: int) -> np.ndarray:
-    """No displacement for k facets, in no memory."""
+    """Zero displacements for k facets, which occupy no memory."""
     return np.broadcast_to(0.0, (k, 3, 3))

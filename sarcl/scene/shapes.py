@@ -1,11 +1,11 @@
 """Solids of exact dimensions as facets: ``from sarcl import shapes; ground + shapes.cone(3, 5).on(ground, 10, 0)``.
 
-They stand on z = 0 with their axis along z through the origin (a sphere is about the origin), then are turned and
-moved; all but `plate` and `disc` are closed and face outwards. Corners lie on the true surface, so curved solids are
-inscribed: n facets round the axis stay within 1 - cos(pi/n) of the radius.
+They stand on z = 0 with their axis along z through the origin (a sphere is centred at the origin), and are then
+rotated and moved. All but `plate` and `disc` are closed and face outwards. Corners lie on the true surface, so curved
+solids are inscribed: n facets around the axis stay within 1 - cos(pi/n) of the radius.
 
-    edge        no facet has a longer edge, m: curved surfaces then follow it the better
-    sections    facets round the axis, default 72, or more where `edge` asks for it
+    edge        m, largest edge of a facet: with smaller ones, facets follow curved surfaces more closely
+    sections    number of facets around the axis, default 72, or more where `edge` requires it
     options     material, materials, reflectivity, roughness, two_sided as in Scene.facets, for all facets;
                 position m (3,), rotation as in Scene.from_mesh
 Each returns a Scene. ValueError names a dimension that is not greater than 0. Source: SARAS Figs 9-17 (cone,
@@ -29,12 +29,12 @@ from .scene import Scene
 if TYPE_CHECKING:
     from scipy.spatial.transform import Rotation
 
-SECTIONS = 72
-MOST_FACETS = 50_000_000
+SECTIONS = 72  # default number of facets around an axis
+MOST_FACETS = 50_000_000  # of a shape
 
 
 class SurfaceOptions(TypedDict, total=False):
-    """What every shape takes beside its dimensions, for all its facets: as in Scene.facets and Scene.from_mesh."""
+    """Options of every shape, for all its facets: as in Scene.facets and Scene.from_mesh."""
 
     position: ArrayLike
     rotation: ArrayLike | Rotation | None
@@ -45,7 +45,7 @@ class SurfaceOptions(TypedDict, total=False):
 
 
 class ClosedOptions(SurfaceOptions, total=False):
-    """The same of closed shapes, whose facets reflect from outside unless two_sided says otherwise."""
+    """Options of closed shapes, whose facets reflect from outside unless two_sided is True."""
 
     two_sided: ArrayLike
 
@@ -53,7 +53,7 @@ class ClosedOptions(SurfaceOptions, total=False):
 def plate(
     size: ArrayLike, *, edge: float | None = None, two_sided: ArrayLike = True, **options: Unpack[SurfaceOptions]
 ) -> Scene:
-    """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` asks."""
+    """A rectangle of size (x, y), m, about the origin in z = 0, facing up: two facets, or more if `edge` requires."""
     x, y = _dimensions("size", size, 2)
     corners = np.array([[[-x, -y, 0], [x, -y, 0]], [[-x, y, 0], [x, y, 0]]]) / 2
     return _placed(geometry.of_grid(corners), edge, two_sided=two_sided, **options)
@@ -69,16 +69,16 @@ def disc(
 ) -> Scene:
     """A circular disc about the origin in z = 0, facing up."""
     radius = validation.number("radius", radius, above=0)
-    return _turned([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
+    return _revolved([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
 
 
 def box(size: ArrayLike, *, edge: float | None = None, **options: Unpack[ClosedOptions]) -> Scene:
-    """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` asks."""
+    """A right parallelepiped of size (x, y, z), m: twelve facets, or more if `edge` requires."""
     x, y, z = _dimensions("size", size, 3)
     low, high = np.array([-x / 2, -y / 2, 0]), np.array([x / 2, y / 2, z])
     sides = []
     for axis in range(3):
-        # the other two axes in the order that makes axis their cross product
+        # the other two axes, ordered so that their cross product is `axis`
         a, b = (axis + 1) % 3, (axis + 2) % 3
         for end, first, second in ((high, a, b), (low, b, a)):
             face = np.empty((2, 2, 3))
@@ -99,7 +99,7 @@ def cylinder(
 ) -> Scene:
     """An upright circular cylinder with its lids."""
     radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
-    return _turned([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
+    return _revolved([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
 
 
 def cone(
@@ -112,7 +112,7 @@ def cone(
 ) -> Scene:
     """An upright circular cone with its base."""
     radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
-    return _turned([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
+    return _revolved([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
 
 
 def frustum(
@@ -127,15 +127,15 @@ def frustum(
     """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
     bottom, top = validation.number("bottom", bottom, above=0), validation.number("top", top, above=0)
     height = validation.number("height", height, above=0)
-    return _turned([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
+    return _revolved([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
 
 
 def sphere(
     radius: float, *, edge: float | None = None, facets: int | None = None, **options: Unpack[ClosedOptions]
 ) -> Scene:
-    """A sphere about the origin: an icosahedron whose edges are cut into n, 20 n^2 facets of like size.
+    """A sphere about the origin: an icosahedron with edges divided into n parts, 20 n^2 facets of similar size.
 
-    n follows from `edge`, or is the least that gives `facets`, default 2000.
+    n follows from `edge`, or is the smallest that gives at least `facets`, default 2000.
     """
     radius = validation.number("radius", radius, above=0)
     if edge is not None and facets is not None:
@@ -145,7 +145,9 @@ def sphere(
             radius * _geodesic(_cuts(validation.count("facets", 2000 if facets is None else facets))), None, **options
         )
     edge = validation.number("edge", edge, above=0)
-    n = max(1, int(np.ceil(1.05 * radius / edge)))  # from the icosahedron's edge; facets amid its faces are larger
+    n = max(
+        1, int(np.ceil(1.05 * radius / edge))
+    )  # from the icosahedron's edge; facets in the middle of its faces are larger
     while (longest := radius * geometry.edges(unit := _geodesic(n)).max()) > edge:
         n = max(n + 1, int(n * longest / edge))
     return _placed(radius * unit, None, **options)
@@ -159,8 +161,8 @@ def _geodesic(n: int) -> np.ndarray:
     """Triangles (20 n^2, 3, 3) of the unit sphere about the origin."""
     if 20 * n * n > MOST_FACETS:
         raise MemoryError(f"a sphere of {20 * n * n:,} facets is too fine; take a larger edge or fewer facets")
-    # corners of the icosahedron are p + q g, g the golden section: sums of whole numbers are the same on both sides
-    # of an edge to the last bit, so that facets stay joined
+    # corners of the icosahedron are p + q g, g the golden section: sums of integers are equal to the last bit on both
+    # sides of an edge, so that facets stay joined
     p = np.array([(-1, 0, 0), (1, 0, 0), (-1, 0, 0), (1, 0, 0), (0, -1, 0), (0, 1, 0), (0, -1, 0), (0, 1, 0),
                   (0, 0, -1), (0, 0, 1), (0, 0, -1), (0, 0, 1)])  # fmt: skip
     q = np.array([(0, 1, 0), (0, 1, 0), (0, -1, 0), (0, -1, 0), (0, 0, 1), (0, 0, 1), (0, 0, -1), (0, 0, -1),
@@ -180,23 +182,23 @@ def _geodesic(n: int) -> np.ndarray:
     return out / np.sqrt(out[..., :1] ** 2 + out[..., 1:2] ** 2 + out[..., 2:] ** 2)
 
 
-def _turned(profile: Any, edge: float | None, sections: int | None, **options: Any) -> Scene:
-    """The surface that a line of (radius, z), from below to above, sweeps round the z axis."""
+def _revolved(profile: Any, edge: float | None, sections: int | None, **options: Any) -> Scene:
+    """The surface of revolution about the z axis of a line of (radius, z), from bottom to top."""
     n = SECTIONS if sections is None else validation.count("sections", sections, 3)
     line = np.array(profile, np.float64)
     if edge is not None:
-        # rings and sections so close that a cell's diagonal is no longer than `edge`
+        # rings and sections so dense that the diagonal of a cell is at most `edge`
         side = validation.number("edge", edge, above=0) / np.sqrt(2)
         if sections is None:
             n = max(n, int(np.ceil(2 * np.pi * line[:, 0].max() / side)))
         steps = np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / side).astype(int)
         if 2 * n * steps.sum() > MOST_FACETS:
-            raise MemoryError(f"edge {edge:g} m asks for {2 * n * steps.sum():,} facets; take a larger one")
+            raise MemoryError(f"edge {edge:g} m needs {2 * n * steps.sum():,} facets; take a larger one")
         between = np.concatenate([[0.0], *(i + np.arange(1, m + 1) / m for i, m in enumerate(steps))])
         line = np.stack([np.interp(between, np.arange(len(line)), v) for v in line.T], axis=-1)
     angle = 2 * np.pi * np.arange(n) / n
-    round_ = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[np.arange(n + 1) % n]  # ends where it began, exactly
-    rings = np.concatenate([line[:, None, :1] * round_, np.broadcast_to(line[:, None, 1:], (len(line), n + 1, 1))], -1)
+    circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[np.arange(n + 1) % n]  # ends exactly where it begins
+    rings = np.concatenate([line[:, None, :1] * circle, np.broadcast_to(line[:, None, 1:], (len(line), n + 1, 1))], -1)
     triangles = geometry.of_grid(rings)
     return _placed(triangles[geometry.solid(triangles)], edge, **options)
 
@@ -209,7 +211,7 @@ def _placed(
     rotation: ArrayLike | Rotation | None = None,
     **options: Any,
 ) -> Scene:
-    """Facets cut, turned and moved."""
+    """Facets rotated, moved and cut."""
     position = validation.array("position", position, np.float64, (3,))
     options = {"two_sided": False, **options}
     scene = Scene.facets(triangles @ geometry.rotation(rotation).T + position, **options)
@@ -225,7 +227,7 @@ SHAPES = (plate, disc, box, cylinder, cone, frustum, sphere)
 
 
 def _spell_out(shape: Any) -> None:
-    """Let help() and scenario files see what `options` may hold."""
+    """Show the keywords of `options` to help() and scenario files, as the signature of the shape."""
     own = inspect.signature(shape)
     more = [p for call in (_placed, Scene.facets) for p in inspect.signature(call).parameters.values()]
     parameters = {p.name: p for p in more if p.kind is p.KEYWORD_ONLY and p.name != "point_roughness"}

@@ -1,4 +1,4 @@
-"""Surfaces over grids of points, as facets."""
+"""Terrain: facets over grids of points, and heights above it."""
 
 from __future__ import annotations
 
@@ -13,9 +13,9 @@ from .material import resolve
 
 log = logging.getLogger(__name__)
 
-Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both rising, and z (n_y, n_x), m
-UNEVEN = 2.0
-ON = 1e-9  # of a terrain's size: corners no further off it are on it
+Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both increasing, and z (n_y, n_x), m
+UNEVEN = 2.0  # largest ratio of cell sizes at which horizons along range lines are used
+ON = 1e-9  # of a terrain's size: corners no farther from it lie on it
 
 
 def grid(x: Any, y: Any, z: Any) -> np.ndarray:
@@ -30,14 +30,14 @@ def grid(x: Any, y: Any, z: Any) -> np.ndarray:
     for name, axis in (("x", x), ("y", y)):
         if len(axis) < 2 or not (np.diff(axis) > 0).all():
             raise ValueError(
-                f"{name} must hold at least two increasing values: a cell needs an extent; turn a falling axis "
-                "round together with z"
+                f"{name} must hold at least two increasing values: a cell needs an extent; reverse a falling "
+                "axis together with z"
             )
     return np.stack([*over, z], axis=-1)
 
 
 def heights(points: np.ndarray) -> Heights:
-    """What `grid` made these of."""
+    """The (x, y, z) from which `grid` made points."""
     x, y, z = points[0, :, 0], points[:, 0, 1], points[..., 2]
     return validation.sealed(x.copy()), validation.sealed(y.copy()), validation.sealed(z.copy())
 
@@ -45,10 +45,10 @@ def heights(points: np.ndarray) -> Heights:
 def surface(
     points: np.ndarray, up: np.ndarray, material: Any, materials: Any, roughness: Any, point_roughness: Any
 ) -> dict[str, Any]:
-    """Arguments of Scene.facets for a grid of points, m (n, m, 3): two facets a cell, none where a point is NaN.
+    """Arguments of Scene.facets for a grid of points, m (n, m, 3): two facets per cell, none where a point is NaN.
 
     They face `up`, unit vectors (3,) or (n, m, 3), along which point_roughness, m, one or (n, m), moves points.
-    material, materials, roughness   one, or one a cell (n - 1, m - 1)
+    material, materials, roughness   one, or one per cell (n - 1, m - 1)
     """
     cells = (points.shape[0] - 1, points.shape[1] - 1)
     index, factor, table = resolve(material, materials, cells)
@@ -67,7 +67,7 @@ def surface(
     triangles = triangles[good]
     row, column = np.divmod(np.argmax(good) // 2, cells[1])
     a, b, c = triangles[0]
-    if np.cross(b - a, c - a) @ up[row, column] < 0:  # rows run down the map: turn facets round
+    if np.cross(b - a, c - a) @ up[row, column] < 0:  # rows run from north to south: reverse the winding
         triangles = triangles[:, ::-1]
         moves = None if moves is None else moves[:, ::-1]
     index, factor, roughness = (np.repeat(v.reshape(-1), 2)[good] for v in (index, factor, roughness))
@@ -90,7 +90,7 @@ def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float6
 
 
 def heights_of(value: Any) -> Heights:
-    """Checked (x, y, z) of a terrain."""
+    """(x, y, z) of a terrain, checked."""
     try:
         x, y, z = value
     except (TypeError, ValueError):
@@ -100,12 +100,12 @@ def heights_of(value: Any) -> Heights:
     z = validation.array("heights z", z, np.float64, (len(y), len(x)))
     for name, axis in (("x", x), ("y", y)):
         if len(axis) < 2 or not (np.diff(axis) > 0).all():
-            raise ValueError(f"heights {name} must hold at least two increasing values, as Scene.from_heights wants")
+            raise ValueError(f"heights {name} must hold at least two increasing values, as for Scene.from_heights")
     return x, y, z
 
 
 def above(grid: Heights, points: np.ndarray) -> np.ndarray:
-    """Heights of points, m (n, 3), above the terrain, m (n,); inf beside it."""
+    """Heights of points, m (n, 3), above the terrain, m (n,); inf outside its grid."""
     x, y, z = grid
     px, py, pz = points.T
     inside = (px >= x[0]) & (px <= x[-1]) & (py >= y[0]) & (py <= y[-1])
@@ -120,20 +120,20 @@ def above(grid: Heights, points: np.ndarray) -> np.ndarray:
 
 
 def check_above(name: str, grid: Heights, ends: np.ndarray) -> None:
-    """ValueError for an antenna under the terrain."""
+    """Raise ValueError for an antenna below the terrain, at positions `ends`, m (n, 3)."""
     high = above(grid, ends)
     if high.min() < 0:
         at = int(high.argmin())
         raise ValueError(
             f"{name}[{at}] stands {-high[at]:.3g} m under the terrain; raise the track, or check that track and "
-            "heights are told above the same surface"
+            "heights refer to the same surface"
         )
 
 
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it.
 
-    None too for cells twice as long or wide as others: range lines would miss some of their edges
+    Also None where cells are more than twice as long or wide as others: range lines would miss some of their edges
     (docs/theory/shadows.md).
     """
     x, y, z = grid
@@ -142,7 +142,7 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
         return None
     size = max(x[-1] - x[0], y[-1] - y[0], np.ptp(z))
     corners = triangles.reshape(-1, 3).copy()
-    # a rounding outside its border is on it
+    # corners outside the border by rounding lie on it
     for axis, ends in enumerate((x, y)):
         near = np.clip(corners[:, axis], ends[0], ends[-1])
         corners[:, axis] = np.where(np.abs(near - corners[:, axis]) <= ON * size, near, corners[:, axis])
@@ -152,7 +152,7 @@ def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
 
 
 def raised(grid: Heights, before: np.ndarray, after: np.ndarray) -> Heights | None:
-    """The terrain whose corners, m (k, 3, 3) before, have moved up or down; None where they moved sideways too."""
+    """The terrain after its corners, m (k, 3, 3), have moved up or down; None where they moved sideways too."""
     x, y, z = grid
     before, after = before.reshape(-1, 3), after.reshape(-1, 3)
     column, row = (np.clip(np.searchsorted(a, v), 0, len(a) - 1) for a, v in zip((x, y), before.T[:2], strict=True))

@@ -1,4 +1,4 @@
-"""Geometry of triangles, and rotations: plain arrays in, plain arrays out."""
+"""Geometry of triangles: lengths, areas, normals, cutting; and rotations. Functions of plain arrays."""
 
 from __future__ import annotations
 
@@ -33,7 +33,7 @@ def normals(triangles: np.ndarray) -> np.ndarray:
 
 
 def solid(triangles: np.ndarray) -> np.ndarray:
-    """True (k,) for triangles with an area that float64 corners can carry: no thinner than 1e-12 of their length."""
+    """True (k,) for triangles with an area that float64 resolves: at least 1e-12 of their length wide."""
     longest = np.maximum.reduce(edges(triangles))
     return 2 * areas(triangles) > 1e-12 * longest**2
 
@@ -48,10 +48,39 @@ def of_grid(points: np.ndarray) -> np.ndarray:
     return both.reshape(-1, 3, *points.shape[2:])
 
 
+def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles (k, 3, 3) bisected at their longest edge until none is longer than max_edge, m.
+
+    Returns them (n, 3, 3), and which of the given triangles each is a part of (n,). MemoryError where n would exceed
+    max_facets.
+    """
+    too_many = (
+        f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
+        "take a smaller scene, a larger max_edge or a coarser resolution"
+    )
+    # no facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory
+    if areas(triangles).sum() > max_facets * np.sqrt(3) / 4 * max_edge**2:
+        raise MemoryError(too_many)
+    row = np.arange(len(triangles))
+    done: list[tuple[np.ndarray, np.ndarray]] = []
+    n_done = 0
+    while len(triangles):
+        lengths = edges(triangles)
+        long = np.maximum.reduce(lengths) > max_edge
+        done.append((triangles[~long], row[~long]))
+        n_done += len(done[-1][0])
+        if n_done + 2 * long.sum() > max_facets:
+            raise MemoryError(too_many)
+        triangles = np.concatenate(bisect(triangles[long], lengths[:, long]))
+        row = np.tile(row[long], 2)
+    triangles, row = (np.concatenate(a) for a in zip(*done, strict=True))
+    return triangles, row
+
+
 def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Both halves of every triangle, cut at the middle of its longest edge.
 
-    An edge is cut by its ends alone, so triangles that share it stay joined.
+    The cut of an edge depends on its ends alone, so triangles that share it stay joined.
     """
     start = lengths.argmax(axis=0)
     row = np.arange(len(start))
@@ -61,7 +90,7 @@ def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.n
 
 
 def highest(triangles: np.ndarray, x: float, y: float) -> float | None:
-    """Largest z of what triangles (k, 3, 3) have above or below (x, y); None where there is none."""
+    """Largest z of triangles (k, 3, 3) at (x, y); None where there is no triangle."""
     if len(triangles) == 0:
         return None
     px, py = (triangles[:, :, i] - v for i, v in enumerate((x, y)))
@@ -70,7 +99,7 @@ def highest(triangles: np.ndarray, x: float, y: float) -> float | None:
     # area of the triangle that (x, y) makes with the edge opposite each corner
     opposite = np.roll(px, -1, 1) * np.roll(py, -2, 1) - np.roll(px, -2, 1) * np.roll(py, -1, 1)
     total = opposite.sum(axis=1)
-    reach = 1e-12 * np.abs(opposite).max(axis=1, initial=0)  # on an edge, rounding must not open a gap
+    reach = 1e-12 * np.abs(opposite).max(axis=1, initial=0)  # on an edge, rounding must not leave a gap
     same = (opposite >= -reach[:, None]).all(axis=1) | (opposite <= reach[:, None]).all(axis=1)
     good = same & (np.abs(total) > reach)
     if not good.any():

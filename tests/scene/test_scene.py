@@ -592,7 +592,7 @@ BAD = {
     "reflectivity above one": (lambda: facets(reflectivity=1.5), "reflectivity must lie between 0 and 1"),
     "place of no material": (
         lambda: sarcl.Scene(np.zeros((0, 3)), [], TRIANGLE, [1], [0], [True], [1], (METAL,)),
-        "scene material holds 1; it is a place in materials, 0 to 0",
+        "scene material holds 1; it is an index into materials, 0 to 0",
     ),
     "deviations of other shape": (lambda: terrain(point_roughness=[[0.1]]), r"point_roughness has .* wanted \(2, 3\)"),
     "negative deviation": (lambda: terrain(point_roughness=-0.1), "point_roughness reaches -0.1 m"),
