@@ -1,4 +1,4 @@
-"""What an array's field errs by, in which numbers it is summed, and in which blocks: docs/theory/fda.md derives it."""
+"""Error, number type and blocks of the field of an array; derived in docs/theory/fda.md."""
 
 from __future__ import annotations
 
@@ -11,21 +11,26 @@ from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
 from ..opencl.device import Device
 
-FLUSH = 16  # elements added plainly before they join the compensated total
+FLUSH = 16  # elements summed plainly before they are added to the compensated total
 FINE = 1e-6  # tolerance below which results are complex128
-U32, U64 = 2.0**-24, 2.0**-53
-EXTENDED = float(np.finfo(np.longdouble).eps) / 2
-# rounding steps of (length, product, sum) that a path difference goes through, in units of the wide number's roundoff
+U32, U64 = 2.0**-24, 2.0**-53  # unit roundoffs of float32 and float64
+EXTENDED = float(np.finfo(np.longdouble).eps) / 2  # unit roundoff of extended precision
+# relative rounding error of a path difference (length, product, sum) with float64 (True), or with pairs of float32
 PATH_STEPS = {True: 16 * 2.0**-53, False: 45 * 2.0**-48}
+# the same for cycles of a shift in time or range
 SHIFT_STEPS = {True: 4 * 2.0**-53, False: 12 * 2.0**-48}
-MOST_TURNS = 2.0**30  # that whole turns are counted in
-ALLOWED = 5e-7
+MOST_CYCLES = 2.0**30  # largest number of cycles over the array whose whole part is counted
+ALLOWED = 5e-7  # largest error allowed for the differences of times and ranges from their block centres
 
 
 @dataclass(frozen=True)
 class FieldPlan:
-    """double: tables and sums in float64;  predicted_error relative to sum |w_n|, a worst case;
-    reach: most, in turns, that the offsets make of what a block's times or ranges differ from its middle."""
+    """Number type and blocks of a field.
+
+    double           tables and sums are float64
+    predicted_error  bound of the error, relative to sum |w_n|
+    reach            cycles, largest phase of a frequency offset between a block's times or ranges and their centre
+    """
 
     double: bool
     predicted_error: float
@@ -35,22 +40,23 @@ class FieldPlan:
 def make_plan(
     device: Device, tolerance: float, highest: float, extent: float, last_time: float, farthest: float
 ) -> FieldPlan:
-    """The cheapest numbers that meet `tolerance`. ToleranceUnreachable names the best tolerance there is.
+    """The cheapest number type that meets `tolerance`; ToleranceUnreachable names the best tolerance.
 
-    highest carrier, Hz; extent of the array about its reference point, m; latest |t|, s; farthest point, m.
+    highest  carrier, Hz;  extent  of the array about its reference point, m;  last_time  largest |t|, s
+    farthest  distance of a point, m
     """
     fp64 = device.info.fp64
-    turns = highest * extent / SPEED_OF_LIGHT
+    cycles = highest * extent / SPEED_OF_LIGHT
     # f t and f R/c on the host; R from differences, squares, their sum and its root
     host = 2 * np.pi * EXTENDED * highest * (2 * last_time + 6 * farthest / SPEED_OF_LIGHT)
-    # a path's difference: |p|(|p| + 2 |v|)/(R + r) <= 3 |p|, every step relative to that; then sums of turns
-    wide = 2 * np.pi * (turns * (3 * PATH_STEPS[fp64] + SHIFT_STEPS[fp64]) + 2 * SHIFT_STEPS[fp64])
-    fixed = np.inf if turns > MOST_TURNS else float(host + wide)
+    # a path difference is |p|(|p| + 2 |v|)/(R + r) <= 3 |p|, and rounding is relative to that; then sums of cycles
+    wide = 2 * np.pi * (cycles * (3 * PATH_STEPS[fp64] + SHIFT_STEPS[fp64]) + 2 * SHIFT_STEPS[fp64])
+    fixed = np.inf if cycles > MOST_CYCLES else float(host + wide)
 
     def met(tolerance: float) -> FieldPlan | None:
-        allowed = min(tolerance / 10, ALLOWED)  # for what times and ranges differ from their blocks' middles, together
+        allowed = min(tolerance / 10, ALLOWED)  # for differences from the blocks' centres, times and ranges together
         numbers = [double for double in (False, True) if (fp64 or not double) and (double or tolerance >= FINE)]
-        rounding = U32 if tolerance >= FINE else 0.0  # of the result
+        rounding = U32 if tolerance >= FINE else 0.0  # of the result to complex64
         for double in numbers:
             error = fixed + _rounding(double) + rounding + allowed
             if error <= tolerance:
@@ -67,19 +73,19 @@ def make_plan(
     raise ToleranceUnreachable(
         tolerance, best if best < 1 else None, "rounding of path differences",
         how=f"on {device.info.name!r}{'' if fp64 else ' without float64'}, for points "
-        f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {turns:.1e}",
+        f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {cycles:.1e}",
     )  # fmt: skip
 
 
 def _rounding(double: bool) -> float:
-    """Two tables' sines, cosines and turns, weights and products, sums of FLUSH elements of two products each."""
+    """Rounding of both tables' cycles, sines and cosines, of weights and products, and of sums of FLUSH elements."""
     unit = U64 if double else U32
     circle = np.sqrt(2) * 4 * U64 if double else np.sqrt(2) * 4e-7 + 2 * np.pi * 2.0**-26
     return float(2 * circle + 4 * unit + 2 * FLUSH * unit)
 
 
 def blocks(values: np.ndarray, reach: float, most: int) -> list[np.ndarray]:
-    """Indices of `values` (n,) in blocks of at most `most`, none farther than `reach` from its block's middle."""
+    """Indices of `values` (n,) in blocks of at most `most`, none farther than `reach` from its block's centre."""
     n = len(values)
     if np.ptp(values) <= 2 * reach:
         return [np.arange(i, min(i + most, n)) for i in range(0, n, most)]
@@ -94,10 +100,10 @@ def blocks(values: np.ndarray, reach: float, most: int) -> list[np.ndarray]:
 
 
 def middle(values: np.ndarray) -> np.longdouble:
-    """What lies between the extremes, in extended precision."""
+    """Mean of the extremes, in extended precision."""
     return np.longdouble((values.min() + values.max()) / 2)
 
 
-def whole_turns_off(turns: np.ndarray) -> np.ndarray:
-    """Turns less their nearest whole number."""
-    return np.asarray(turns - np.rint(turns))
+def fraction(cycles: np.ndarray) -> np.ndarray:
+    """Cycles minus their nearest whole number, -1/2 to 1/2."""
+    return np.asarray(cycles - np.rint(cycles))

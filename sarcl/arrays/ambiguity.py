@@ -1,4 +1,4 @@
-"""Ambiguity functions: what the matched filter of a waveform gives an echo that is late and Doppler-shifted."""
+"""Ambiguity functions: response of a waveform's matched filter to a delayed and Doppler-shifted echo."""
 
 from __future__ import annotations
 
@@ -10,13 +10,13 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import validation
 from ..base.text import size_text
 
-ROWS = 64  # delays transformed at once
-MOST_BYTES = 4e9
+ROWS = 64  # delays per FFT call: bounds the memory
+MOST_BYTES = 4e9  # largest size of an ambiguity function
 
 
 @dataclass(frozen=True, eq=False)
 class Ambiguity:
-    """|chi| (n_delays, n_dopplers), 1 at the origin, at delays (s) and dopplers (Hz), both rising and evenly spaced."""
+    """|chi| (n_delays, n_dopplers), 1 at the origin, at evenly spaced, increasing delays, s, and Doppler shifts, Hz."""
 
     delays: NDArray[np.float64]
     dopplers: NDArray[np.float64]
@@ -24,12 +24,12 @@ class Ambiguity:
 
     @property
     def volume(self) -> float:
-        """The integral of |chi|^2 over delay and Doppler: 1 for every waveform, if neither was cut."""
+        """Integral of |chi|^2 over delay and Doppler: 1 for every waveform if neither axis was limited."""
         cell = np.diff(self.delays[:2]).sum() * np.diff(self.dopplers[:2]).sum()
         return float((self.magnitude**2).sum() * cell)
 
     def delay_of_peak(self) -> np.ndarray:
-        """Delay at which each Doppler shift peaks, s (n_dopplers,): range-Doppler coupling."""
+        """Delay of the peak at each Doppler shift, s (n_dopplers,): range-Doppler coupling."""
         return np.asarray(self.delays[self.magnitude.argmax(axis=0)])
 
 
@@ -39,8 +39,8 @@ def ambiguity(
     """|chi(tau, nu)| = |integral of s(t - tau) conj(s(t)) exp(+j 2 pi nu t) dt|/integral of |s|^2, by FFT.
 
     signal       complex samples s (n,) at `rate` Hz;  delays are whole samples, Doppler shifts rate/(2 n) or less apart
-    max_delay    s and Hz: parts to keep; None: all there is, the pulse's length either way and half the rate;
-    max_doppler  the signal must be sampled finely enough for the shifts looked at
+    max_delay    s, largest |delay| that is returned; None: the length of the pulse
+    max_doppler  Hz, largest |Doppler shift| that is returned; None: half the rate, which must be high enough for that
 
     A chirp of rate K has its ridge along nu = + K tau. Source: Farooq 2009, equations 4.22, 4.23 (without the square).
     """

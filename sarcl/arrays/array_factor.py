@@ -1,15 +1,15 @@
 """Closed forms of linear and planar arrays: array factors, their validity, and the waveform of diverse carriers.
 
-Elements stand at +n dy y + p dz z from the reference, n < N, p < P, and send f0 + n dfy + p dfz, as
-`AntennaArray.planar` lays them out. Farooq (2009) puts them at -n dy and -p dz: turn the sign of `spacing` for his
-layout, and with it that of every angle. Directions are cosines (ky, kz) along y and z; azimuth and elevation have
+Elements stand at +n dy y + p dz z from the reference, n < N, p < P, and transmit f0 + n dfy + p dfz, as in
+`AntennaArray.planar`. Farooq (2009) has them at -n dy and -p dz: reverse the sign of `spacing` for his layout, which
+reverses every angle. Directions are cosines (ky, kz) along y and z; azimuth and elevation have
 ky = cos(elevation) sin(azimuth), kz = sin(elevation). Retarded time t' = t - R/c, R from the reference element.
 
     constant   sum exp(j k0 (n dy ky + p dz kz))                               his (3.23), for elements at -n d
     diverse    sum exp(j (n Theta + p Psi))                                    his (3.46)
                Theta = 2 pi dfy t' + k0 dy ky,  Psi = 2 pi dfz t' + k0 dz kz   his (3.44), (3.45) with - k0 d k
 
-Multiplied by exp(j 2 pi f0 t') the factor is the far field, but for the phase of n^2 and n p that (3.40) bounds.
+Multiplied by exp(j 2 pi f0 t') the factor is the far field, except for the phase in n^2 and n p, which (3.40) bounds.
 """
 
 from __future__ import annotations
@@ -24,25 +24,25 @@ from ..base.constants import SPEED_OF_LIGHT
 
 Cosines = Sequence[ArrayLike] | np.ndarray  # (ky, kz), each (...)
 
-# 2 pi in parts of 33 bits, so that up to 2^20 of each are exact, and what is left
-_TURN = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
+# 2 pi in parts of 33 bits, of which up to 2^20 multiples are exact, and the rest
+_TWO_PI = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
 
 
 def reduced(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
-    """x rad less its nearest whole turns, in [-pi, pi], and how many turns those are; |x| up to 6e6."""
+    """x, rad, reduced to [-pi, pi], and the number of whole cycles that are removed; |x| up to 6e6."""
     x = np.asarray(x, np.float64)
     validation.finite("angle", x)
     whole = np.rint(x / (2 * np.pi))
     if whole.size and np.abs(whole).max() >= 2**20:
         raise ValueError(f"an angle of {np.abs(x).max():g} rad is too large to be reduced; keep below 6e6")
-    return ((x - whole * _TURN[0]) - whole * _TURN[1]) - whole * _TURN[2], whole
+    return ((x - whole * _TWO_PI[0]) - whole * _TWO_PI[1]) - whole * _TWO_PI[2], whole
 
 
 def dirichlet(x: ArrayLike, n: int) -> np.ndarray:
-    """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. Errs by less than 1e-12 n."""
+    """sin(n x/2)/sin(x/2), n where x is 0; x rad (...), |x| <= 6e6. The error is below 1e-12 n."""
     n = validation.count("n", n)
     rest, whole = reduced(x)
-    flat = np.abs(rest) < 1e-300  # half of less may vanish
+    flat = np.abs(rest) < 1e-300  # half of a smaller number may underflow to 0
     half = np.where(flat, 1.0, rest / 2)
     ratio = np.where(flat, float(n), np.sin(n * half) / np.sin(half))
     return np.asarray(np.where((whole % 2 != 0) & (n % 2 == 0), -ratio, ratio))
@@ -70,7 +70,7 @@ def diverse_factor(
     cosines: Cosines,
     retarded: ArrayLike,
 ) -> np.ndarray:
-    """Array factor of N by P elements, (3.46): closed, for arrays well within `quadratic_phase`'s bound.
+    """Array factor of N by P elements, (3.46), in closed form: valid where `quadratic_phase` is small.
 
     shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz, cosines (ky, kz) and retarded s: (...), broadcast.
     """
@@ -81,8 +81,8 @@ def diverse_factor(
     t = np.asarray(retarded, np.float64)
     out = np.ones(np.broadcast_shapes(ky.shape, kz.shape, t.shape), np.complex128)
     for i, cosine in enumerate((ky, kz)):
-        turns = df[i] * t
-        x = 2 * np.pi * ((turns - np.rint(turns)) + f0 * d[i] * cosine / SPEED_OF_LIGHT)
+        cycles = df[i] * t
+        x = 2 * np.pi * ((cycles - np.rint(cycles)) + f0 * d[i] * cosine / SPEED_OF_LIGHT)
         out = out * geometric(x, validation.count(f"shape[{i}]", shape[i]))
     return out
 
@@ -96,10 +96,10 @@ def power_pattern(factor: ArrayLike, peak: float | None = None) -> np.ndarray:
 def quadratic_phase(
     *, shape: Sequence[int] | np.ndarray, spacing: ArrayLike, frequency_step: ArrayLike, cosines: ArrayLike = (1.0, 1.0)
 ) -> float:
-    """Largest phase that the closed form leaves out, rad: the terms of (3.39), each by its modulus.
+    """Largest phase that the closed form neglects, rad: the sum of moduli of the terms of (3.39).
 
-    Farooq holds pi/4 to be little enough. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59).
-    Moduli, because steps of opposite signs cancel at the corner (N, P), where the paper looks, and not elsewhere.
+    Farooq accepts up to pi/4. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59). Moduli are summed
+    because steps of opposite signs cancel at the corner (N, P), which the paper considers, but not elsewhere.
     """
     n, p = (validation.count(f"shape[{i}]", shape[i]) for i in range(2))
     dy, dz = np.abs(
@@ -123,7 +123,7 @@ def beam_angles(
     d = validation.array("spacing", spacing, np.float64, (2,))
     df = validation.array("frequency_step", frequency_step, np.float64, (2,))
     if not d.all():
-        raise ValueError(f"spacing is {d.tolist()}; elements at one place make no beam")
+        raise ValueError(f"spacing is {d.tolist()}; elements at one position form no beam")
     t = np.asarray(retarded, np.float64)
     ky, kz = (wave / d[i] * (lobe[i] - df[i] * t) for i in range(2))
     with np.errstate(invalid="ignore"):
@@ -133,7 +133,7 @@ def beam_angles(
 
 
 def period(frequency_step: float) -> float:
-    """1/|df|, s: pulses of this length hold one peak, (4.15)."""
+    """1/|df|, s: a pulse of this length holds one peak, (4.15)."""
     return 1 / abs(_step(frequency_step))
 
 
@@ -162,10 +162,10 @@ def center_frequency(f0: float, n: int, frequency_step: float) -> float:
 def peak_delay(
     f0: float, *, spacing: float, frequency_step: float, azimuth: ArrayLike, elevation: ArrayLike = 0.0, n: int = 1
 ) -> np.ndarray:
-    """When the peak passes, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
+    """Delay of the peak, s after R/c: -d cos(elevation) sin(azimuth) f/(c df) for elements at +n d.
 
-    n = 1: f = f0, the peak of the closed form, (4.27), whose other sign is that of elements at -n d.
-    n elements: f = f0 + (n - 1) df, that of the exact field: of its phase i^2 dk d k, the part i (n - 1) is linear.
+    n = 1: f = f0, the peak of the closed form, (4.27), which has the other sign for its elements at -n d.
+    n elements: f = f0 + (n - 1) df, the peak of the exact field: the part i (n - 1) of its phase i^2 dk d k is linear.
     """
     f = validation.number("f0", f0, above=0) + (validation.count("n", n) - 1) * _step(frequency_step)
     d = validation.number("spacing", spacing)
@@ -188,13 +188,13 @@ def waveform(
     factor = diverse_factor(
         f0, shape=(n, 1), spacing=(spacing, 0.0), frequency_step=steps, cosines=(np.sin(azimuth), 0.0), retarded=t
     )
-    turns = f0 * t
-    out = np.exp(2j * np.pi * (turns - np.rint(turns))) * factor
+    cycles = f0 * t
+    out = np.exp(2j * np.pi * (cycles - np.rint(cycles))) * factor
     return np.asarray(out * (np.abs(t) <= period(frequency_step) / 2) if pulsed else out)
 
 
 def _step(frequency_step: float) -> float:
     step = validation.number("frequency_step", frequency_step)
     if step == 0:
-        raise ValueError("frequency_step is 0: carriers that are all alike have no period, lobe or delay")
+        raise ValueError("frequency_step is 0: equal carriers have no period, lobe or delay")
     return step

@@ -1,4 +1,4 @@
-"""Fields of arrays: what elements that each send a carrier of their own add up to, anywhere and at any time."""
+"""Field of an array whose elements each transmit a carrier of their own, at any positions and times."""
 
 from __future__ import annotations
 
@@ -13,12 +13,12 @@ from ..model.antenna_array import AntennaArray
 from ..opencl import memory_budget
 from ..opencl.choose_device import open_device
 from ..opencl.device import Device, DeviceChoice
-from ._beam_plan import FINE, FLUSH, FieldPlan, blocks, make_plan, middle, whole_turns_off
+from ._beam_plan import FINE, FLUSH, FieldPlan, blocks, fraction, make_plan, middle
 
-CHUNK = 64  # elements a work-item tabulates
-ROWS = 8  # entries of a tile of rows
-MOST_ROWS, MOST_LANES = 256, 2**16  # entries of a block
-SLICE = 2**18  # points whose ranges are taken at once on the host
+CHUNK = 64  # elements per work-item when tables are made
+ROWS = 8  # rows per tile
+MOST_ROWS, MOST_LANES = 256, 2**16  # largest numbers of rows and lanes in a block
+SLICE = 2**18  # points per array operation on the host: bounds the memory
 
 
 def beam(
@@ -33,18 +33,18 @@ def beam(
     max_bytes: float | None = None,
     pulse: int = 0,
 ) -> NDArray[np.complexfloating]:
-    """The array's field, sum_n w_n exp(+j 2 pi f_n (t - |x - x_n|/c)): times.shape + positions.shape[:-1].
+    """The field of an array, sum_n w_n exp(+j 2 pi f_n (t - |x - x_n|/c)): times.shape + positions.shape[:-1].
 
     f0         base frequency, Hz; element n sends f_n = f0 + array.offsets_at(pulse)[n]
     times      s (...), absolute: at t = 0 every element's carrier has phase arg w_n
-    positions  x, m (..., 3), in the array's axes;  reference  where its reference point stands, m (3,)
+    positions  x, m (..., 3), in the array's axes;  reference  position of the array's reference point, m (3,)
     tolerance  largest error of any value, relative to sum |w_n|; below 1e-6 the result is complex128, else complex64
     device     an OpenCL device: an index, "cpu", "gpu" or part of a name
     max_bytes  memory for blocks on the device, default 1 GiB on CPUs, half the memory of a GPU
 
-    Distances to every element are exact, the phase is absolute, nothing falls off with range. An array of one carrier
-    is evaluated once a point. ValueError: bad input; ToleranceUnreachable: a tolerance that cannot be
-    met, naming the best one; MemoryError: max_bytes too small for one tile.
+    Distances to every element are exact, the phase is absolute, and amplitudes do not fall with range. The field of an
+    array with one carrier is computed once per point. Raises ValueError for invalid arguments, ToleranceUnreachable
+    with the best tolerance, and MemoryError if max_bytes is too small for one tile.
     """
     validation.instance("array", array, AntennaArray)
     f0 = validation.number("f0", f0)
@@ -72,10 +72,10 @@ def beam(
     ranges = _ranges(points, origin)
     plan = make_plan(opened, tolerance, float(carriers.max()), extent, float(np.abs(t).max()), float(ranges.max()))
     work = _Field(opened, plan, array, carriers, points, ranges, origin, budget)
-    if np.ptp(offsets) == 0:  # time and place factor
+    if np.ptp(offsets) == 0:  # the field is a product of functions of time and of position
         work.add(np.zeros(1), once := np.empty((1, len(points)), kind))
-        turns = whole_turns_off(carriers[0] * t.ravel().astype(np.longdouble))
-        np.multiply.outer(np.exp(2j * np.pi * turns.astype(np.float64)).astype(kind), once[0], out=out)
+        cycles = fraction(carriers[0] * t.ravel().astype(np.longdouble))
+        np.multiply.outer(np.exp(2j * np.pi * cycles.astype(np.float64)).astype(kind), once[0], out=out)
     else:
         work.add(t.ravel(), out)
     return out.reshape(t.shape + x.shape[:-1])
@@ -90,7 +90,7 @@ def _ranges(points: np.ndarray, origin: np.ndarray) -> np.ndarray:
 
 
 class _Field:
-    """Adds up one array's carriers at points, block by block of times and points."""
+    """Sums the carriers of an array at points, block by block of times and points."""
 
     def __init__(
         self,
@@ -112,10 +112,10 @@ class _Field:
         self.item = 16 if plan.double else 8  # bytes of a complex number
         self.weights = device.upload(np.stack([array.weights.real, array.weights.imag]).astype(self.real))
         self.lane_width = 8 if device.is_cpu else 64
-        self.group = (1, 1) if device.is_cpu else None  # PoCL gives every work-item of a group its own stack
+        self.group = (1, 1) if device.is_cpu else None  # on PoCL every work-item of a group has its own stack
 
     def add(self, times: np.ndarray, out: np.ndarray) -> None:
-        """Fill out (times, points). Lanes run along the longer of the two."""
+        """Compute out (times, points). Lanes run along the longer of the two axes."""
         n, most, c = len(self.carriers), np.abs(self.offsets).max(), np.longdouble(SPEED_OF_LIGHT)
         along_times = len(times) > len(self.points)
         room = min(self.budget / 4, self.device.info.max_alloc)
@@ -135,16 +135,16 @@ class _Field:
 
         def time_table(which: np.ndarray) -> tuple[Any, int]:
             t0 = middle(t[which])
-            entries = np.stack([t[which] - t0, whole_turns_off(self.center * (t[which] - t0))])
-            elements = np.stack([self.offsets, whole_turns_off(self.carriers * t0)])
+            entries = np.stack([t[which] - t0, fraction(self.center * (t[which] - t0))])
+            elements = np.stack([self.offsets, fraction(self.carriers * t0)])
             return self._table("times", entries, elements, lanes_are=along_times)
 
         def path_table(which: np.ndarray) -> tuple[Any, int]:
             r0 = middle(self.ranges[which])
             shift = self.ranges[which] - r0
             v = (self.points[which].astype(np.longdouble) - self.origin).T
-            entries = np.stack([*v, self.ranges[which], shift, whole_turns_off(self.center * shift / c)])
-            start = whole_turns_off(self.carriers * r0 / c)
+            entries = np.stack([*v, self.ranges[which], shift, fraction(self.center * shift / c)])
+            start = fraction(self.carriers * r0 / c)
             elements = np.stack([*self.elements, self.carriers / c, self.offsets / c, start])
             return self._table("paths", entries, elements, lanes_are=not along_times)
 
@@ -161,7 +161,7 @@ class _Field:
                     out[np.ix_(row_block, lane_block)] = made
 
     def _table(self, name: str, entries: np.ndarray, elements: np.ndarray, *, lanes_are: bool) -> tuple[Any, int]:
-        """The table of kernel `name` and its number of entries, whole tiles, the last of them filled with repeats."""
+        """The table of kernel `name`, and its number of entries: whole tiles, the last one filled up with repeats."""
         device, n, lanes = self.device, elements.shape[1], self.device.info.vector_width
         width = self.lane_width if lanes_are else ROWS
         many = -(-entries.shape[1] // width) * width
@@ -173,11 +173,11 @@ class _Field:
             self._kernel(name), (many // lanes, -(-n // CHUNK)), self.group,
             numbers[0], many, numbers[1], n, *weights, table, width,
         )  # fmt: skip
-        device.finish()  # before `numbers` go: on CPUs buffers are the arrays' own memory
+        device.finish()  # `numbers` must live until then: on CPUs buffers use the memory of the arrays
         return table, many
 
     def _sum(self, lane: tuple[Any, int], row: tuple[Any, int], rows: int) -> np.ndarray:
-        """(rows, lanes) complex."""
+        """Sums over the elements for the entries of two tables, complex (rows, lanes)."""
         used = next(k for k in (1, 2, 4, ROWS) if k >= min(rows, ROWS))
         tiles = row[1] // ROWS
         out = self.device.empty(self.item * tiles * used * lane[1])
@@ -193,7 +193,7 @@ class _Field:
         return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK)
 
     def _wide(self, values: np.ndarray) -> Any:
-        """(k, n) as the device's wide numbers: float64, or (k, 2, n) float32."""
+        """Values (k, n) as wide numbers on the device: float64, or pairs of float32 (k, 2, n)."""
         if self.device.info.fp64:
             return self.device.upload(values.astype(np.float64))
         return self.device.upload(float_pairs.wide(values).swapaxes(0, 1))

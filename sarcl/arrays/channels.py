@@ -1,4 +1,4 @@
-"""Channels of an array: which carriers its elements send from where, and on which frequencies they are sampled."""
+"""Channels of an array: carriers and positions of its elements, and the frequencies at which echoes are sampled."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..base.errors import warn
 from ..model.antenna_array import AntennaArray
 from ..model.waveform import Waveform
 
-EVEN = 1e-9  # of the carriers' spacing: what lies no further off its multiples is on them
+EVEN = 1e-9  # of the carriers' total span: carriers no farther from multiples of their spacing are evenly spaced
 
 
 @dataclass(frozen=True, eq=False)
 class Channel:
-    """What elements of one carrier and one place send, from pulse `first` to `stop`.
+    """Elements with one carrier and one position, and the pulses first ... stop - 1 at which they transmit it.
 
-    elements  their numbers;  offset  their place, m (3,);  carrier  Hz;  weight  the sum of theirs, complex
+    elements  their numbers;  offset  their position in the array, m (3,);  carrier  Hz;  weight  sum of theirs, complex
     """
 
     elements: np.ndarray
@@ -32,14 +32,14 @@ class Channel:
 
 
 def is_single(array: AntennaArray) -> bool:
-    """One element at the reference point that sends the base frequency: no array at all."""
+    """Whether the array is one element at the reference point with the base frequency: equivalent to no array."""
     return array.n == 1 and not (array.positions.any() or array.offsets.any()) and array.weights[0] == 1
 
 
 def channels_of(array: AntennaArray, center: float, n_pulses: int, merge: bool = True) -> list[Channel]:
-    """Channels of an array about a base frequency, Hz; equal ones are one (merge), or each is by itself.
+    """Channels of an array about a base frequency, Hz; with `merge`, elements of equal carrier and position are one.
 
-    ValueError for carriers of 0 Hz or less.
+    Raises ValueError for carriers of 0 Hz or less.
     """
     low = center + float(array.offsets.min())
     if low <= 0:
@@ -63,13 +63,13 @@ def channels_of(array: AntennaArray, center: float, n_pulses: int, merge: bool =
 
 
 def _runs(array: AntennaArray, n_pulses: int) -> Iterator[tuple[int, int, int]]:
-    """(plan, first, stop) of pulses that follow one another under one plan."""
+    """(plan, first, stop) of each run of pulses with one plan."""
     if array.plan is None:
         yield 0, 0, n_pulses
         return
     if len(array.plan) != n_pulses:
         raise ValueError(
-            f"the array's plan names {len(array.plan)} pulses but the track has {n_pulses}; give one entry a pulse"
+            f"the array's plan names {len(array.plan)} pulses but the track has {n_pulses}; give one entry per pulse"
         )
     ends = [0, *(np.flatnonzero(np.diff(array.plan)) + 1).tolist(), n_pulses]
     for first, stop in pairwise(ends):
@@ -77,7 +77,7 @@ def _runs(array: AntennaArray, n_pulses: int) -> Iterator[tuple[int, int, int]]:
 
 
 def spacing(carriers: np.ndarray) -> float | None:
-    """The step that carriers, Hz (n,), are whole multiples of apart; None where there is none, or one carrier."""
+    """The step, Hz, of which differences of carriers, Hz (n,), are multiples; None if there is none, or one carrier."""
     steps = np.diff(np.unique(carriers))
     if len(steps) == 0:
         return None
@@ -89,7 +89,7 @@ def spacing(carriers: np.ndarray) -> float | None:
 
 @dataclass(frozen=True)
 class Sampling:
-    """Samples frequency + i step, Hz, i < n; `width` of them belong to one channel, about its carrier."""
+    """Samples at frequency + i step, Hz, i < n, of which `width` about its carrier belong to each channel."""
 
     frequency: float
     step: float
@@ -97,26 +97,26 @@ class Sampling:
     width: int
 
     def part(self, carrier: float) -> slice:
-        """The samples of a channel."""
+        """The samples of a channel with this carrier."""
         first = round((carrier - self.frequency) / self.step - (self.width - 1) / 2)
         return slice(max(first, 0), min(first + self.width, self.n))
 
     def holds(self, carriers: Iterable[float]) -> bool:
-        """Whether the samples of each channel alone are among these."""
+        """Whether the samples that each channel has by itself are among these."""
         places = (np.fromiter(carriers, float) - self.frequency) / self.step - (self.width - 1) / 2
         inside = (places > -0.5) & (places + self.width < self.n + 0.5)
         return bool((inside & (np.abs(places - np.rint(places)) < 1e-6)).all())
 
     def of(self, carrier: float) -> Sampling:
-        """Samples of one channel alone."""
+        """The samples of one channel by itself."""
         return replace(self, frequency=carrier - (self.width - 1) / 2 * self.step, n=self.width)
 
 
 def sampling(carriers: np.ndarray, waveform: Waveform, near: float, far: float, compressed: bool) -> Sampling:
-    """Frequencies of all carriers, Hz (n,), so fine that a range window (near, far), m, does not repeat.
+    """Samples over the bands of all carriers, Hz (n,), so close that a range window (near, far), m, is unambiguous.
 
-    Where carriers are evenly spaced each lies on a sample. A tone is sampled no further than halfway to the next
-    carrier; if it is as long as 1/spacing, and so is the window, that is one sample a channel.
+    Evenly spaced carriers lie on samples. A tone is sampled up to halfway to the next carriers; if its duration and the
+    window's are 1/spacing, that is one sample per channel.
     """
     period = 4 * max(abs(near), abs(far)) / SPEED_OF_LIGHT
     if not compressed:
@@ -136,7 +136,7 @@ def sampling(carriers: np.ndarray, waveform: Waveform, near: float, far: float, 
 
 
 def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> None:
-    """SarclWarnings of what these channels cannot tell apart, or do not focus."""
+    """Warn where ranges are ambiguous with these channels, or images defocus."""
     apart = spacing(carriers)
     if apart is not None and waveform.duration * apart > 1 + 1e-9:
         warn(

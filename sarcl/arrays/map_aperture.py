@@ -1,4 +1,4 @@
-"""Phase histories of frequency-diverse arrays as others would have collected them: corrected, mapped, or told apart."""
+"""Phase histories of frequency-diverse arrays converted to those of other radars: corrected, mapped, or by channel."""
 
 from __future__ import annotations
 
@@ -19,12 +19,12 @@ from .channels import spacing
 MapKind = Literal["corrected", "apparent", "channels"]
 MAPPINGS = ("corrected", "apparent", "channels")
 OFFSETS = ("published", "halved")
-NEAR = 1e-3  # m by which reference ranges may differ from the distance to `center`
-LINE = 1e-9  # of an array's length: elements that lie no further off a line of even steps are on it
+NEAR = 1e-3  # m, largest difference of reference ranges from the distances to `center`
+LINE = 1e-9  # of an array's length: elements no farther from evenly spaced points of a line are on it
 
 
 class MapApertureOptions(TypedDict):
-    """Arguments of `map_aperture` but raw."""
+    """Arguments of `map_aperture` other than raw."""
 
     mapping: MapKind
     center: NotRequired[ArrayLike]
@@ -38,22 +38,22 @@ def map_aperture(
     raw: PhaseHistory, mapping: MapKind, *, center: ArrayLike = (0.0, 0.0, 0.0), attitude: ArrayLike | None = None,
     quadratic: bool = True, offset: Literal["published", "halved"] = "published", vertical: ArrayLike = (0.0, 0.0, 1.0),
 ) -> PhaseHistory:  # fmt: skip
-    """Echoes of a frequency-diverse array, channels added up, for a backprojection that knows nothing of arrays.
+    """Echoes of a frequency-diverse array with summed channels, for a backprojection without a model of arrays.
 
-    mapping    "corrected": the delay and phase of every channel's element, as `center` sees it, are taken out: data of
-               one antenna at the reference point, for points at `center` (Farooq 2009, equations 5.4 and 5.5)
-               "apparent": the same, from the apparent positions that the wavefront of the peak points back to
-               (equations 5.14 to 5.18, signs corrected: docs/theory/fda.md)
-               "channels": a row for each channel, at its own element and carrier: backprojection of these is the
-               matched filter of the whole model, at any point
+    mapping    "corrected": the delay and phase of every channel's element, for a point at `center`, are removed: there
+               the data are those of one antenna at the reference point (Farooq 2009, equations 5.4 and 5.5)
+               "apparent": the same, with the apparent antenna positions from which the wavefront of the peak seems to
+               come (equations 5.14 to 5.18, signs corrected: docs/theory/fda.md)
+               "channels": a row for each channel, with the position and carrier of its element: backprojection of
+               these is the matched filter of the whole model, at any point
     center     the point whose phase and delay are removed from raw, m (3,): the `reference` of `sarcl.echo`
     attitude   (n_pulses, 3, 3) of the track, if it had one
-    quadratic  False: only the part linear in the channel's number is taken out, as the paper does
-    offset     "published": the apparent angle takes c dt of the peak for a one-way path; "halved": for a two-way path
-    vertical   the apparent position keeps its elevation above the plane across it (3,)
+    quadratic  False: only the part that is linear in the channel's number is removed, as in the paper
+    offset     "published": the apparent angle uses c dt of the peak as a one-way path; "halved": as a two-way path
+    vertical   (3,), normal of the plane over which apparent positions keep their elevation
 
-    ValueError: no array, channels kept apart already, sharing samples or outside the sampled band, elements or carriers
-    that do not progress in even steps, a center that is not the data's.
+    Raises ValueError without an array, for channels that are separate already, share samples or lie outside the sampled
+    band, for elements or carriers that are not evenly spaced, and for a center other than that of the data.
     """
     validation.instance("raw", raw, PhaseHistory)
     validation.choice("mapping", mapping, MAPPINGS)
@@ -68,30 +68,30 @@ def map_aperture(
             f"reference_range[{worst}] is {raw.reference_range[worst]:.4f} m, but center is {away[worst]:.4f} m away; "
             "give the point that raw's phase is relative to as center (echo's reference)"
         )
-    turn = None if attitude is None else _rotations(attitude, int(pulse.max()) + 1)[pulse]
+    rotation = None if attitude is None else _rotations(attitude, int(pulse.max()) + 1)[pulse]
     element = _elements(raw, array, pulse)
     if mapping == "channels":
-        return _apart(raw, array, element, turn)
+        return _separate(raw, array, element, rotation)
     towards = point - raw.tx
     distance = np.linalg.norm(towards, axis=1)
     frequencies = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
     if quadratic:
-        steps = array.positions if turn is None else np.einsum("pij,nj->pni", turn, array.positions)
+        steps = array.positions if rotation is None else np.einsum("pij,nj->pni", rotation, array.positions)
         near = np.linalg.norm(towards[:, None] - steps, axis=2)
         # |T + d - c| - |T - c| without cancellation
         bent = ((steps**2).sum(axis=-1) - 2 * (towards[:, None] * steps).sum(axis=2)) / (near + distance[:, None])
-        turns = frequencies * np.take_along_axis(bent, element, axis=1) / SPEED_OF_LIGHT
+        cycles = frequencies * np.take_along_axis(bent, element, axis=1) / SPEED_OF_LIGHT
     else:
         assert raw.waveform is not None
         base = raw.waveform.center + array.offsets[_plan(array, pulse), 0]
-        along = -(towards * _turned(turn, _progression(array))).sum(axis=1) / distance
-        turns = element * (along * base / SPEED_OF_LIGHT)[:, None]
-    samples = np.asarray(raw.samples) * np.exp(2j * np.pi * np.mod(turns, 1.0))
+        along = -(towards * _rotated(rotation, _progression(array))).sum(axis=1) / distance
+        cycles = element * (along * base / SPEED_OF_LIGHT)[:, None]
+    samples = np.asarray(raw.samples) * np.exp(2j * np.pi * np.mod(cycles, 1.0))
     moved = replace(raw, samples=validation.sealed(samples.astype(raw.samples.dtype)))
     if mapping == "corrected":
         return moved
     up = validation.direction("vertical", vertical)
-    places = _apparent(raw, array, pulse, _turned(turn, _progression(array)), towards, up, offset == "halved")
+    places = _apparent(raw, array, pulse, _rotated(rotation, _progression(array)), towards, up, offset == "halved")
     return replace(moved, tx=point - places, rx=point - places, reference_range=np.linalg.norm(places, axis=1))
 
 
@@ -99,9 +99,9 @@ def _apparent(
     raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray, step: np.ndarray, towards: np.ndarray, up: np.ndarray,
     halved: bool,
 ) -> np.ndarray:  # fmt: skip
-    """From apparent positions to the point, m (n, 3): along the gradient of r + g kappa, r_app = r + g kappa away.
+    """Vectors from apparent positions to the point, m (n, 3): along the gradient of r + g kappa, of that length.
 
-    kappa = sin of the angle off the array's broadside, g = d f0/df; Farooq's elements lie at -n d y.
+    kappa is the sine of the angle from the array's broadside, g = d f0/df; Farooq's elements lie at -n d y.
     """
     assert raw.waveform is not None
     spacing_m = float(np.linalg.norm(_progression(array)))
@@ -127,23 +127,22 @@ def _rotations(attitude: Any, n_pulses: int) -> np.ndarray:
 
 
 def _array_of(raw: PhaseHistory) -> AntennaArray:
-    """The array whose channels are added up in raw's rows."""
+    """The array whose channels are summed in the rows of raw."""
     if not isinstance(raw.array, AntennaArray) or raw.waveform is None:
-        raise ValueError("raw has no array and waveform: map_aperture wants echoes made with array=")
+        raise ValueError("raw has no array and waveform: map_aperture needs echoes made with array=")
     if raw.tx_channel is not None:
         raise errors.NotApplicable(
-            "raw's channels are kept apart already, each with its own position and carrier: backproject them as they "
-            "are"
+            "raw's channels are separate already, each with its own position and carrier: backproject them as they are"
         )
     return raw.array
 
 
 def _pulses(raw: PhaseHistory, array: AntennaArray) -> np.ndarray:
-    """Number of each row's pulse (n_rows,)."""
+    """Pulse number of each row (n_rows,)."""
     if raw.time is None:
         if array.plan is None:
             return np.zeros(raw.n_rows, np.int64)
-        raise ValueError("raw has no time, so that its pulses cannot be told apart; keep all that echo returns")
+        raise ValueError("raw has no time, so its pulses cannot be identified; keep all fields that echo returns")
     pulse = np.unique(raw.time, return_inverse=True)[1].ravel()
     if array.plan is not None and pulse.max() + 1 != len(array.plan):
         raise ValueError(
@@ -153,12 +152,12 @@ def _pulses(raw: PhaseHistory, array: AntennaArray) -> np.ndarray:
 
 
 def _plan(array: AntennaArray, pulse: np.ndarray) -> np.ndarray:
-    """Row of array.offsets that each row uses."""
+    """Index into array.offsets of each row's plan."""
     return np.zeros(len(pulse), np.int64) if array.plan is None else array.plan[pulse]
 
 
 def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.ndarray:
-    """The element whose channel each sample is of (n_rows, n_samples)."""
+    """Element of the channel that each sample belongs to (n_rows, n_samples)."""
     assert raw.waveform is not None
     out = np.empty(raw.samples.shape, np.int64)
     frequencies = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(raw.n_samples)
@@ -169,7 +168,7 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
         apart = spacing(carriers)
         if apart is None or len(np.unique(carriers)) < array.n:
             raise errors.NotApplicable(
-                "the array's channels share carriers, or are not evenly spaced, so that samples cannot be told apart "
+                "the array's channels share carriers, or are not evenly spaced, so that samples cannot be separated "
                 "by frequency; make the echoes with channels='separated'"
             )
         if raw.waveform.kind != "tone" and raw.waveform.bandwidth > apart * (1 + 1e-9):
@@ -194,7 +193,7 @@ def _elements(raw: PhaseHistory, array: AntennaArray, pulse: np.ndarray) -> np.n
 
 
 def _progression(array: AntennaArray) -> np.ndarray:
-    """Step from element to element, m (3,). ValueError where positions or carriers do not progress evenly."""
+    """Step from element to element, m (3,). ValueError where positions or carriers are not evenly spaced."""
     step = array.positions[-1] / max(array.n - 1, 1)
     off = np.abs(array.positions - np.arange(array.n)[:, None] * step).max()
     change = array.offsets[:, -1:] - array.offsets[:, :1]
@@ -206,14 +205,14 @@ def _progression(array: AntennaArray) -> np.ndarray:
         or bent > LINE * np.abs(change).max()
     ):
         raise errors.NotApplicable(
-            "apparent positions and the paper's linear correction are told from elements and carriers that progress in "
-            "even steps along a line; use mapping='corrected' with quadratic=True, or 'channels'"
+            "apparent positions and the paper's linear correction need elements and carriers in even steps "
+            "along a line; use mapping='corrected' with quadratic=True, or 'channels'"
         )
     return np.asarray(step)
 
 
-def _apart(raw: PhaseHistory, array: AntennaArray, element: np.ndarray, turn: np.ndarray | None) -> PhaseHistory:
-    """A row for each channel of each row, of the samples that are its own."""
+def _separate(raw: PhaseHistory, array: AntennaArray, element: np.ndarray, rotation: np.ndarray | None) -> PhaseHistory:
+    """A row for each channel of each row, with the samples that belong to it."""
     width = int(np.bincount(element[0], minlength=array.n).max())
     starts = np.array([np.searchsorted(np.sort(row), np.arange(array.n)) for row in np.sort(element, axis=1)])
     order = np.argsort(element, axis=1, kind="stable")
@@ -225,8 +224,8 @@ def _apart(raw: PhaseHistory, array: AntennaArray, element: np.ndarray, turn: np
         raise ValueError("channels differ in their number of samples; make the echoes with channels='separated'")
     n, rows = array.n, np.repeat(np.arange(raw.n_rows), array.n)
     samples = np.take_along_axis(np.asarray(raw.samples), index.reshape(raw.n_rows, -1), axis=1).reshape(-1, width)
-    steps = np.broadcast_to(array.positions, (raw.n_rows, n, 3)) if turn is None else turn @ array.positions.T
-    steps = steps if turn is None else np.swapaxes(steps, 1, 2)
+    steps = np.broadcast_to(array.positions, (raw.n_rows, n, 3)) if rotation is None else rotation @ array.positions.T
+    steps = steps if rotation is None else np.swapaxes(steps, 1, 2)
     first = replace(raw, samples=validation.sealed(np.array(raw.samples[:, :1])))[rows]
     return replace(
         first,
@@ -237,5 +236,5 @@ def _apart(raw: PhaseHistory, array: AntennaArray, element: np.ndarray, turn: np
     )
 
 
-def _turned(turn: np.ndarray | None, step: np.ndarray) -> np.ndarray:
-    return step if turn is None else turn @ step
+def _rotated(rotation: np.ndarray | None, step: np.ndarray) -> np.ndarray:
+    return step if rotation is None else rotation @ step

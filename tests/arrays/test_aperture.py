@@ -196,7 +196,7 @@ BAD = {
     "no array": (lambda: map_aperture(replace(simple(), array=None), "corrected"), "no array"),
     "mapping": (lambda: map_aperture(simple(), "sideways"), "corrected"),
     "center": (lambda: map_aperture(simple(), "corrected", center=(5, 0, 0)), "give the point"),
-    "apart": (lambda: map_aperture(map_aperture(simple(), "channels"), "corrected"), "kept apart already"),
+    "apart": (lambda: map_aperture(map_aperture(simple(), "channels"), "corrected"), "separate already"),
     "one carrier": (
         lambda: map_aperture(replace(simple(), array=AntennaArray.linear(5, spacing=1)), "corrected"), "share carriers"
     ),
