@@ -14,7 +14,7 @@ from ..model.waveform import Waveform
 def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistory:
     """Apply the matched filter conj(P(f)) to uncompressed echoes; compressed ones come back as they are.
 
-    waveform  default raw.waveform. ValueError when there is none: data of unknown pulse cannot be compressed.
+    waveform  default raw.waveform. ValueError where there is none: data of an unknown pulse cannot be compressed.
     """
     if raw.compressed:
         return raw

@@ -1,4 +1,4 @@
-"""A grid for data that come without one: where they were aimed, as fine and as wide as they tell."""
+"""A grid for data without one: at the point that they were aimed at, with their resolution and unambiguous extent."""
 
 from __future__ import annotations
 
@@ -13,15 +13,16 @@ from ..model.image_grid import ImageGrid
 if TYPE_CHECKING:
     from ..model.phase_history import PhaseHistory
 
-MOST = 1024  # pixels along a side
-ROWS = 4096  # rows looked at; more say nothing new about the geometry
-WELL_POSED = 0.02  # smallest over largest singular value that fixes all three coordinates, and
-FIXED = 0.001  # that fixes a direction on the ground; others stay as they are
+MOST = 1024  # pixels along a side, at most
+ROWS = 4096  # rows from which the geometry is taken
+# Smallest ratio of a singular value to the largest at which all three coordinates are determined, and at which a
+# direction on the ground is; other directions are left unchanged
+WELL_POSED, FIXED = 0.02, 0.001
 
 
 @dataclass(frozen=True, eq=False)
 class DefaultGrid:
-    """A plane, and in words why it is this one."""
+    """A plane, and the reason for its choice in words."""
 
     grid: ImageGrid
     why: str
@@ -36,13 +37,13 @@ def default_grid(
     normal: Any = None,
     x_axis: Any = None,
 ) -> DefaultGrid:
-    """A plane (level by default) for phase history, from the data where its owner leaves it open.
+    """A plane (horizontal by default) for a phase history; arguments that are None are chosen from the data.
 
-    center   the point whose range equals reference_range in every row: the origin where it does to within a
-             resolution cell; else by least squares, on z = 0 unless the antennas' directions fix z too;
+    center   the point whose range equals reference_range in every row: the origin where that holds to within a
+             resolution cell; else by least squares, on z = 0 unless the directions to the antennas determine z too;
              else the origin
-    spacing  half the resolution along rows and columns, from the frequencies and directions the data hold
-    shape    what the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
+    spacing  half the resolution along rows and columns, from the frequencies and directions in the data
+    shape    the extent that the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
     normal, x_axis   as in `ImageGrid.plane`
     """
     part = raw if raw.n_rows <= ROWS else raw[np.linspace(0, raw.n_rows - 1, ROWS).astype(int)]
@@ -94,9 +95,9 @@ def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
 
 
 def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:
-    """Least-squares point of equal ranges, its first `free` coordinates free, the rest 0.
+    """Least-squares point of equal ranges; its first `free` coordinates are free, the others 0.
 
-    None where antennas too much alike leave one of three coordinates open, or the search does not settle.
+    None where the directions to the antennas do not determine all three coordinates, or the search does not converge.
     """
     x = np.zeros(3)
     for _ in range(50):
@@ -106,7 +107,7 @@ def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:
             return None
         fixed = s > FIXED * s[0]
         step = -vt.T[:, fixed] @ ((u.T @ excess)[fixed] / s[fixed])
-        # no further at once than the antennas are away: farther, the gradients have nothing to say
+        # steps of half the distance to the antennas at most, where the gradients are still valid
         reach = float(raw.reference_range.max()) / 2
         length = float(np.linalg.norm(step))
         x[:free] += step * min(1.0, reach / max(length, 1e-300))
@@ -116,10 +117,10 @@ def _meet(raw: PhaseHistory, free: int) -> np.ndarray | None:
 
 
 def _resolution(raw: PhaseHistory, plane: ImageGrid, n_rows: int) -> tuple[np.ndarray, float]:
-    """Resolution along rows and columns (y_axis, x_axis), m, and the extent, m, over which nothing repeats.
+    """Resolution along rows and columns (y_axis, x_axis), m, and the extent, m, over which echoes do not repeat.
 
-    The data hold the spatial frequencies k = 2 f/c times the gradient of range; their extent along an axis
-    is 0.886 over the resolution.
+    The data contain the spatial frequencies k = 2 f/c times the gradient of range; their extent along an axis is 0.886
+    divided by the resolution.
     """
     assert plane.center is not None and plane.x_axis is not None and plane.y_axis is not None
     direction = -_excess(raw, plane.center)[1] @ np.stack([plane.y_axis, plane.x_axis], axis=1)
@@ -132,6 +133,6 @@ def _resolution(raw: PhaseHistory, plane: ImageGrid, n_rows: int) -> tuple[np.nd
     if raw.n_rows > 1 and turn > 0:
         middle = 2 / SPEED_OF_LIGHT * float(np.median((low + high) / 2))
         swath = min(swath, (n_rows - 1) / (turn * level * middle))
-    # an axis the data do not resolve gets pixels that are not too far from square
+    # along an axis that the data do not resolve, pixels are at most 8 times longer than across
     extent = np.maximum(extent, extent.max() / 8)
     return 0.886 / np.maximum(extent, 0.886 / swath), swath

@@ -17,9 +17,9 @@ from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 from .focusing_task import FocusingTask
 
-ROWS, PIXELS, MOST = 16, 256, 2**18
-ALL = 2**28  # samples up to which every row is looked at
-TAPS, FINER, TERMS = 12, 4.0, 6  # of a kernel that errs by 1e-11
+ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples at most
+ALL = 2**28  # samples up to which every row is read
+TAPS, FINER, TERMS = 12, 4.0, 6  # of an interpolator with an error of 1e-11
 
 
 _norms: WeakKeyDictionary[FocusingTask, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
@@ -39,9 +39,9 @@ class ProfileEnergy:
 
 
 def estimate(task: FocusingTask) -> ProfileEnergy:
-    """Estimate from 256 pixels in 16 rows spread over the data and in the 16 brightest, exact to 1e-11 of an amplitude.
+    """Estimate from 256 pixels in 16 rows spread over the data and in the 16 strongest rows, to 1e-11 of an amplitude.
 
-    ProfileEnergy(1, 1) where no pixel sees anything.
+    ProfileEnergy(1, 1) where no row sees any of these pixels.
     """
     if task not in _known:
         _known[task] = _estimate(task)
@@ -49,14 +49,14 @@ def estimate(task: FocusingTask) -> ProfileEnergy:
 
 
 def _estimate(task: FocusingTask) -> ProfileEnergy:
-    """As `estimate`, anew."""
+    """See `estimate`."""
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
     count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
     usual = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
     best = np.setdiff1d(np.argsort(bright)[-count:], usual)
     _, x = grid.sample(PIXELS, seed=1)
-    # the brightest stand for themselves, the others for all that were not looked at
+    # weights: the strongest rows count once, the others stand for all rows that are not read
     stands_for = {int(r): (raw.n_rows - len(best)) / len(usual) for r in usual} | {int(r): 1.0 for r in best}
     read = {r: raw.read(r, r + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in stands_for}
     scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read.values()))  # squares must not overflow
@@ -64,23 +64,25 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     k = np.arange(n) - n // 2
     length = fft.good_length(max(4 * n, 48))
     shaped = 1 / deconvolved(TAPS, FINER, TERMS, np.float64).transform(k / length)
-    at = near = lit = 0.0
+    pixel_power = near = pixels_inside = 0.0
     for row, samples in read.items():
-        turns, inside = _delays(task, x, row)
-        values, close = _read(samples / scale, shaped, length, turns[inside])
-        at, near = at + stands_for[row] * values, near + stands_for[row] * close
-        lit += stands_for[row] * int(inside.sum()) / raw.n_rows
-    whole = lit * float(((bright / scale) ** 2).sum())
+        delays, inside = _delays(task, x, row)
+        values, close = _powers(samples / scale, shaped, length, delays[inside])
+        pixel_power, near = pixel_power + stands_for[row] * values, near + stands_for[row] * close
+        pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
+    whole = pixels_inside * float(((bright / scale) ** 2).sum())
     if whole == 0 or near == 0:
         return ProfileEnergy(1.0, 1.0)
-    floor = 1e-20 * whole  # every pixel of every row at an exact null: no more can be told
-    return ProfileEnergy(float(np.sqrt(near / max(at, floor))), float(np.sqrt(whole / max(at, floor))))
+    floor = 1e-20 * whole  # where every pixel is at an exact null of every row
+    return ProfileEnergy(
+        float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(whole / max(pixel_power, floor)))
+    )
 
 
 def row_norms(task: FocusingTask) -> np.ndarray:
-    """Norm of the samples of each row as they are weighed, (n_rows,) float64.
+    """Norm of the samples of each row with their weights, (n_rows,) float64.
 
-    Of more than 2^28 samples (2 GiB), every n-th row alone is read, and stands for those up to the next.
+    Of more than 2^28 samples (2 GiB), only every n-th row is read, and its norm is used up to the next one.
     """
     if task in _norms:
         return _norms[task]
@@ -107,18 +109,19 @@ def share(task: FocusingTask) -> float:
 
 
 def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
-    """Delays of points, m (m, 3), in turns of a row's window, and whether the row sees them."""
+    """Delays of points, m (m, 3), in fractions of a row's range window, and whether the row sees them."""
     raw = task.raw
     half = half_path(raw.tx[row], raw.rx[row], x)
-    turns = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
-    lit = np.full(len(x), True) if task.wrap else np.abs(turns) <= 0.5
+    delays = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])
+    seen = np.full(len(x), True) if task.wrap else np.abs(delays) <= 0.5
     if task.antennas.beam is not None:
-        lit &= task.antennas.beam_depth(x, row) >= 0
-    return turns, lit
+        seen &= task.antennas.beam_depth(x, row) >= 0
+    return delays, seen
 
 
-def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarray) -> tuple[float, float]:
-    """Power of a profile at delays (m,), in turns of the window, added up; and around them.
+def _powers(samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray) -> tuple[float, float]:
+    """Power of a profile at delays (m,), in fractions of the window, summed; and the mean power of the samples around
+    each delay, summed.
 
     shaped  (n_samples,): what makes up for the kernel's transform
     """
@@ -126,10 +129,10 @@ def _read(samples: np.ndarray, shaped: np.ndarray, length: int, turns: np.ndarra
     weights = np.stack([shaped, np.ones(len(samples))])
     profile, plain = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
     power = np.abs(plain) ** 2
-    place = turns * length - (made.taps - 1) / 2
+    place = delays * length - (made.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
     taps = (first[:, None] + np.arange(made.taps)) % length
     values = (made.weights(place - first) * profile[taps]).sum(axis=1)
-    # what a kernel reads, and a sample more on each side
+    # the samples that an interpolation reads, and one more on each side
     around = (first[:, None] + np.arange(-1, made.taps + 1)) % length
     return float((np.abs(values) ** 2).sum()), float(power[around].mean(axis=1).sum())

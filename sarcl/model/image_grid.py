@@ -110,7 +110,7 @@ class ImageGrid:
 
     @property
     def is_plane(self) -> bool:
-        """True for a grid made by `plane`."""
+        """Whether the grid was made by `plane`."""
         return self.listed is None
 
     @property
@@ -132,14 +132,14 @@ class ImageGrid:
         return self.shape[1] // 2
 
     def columns(self, start: int, stop: int) -> ImageGrid:
-        """Columns start ... stop - 1 of a plane, their positions to the bit those they have there."""
+        """Columns start ... stop - 1 of a plane, with the same positions to the bit."""
         self._need_plane("columns")
         part = replace(self, shape=(self.shape[0], stop - start))
         part.__dict__["_middle"] = self._middle - start
         return part
 
     def filled(self) -> ImageGrid:
-        """The grid with a position that is not empty in every empty cell; itself where there is none."""
+        """The grid with some position of another cell in every empty cell; itself where no cell is empty."""
         if self.empty is None or self.listed is None:
             return self
         listed = self.listed.copy()
@@ -147,9 +147,9 @@ class ImageGrid:
         return ImageGrid(shape=self.shape, listed=validation.sealed(listed))
 
     def sample(self, most: int, seed: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
-        """Up to `most` random pixels, no empty ones: index into an image, and positions, m (n, 3)."""
+        """Up to `most` random pixels that are not empty: indices into an image, and positions, m (n, 3)."""
         random = np.random.default_rng(seed)
-        if self.size > MOST_NUMBERED:  # none is likely to be picked twice
+        if self.size > MOST_NUMBERED:  # the same pixel twice is unlikely
             index = tuple(random.integers(0, n, most) for n in self.shape)
             return index, self.positions_of(index)
         if self.empty is None:
@@ -180,7 +180,7 @@ class ImageGrid:
 
     @property
     def bounds(self) -> NDArray[np.float64]:
-        """Lower and upper corner of the box that holds all pixels but empty ones, m (2, 3)."""
+        """Lower and upper corner of the box around all pixels that are not empty, m (2, 3)."""
         if self.listed is not None:
             p = self.listed.reshape(-1, 3) if self.empty is None else self.listed[~self.empty]
         else:
@@ -212,7 +212,8 @@ class ImageGrid:
 
 
 def _cells(positions: np.ndarray) -> np.ndarray:
-    """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor an empty cell's three NaN."""
+    """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor the three NaN of an empty
+    cell."""
     empty = np.isnan(positions).all(axis=-1)
     if empty.all():
         raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")

@@ -135,7 +135,7 @@ def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
     raw = noise_on(ARC, n_samples=90)
     waves = waves_about(raw, GRID.center)
     for scale in (1.0, 7.0):  # wavenumbers that wrap once, and again and again
-        turns, step = (scale * v for v in waves.places(raw, GRID))
+        turns, step = (scale * v for v in waves.pixel_cycles(raw, GRID))
         for taps in (2, 4, 6, 8):
             plan = nufft2d.GridPlan(interpolator(taps, 2.0), (126, 150), 1.0, 1.0, 1.0)
             seen = []
@@ -194,7 +194,7 @@ def test_points_are_displaced_as_predicted_and_within_the_wavefronts_bend(squint
         whole = sarcl.ImageGrid.plane(shape=(360, 360), spacing=0.2)
         image = sarcl.polar_format(raw, whole, tolerance=1e-3, check=False)
         # the part of the wavefront's bend that is a shift, at this place
-        looked = _wavefront._Looked(raw, waves_about(raw, np.zeros(3)), whole, np.arange(200))
+        looked = _wavefront._NeglectedPhase(raw, waves_about(raw, np.zeros(3)), whole, np.arange(200))
         predicted = float(looked(np.array([point]))[2][0])
         moved = float(np.linalg.norm(sarcl.measure(image, near=point).position - point))
         r, distance = np.linalg.norm(point), np.linalg.norm(middle)

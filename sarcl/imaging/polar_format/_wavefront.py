@@ -1,4 +1,4 @@
-"""Plane waves over a scene: wavenumbers of rows on a plane, and what the wavefronts' curvature is beside them."""
+"""Plane waves over a scene: wavenumbers of the rows on a plane, and the error of neglecting the wavefront curvature."""
 
 from __future__ import annotations
 
@@ -10,9 +10,9 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 
-MOST_ROWS = 65  # of those that the curvature is looked at
-DIRECTIONS = 16  # from the centre, along which focus is looked for
-FOCUSED = np.pi / 4  # rad
+MOST_ROWS = 65  # rows from which the error is estimated
+DIRECTIONS = 16  # directions from the centre along which the sharp radius is searched
+FOCUSED = np.pi / 4  # rad: largest blurring phase of a sharp image
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,7 +22,7 @@ class Waves:
     center    m (3,): where they are exact
     toward    unit vectors from it to the antennas (n_rows, 3)
     distance  |tx - center|, m (n_rows,)
-    shift     distance less reference_range, m (n_rows,): the phase 4 pi f shift/c is put back
+    shift     distance less reference_range, m (n_rows,): the phase 4 pi f shift/c is added back
     """
 
     center: np.ndarray
@@ -30,8 +30,9 @@ class Waves:
     distance: np.ndarray
     shift: np.ndarray
 
-    def places(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[np.ndarray, np.ndarray]:
-        """Turns from one pixel to the next (n_rows, 2), rows and columns: of sample n_samples//2, and a sample more.
+    def pixel_cycles(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[np.ndarray, np.ndarray]:
+        """Cycles of phase from one pixel to the next along rows and columns, of sample n_samples//2, and their change
+        from one sample to the next, each (n_rows, 2).
 
         K = -(2 f/c) u on the plane, so that I(x) = sum s exp(+j 2 pi K.(x - center)).
         """
@@ -43,12 +44,12 @@ class Waves:
 
 
 def waves_about(raw: PhaseHistory, center: np.ndarray) -> Waves:
-    """Plane waves of every row about `center`, m (3,). ValueError where an antenna is there."""
+    """Plane waves of every row about `center`, m (3,). ValueError where an antenna is at the centre."""
     away = raw.tx - center
     distance = np.linalg.norm(away, axis=1)
     if not distance.all():
         raise ValueError(f"tx[{int(np.argmin(distance))}] is at the grid's centre, where waves have no direction")
-    # differences of float64 are 4e-9 m off at 36 000 km: 1e-5 rad at 60 GHz
+    # in float64 the difference has an error of 4e-9 m at 36 000 km: 1e-5 rad at 60 GHz
     wide, known = raw.tx.astype(np.longdouble) - center, raw.reference_range.astype(np.longdouble)
     length = np.sqrt((wide**2).sum(axis=1))
     shift = ((wide**2).sum(axis=1) - known**2) / np.where(length + known > 0, length + known, 1)
@@ -57,12 +58,12 @@ def waves_about(raw: PhaseHistory, center: np.ndarray) -> Waves:
 
 @dataclass(frozen=True)
 class Curvature:
-    """What plane waves err on a grid.
+    """Error of plane waves on a grid.
 
     phase       largest |4 pi f/c (|T - x| - |T - c| + u.(x - c))| of any pixel, row and frequency, rad
-    defocus     what is left of it, rad, once a constant phase and a shift are taken out pixel by pixel
+    defocus     remaining phase, rad, after removal of a constant phase and a shift for each pixel
     distortion  the largest such shift, m
-    radius      m from the centre within which defocus stays below pi/4; inf where it does as far as the antennas
+    radius      m from the centre within which defocus stays below pi/4; inf where it does up to the antennas
     """
 
     phase: float
@@ -72,18 +73,18 @@ class Curvature:
 
 
 def curvature(raw: PhaseHistory, waves: Waves, grid: ImageGrid) -> Curvature:
-    """What plane waves err on a plane: at its border, from some rows, lowest, middle and highest frequency."""
+    """Error of plane waves on a plane: at its border, from some rows, at the lowest, middle and highest frequency."""
     rows = np.unique(np.linspace(0, raw.n_rows - 1, MOST_ROWS).astype(int))
-    looked = _Looked(raw, waves, grid, rows)
+    neglected = _NeglectedPhase(raw, waves, grid, rows)
     last = np.array(grid.shape) - 1
     i, j = (np.array(at) / 2 for at in ([0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]))
-    phase, rest, shift = looked(grid.at(i * last[0], j * last[1]) - waves.center)
+    phase, rest, shift = neglected(grid.at(i * last[0], j * last[1]) - waves.center)
     angle = np.arange(DIRECTIONS) * 2 * np.pi / DIRECTIONS
     assert grid.y_axis is not None and grid.x_axis is not None
     compass = np.cos(angle)[:, None] * grid.x_axis + np.sin(angle)[:, None] * grid.y_axis
 
     def blurred(radius: float) -> bool:
-        return bool(looked(radius * compass)[1].max() >= FOCUSED)
+        return bool(neglected(radius * compass)[1].max() >= FOCUSED)
 
     low, high = 0.0, float(waves.distance[rows].min()) / 2
     radius = np.inf
@@ -95,8 +96,8 @@ def curvature(raw: PhaseHistory, waves: Waves, grid: ImageGrid) -> Curvature:
     return Curvature(float(phase.max()), float(rest.max()), float(shift.max()), radius)
 
 
-class _Looked:
-    """The phase that plane waves lack, of some rows at three frequencies, and what of it is no shift."""
+class _NeglectedPhase:
+    """The phase that plane waves neglect, for some rows at three frequencies, and its part that is no shift."""
 
     def __init__(self, raw: PhaseHistory, waves: Waves, grid: ImageGrid, rows: np.ndarray) -> None:
         self.toward, self.distance = waves.toward[rows], waves.distance[rows]
@@ -107,12 +108,12 @@ class _Looked:
         on_plane = self.toward @ np.stack([grid.y_axis, grid.x_axis], axis=1)
         waves_here = (self.wavenumber[:, :, None] * on_plane[:, None]).reshape(-1, 2)
         middle = waves_here.mean(axis=0)
-        # a phase and a shift: the columns are scaled alike, so that what no shift can be told from a phase is dropped
+        # constant phase and shift; with columns of equal scale, shifts that equal a constant phase drop out of the fit
         self.scale = float(np.abs(waves_here - middle).max()) or 1.0
         self.basis = np.column_stack([np.ones(len(waves_here)), (waves_here - middle) / self.scale])
 
     def __call__(self, d: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """Largest phase, rad, largest rest, rad, and shift, m, at places d, m (n, 3), from the centre: each (n,)."""
+        """Largest phase and remainder, rad, and shift, m, each (n,), at offsets d, m (n, 3), from the centre."""
         along = self.toward @ d.T
         near = self.distance[:, None] - along
         path = np.sqrt(np.maximum((d * d).sum(axis=1) - along**2, 0) + near**2)

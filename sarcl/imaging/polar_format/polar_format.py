@@ -1,4 +1,4 @@
-"""polar_format: monostatic echoes to an image as if wavefronts were planes, by one two-dimensional FFT."""
+"""polar_format: monostatic echoes to an image with plane wavefronts, by one two-dimensional FFT."""
 
 from __future__ import annotations
 
@@ -26,7 +26,7 @@ from ...opencl.device import DeviceChoice
 from ..focusing_task import FocusingTask, make_task
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
-DEFOCUS = np.pi / 2  # rad at the grid's border that is warned of
+DEFOCUS = np.pi / 2  # rad: blurring phase at the border of the grid above which a warning is given
 Progress = Callable[[str, int, int], None]
 
 
@@ -42,24 +42,24 @@ def polar_format(
     check: bool | None = None,
     progress: Progress | None = None,
 ) -> Image:
-    """Focus echoes on a plane, wavefronts taken for planes: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
+    """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
 
     raw        PhaseHistory, compressed, monostatic, of at least 2 rows; any track
-    grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, u from c to the antenna; phases
-               are referred to c whatever reference_range is
-    tolerance  L2 error allowed against that sum, relative to the larger of |I| and the norm if samples added with
-               random phases, sqrt(pixels sum |w s|^2)
+    grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, with u the direction from c to the
+               antenna. Phases are relative to c, whatever reference_range is
+    tolerance  L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that
+               add with random phases, sqrt(pixels sum |w s|^2)
     window, weights, max_bytes   as `backproject` takes them
     check      compute 256 random pixels of that sum exactly; None: where that costs less than 2 %
     device     see `sarcl.devices`
     progress   called as progress(stage, done, total), in thousandths
 
-    The report's plan says what plane waves err against `backproject`, which the tolerance does not count: the
-    largest phase, what of it blurs, by how much pixels are displaced, and the radius in which images are sharp.
-    sarcl.SarclWarning where they are not to the grid's border, and where that lies beyond the range window, in
-    which echoes repeat. ValueError: bistatic or uncompressed data, listed points, one row;
-    ToleranceUnreachable: a tolerance that cannot be met; ToleranceMissed: the check measured more than the tolerance;
-    MemoryError: max_bytes too small.
+    The plan in the report gives the error of plane wavefronts against `backproject`, which the tolerance does not
+    include: the largest neglected phase, its part that blurs, the largest displacement of a pixel, and the radius in
+    which images are sharp. sarcl.SarclWarning where images are not sharp up to the border of the grid, and where the
+    border lies beyond the range window, so that echoes repeat. ValueError: bistatic or uncompressed data, listed
+    points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an error
+    above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()
@@ -81,9 +81,9 @@ def polar_format(
     waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
     bent = curvature(task.raw, waves, grid)
     _warn(task, waves, bent)
-    turns, step = waves.places(task.raw, grid)
-    plan = make_plan(tolerance, grid.shape, turns, step, raw.n_samples, tile_of(opened))
-    engine = Gridder(opened, plan, turns, step, raw.n_samples)
+    cycles, step = waves.pixel_cycles(task.raw, grid)
+    plan = make_plan(tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(opened))
+    engine = Gridder(opened, plan, cycles, step, raw.n_samples)
     engine.blocks(budget)
     clock.lap("plan")
 
@@ -94,11 +94,11 @@ def polar_format(
         energy[start:stop] = (made.real.astype(np.float64) ** 2 + made.imag.astype(np.float64) ** 2).sum(axis=1)
         return made
 
-    def tell(share: float) -> None:
+    def on_progress(share: float) -> None:
         if progress:
             progress("polar format", round(1000 * share), 1000)
 
-    data = engine.image(read, grid.shape, budget, clock, tell)
+    data = engine.image(read, grid.shape, budget, clock, on_progress)
     norm, random = float(np.linalg.norm(data)), float(np.sqrt(energy.sum() * grid.size))
     details = plan.describe()
     if norm < random:
@@ -134,16 +134,16 @@ def polar_format(
 
 
 def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
-    """Samples of some rows, times weights, their phase about the grid's centre: complex64."""
+    """Samples of rows start ... stop - 1 times their weights, with phases relative to the grid's centre: complex64."""
     raw, rows = task.raw, slice(start, stop)
     made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
     shift = waves.shift[rows, None]
-    # a reference at the centre differs from it by roundings alone
+    # where the reference is the centre, the shift is rounding alone
     if float(np.abs(shift).max()) * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * tolerance:
         n = np.arange(raw.n_samples)
         first = 2 / SPEED_OF_LIGHT * shift * raw.frequency[rows, None] % 1
-        turns = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
-        made = made * np.exp(2j * np.pi * turns)
+        cycles = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
+        made = made * np.exp(2j * np.pi * cycles)
     largest = float(np.abs(made).max(initial=0.0))
     if largest > LARGEST[np.complex64] / raw.samples.size:
         raise ValueError(
@@ -154,7 +154,7 @@ def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance
 
 
 def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
-    """What of the grid is blurred, or repeats what lies elsewhere."""
+    """Warn where the grid is blurred, or reaches beyond the range window."""
     if bent.defocus > DEFOCUS:
         text = (
             f"wavefronts are curved: at the grid's border {bent.defocus:.2g} rad are left that blur; polar_format "
@@ -177,7 +177,7 @@ def _corners(grid: ImageGrid) -> np.ndarray:
 
 
 def _describe(bent: Curvature) -> dict[str, str]:
-    """What plane waves err, for a report."""
+    """The error of plane wavefronts, for a report."""
     return {
         "plane waves err": f"{bent.phase:.2g} rad",
         "that blurs": f"{bent.defocus:.2g} rad",
