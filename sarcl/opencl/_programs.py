@@ -36,6 +36,12 @@ def source(file: str) -> str:
     return expand(file)
 
 
+@functools.cache
+def names_in(text: str) -> frozenset[str]:
+    """Every identifier of OpenCL source text, those in comments left out."""
+    return frozenset(re.findall(r"\b[A-Za-z_]\w*", re.sub(r"//.*", "", text)))
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
     """Context of every build: no warnings of a compiler that succeeds, and no wait for the lock of a killed process."""

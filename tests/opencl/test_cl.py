@@ -239,6 +239,25 @@ def test_includes_are_expanded_once_and_lines_point_at_the_files():
     assert original[number - 1].startswith("__kernel void backproject(")
 
 
+def test_programs_are_given_only_the_macros_they_name(device, monkeypatch):
+    import pyopencl
+
+    given = []
+
+    class Program(pyopencl.Program):
+        def build(self, options):
+            given.append(options)
+            return super().build(options)
+
+    monkeypatch.setattr(pyopencl, "Program", Program)
+    device._build("ray_casting.cl", {"VW": device.info.vector_width, "FP64": 0, "TAPS": 4})
+    assert given == [[]]
+    assert {"VW", "FP64", "TAPS"} <= _programs.names_in(_programs.source("backproject.cl"))
+    # tests/visibility runs on no twin of a device: none would change these
+    for file in ("ray_casting.cl", "terrain_horizon.cl"):
+        assert not {"VW", "FP64"} & _programs.names_in(_programs.source(file))
+
+
 def test_a_kernel_that_does_not_build_names_file_device_and_log(device, monkeypatch):
     monkeypatch.setattr("sarcl.opencl.device.source", lambda file: "__kernel void broken(int x) { y = 1; }")
     with pytest.raises(RuntimeError, match=r"kernels/broken.cl does not build on '.*'") as caught:
