@@ -2,20 +2,24 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test bench results architecture lint clean ready ready-dev
+.PHONY: help demo test test-all bench results architecture lint clean ready ready-dev
 
 ARGS ?=
+PYTEST = .venv/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
 CODE = sarcl kernels tests bench docs conftest.py
 
 help:  ## this list
 	@echo "make GOAL [ARGS='...' handed to the command] [PYTHON=/path/to/python3.12]"
-	@sed -n 's/^\([a-z]*\):[^#]*## */  \1\t/p' Makefile
+	@sed -n 's/^\([a-z-]*\):[^#]*## */  \1\t/p' Makefile
 
 demo: ready  ## simulate and focus a scene; the picture is out/demo.png
 	@.venv/bin/sarcl demo $(ARGS)
 
-test: ready  ## the tests
-	@.venv/bin/python -m pytest $(ARGS)
+test: ready  ## the quick tests, in one process for each processor, at most four
+	@$(PYTEST) $(ARGS)
+
+test-all: ready  ## all tests, the slow ones too
+	@$(PYTEST) -m '' $(ARGS)
 
 bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
 	@.venv/bin/sarcl bench backproject $(ARGS)

@@ -1,4 +1,4 @@
-"""Fixtures: every OpenCL device on the machine, with and without float64, and the folder of outside data."""
+"""Fixtures: every OpenCL device on the machine and its twins, and the folder of outside data."""
 
 from __future__ import annotations
 
@@ -6,43 +6,27 @@ import os
 from pathlib import Path
 
 import pytest
-
-from sarcl.opencl.choose_device import REMEDY, open_device
-from sarcl.opencl.device_list import devices
+from helpers.devices import opened, variants
 
 
-def _devices():
-    """Every working device, each once more without float64, and CPUs once more with one lane, as GPUs run."""
-    found = []
-    for info in devices():
-        if info.works:
-            name = f"{info.index}-{info.kind}"
-            found.append(pytest.param((info.index, None), id=name))
-            if info.fp64:
-                found.append(pytest.param((info.index, "without_fp64"), id=f"{name}-no-fp64"))
-            if info.vector_width > 1:
-                found.append(pytest.param((info.index, "one_lane"), id=f"{name}-one-lane"))
-    if not found:
-        found.append(pytest.param(None, id="none"))
-    return found
-
-
-@pytest.fixture(params=_devices())
+@pytest.fixture(params=variants())
 def device(request):
     """An open device; a kernel that fails on it fails the test."""
+    return opened(request.param)
+
+
+@pytest.fixture(params=variants(slow=()))
+def every_device(request):
+    """As `device`, with no twin left to the slow tests: where the branches themselves are tested, at little cost."""
+    return opened(request.param)
+
+
+@pytest.fixture(params=variants(fp64=True))
+def double(request):
+    """Every device that has float64, and its twin of one lane."""
     if request.param is None:
-        pytest.fail(f"no OpenCL device works. {REMEDY}")
-    index, twin = request.param
-    opened = open_device(index)
-    return getattr(opened, twin)() if twin else opened
-
-
-@pytest.fixture
-def double(device):
-    """Every device that has float64; the others are refused, as a test of its own says."""
-    if not device.info.fp64:
         pytest.skip("no float64")
-    return device
+    return opened(request.param)
 
 
 @pytest.fixture(scope="session")
