@@ -1,24 +1,24 @@
-"""TOML text: the line of each key, and values written as TOML.
-
-tomli-w and tomlkit are not used for writing: one puts every number of an array on a line of its own, the other all of
-them on one line. Positions and rows of numbers stay readable here.
-"""
+"""TOML text: the line of each key, and values written as TOML."""
 
 from __future__ import annotations
 
 import re
+import textwrap
 from bisect import bisect_right
 from collections.abc import Mapping
 from typing import Any
 
 Path = tuple[str | int, ...]
 
-WIDTH = 80  # characters of the longest array that stays on one line
+WIDTH = 80  # most characters of a line with the numbers of an array
+INDENT = 2  # spaces
 
 _BARE = re.compile(r"[A-Za-z0-9_-]+")
 _SCALAR = re.compile(r"[^\s,\]}#]+(?: \d[^\s,\]}#]*)?")  # a space may separate date and time
 _STRING = re.compile(r'"""(?:\\.|[^\\])*?"{3,5}' r"|'''.*?'{3,5}" r'|"(?:\\.|[^"\\])*"' r"|'[^']*'", re.DOTALL)
 _FLAT = re.compile(r"""\[[^\[\]{}"'#]*\]""")  # an array of numbers: nothing in it has a path of its own
+# an array of numbers as tomli-w writes it; strings hold no line end there
+_NUMBERS = re.compile(r"\[\n(?P<indent> +)(?P<values>[-+.\w]+(?:,\s+[-+.\w]+)*),\n *\]")
 _SPACE = re.compile(r"(?:[ \t\r\n]|#[^\n]*)*")
 _ESCAPE = re.compile(r'\\(u[0-9A-Fa-f]{4}|U[0-9A-Fa-f]{8}|x[0-9A-Fa-f]{2}|[btnfre"\\])')
 _ESCAPED = {"b": "\b", "t": "\t", "n": "\n", "f": "\f", "r": "\r", "e": "\x1b", '"': '"', "\\": "\\"}
@@ -148,62 +148,32 @@ def _unquote(text: str) -> str:
 def dumps(tables: Mapping[str, Any]) -> str:
     """TOML text of nested tables of str, bool, int, float, lists and dicts.
 
+    tomli-w writes the text; numbers of an array, each on a line of its own there, are then put side by side.
     TypeError names a key whose value is of no TOML type (None, complex, NumPy arrays: give lists).
     """
-    return "\n".join(_table((), tables)).strip("\n") + "\n"
+    import tomli_w
+
+    _check(tables, "")
+    return _NUMBERS.sub(_side_by_side, tomli_w.dumps(tables, indent=INDENT))
 
 
-def _table(path: tuple[str, ...], table: Mapping[str, Any]) -> list[str]:
-    """Lines of a table: its own keys, then the tables in it."""
-    own, nested = [], []
-    for key, value in table.items():
-        where = (*path, key)
-        name = ".".join(map(_key, where))
-        if isinstance(value, Mapping):
-            # a table that only holds tables needs no header of its own
-            plain = not value or not all(_holds_tables(v) for v in value.values())
-            nested += ["", f"[{name}]"] if plain else []
-            nested += _table(where, value)
-        elif _holds_tables(value):
-            for part in value:
-                nested += ["", f"[[{name}]]", *_table(where, part)]
-        else:
-            own.append(f"{_key(key)} = {_value(value, name)}")
-    return own + nested
-
-
-def _holds_tables(value: Any) -> bool:
-    return isinstance(value, Mapping) or (
-        isinstance(value, (list, tuple)) and bool(value) and all(isinstance(v, Mapping) for v in value)
-    )
-
-
-def _key(key: str) -> str:
-    return key if _BARE.fullmatch(key) else _string(key)
-
-
-def _value(value: Any, name: str) -> str:
-    if isinstance(value, bool):
-        return "true" if value else "false"
-    if isinstance(value, (int, float)):
-        return (float if isinstance(value, float) else int).__repr__(
-            value
-        )  # the shortest text that reads back as the same number; inf and nan too
-    if isinstance(value, str):
-        return _string(value)
+def _check(value: Any, name: str) -> None:
     if isinstance(value, Mapping):
-        return "{" + ", ".join(f"{_key(k)} = {_value(v, f'{name}.{k}')}" for k, v in value.items()) + "}"
-    if isinstance(value, (list, tuple)):
-        parts = [_value(v, f"{name}[{i}]") for i, v in enumerate(value)]
-        if sum(map(len, parts)) + 2 * len(parts) <= WIDTH:
-            return "[" + ", ".join(parts) + "]"
-        if all(isinstance(v, (bool, int, float)) for v in value):
-            return "[\n" + "".join(f"  {', '.join(parts[i : i + 8])},\n" for i in range(0, len(parts), 8)) + "]"
-        return "[\n" + "".join(f"  {p},\n" for p in parts) + "]"
-    raise TypeError(f"{name} is a {type(value).__name__}; TOML holds strings, numbers, true, false, arrays and tables")
+        for key, part in value.items():
+            _check(part, f"{name}.{key}" if name else key)
+    elif isinstance(value, (list, tuple)):
+        for i, part in enumerate(value):
+            _check(part, f"{name}[{i}]")
+    elif not isinstance(value, (bool, int, float, str)):
+        kind = type(value).__name__
+        raise TypeError(f"{name} is a {kind}; TOML holds strings, numbers, true, false, arrays and tables")
 
 
-def _string(text: str) -> str:
-    """A basic string; TOML wants every control character escaped."""
-    short = {"\\": "\\\\", '"': '\\"', "\n": "\\n", "\t": "\\t", "\r": "\\r"}
-    return '"' + re.sub(r'[\x00-\x1f\x7f"\\]', lambda m: short.get(m[0]) or f"\\u{ord(m[0]):04x}", text) + '"'
+def _side_by_side(match: re.Match[str]) -> str:
+    """An array of numbers on one line, or on lines of at most WIDTH characters."""
+    values = ", ".join(match["values"].replace(",", " ").split())
+    if len(values) + 2 <= WIDTH:
+        return f"[{values}]"
+    indent = match["indent"]
+    lines = textwrap.fill(values, WIDTH, initial_indent=indent, subsequent_indent=indent, break_on_hyphens=False)
+    return f"[\n{lines},\n{indent[INDENT:]}]"
