@@ -2,14 +2,14 @@
 
     python bench/channels.py --json bench/results/4-channels-pocl.json
 
-growth   points in front of 9, 45 and 450 elements half a wave apart, a carrier each, 900 MHz in all: by one call of
-         echo; by the same with every channel made by itself; by a call of echo for every element as a single antenna
-one      9, 45 and 450 elements of one carrier: `AntennaArray.linear` without a step, the same array given element by
-         element, every element made by itself (not for 450), and a single element
-many     450 senders and 450 receivers, written to a file within 100 MB
+growth   points in front of 9, 45 and 450 elements half a wavelength apart, each with its own carrier, 900 MHz in all:
+         with one call of echo; with one call and every channel computed; with one call per element as a single antenna
+one      9, 45 and 450 elements with one carrier: `AntennaArray.linear` without a step, the same array given element by
+         element, every element computed (not for 450), and a single element
+many     450 transmitters and 450 receivers, written to a file within 100 MB
 
-A contribution is a pair of scatterer and pulse for every sender and receiver. Errors are achieved ones, by echo's own
-check against exact sums. The shortest run counts, of runs that take turns; compiling is not in it.
+A contribution is one scatterer in one pulse from one transmitter to one receiver. Errors are measured by echo's own
+check against exact sums. Runs alternate; the shortest counts. Compiling is not included.
 """
 
 from __future__ import annotations
@@ -60,7 +60,7 @@ def main() -> None:
 
 
 def growth(args: argparse.Namespace) -> list[Row]:
-    """Rows of every number of channels and points."""
+    """Rows for every number of channels and points."""
     out = []
     for name, (count, half) in POINTS.items():
         for n in (9, 45, 450):
@@ -81,7 +81,7 @@ def growth(args: argparse.Namespace) -> list[Row]:
 
 
 def singly(scene: Any, tone: Any, track: Any, array: Any, options: Row, *, check: bool) -> Any:
-    """A call for every element as a single antenna; returns the echoes that err most, of nine that are checked."""
+    """One call per element as a single antenna; returns the echoes with the largest error of nine that are checked."""
     made, some = [], max(1, array.n // 9)
     for i, (place, offset) in enumerate(zip(array.positions, array.offsets[0], strict=True)):
         wave = replace(tone, center=tone.center + float(offset))
@@ -91,7 +91,7 @@ def singly(scene: Any, tone: Any, track: Any, array: Any, options: Row, *, check
 
 
 def one(args: argparse.Namespace) -> list[Row]:
-    """Rows of arrays of one carrier."""
+    """Rows for arrays with one carrier."""
     out = []
     scene, tolerance = scatter(20_000, 5.0), 1e-3
     chirp = sarcl.Waveform.chirp(center=10e9, bandwidth=300e6, duration=1e-6)
@@ -111,7 +111,7 @@ def one(args: argparse.Namespace) -> list[Row]:
 
 
 def many(args: argparse.Namespace) -> list[Row]:
-    """Rows of 450 senders and 450 receivers, into a file."""
+    """Rows for 450 transmitters and 450 receivers, into a file."""
     case = Case("many", n=450, frequency_step=2e6, n_pulses=PULSES, mirrored=False)
     tone = sarcl.Waveform.tone(center=case.center, duration=1 / 2e6)
     out = []
@@ -136,7 +136,7 @@ def scatter(count: int, half: float) -> sarcl.Scene:
 def measured(
     args: argparse.Namespace, name: str, n: int, contributions: int, ways: dict[str, Callable[..., Any]]
 ) -> list[Row]:
-    """A row of each way; runs take turns, after one that builds kernels."""
+    """A row for each way; runs alternate, after one run that builds kernels."""
     rows: dict[str, Row] = {}
     for turn in range(args.repeats + 1):
         for way, call in ways.items():

@@ -1,16 +1,16 @@
-"""Echoes: run time against achieved error, and how long whole scenes take.
+"""Echoes: run time against achieved error, and run time of whole scenes.
 
     python bench/echo.py --peer-python PATH --json bench/results/3-echo-pocl.json
         PATH: the Python of an environment that has finufft;  --scenes: the long part too, half an hour on two cores
 
 spread   the same points and complex amplitudes, pulse by pulse, by sarcl and by finufft (1-D, type 1). finufft is given
-         the delays (its plan is made once, its points are set for every pulse, as they move); sarcl finds them from
-         antennas and positions, carrier included. Errors are those achieved, against the exact sum
-whole    facets with all their physics, whole calls, beside finufft's spreading of as many given delays
+         the delays (its plan is made once; its points are set for every pulse, because they move); sarcl computes them
+         and the carrier from antennas and positions. Errors are measured against the exact sum
+whole    facets with all their physics, whole calls, compared with finufft's spreading of as many given delays
 scenes   a million facets x 1024 pulses, and the 512 x 512 scene of Franceschetti et al. 1992 at 1, 4, 9, 16 cells a
          pixel of two facets each; errors from echo's own check
 
-The shortest run counts, of runs that take turns.
+Runs alternate; the shortest counts.
 """
 
 from __future__ import annotations
@@ -88,7 +88,7 @@ def main() -> None:
 
 
 def spread(args: argparse.Namespace, document: Row) -> list[Row]:
-    """Rows of sarcl and, where there is one, of finufft; runs take turns."""
+    """Rows of sarcl and, where there is one, of finufft; runs alternate."""
     import sarcl
     from sarcl.reference.echo import echo as exact
 
@@ -135,7 +135,7 @@ def spread(args: argparse.Namespace, document: Row) -> list[Row]:
 
 
 class Peer:
-    """finufft in its own Python, kept alive so that runs take turns."""
+    """finufft in its own Python, kept alive so that runs can alternate."""
 
     def __init__(self, python: str, file: Path) -> None:
         import sarcl
@@ -213,7 +213,7 @@ def scenes(device: Any) -> list[Row]:
 
 
 def timed(name: str, scene: Any, at: Any, tolerance: float, device: Any, wave: Any = None, **options: Any) -> Row:
-    """One row: a call with its check, whose seconds are left out."""
+    """One row: a call with its check; the seconds of the check are left out."""
     import sarcl
 
     start = time.perf_counter()
@@ -223,7 +223,7 @@ def timed(name: str, scene: Any, at: Any, tolerance: float, device: Any, wave: A
 
 
 def row(name: str, setting: str, raw: Any, seconds: list[float]) -> Row:
-    """What the page shows of a run."""
+    """The entries of a run that the page shows."""
     pairs = raw.report.contributions_done + sum(raw.report.contributions_skipped.values())
     return {
         "name": name, "setting": setting, "seconds": seconds, "pairs": pairs, "error": raw.report.measured_error,

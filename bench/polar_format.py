@@ -1,11 +1,11 @@
-"""Polar format beside backprojection: run time against both errors, of arithmetic and of plane waves.
+"""Polar format compared with backprojection: run time against the errors of arithmetic and of plane waves.
 
     python bench/polar_format.py [--size 1024] [--tolerance 1e-2 ...] [--km 10 ...] [--device ...]
 
 White noise, as many pulses, samples and pixels a side as --size, X band, pixels of 0.25 m, 400 MHz
 at 1024 and in proportion, an aperture of 0.04 of the distance, 10 and 1000 km.
 Errors are relative L2 at 100 random pixels: of each against its own exact sum, and of the polar format image against
-the exact sum of backprojection. The shortest of three runs counts; runs take turns.
+the exact sum of backprojection. Runs alternate; the shortest of three counts.
 """
 
 from __future__ import annotations

@@ -100,7 +100,7 @@ def run(
     setting = QUICK if quick else FULL
     clock = _Clock(say)
     scene = _demo_scene.scene(setting.edge, seed)
-    clock.lap("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
+    clock.stage("scene", f"an airfield of {len(scene.triangles):,} facets, made by code")
     raw = echo(
         scene,
         setting.waveform(),
@@ -110,14 +110,14 @@ def run(
         device=opened,
         progress=progress,
     )
-    clock.lap("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
+    clock.stage("echo", f"{raw.n_rows} pulses of {raw.n_samples} samples{_rate(raw, 'facet x pulse')}")
     image = backproject(raw, setting.grid(), window=WINDOW, tolerance=TOLERANCE, device=opened, progress=progress)
-    clock.lap("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
+    clock.stage("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
     band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
     title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
     image.save(picture, floor_db=FLOOR_DB, percentile=PERCENTILE, title=title)
     raw.save(raw_file)
-    clock.lap("write", f"{picture}, {raw_file.name}")
+    clock.stage("write", f"{picture}, {raw_file.name}")
     say(f"device  {opened.info.name}, {opened.info.platform}")
     say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")
     say(f"echoes  {raw_file.resolve()}; sarcl focus {raw_file} focuses them again")
@@ -159,7 +159,7 @@ class _Clock:
         self.say = say
         self.last = time.perf_counter()
 
-    def lap(self, step: str, what: str) -> None:
+    def stage(self, step: str, what: str) -> None:
         now = time.perf_counter()
         self.say(f"{step:7} {now - self.last:6.1f} s  {what}")
         self.last = now

@@ -14,11 +14,12 @@ if TYPE_CHECKING:
     from PIL.Image import Image as Picture
 
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
-THINNEST = 1 / 6  # shorter side over longer side at least: a strip any thinner shows nothing
+THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
 CURVE = (22, 82, 148)
 PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
-# Levels below, dB. The median of speckle lies 8 dB below its 99th percentile, and up to 20 dB where there are shadows;
-# the median of the side lobes of a point, over 64 x 64 resolution cells without a taper, 41 dB.
+# Levels that tell a scene from an object in front of nothing, dB. FILLED: largest difference of percentile 99.5 and the
+# median in a scene. It is 9 dB for speckle and about 20 with shadows, but over 40 for the side lobes of a lone point.
+# FAINTEST: a scene that lies farther below the brightest pixel is taken for noise. OBJECT: range of an object's pixels.
 FILLED, FAINTEST, OBJECT = 25.0, 40.0, 30.0
 
 
@@ -95,10 +96,10 @@ def white_level(db: np.ndarray, percentile: float | None = None) -> float:
     """Level of white, dB: a percentile of the pixels of the scene. -inf where no pixel has a signal.
 
     A scene fills the picture where half of all pixels lie within FILLED dB of percentile 99.5, and that within
-    FAINTEST dB of the brightest pixel: all pixels with a signal then count, and a few bright points in the scene are
-    clipped. Otherwise a point or an object stands in front of (almost) nothing: only pixels within OBJECT dB of the
-    brightest count, so that neither side lobes nor the noise of the numbers set the level. Of fewer than 200 pixels
-    none is clipped by the default.
+    FAINTEST dB of the brightest pixel. Then all pixels with a signal count, and a few bright points are clipped.
+    Otherwise the picture shows a point or an object in front of almost nothing. Then only pixels within OBJECT dB of
+    the brightest count, so that neither side lobes nor faint noise set the level. With fewer than 200 pixels the
+    default clips none.
     """
     signal = db[db > -np.inf]
     if not signal.size:
@@ -139,7 +140,7 @@ def drawn_shape(shape: tuple[int, int], spacing: tuple[float, float] | None) -> 
 
 
 def _whole(old: int, wanted: float) -> int:
-    """`wanted` pixels for `old`, moved by up to 1 % where that makes the factor between them whole."""
+    """`wanted` pixels for `old`, changed by up to 1 % where that makes the factor between them whole."""
     near = old * round(wanted / old) if wanted >= old else -(-old // round(old / wanted))
     return near if abs(near - wanted) <= 0.01 * wanted + 1 else round(wanted)
 

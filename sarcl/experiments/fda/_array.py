@@ -72,8 +72,8 @@ def subarrays(line: AntennaArray, groups: int, center: float, look: np.ndarray) 
     made, each = line.subarrays(groups), line.n // groups
     places = made.positions - made.positions[:each].mean(axis=0)
     off = places - np.repeat(_middles(places, groups), each, axis=0)
-    turns = (center + made.offsets[0]) * (off @ look) / SPEED_OF_LIGHT
-    return replace(made, positions=places, weights=np.exp(-2j * np.pi * turns) / each)
+    cycles = (center + made.offsets[0]) * (off @ look) / SPEED_OF_LIGHT
+    return replace(made, positions=places, weights=np.exp(-2j * np.pi * cycles) / each)
 
 
 def as_channels(array: AntennaArray, groups: int) -> AntennaArray:

@@ -13,7 +13,7 @@ For this folder alone, one section or a group of sections of the page each:
     _errata       errors in the printed equations and figures
     _field        4.4: delay of the pulse's peak against direction
     _focus        5.1: backprojection of frequency-diverse echoes, unmodified and corrected
-    _honest       off-centre points, two points, spatial frequencies (sarcl's own check)
+    _off_centre   points off the centre, two points, spatial frequencies (sarcl's own check)
     _pattern      chapter 3: patterns of planar arrays
     _pulse        chapter 4: the pulse, its spectrum and its ambiguity function
     _reference    2.2: the reference image
@@ -25,7 +25,7 @@ from __future__ import annotations
 
 from .. import PAPERS
 from ..paper import Paper
-from . import _aperture, _errata, _field, _focus, _honest, _pattern, _pulse, _reference, _trend, _zones
+from . import _aperture, _errata, _field, _focus, _off_centre, _pattern, _pulse, _reference, _trend, _zones
 
 __all__ = ["PAPER", "range_zones"]
 
@@ -70,7 +70,7 @@ PAPER = Paper(
         _aperture.nulls,
         _trend.trends,
         _trend.abstract,
-        _honest.section,
+        _off_centre.section,
         _zones.section,
         _errata.section,
     ),

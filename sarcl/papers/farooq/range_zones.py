@@ -97,8 +97,8 @@ def collect(radar: RangeZones, scenes: Sequence[Scene | None], device: DeviceCho
         if scene is None:
             continue
         own = _echo(radar, zone, scene, device)
-        turned = own.samples * np.exp(-2j * np.pi * _turns(radar, own, zone))
-        total = replace(own, samples=turned if total is None else total.samples + turned)
+        shifted = own.samples * np.exp(-2j * np.pi * _cycles(radar, own, zone))
+        total = replace(own, samples=shifted if total is None else total.samples + shifted)
     if total is None:
         raise ValueError(f"scenes has {len(scenes)} zones and all are empty; give one of them a scene")
     return _as_of(radar, total, 0)
@@ -110,8 +110,8 @@ def of_zone(radar: RangeZones, received: PhaseHistory, zone: int) -> PhaseHistor
     Delays are counted from the pulse that this zone returns. exp(+j 2 pi f_n zone/PRF) takes out the phase of the
     carriers since then, so that echoes of other zones cancel over the elements.
     """
-    turned = received.samples * np.exp(2j * np.pi * _turns(radar, received, zone))
-    return _as_of(radar, replace(received, samples=turned), zone)
+    shifted = received.samples * np.exp(2j * np.pi * _cycles(radar, received, zone))
+    return _as_of(radar, replace(received, samples=shifted), zone)
 
 
 def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
@@ -119,9 +119,9 @@ def isolation(radar: RangeZones, apart: int, elevation: float = 0.0) -> float:
 
     The ratio in the module's docstring; -inf where zones are orthogonal.
     """
-    turns = np.mod(apart * radar.step / radar.prf, 1.0)
-    turns -= radar.center * radar.spacing * np.sin(validation.number("elevation", elevation)) / SPEED_OF_LIGHT
-    ratio = abs(float(dirichlet(2 * np.pi * turns, radar.n))) / radar.n
+    cycles = np.mod(apart * radar.step / radar.prf, 1.0)
+    cycles -= radar.center * radar.spacing * np.sin(validation.number("elevation", elevation)) / SPEED_OF_LIGHT
+    ratio = abs(float(dirichlet(2 * np.pi * cycles, radar.n))) / radar.n
     return 20 * float(np.log10(ratio)) if ratio > 1e-12 else -np.inf
 
 
@@ -134,7 +134,7 @@ def _echo(radar: RangeZones, zone: int, scene: Scene, device: Any) -> PhaseHisto
     )  # fmt: skip
 
 
-def _turns(radar: RangeZones, raw: PhaseHistory, zone: int) -> np.ndarray:
+def _cycles(radar: RangeZones, raw: PhaseHistory, zone: int) -> np.ndarray:
     """Phase, cycles, by which a zone's samples lag; delays in the interval are counted from zone 0's centre."""
     late = 2 * (_ends(radar, zone)[2] - _ends(radar, 0)[2]) / SPEED_OF_LIGHT - zone / radar.prf
     carrier = radar.center + np.tile(radar.array.offsets[0], radar.n_pulses)
