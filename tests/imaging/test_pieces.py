@@ -218,7 +218,7 @@ def test_an_interrupted_run_keeps_what_is_worth_it(raw, whole, tmp_path, monkeyp
     monkeypatch.setattr(checkpoint, "WORTH", 0.0)
     with pytest.raises(Stopped):
         sarcl.backproject(raw, GRID, **options)
-    assert len(tiles(tmp_path)) >= 3 and "the same call again goes on" in caplog.text
+    assert len(tiles(tmp_path)) >= 3 and "the same call continues" in caplog.text
     image = sarcl.backproject(raw, GRID, out=tmp_path / "image.h5")
     assert np.array_equal(image.data[...], whole.data) and names(tmp_path) == ["image.h5"]
 
@@ -537,7 +537,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
     marks = [mark_of(More(**known, more=value)) for value in kinds]
     assert len({*marks, mark_of(task)}) == len(kinds) + 1
     assert marks == [mark_of(More(**known, more=value)) for value in kinds]
-    with pytest.raises(TypeError, match="tiles made with a function among the options"):
+    with pytest.raises(TypeError, match="tiles computed with a function among the options"):
         mark_of(More(**known, more=lambda x: x))
 
 
@@ -570,7 +570,7 @@ def test_files_that_are_not_sarcls_stay(raw, tmp_path, caplog):
     half_done(raw, tmp_path / "image.h5")
     (tmp_path / "image.h5.parts" / "notes.txt").write_text("mine")
     sarcl.backproject(raw, GRID, out=tmp_path / "image.h5")
-    assert names(tmp_path / "image.h5.parts") == ["notes.txt"] and "not sarcl's and stays" in caplog.text
+    assert names(tmp_path / "image.h5.parts") == ["notes.txt"] and "not from sarcl and is not removed" in caplog.text
 
 
 def test_a_file_in_the_folders_place_is_named(raw, tmp_path):
