@@ -158,7 +158,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     large.add_argument(
         "--resume",
         action=argparse.BooleanOptionalAction,
-        help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start anew",
+        help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
     )
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this polarisation, e.g. HV")

@@ -59,19 +59,19 @@ def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: floa
     for i, place in enumerate(roots.centers + center):
         depth = a.depth(place)
         outside, whole = depth < -reach, depth >= reach
-        unlit = np.zeros_like(outside)
+        outside_beam = np.zeros_like(outside)
         if a.beam is not None:
             depth = a.beam_depth(place)
-            unlit = ~outside & (depth < -reach)
+            outside_beam = ~outside & (depth < -reach)
             whole &= depth >= reach
         if whole.all():
             continue
-        some = ~(whole | outside | unlit)
+        some = ~(whole | outside | outside_beam)
         if some.any() and whole.sum() < least:
             merged[i] = False
             all_rows.append(i)
             continue
-        merged[i], left_out[i], reasons[i] = whole.any(), ~whole, np.stack([outside, unlit])
+        merged[i], left_out[i], reasons[i] = whole.any(), ~whole, np.stack([outside, outside_beam])
         if some.any():
             partly[i] = some
     directly: list[tuple[np.ndarray, np.ndarray | None]] = []
