@@ -17,8 +17,8 @@
 //           CHUNK     pulses added plainly before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
 
-#include "common.clh"
 #include "doubledouble.clh"
+#include "tile_state.clh"
 #include "interp_float64.clh"
 
 // Components of the per-pulse array, each n long.
@@ -27,15 +27,7 @@ enum { P_TX, P_TY, P_TZ, P_REFERENCE, P_KAPPA, P_KAPPA_LOW, P_SIGMA, P_SIGMA_LOW
 // Record of a (tile, pulse): [tile][pulse][component].
 enum { C_UX, C_UY, C_UZ, C_R0, C_INVERSE, C_TURN, C_FRAC, C_BASE, C_KAPPA, C_SIGMA, C_STATE, C_RX, C_RR = C_RX + 3, C_RINVERSE };
 #define N_CONST 16
-// C_STATE: 0 no point of the tile is inside the window, 1 every point is (and in the beam), 2 look at each point,
-// 3 none is in the beam
-#define OUTSIDE 0
-#define INSIDE 1
-#define CROSSING 2
-#define UNLIT 3
-// bits of `skip`: reasons to leave tiles out instead of looking at each of their points
-#define SKIP_WINDOW 1
-#define SKIP_BEAM 2
+// C_STATE: see tile_state.clh
 
 typedef struct { dv x, y, z; } point;
 
@@ -71,26 +63,14 @@ inline pair half_path(__global const double *restrict pulse, size_t n, size_t p,
     return pair_add(path, make_pair(-PULSE(P_REFERENCE), (dv)0));
 }
 
-// Writes one component of VW records.
-inline void put(__global double *records, int component, dv value) {
-#if VW == 1
-    records[component] = value;
-#else
-    double lane[VW];
-    STORE(value, 0, lane);
-#pragma unroll
-    for (int l = 0; l < VW; l++) records[l * N_CONST + component] = lane[l];
-#endif
-}
-
 inline void put_direction(__global double *records, int first, int length, point d, pair r) {
     // an antenna on the reference point has no direction: any will do, R0 = 0 says so
     dv inverse = r.hi > 0 ? (dv)1 / r.hi : (dv)0;
-    put(records, first, d.x * inverse);
-    put(records, first + 1, d.y * inverse);
-    put(records, first + 2, d.z * inverse);
-    put(records, length, r.hi);
-    put(records, length + 1, inverse);
+    put(records, N_CONST, first, d.x * inverse);
+    put(records, N_CONST, first + 1, d.y * inverse);
+    put(records, N_CONST, first + 2, d.z * inverse);
+    put(records, N_CONST, length, r.hi);
+    put(records, N_CONST, length + 1, inverse);
 }
 
 inline dv place_of(pair delta, pair sigma, dv *base) {
@@ -115,12 +95,9 @@ inline dv beam_state(__global const double *restrict pulse, size_t n, size_t p, 
                      dv state) {
     dv along;
     beam_edge(pulse, n, p, 0, d, r, &along);
-    // the distance from the cone is that from its side, or from its tip; reach has room for what rounding does to it
     dv across = sqrt(fmax(fma(r, r, -along * along), (dv)0)), cosine = LOAD(p, pulse + (P_BX + 3) * (size_t)n);
     dv sine = LOAD(p, pulse + (P_BX + 4) * (size_t)n), reach = fma(r, (dv)1e-7, (dv)(radius * 1.000001));
-    dv inside = along * sine - across * cosine, ahead = along * cosine + across * sine;
-    dv distance = ahead > 0 ? fabs(inside) : r;
-    dv lit = distance > reach ? (inside > 0 ? (dv)1 : (dv)-1) : (dv)0;
+    dv lit = beam_side(along, across, r, cosine, sine, reach);
     dv seen = state != OUTSIDE ? (dv)1 : (dv)0;
     if (skip & SKIP_BEAM) state = lit * seen < 0 ? (dv)UNLIT : state;
     dv partly = state == INSIDE ? (dv)1 - lit : (dv)0;
@@ -150,11 +127,11 @@ __kernel void tile_constants(__global const double *restrict pulse, __global con
 #endif
     pair kappa = make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW)), sigma = make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW));
     dv base, unused;
-    put(out, C_TURN, pair_split(pair_mul(delta, kappa), &unused));
-    put(out, C_FRAC, place_of(delta, sigma, &base));
-    put(out, C_BASE, base);
-    put(out, C_KAPPA, kappa.hi);
-    put(out, C_SIGMA, sigma.hi);
+    put(out, N_CONST, C_TURN, pair_split(pair_mul(delta, kappa), &unused));
+    put(out, N_CONST, C_FRAC, place_of(delta, sigma, &base));
+    put(out, N_CONST, C_BASE, base);
+    put(out, N_CONST, C_KAPPA, kappa.hi);
+    put(out, N_CONST, C_SIGMA, sigma.hi);
     dv state = INSIDE;
 #if !WRAP
     dv reach = fma(PULSE(P_LIMIT), (dv)1e-14, (dv)(radius[k] * 1.000001)), room = PULSE(P_LIMIT) - fabs(delta.hi);
@@ -164,7 +141,7 @@ __kernel void tile_constants(__global const double *restrict pulse, __global con
 #if BEAM
     state = beam_state(pulse, n, p, u, R0.hi, radius[k], skip, state);
 #endif
-    put(out, C_STATE, state);
+    put(out, N_CONST, C_STATE, state);
 }
 
 // |T - x| - R0
@@ -192,13 +169,6 @@ inline lv in_window(__global const double *restrict pulse, size_t n, size_t p, p
     dv sign = delta.hi < 0 ? (dv)1 : (dv)-1;
     pair room = pair_add(make_pair(PULSE(P_LIMIT), PULSE(P_LIMIT_LOW)), make_pair(sign * delta.hi, sign * delta.lo));
     return room.hi >= 0;
-}
-
-// total + error += x: the error of each addition is kept and added back at the end
-inline void add_to_total(__global double *total, __global double *error, size_t i, dv x) {
-    pair s = exact_sum(LOAD(i, total), x);
-    STORE(s.hi, i, total);
-    STORE(LOAD(i, error) + s.lo, i, error);
 }
 
 // global size (vectors of points a tile, tiles of this call), local size (vectors a tile, 1)
@@ -273,7 +243,8 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
 #endif
             }
             dv w[TAPS], g, h, sine, cosine;
-            lv j = tap_weights(t, base, stride, origin, table, w);
+            lv j;
+            tap_weights(first_tap(t, base, stride, origin, &j), table, w);
             weighted_sum(profiles + 2 * ((size_t)p * stride + origin), j, w, &g, &h);
             sincos_double(turn, &sine, &cosine);
             if (state == CROSSING) {
@@ -283,8 +254,8 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
             re = fma(g, cosine, fma(-h, sine, re));
             im = fma(g, sine, fma(h, cosine, im));
         }
-        add_to_total(image, image + 2 * pixels, i, re);
-        add_to_total(image + pixels, image + 3 * pixels, i, im);
+        add_compensated(image, image + 2 * pixels, i, re);
+        add_compensated(image + pixels, image + 3 * pixels, i, im);
     }
     if (get_global_id(0) == 0) {
         skipped[k] += missed;

@@ -37,21 +37,7 @@
 #define W_SIZE (LINE_TAPS * PARTS * SIDE)
 #define AT_SIZE (SIDE * LINE_TAPS)
 
-inline void line_weights(fv z, __global const float *restrict weights, fv *w) {
-    fv z2 = z * z;
-#pragma unroll
-    for (int k = 0; k < LINE_TAPS / 2; k++) {
-        __global const float *c = weights + k * 2 * LINE_TERMS;
-        fv even = (fv)c[LINE_TERMS - 1], odd = (fv)c[2 * LINE_TERMS - 1];
-#pragma unroll
-        for (int i = LINE_TERMS - 2; i >= 0; i--) {
-            even = fma(even, z2, (fv)c[i]);
-            odd = fma(odd, z2, (fv)c[LINE_TERMS + i]);
-        }
-        w[k] = fma(z, odd, even);
-        w[LINE_TAPS - 1 - k] = fma(-z, odd, even);
-    }
-}
+DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
 
 #if SLOPE
 // Derivatives of the weights by z.
@@ -300,13 +286,16 @@ inline void add_each(group shared, __global const float *restrict record, fv i, 
 
 // total[i], total[i + step], ... += x, as add_compensated
 inline void add_spread(__global float *total, __global float *error, size_t i, int step, fv x) {
-    float lane[VW];
-    STORE(x, 0, lane);
+    float hi[VW], lo[VW];
 #pragma unroll
-    for (int l = 0; l < VW; l++, i += step) {
-        float a = total[i], s = a + lane[l], t = s - a;
-        total[i] = s;
-        error[i] += (a - (s - t)) + (lane[l] - t);
+    for (int l = 0; l < VW; l++) hi[l] = total[i + l * step];
+    pair s = exact_sum(LOAD(0, hi), x);
+    STORE(s.hi, 0, hi);
+    STORE(s.lo, 0, lo);
+#pragma unroll
+    for (int l = 0; l < VW; l++) {
+        total[i + l * step] = hi[l];
+        error[i + l * step] += lo[l];
     }
 }
 

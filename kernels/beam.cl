@@ -20,6 +20,7 @@
 //           CHUNK     elements a work-item of `times` or `paths` takes
 // reference: sarcl/reference/field.py:field
 
+#define REAL64 DOUBLE
 #include "common.clh"
 #include "doubleword.clh"
 
@@ -34,14 +35,6 @@ typedef float stored;
 #define PLANE(p, k, step) ((p) + 2 * (size_t)(k) * (step))
 #define WIDE(p, i, step) w_load(p, i, step)
 #define WIDE1(p, i, step) w_load1(p, i, step)
-#endif
-
-#if DOUBLE
-typedef double real;
-typedef wv rv;
-#else
-typedef float real;
-typedef fv rv;
 #endif
 
 enum { S_SHIFT, S_BASE };                                       // of a time
@@ -69,7 +62,7 @@ inline size_t entry(int i, int k, int n, int width) {
 // exp(+j 2 pi f_n t); global size (entries/VW, elements/CHUNK)
 //   entries (2, step), elements (2, n), table
 __kernel void times(__global const stored *restrict entries, int step, __global const stored *restrict elements, int n,
-                    __global real *restrict table, int width) {
+                    __global REAL *restrict table, int width) {
     int i = get_global_id(0), from = get_global_id(1) * CHUNK, to = min(n, from + CHUNK);
     wv shift = WIDE(PLANE(entries, S_SHIFT, step), i, step), base = WIDE(PLANE(entries, S_BASE, step), i, step);
     for (int k = from; k < to; k++) {
@@ -86,7 +79,7 @@ __kernel void times(__global const stored *restrict entries, int step, __global 
 // w_n exp(-j 2 pi f_n r_n/c); global size (entries/VW, elements/CHUNK)
 //   entries (6, step), elements (6, n), weights (2, n) re, im
 __kernel void paths(__global const stored *restrict entries, int step, __global const stored *restrict elements, int n,
-                    __global const real *restrict weights, __global real *restrict table, int width) {
+                    __global const REAL *restrict weights, __global REAL *restrict table, int width) {
     int i = get_global_id(0), from = get_global_id(1) * CHUNK, to = min(n, from + CHUNK);
     wv v[3], tiny = w_make((fv)1e-30f, (fv)0);  // no length is zero: a point may stand on an element
     for (int a = 0; a < 3; a++) v[a] = WIDE(PLANE(entries, V_X + a, step), i, step);
@@ -106,7 +99,7 @@ __kernel void paths(__global const stored *restrict entries, int step, __global 
         turn = w_sub(turn, w_add(base, WIDE1(PLANE(elements, P_START, n), k, n)));
         rv sine, cosine;
         unit_circle(turn, &sine, &cosine);
-        real re = weights[k], im = weights[n + k];
+        REAL re = weights[k], im = weights[n + k];
         size_t at = entry(i, k, n, width);
         STORE(re * cosine - im * sine, 0, table + at);
         STORE(re * sine + im * cosine, 0, table + at + width);
@@ -121,8 +114,8 @@ inline void add_to(rv *sum, rv *error, rv x) {
 }
 
 // out[row][re, im][lane] = sum_n lane_n row_n; global size (lanes/VW, tiles of rows)
-__kernel void add(__global const real *restrict lanes, __global const real *restrict rows, int n, int n_lanes,
-                  __global real *restrict out) {
+__kernel void add(__global const REAL *restrict lanes, __global const REAL *restrict rows, int n, int n_lanes,
+                  __global REAL *restrict out) {
     int i = get_global_id(0), tile = get_global_id(1);
     rv total[2 * USED], error[2 * USED];
     for (int r = 0; r < 2 * USED; r++) total[r] = error[r] = (rv)0;
@@ -133,7 +126,7 @@ __kernel void add(__global const real *restrict lanes, __global const real *rest
         for (int k = from; k < to; k++) {
             size_t at = entry(i, k, n, LANES);
             rv a = LOAD(0, lanes + at), b = LOAD(0, lanes + at + LANES);
-            __global const real *c = rows + ((size_t)tile * n + k) * 2 * ROWS, *d = c + ROWS;
+            __global const REAL *c = rows + ((size_t)tile * n + k) * 2 * ROWS, *d = c + ROWS;
 #pragma unroll
             for (int r = 0; r < USED; r++) {
                 re[r] = fma(a, (rv)c[r], fma(-b, (rv)d[r], re[r]));

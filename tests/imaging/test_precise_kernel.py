@@ -106,7 +106,7 @@ def test_look_up_equals_its_twin_however_far_lanes_are_apart(double, monkeypatch
     places = 200 + apart * random.uniform(-3, 3, 1001) + np.repeat(random.uniform(-90, 90, 126), 8)[:1001]
     table = np.concatenate([made.table.ravel(), row.view(np.float64)])
     body = (
-        "dv w[TAPS], re, im; lv j = tap_weights(LOAD(i, x), (dv)0, 400, 0, table, w);"
+        "dv w[TAPS], re, im; lv j; dv z = first_tap(LOAD(i, x), (dv)0, 400, 0, &j); tap_weights(z, table, w);"
         f"weighted_sum(table + {made.table.size}, j, w, &re, &im); STORE(re, i, out); STORE(im, i, out + n);"
     )
     macros = {"TAPS": taps, "TERMS": 5, "WRAP": 0, "table": table}
@@ -116,7 +116,7 @@ def test_look_up_equals_its_twin_however_far_lanes_are_apart(double, monkeypatch
 
 def test_taps_never_leave_their_row(double, monkeypatch):
     body = (
-        "dv w[TAPS]; lv j = tap_weights(LOAD(i, x), LOAD(i, x + n), 100, 40, table, w);"
+        "lv j; first_tap(LOAD(i, x), LOAD(i, x + n), 100, 40, &j);"
         "dv k = 0; long lane[VW]; STORE(j, 0, lane); for (int l = 0; l < VW; l++) ((double *)&k)[l] = lane[l];"
         "STORE(k, i, out);"
     )
