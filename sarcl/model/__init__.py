@@ -1,4 +1,4 @@
-"""What a radar is and what it records.
+"""Parts of a radar and the data it records.
 
 For other folders:
 

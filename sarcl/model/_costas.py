@@ -8,7 +8,7 @@ import numpy as np
 def permutation(n: int) -> np.ndarray | None:
     """A Costas permutation of 0 ... n - 1, int64, or None where these constructions give none of this size.
 
-    Welch (p - 1) and Golomb (p - 2), with corners cut: p - 1 down to p - 4 over the next primes p.
+    Welch (p - 1) and Golomb (p - 2), with up to two corner points removed: sizes p - 1 to p - 4 for the next primes p.
     Source: Golomb, Taylor 1984, Constructions and properties of Costas arrays.
     """
     for p in range(n + 1, n + 5):
@@ -21,7 +21,7 @@ def permutation(n: int) -> np.ndarray | None:
 
 
 def nearest_sizes(n: int) -> tuple[int, int]:
-    """The sizes next below (0: none) and above n that `permutation` has."""
+    """The nearest sizes below (0: none) and above n for which `permutation` finds one."""
     below = next((m for m in range(n - 1, 0, -1) if permutation(m) is not None), 0)
     above = n + 1
     while permutation(above) is None:
@@ -32,8 +32,8 @@ def nearest_sizes(n: int) -> tuple[int, int]:
 def is_costas(f: np.ndarray) -> bool:
     """Whether f is a permutation of 0 ... n - 1 with f(i + k) - f(i) all different for every k.
 
-    Only k <= (n - 1)/2 need be looked at (Chang 1987): two equal differences k apart are also two equal ones
-    between the pairs the other way round.
+    Only k <= (n - 1)/2 need to be checked (Chang 1987): two equal differences at distance k imply two equal ones
+    between the same points paired the other way.
     """
     n = len(f)
     if not np.array_equal(np.sort(f), np.arange(n)):
@@ -42,7 +42,7 @@ def is_costas(f: np.ndarray) -> bool:
 
 
 def _constructions(p: int) -> list[np.ndarray]:
-    """Welch's array of order p - 1 and Golomb's of order p - 2 whose corners can be cut, from 0."""
+    """Welch's array of order p - 1 and Golomb's of order p - 2 whose corner points can be removed, counted from 0."""
     g = _primitive_root(p)
     power = np.ones(p - 1, np.int64)
     for i in range(1, p - 1):
@@ -56,7 +56,9 @@ def _constructions(p: int) -> list[np.ndarray]:
     primitive = np.gcd(log[element], p - 1) == 1
     other = (1 - element) % p  # Golomb: alpha^i + beta^j = 1, so alpha + beta = 1 puts a point in the corner
     pairs = element[primitive & (np.gcd(log[other], p - 1) == 1)]
-    square = [a for a in element[primitive].tolist() if (a * a + a) % p == 1]  # the corner of two by two (Taylor)
+    square = [
+        a for a in element[primitive].tolist() if (a * a + a) % p == 1
+    ]  # two by two points in the corner (Taylor)
     chosen = [(int(a), int((1 - a) % p)) for a in pairs[:1]] + [(a, a) for a in square[:1]]
     number = np.arange(1, p - 1)
     for a, b in chosen:
@@ -66,7 +68,7 @@ def _constructions(p: int) -> list[np.ndarray]:
 
 
 def _corner(f: np.ndarray, n: int) -> np.ndarray | None:
-    """f without its first rows and columns, where those hold a permutation of their own; None where they do not."""
+    """f without its first rows and columns, if those hold a permutation of their own; else None."""
     cut = len(f) - n
     if cut < 0 or (cut and f[:cut].max() >= cut):
         return None

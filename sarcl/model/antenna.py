@@ -1,4 +1,4 @@
-"""Antenna: a pattern in its own axes, how it is mounted, and what a device needs to look it up."""
+"""Antenna: a pattern in its own axes, its mounting, and its numbers for the kernels."""
 
 from __future__ import annotations
 
@@ -15,11 +15,11 @@ from .trajectory import Trajectory
 
 Kind = Literal["isotropic", "aperture", "gaussian", "table"]
 KINDS = ("isotropic", "aperture", "gaussian", "table")
-LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mounted along the body's axes
-HEADER = 16  # floats before a table's coefficients, as kernels/pattern.clh reads them
+LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
+HEADER = 16  # floats before the coefficients of a table, as kernels/pattern.clh reads them
 ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
-COSINE = 1e-5  # beyond which a float32 direction cosine exceeds a limit for certain
-FLOAT_ERROR = 2e-6  # of the peak: float32 sines, exponentials and spline sums
+COSINE = 1e-5  # added to limits of direction cosines, which kernels compute in float32
+FLOAT_ERROR = 2e-6  # of the peak: rounding of float32 sines, exponentials and spline sums
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,21 +30,21 @@ class Antenna:
     atan2(y, x) and elevation atan2(z, hypot(x, y)).
 
     kind        "isotropic", "aperture", "gaussian" or "table"
-    gain_db     gain at the peak, dBi; 0 leaves a unit peak
-    two_way     the pattern, and gain_db, are those of sending and receiving together
-    size        m (azimuth, elevation), of an aperture;  taper  its illumination at the edges, 0 ... 1 of that amid
-    width       rad (azimuth, elevation), between half-power directions, of a Gaussian
+    gain_db     gain at the peak, dBi; with 0 the peak is 1
+    two_way     pattern and gain_db are those of transmitting and receiving together
+    size        m (azimuth, elevation), of an aperture;  taper  illumination at its edges, 0 ... 1 of that at the centre
+    width       rad (azimuth, elevation), half-power width of a Gaussian pattern
     azimuth, elevation, values   of a table: rad (n,) and (m,), evenly spaced; complex amplitude (n, m), peak modulus 1
-    frequency   Hz at which width or table hold: angles shrink as frequency rises; None: the same at every frequency
-    mount       rotation from antenna to body axes (3, 3): attitude @ mount turns antenna axes into the scene's
+    frequency   Hz, to which width or table refer: angles are inversely proportional to frequency; None: no dependence
+    mount       rotation from antenna to body axes (3, 3): attitude @ mount is that from antenna to scene axes
 
-    ValueError names what does not fit. An aperture does not see behind itself, a table not beyond its angles.
+    ValueError names the wrong argument. The gain of an aperture is 0 behind it, that of a table outside its angles.
     """
 
     kind: Kind
     gain_db: float = 0.0
     two_way: bool = False
-    size: NDArray[np.float64] = None  # type: ignore[assignment]  # these are there as the kind needs them
+    size: NDArray[np.float64] = None  # type: ignore[assignment]  # set where the kind has them
     taper: NDArray[np.float64] = (1.0, 1.0)  # type: ignore[assignment]
     width: NDArray[np.float64] = None  # type: ignore[assignment]
     azimuth: NDArray[np.float64] = None  # type: ignore[assignment]
@@ -53,7 +53,7 @@ class Antenna:
     frequency: float | None = None
     mount: NDArray[np.float64] = LEVEL  # type: ignore[assignment]
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -86,7 +86,7 @@ class Antenna:
             taper = validation.array("antenna taper", self.taper, np.float64, (2,))
             if not ((taper >= 0) & (taper <= 1)).all():
                 raise ValueError(
-                    f"antenna taper is {taper.tolist()}; the illumination at the edges is 0 to 1 of the middle's"
+                    f"antenna taper is {taper.tolist()}; the illumination at the edges is 0 to 1 of that at the centre"
                 )
             self._set("taper", taper)
         elif self.kind == "gaussian":
@@ -105,7 +105,7 @@ class Antenna:
             step = np.diff(axis)
             if len(axis) < 4 or not (step > 0).all():
                 raise ValueError(
-                    f"antenna {name} must be at least 4 rising angles, got {len(axis)}: {axis[:5].tolist()} ..."
+                    f"antenna {name} must be at least 4 increasing angles, got {len(axis)}: {axis[:5].tolist()} ..."
                 )
             if np.ptp(step) > 1e-6 * step.mean():
                 at = int(np.argmax(np.abs(step - step.mean())))
@@ -120,7 +120,7 @@ class Antenna:
         shape = (len(self.azimuth), len(self.elevation))
         values = validation.array("antenna values", self.values, np.complex128, shape)
         if not values.any():
-            raise ValueError("antenna values are zero everywhere; an antenna must see something")
+            raise ValueError("antenna values are zero everywhere; some gain must be larger")
         self._set("values", validation.sealed(values / np.abs(values).max()))
 
     def _set(self, name: str, value: Any) -> None:
@@ -128,7 +128,7 @@ class Antenna:
 
     @classmethod
     def isotropic(cls, *, gain_db: float = 0.0) -> Antenna:
-        """The same in every direction."""
+        """An antenna with the same gain in every direction."""
         return cls(kind="isotropic", gain_db=gain_db)
 
     @classmethod
@@ -141,10 +141,10 @@ class Antenna:
         two_way: bool = False,
         mount: ArrayLike = LEVEL,
     ) -> Antenna:
-        """A rectangular aperture, m (azimuth, elevation): sinc(size_y y/lambda) sinc(size_z z/lambda) if lit evenly.
+        """A rectangular aperture, m (azimuth, elevation): sinc(size_y y/lambda) sinc(size_z z/lambda) if uniform.
 
-        taper  illumination at the edges, one or per axis: 1 even, 0.08 Hamming's, 0 Hann's, a raised cosine on a
-               pedestal
+        taper  illumination at the edges, one or per axis, of a raised cosine on a pedestal: 1 uniform, 0.08 Hamming's,
+               0 Hann's
         """
         taper = np.broadcast_to(np.asarray(taper), (2,))
         return cls(kind="aperture", size=size, taper=taper, gain_db=gain_db, two_way=two_way, mount=mount)
@@ -154,7 +154,7 @@ class Antenna:
         cls, *, width: ArrayLike, gain_db: float = 0.0, two_way: bool = False, frequency: float | None = None,
         mount: ArrayLike = LEVEL,
     ) -> Antenna:  # fmt: skip
-        """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle off boresight times the
+        """Power exp(-4 ln 2 ((a/width_y)^2 + (e/width_z)^2)), rad, where (a, e) is the angle from boresight times the
         unit vector of (y, z): azimuth and elevation on the axes."""
         return cls(kind="gaussian", width=width, gain_db=gain_db, two_way=two_way, frequency=frequency, mount=mount)
 
@@ -166,7 +166,7 @@ class Antenna:
     ) -> Antenna:  # fmt: skip
         """A measured pattern: bicubic spline through complex amplitudes, or values_db = 20 log10 of their modulus.
 
-        azimuth (n,), elevation (m,) rad, evenly spaced; values (n, m), of any scale: their peak gets `gain_db`.
+        azimuth (n,), elevation (m,) rad, evenly spaced; values (n, m), of any scale: their peak is set to `gain_db`.
         """
         if (values is None) == (values_db is None):
             raise ValueError("an antenna table takes either values or values_db; give one of them")
@@ -185,7 +185,7 @@ class Antenna:
     def axes(self, track: Trajectory) -> NDArray[np.float64]:
         """Antenna axes in the scene at every pulse, as columns, (n, 3, 3): track.attitude @ mount.
 
-        ValueError where the track has no attitude, unless the antenna is isotropic, or it is no rotation.
+        Raises ValueError where the track has no attitude, unless the antenna is isotropic, or it is not a rotation.
         """
         if track.attitude is None:
             if self.kind == "isotropic":
@@ -204,7 +204,7 @@ class Antenna:
         return pattern_gain(self, np.asarray(directions, np.float64), frequency)
 
     def ratio(self, frequency: float | np.ndarray) -> Any:
-        """What angles are multiplied by before the pattern is looked up."""
+        """Factor by which angles are multiplied before the pattern is evaluated."""
         return 1.0 if self.frequency is None else frequency / self.frequency
 
     def slope(self, frequency: float) -> float:
@@ -214,12 +214,12 @@ class Antenna:
         if self.kind == "aperture":  # |g'| <= 2 pi/lambda times the illumination's mean distance from its centre
             return float(np.pi / 2 * np.hypot(*self.size) * frequency / constants.SPEED_OF_LIGHT)
         scale = float(self.ratio(frequency))
-        if self.kind == "gaussian":  # pi/2: what a circle about boresight is stretched by at most
+        if self.kind == "gaussian":  # pi/2: largest stretch of a circle about boresight
             return float(np.pi / 2 * np.exp(-0.5) * 2 * np.sqrt(np.log(2)) / self.width.min()) * scale
         return table_slope(self) * scale
 
     def error(self, frequency: float) -> float:
-        """Bound of what a device's float32 gain errs, over the peak, at directions right to float32."""
+        """Bound of the error of float32 gains, over the peak, at directions with the error of float32."""
         return FLOAT_ERROR + ANGLE_ERROR * self.slope(frequency)
 
     def limits(self, level: float, frequency: float) -> np.ndarray:
@@ -232,14 +232,14 @@ class Antenna:
         if self.kind == "aperture":
             y, z = (factor_reach(self, axis, level, frequency) for axis in (0, 1))
             return np.array([y + COSINE, z + COSINE, -1.0])
-        if self.kind == "gaussian":  # an angle is no less than its sine
+        if self.kind == "gaussian":  # an angle is not smaller than its sine
             off = np.sqrt(max(np.log(1 / level), 0.0) / (2 * np.log(2))) / self.ratio(frequency)
             return np.array([*(self.width * off + COSINE), -float(self.width.max() * off < np.pi / 2)])
         y, z, behind = table_limits(self, level, float(self.ratio(frequency)))
         return np.array([y + COSINE, z + COSINE, behind])
 
     def packed(self, frequency: float) -> np.ndarray:
-        """Numbers of kernels/pattern.clh, float32: a header, then a table's spline coefficients.
+        """Numbers of kernels/pattern.clh, float32: a header, then the spline coefficients of a table.
 
         frequency  Hz at which the kernel's `ratio` is 1.
         """
@@ -262,7 +262,7 @@ class Antenna:
 
 
 def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
-    """(transmitting, receiving) antennas from one Antenna or a pair; None where a two-way pattern serves for both."""
+    """(transmitting, receiving) antennas from one Antenna or a pair; None for the second if the first is two-way."""
     given = antenna if isinstance(antenna, (tuple, list)) else (antenna, antenna)
     if len(given) != 2:
         raise ValueError(f"antenna has {len(given)} entries; give an Antenna, or (transmitting, receiving)")
@@ -272,7 +272,7 @@ def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
     if not (tx.two_way or rx.two_way):
         return tx, rx
     if tx is not rx or bistatic:
-        raise ValueError("a two-way pattern is that of one antenna at one place; give two one-way patterns")
+        raise ValueError("a two-way pattern is that of one antenna at one position; give two one-way patterns")
     return tx, None
 
 

@@ -1,4 +1,4 @@
-"""AntennaArray: where elements stand and what carrier each of them sends; one carrier, or diverse ones."""
+"""AntennaArray: positions, carriers and weights of elements; the carriers may be equal or diverse."""
 
 from __future__ import annotations
 
@@ -12,22 +12,22 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import constants, validation
 from ._costas import nearest_sizes, permutation
 
-MOST = 10_000  # elements
+MOST = 10_000  # largest number of elements
 Y, Z = (0.0, 1.0, 0.0), (0.0, 0.0, 1.0)
 
 
 @dataclass(frozen=True, eq=False, kw_only=True, repr=False)
 class AntennaArray:
-    """Isotropic elements, each sending its own carrier. Make one with `single`, `linear`, `planar` or `costas`.
+    """Isotropic elements, each with its own carrier. Make one with `single`, `linear`, `planar` or `costas`.
 
     positions  from the reference point, m (n, 3), along the scene's axes
-    offsets    carriers less the base frequency f0, Hz (n_plans, n)
-    weights    complex (n,), one an element, default 1
+    offsets    carriers minus the base frequency f0, Hz (n_plans, n)
+    weights    complex (n,), one per element, default 1
     plan       row of `offsets` that each pulse uses, (n_pulses,); None: row 0 at every pulse
 
     Elements may coincide. A field is sum_n w_n exp(+j 2 pi f_n (t - r_n/c)), f_n = f0 + offset (`sarcl.beam`).
-    Farooq's array (2009, equation 3.1) lies along (0, -1, 0) and (0, 0, -1), which flips the sign of angles.
-    ValueError for other shapes, more than 10 000 elements, weights that are all zero, NaN or Inf.
+    Farooq's array (2009, equation 3.1) lies along (0, -1, 0) and (0, 0, -1), which reverses the sign of angles.
+    Raises ValueError for other shapes, more than 10 000 elements, weights that are all zero, NaN or Inf.
     """
 
     positions: NDArray[np.float64]
@@ -35,7 +35,7 @@ class AntennaArray:
     weights: NDArray[np.complex128] = None  # type: ignore[assignment]
     plan: NDArray[np.int64] | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -49,12 +49,12 @@ class AntennaArray:
     def __post_init__(self) -> None:
         self._set("positions", validation.array("array positions", self.positions, np.float64, ("n", 3)))
         if self.n > MOST:
-            raise ValueError(f"array has {self.n} elements; at most {MOST} are taken: model groups as one element")
+            raise ValueError(f"array has {self.n} elements; at most {MOST} are possible: model groups as one element")
         self._set("offsets", validation.array("array offsets", self.offsets, np.float64, ("n_plans", self.n)))
         given = np.ones(self.n) if self.weights is None else self.weights
         self._set("weights", validation.array("array weights", given, np.complex128, (self.n,)))
         if not self.weights.any():
-            raise ValueError("array weights are zero everywhere; some element must send")
+            raise ValueError("array weights are zero everywhere; some element must transmit")
         if self.plan is not None:
             plan = validation.array("array plan", self.plan, np.int64, ("n_pulses",))
             bad = (plan < 0) | (plan >= len(self.offsets))
@@ -76,7 +76,7 @@ class AntennaArray:
 
     @classmethod
     def single(cls) -> AntennaArray:
-        """One element at the reference point, sending f0."""
+        """One element at the reference point, which transmits f0."""
         return cls(positions=np.zeros((1, 3)), offsets=np.zeros((1, 1)))
 
     @classmethod
@@ -89,9 +89,9 @@ class AntennaArray:
         axis: ArrayLike = Y,
         weights: ArrayLike | None = None,
     ) -> AntennaArray:
-        """Element i at i spacing axis, m, sending f0 + i frequency_step, Hz; element 0 is the reference point.
+        """Element i at i spacing axis, m, transmits f0 + i frequency_step, Hz; element 0 is the reference point.
 
-        A negative spacing is the axis turned round.
+        A negative spacing reverses the axis.
         """
         i = np.arange(_size("n", n))
         step = validation.number("frequency_step", frequency_step)
@@ -108,7 +108,7 @@ class AntennaArray:
         axes: Sequence[Sequence[float] | np.ndarray] | np.ndarray = (Y, Z),
         weights: ArrayLike | None = None,
     ) -> AntennaArray:
-        """N by P elements: number n P + p at n dy axes[0] + p dz axes[1], sending f0 + n dfy + p dfz.
+        """N by P elements: number n P + p at n dy axes[0] + p dz axes[1], which transmits f0 + n dfy + p dfz.
 
         shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz.
         """
@@ -127,9 +127,9 @@ class AntennaArray:
     def costas(
         cls, n: int, *, spacing: float, frequency_step: float, axis: ArrayLike = Y, weights: ArrayLike | None = None
     ) -> AntennaArray:
-        """Like `linear`, but element i sends f0 + g(i) frequency_step, g a Costas permutation of 0 ... n - 1.
+        """Like `linear`, but element i transmits f0 + g(i) frequency_step, g a Costas permutation of 0 ... n - 1.
 
-        ValueError where Welch's and Golomb's constructions modulo a prime give none of this size.
+        Raises ValueError where the constructions of Welch and Golomb modulo a prime give none of this size.
         """
         order = permutation(_size("n", n))
         if order is None:
@@ -141,12 +141,12 @@ class AntennaArray:
         return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(order * step)
 
     def with_offsets(self, offsets: ArrayLike, *, plan: ArrayLike | None = None) -> AntennaArray:
-        """The same elements sending other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
+        """The same elements with other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
         rows = validation.converted("array offsets", offsets, np.float64)
         return replace(self, offsets=rows[None] if rows.ndim == 1 else rows, plan=cast(Any, plan))
 
     def subarrays(self, count: int, *, steer: ArrayLike | None = None, frequency: float | None = None) -> AntennaArray:
-        """`count` equal groups of consecutive elements, each sending the carrier of its first element.
+        """`count` equal groups of consecutive elements, each with the carrier of its first element.
 
         steer      a direction (3,), or (azimuth, elevation) rad from x towards y and z: weights gain the phases that
                    turn each group there, about its first element, at the carrier it sends in plan 0
@@ -156,7 +156,7 @@ class AntennaArray:
         if self.n % count:
             raise ValueError(f"{self.n} elements do not make {count} equal groups; give a divisor of {self.n}")
         if (steer is None) != (frequency is None):
-            raise ValueError("steer and frequency go together: phases that steer hold for one frequency; give both")
+            raise ValueError("steer and frequency go together: steering phases refer to one frequency; give both")
         first = np.arange(self.n) // (self.n // count) * (self.n // count)
         grouped = replace(self, offsets=self.offsets[:, first])
         if steer is None:
@@ -164,7 +164,7 @@ class AntennaArray:
         f = validation.number("frequency", frequency, above=0) + grouped.offsets[0]
         if f.min() <= 0:
             raise ValueError(
-                f"frequency {frequency:g} Hz leaves a carrier of {f.min():g} Hz; every one must be above 0"
+                f"frequency {frequency:g} Hz gives a carrier of {f.min():g} Hz; every carrier must be above 0"
             )
         along = (self.positions - self.positions[first]) @ _towards(steer)
         return replace(grouped, weights=self.weights * np.exp(-2j * np.pi * f * along / constants.SPEED_OF_LIGHT))
@@ -172,7 +172,7 @@ class AntennaArray:
     def switched(self, other: AntennaArray, at: int, n_pulses: int) -> AntennaArray:
         """This array for the pulses before `at`, the carriers of `other` from `at` on; n_pulses in all.
 
-        ValueError where the two differ in more than their carriers.
+        Raises ValueError where the two differ in more than their carriers.
         """
         validation.instance("other", other, AntennaArray)
         n_pulses = validation.count("n_pulses", n_pulses)
@@ -213,7 +213,7 @@ class AntennaArray:
 
     @property
     def is_constant(self) -> bool:
-        """Whether all elements send one carrier in every plan: the constant-frequency array."""
+        """Whether all elements have one carrier in every plan: the constant-frequency array."""
         return bool((np.ptp(self.offsets, axis=1) == 0).all())
 
     @property
@@ -239,12 +239,12 @@ class AntennaArray:
 
     @property
     def span(self) -> float:
-        """Highest less lowest offset over all plans, Hz."""
+        """Highest minus lowest offset over all plans, Hz."""
         return float(np.ptp(self.offsets))
 
     @property
     def center_jump(self) -> float:
-        """Most that the centre frequency differs between two plans, Hz: what pulses of both would not add up by."""
+        """Largest difference of the centre frequency between two plans, Hz; it defocuses the sum of their pulses."""
         return float(np.ptp(self.centers))
 
 

@@ -11,7 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 if TYPE_CHECKING:
     from .antenna import Antenna
 
-SLACK = 1e-3  # of a table's step: a direction this little outside the table gets the value at its edge
+SLACK = 1e-3  # of a table's step: directions outside the table by no more get the value at its edge
 
 
 def uniform_spline(values: np.ndarray) -> np.ndarray:
@@ -43,13 +43,13 @@ def table_slope(antenna: Antenna) -> float:
 
 
 def table_limits(antenna: Antenna, level: float, ratio: float) -> tuple[float, float, float]:
-    """Largest direction cosines along azimuth and elevation where a table reaches `level`; -1 if nowhere behind."""
+    """Largest direction cosines along azimuth and elevation where a table reaches `level`; and -1 if never behind."""
     a, e = _fine(antenna.azimuth), _fine(antenna.elevation)
     power = sum(s(a, e) ** 2 for s in splines(antenna))
     seen = power >= level**2
     if not seen.any():
         return 0.0, 0.0, -1.0
-    # half a cell of the finer grid between samples that were looked at, and what may lie outside by rounding
+    # margin: half a cell of the finer grid, between its samples, and rounding
     azimuth = np.minimum(np.abs(a) / ratio + (a[1] - a[0]) / ratio, np.pi)[seen.any(axis=1)].max()
     elevation = np.minimum(np.abs(e) / ratio + (e[1] - e[0]) / ratio, np.pi / 2)[seen.any(axis=0)].max()
     return float(np.sin(min(azimuth, np.pi / 2))), float(np.sin(elevation)), -float(azimuth < np.pi / 2)
@@ -85,7 +85,7 @@ def _isotropic(antenna: Antenna, x: np.ndarray, y: np.ndarray, z: np.ndarray, fr
 
 
 def _aperture(antenna: Antenna, x: np.ndarray, y: np.ndarray, z: np.ndarray, frequency: float) -> np.ndarray:
-    """Transform of the illumination (1 + b) /2 ... in each axis: sinc u + (b/2) (sinc(u - 1) + sinc(u + 1))."""
+    """Fourier transform of the illumination along each axis: sinc u + (b/2) (sinc(u - 1) + sinc(u + 1))."""
     out = (x > 0).astype(np.float64)
     for size, taper, cosine in zip(antenna.size, antenna.taper, (y, z), strict=True):
         u, b = size * frequency / SPEED_OF_LIGHT * cosine, (1 - taper) / (1 + taper)
@@ -131,7 +131,7 @@ def two_way_gain(
 ) -> np.ndarray:  # fmt: skip
     """Transmit times receive gain (n_points,), one antenna pair: positions m (3,), axes (3, 3), points m (n, 3).
 
-    antennas as `antenna.pair_of` gives them; v = d @ axes are a direction's components along the axes' columns.
+    antennas  from `antenna.pair_of`; d @ axes are the components of a direction d along the columns of axes
     """
     out = pattern_gain(antennas[0], (points - tx) @ axes[0], frequency)
     return out if antennas[1] is None else out * pattern_gain(antennas[1], (points - rx) @ axes[1], frequency)

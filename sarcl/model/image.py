@@ -25,12 +25,12 @@ if TYPE_CHECKING:
 class Image:
     """An image on a grid.
 
-    data       complex, of grid.shape; real where it is intensity (after `multilook`). May be a file's dataset
-    grid       where the pixels are
-    gain       sum of all weights that went into a pixel: a unit point gives |data| = gain at its place
+    data       complex, of grid.shape; real if it is intensity (after `multilook`). It may be a dataset of a file
+    grid       positions of the pixels
+    gain       sum of all weights in a pixel: a unit point gives |data| = gain at its position
     frequency  centre frequency, Hz, and
     tx, rx     antenna positions at mid-aperture, m (3,): the image's local carrier follows from them
-    report     how it was made
+    report     how the image was made
     """
 
     data: Any
@@ -41,7 +41,7 @@ class Image:
     rx: NDArray[np.float64] | None = None
     report: Report | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -81,7 +81,7 @@ class Image:
         return np.dtype(self.data.dtype).kind == "c"
 
     def decibels(self) -> NDArray[np.float32]:
-        """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where nothing is."""
+        """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where data is 0."""
         data = np.asarray(self.data)
         with np.errstate(divide="ignore"):
             if self.is_complex:
@@ -92,9 +92,9 @@ class Image:
             return (10 * np.log10(data / self.gain**2)).astype(np.float32)
 
     def multilook(self, looks: int | Sequence[int] | np.ndarray) -> Image:
-        """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; a remainder is cut off.
+        """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; incomplete blocks are left out.
 
-        ValueError when the grid is no plane or the block is larger than the image.
+        Raises ValueError when the grid is not a plane or the block is larger than the image.
         """
         if not self.grid.is_plane:
             raise ValueError("multilook is for images on a plane; this grid lists its points")
@@ -105,7 +105,7 @@ class Image:
             raise ValueError(f"looks ({a}, {b}) is larger than the image {self.grid.shape}; take fewer")
         data = np.asarray(self.data)[: rows * a, : columns * b]
         power = np.abs(data) ** 2 if self.is_complex else data
-        # The mean of a block sits at the mean of its pixels' positions.
+        # the mean of a block lies at the mean position of its pixels
         center = self.grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
         assert self.grid.spacing is not None
         grid = replace(
@@ -175,7 +175,7 @@ class Image:
         grid = self.grid
         if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
             origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
-            # Axes along the scene's own carry its coordinates; other axes carry the distance along themselves.
+            # axes parallel to the scene's show its coordinates, other axes the distance along themselves
             along = np.eye(3)[1], np.eye(3)[0]
             if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
                 names = ("along y_axis", "along x_axis")
@@ -186,5 +186,5 @@ class Image:
 
 
 def image_fields(image: Image) -> dict[str, Any]:
-    """All fields but data and grid, by name, as a file of sarcl's holds them."""
+    """All fields except data and grid, by name, as sarcl's files hold them."""
     return {name: getattr(image, name) for name in ("gain", "frequency", "tx", "rx", "report")}

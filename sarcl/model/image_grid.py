@@ -1,4 +1,4 @@
-"""Image grids: where the pixels are."""
+"""Image grids: positions of the pixels."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import validation
 
 FARTHEST = 1e150  # m: squares of coordinates stay finite
-MOST_NUMBERED = 2**63 - 1  # pixels that have a number
+MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 
 @dataclass(frozen=True, eq=False)
@@ -94,8 +94,8 @@ class ImageGrid:
         """Any positions, m (..., 3); the image has the shape of all axes but the last.
 
         valid  bool, of that shape: False where a cell is empty (a height model without data there), whatever its
-               position; NaN in all three coordinates says the same. Its pixel is 0.
-        ValueError: NaN in one or two coordinates, Inf, no cell that is not empty.
+               position; NaN in all three coordinates means the same. The pixel of an empty cell is 0.
+        Raises ValueError for NaN in one or two coordinates, for Inf, and where every cell is empty.
         """
         listed = validation.converted("positions", positions, np.float64)
         shape = listed.shape
@@ -235,7 +235,7 @@ def _text(vector: Any) -> str:
 
 
 def pair(name: str, value: Any) -> tuple[Any, Any]:
-    """A (row, column) pair; one number serves for both."""
+    """A (row, column) pair, from a pair or one number for both."""
     if np.ndim(value) == 0:
         return value, value
     if np.shape(value) != (2,):

@@ -1,4 +1,4 @@
-"""Rows of arrays that may lie in files: picked, stacked, scaled and cut without reading them."""
+"""Rows of arrays that may be in files: selected, stacked, scaled and sliced without reading them."""
 
 from __future__ import annotations
 
@@ -10,7 +10,7 @@ from ..base.validation import sealed
 
 
 def in_memory(source: Any) -> bool:
-    """True for a plain array; a memmap is a file, and read like one."""
+    """Whether `source` is a plain array; a memmap counts as a file."""
     return isinstance(source, np.ndarray) and not isinstance(source, np.memmap)
 
 
@@ -31,7 +31,7 @@ def stack(sources: list[Any]) -> Any:
 
 
 class Picked:
-    """Chosen rows of a lazy source; reads what a slice asks for, in as few reads as runs of rows allow."""
+    """Selected rows of a lazy source; a slice reads its rows, one read per run of consecutive rows."""
 
     def __init__(self, source: Any, index: np.ndarray) -> None:
         self.source, self.index = source, index
@@ -50,7 +50,7 @@ class Picked:
 
 
 class Stacked:
-    """Rows of several sources one after another; a slice reads only the sources it touches."""
+    """Rows of several sources one after another; a slice reads only the sources of its rows."""
 
     def __init__(self, sources: list[Any]) -> None:
         self.sources = sources
@@ -72,7 +72,7 @@ class Stacked:
 
 
 class Scaled:
-    """Rows of a source times a factor a row (n,); the source is read, and multiplied, as a slice asks for it."""
+    """Rows of a source times a factor per row (n,); a slice reads and multiplies its rows."""
 
     def __init__(self, source: Any, factor: np.ndarray) -> None:
         self.source, self.factor = source, factor.astype(np.result_type(source.dtype, np.complex64))
@@ -86,7 +86,7 @@ class Scaled:
 
 
 class Columns:
-    """Columns first ... last - 1 of a source; a slice reads the rows it asks for."""
+    """Columns first ... last - 1 of a source; a slice reads its rows."""
 
     def __init__(self, source: Any, first: int, last: int) -> None:
         self.source, self.columns = source, slice(first, last)

@@ -1,4 +1,4 @@
-"""PhaseHistory: echoes by row and frequency, with the geometry that made them."""
+"""PhaseHistory: echoes by row and frequency, with the geometry of their collection."""
 
 from __future__ import annotations
 
@@ -19,7 +19,7 @@ if TYPE_CHECKING:
     from .antenna_array import AntennaArray
     from .waveform import Waveform
 
-# Optional arrays with one entry a row: name -> (dtype, trailing shape).
+# optional arrays with one entry per row: name -> (dtype, trailing shape)
 PER_ROW = {
     "time": (np.float64, ()),
     "tx_channel": (np.int64, ()),
@@ -36,18 +36,18 @@ class PhaseHistory:
     """Echoes s (n_rows, n_samples); a row is one (pulse, transmit channel, receive channel, polarisation).
 
     samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
-                     A writeable array is copied; make it read-only to hand it over as it is
+                     A writeable array is copied, a read-only one is not
     frequency        of sample 0, Hz, one or per row
     frequency_step   Hz, one or per row, positive
     tx, rx           antenna positions, m (n_rows, 3); rx defaults to tx
     reference_range  m, one or per row: half the two-way path whose phase is already removed
-    time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one a row
-    waveform         the Waveform sent, or None;  array  the AntennaArray that sent it, or None: one antenna
-    compressed       False while the pulse's own spectrum is still in the data (see `compress`)
+    time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one per row
+    waveform         the transmitted Waveform, or None;  array  the AntennaArray that transmitted, or None: one antenna
+    compressed       False for data that still have the spectrum of the pulse (see `compress`)
 
     A point of amplitude a at x gives a exp(-j 2 pi f (tau - tau_ref)), tau = (|tx - x| + |x - rx|)/c,
-    tau_ref = 2 reference_range/c. ValueError names the field whose shape or value does not fit; samples that
-    are read lazily are checked for NaN and Inf when they are read.
+    tau_ref = 2 reference_range/c. ValueError names a field of wrong shape or value; samples that are
+    read lazily are checked for NaN and Inf when they are read.
     """
 
     samples: Any
@@ -68,7 +68,7 @@ class PhaseHistory:
     compressed: bool = True
     report: Report | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -131,7 +131,7 @@ class PhaseHistory:
         object.__setattr__(self, name, value)
 
     def _rows(self, name: str, value: Any, dtype: Any, tail: tuple[int, ...], spread: bool = False) -> np.ndarray:
-        """`value` with one entry a row; a single entry serves all rows where `spread`."""
+        """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
         n = self.samples.shape[0]
         if spread and np.ndim(value) == 0:
             value = np.full(n, value)
@@ -160,7 +160,7 @@ class PhaseHistory:
 
     @property
     def n_samples(self) -> int:
-        """Number of frequencies in a row."""
+        """Number of frequencies per row."""
         return int(self.samples.shape[1])
 
     @property
@@ -170,7 +170,7 @@ class PhaseHistory:
 
     @property
     def center_frequency(self) -> NDArray[np.float64]:
-        """Middle of the sampled band, Hz (n_rows,)."""
+        """Centre of the sampled band, Hz (n_rows,)."""
         return self.frequency + (self.n_samples - 1) / 2 * self.frequency_step
 
     @property
@@ -180,27 +180,27 @@ class PhaseHistory:
 
     @property
     def is_monostatic(self) -> bool:
-        """True where transmitter and receiver share every position."""
+        """Whether transmitter and receiver have equal positions in every row."""
         return self.rx is self.tx or np.array_equal(self.rx, self.tx)
 
     def read(self, start: int, stop: int) -> np.ndarray:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
         if not 0 <= start <= stop <= self.n_rows:
-            raise IndexError(f"rows {start} to {stop} were asked for, but there are {self.n_rows}")
+            raise IndexError(f"rows {start} to {stop} were requested, but there are {self.n_rows}")
         block = np.asarray(self.samples[start:stop])
         if block.shape != (stop - start, self.n_samples):
             raise ValueError(
                 f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "
-                "its source does not slice as its shape says"
+                "slices of its source do not agree with its shape"
             )
         validation.finite("samples", block, first_row=start)
         return block if block.dtype.isnative else block.astype(block.dtype.newbyteorder("="))
 
     def __getitem__(self, rows: slice | Sequence[int] | np.ndarray) -> PhaseHistory:
-        """The chosen rows (slice, index array or mask); a lazy source stays lazy."""
+        """The selected rows (slice, index array or mask); a lazy source stays lazy."""
         index = np.atleast_1d(np.arange(self.n_rows)[rows])
         if index.ndim != 1:
-            raise IndexError(f"rows are chosen along one axis, the index has {index.ndim}")
+            raise IndexError(f"rows are selected along one axis, the index has {index.ndim}")
         if index.size == 0:
             raise ValueError(f"no row is left of {self.n_rows}; choose at least one")
         names = ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)
@@ -212,7 +212,7 @@ class PhaseHistory:
     def select(
         self, *, polarization: str | None = None, channel: int | None = None, sender: int | None = None
     ) -> PhaseHistory:
-        """Rows of one polarisation ("HV"), receive channel, sending element. ValueError lists what there is."""
+        """Rows of one polarisation ("HV"), receive channel, transmitting element. ValueError lists those that exist."""
         keep, where = np.ones(self.n_rows, bool), "these data"
         for name, field, wanted in (
             ("polarization", self.polarization, polarization),
@@ -222,7 +222,7 @@ class PhaseHistory:
             if wanted is None:
                 continue
             if field is None:
-                raise ValueError(f"these data name no {name}; every row is alike")
+                raise ValueError(f"these data name no {name}; it is the same for every row")
             if not (keep & (field == wanted)).any():
                 there = sorted(set(field[keep].tolist()))
                 raise ValueError(f"{name} {wanted!r} is not in {where}; there are {there}")
@@ -248,9 +248,9 @@ class PhaseHistory:
     def save(self, path: PathLike) -> None:
         """Write a lossless HDF5 file that `sarcl.read` opens; samples are copied in blocks of rows.
 
-        `path` may be the file that the samples are read from. ValueError for a NaN or Inf in lazily read samples;
-        FileNotFoundError, PermissionError and the like before anything is written. On any exception `path` is as
-        it was.
+        `path` may be the file that the samples are read from. Raises ValueError for a NaN or Inf in lazily read
+        samples, and FileNotFoundError, PermissionError and the like before anything is written. On any exception `path`
+        is unchanged.
         """
         writer = formats.writer_functions(path, "phase history").EchoWriter(
             path, self.n_rows, self.n_samples, self.samples.dtype
@@ -264,7 +264,7 @@ class PhaseHistory:
 
 
 def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
-    """All fields but the samples, by name, as a file of sarcl's holds them: rx is None where it is tx."""
+    """All fields except the samples, by name, as sarcl's files hold them: rx is None where it is tx."""
     names = ("frequency", "frequency_step", "reference_range", "tx", *PER_ROW)
     return {
         **{name: getattr(raw, name) for name in names},
@@ -277,7 +277,7 @@ def phase_history_fields(raw: PhaseHistory) -> dict[str, Any]:
 
 
 def _words(name: str, value: Any) -> np.ndarray:
-    """Words (n,) from strings or, as files hold them, bytes."""
+    """Strings (n,), from strings or from bytes, as files hold them."""
     given = np.asarray(value)
     if given.dtype.kind == "S":
         given = np.char.decode(given, "ascii")
@@ -287,10 +287,10 @@ def _words(name: str, value: Any) -> np.ndarray:
 
 
 def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
-    """Rows of several phase histories in one, in order; all need the same number of samples.
+    """One phase history with the rows of several, in order; all need the same number of samples.
 
-    Optional per-row fields and the waveform are kept where every part has them; lazy samples stay lazy.
-    ValueError names the part that does not fit.
+    Optional fields per row and the waveform are kept where every part has them; lazy samples stay lazy.
+    ValueError names the part that differs.
     """
     if isinstance(parts, PhaseHistory):
         raise TypeError("concatenate takes a list of phase histories, got one; give [raw, ...]")
@@ -301,7 +301,7 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
         if not isinstance(part, PhaseHistory):
             raise TypeError(f"part {i} is a {type(part).__name__}; concatenate joins phase histories")
         if part.n_samples != parts[0].n_samples:
-            raise ValueError(f"part {i} has {part.n_samples} samples a row, part 0 has {parts[0].n_samples}")
+            raise ValueError(f"part {i} has {part.n_samples} samples per row, part 0 has {parts[0].n_samples}")
         if part.compressed != parts[0].compressed:
             raise ValueError(f"part {i} and part 0 differ: one is compressed, one is not; call compress on it first")
     joined: dict[str, Any] = {}

@@ -1,7 +1,7 @@
-"""Where antennas look: tracks with an attitude, made from what the beam should do.
+"""Pointing of antennas: tracks with an attitude that directs the beam.
 
-Every function returns the track with `attitude` set: columns are body axes in the scene, x ahead of the beam (an
-antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, which points up as far as it can.
+Every function returns the track with `attitude` set: columns are body axes in the scene, x along the beam (an
+antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, which is as vertical as possible.
 """
 
 from __future__ import annotations
@@ -25,7 +25,7 @@ def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike = UP) -> Tra
 
 
 def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike = UP) -> Trajectory:
-    """Boresight at a point, m (3,) or (n, 3) for one that moves. ValueError where an antenna stands on it."""
+    """Boresight towards a point, m (3,), or (n, 3) if it moves. ValueError where an antenna stands on it."""
     target = _vectors("point", point, len(track))
     return _looking(
         track, _units("point - position", target - track.positions, len(track)), _units("up", up, len(track))
@@ -35,10 +35,10 @@ def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike = UP) -> Tra
 def stripmap(
     track: Trajectory, look: float, *, squint: float = 0.0, side: Literal["right", "left"] = "right", up: ArrayLike = UP
 ) -> Trajectory:
-    """Boresight across the track, `look` rad off straight down, turned `squint` rad towards the velocity.
+    """Boresight across the track, `look` rad from straight down, rotated by `squint` rad towards the velocity.
 
-    side  "right" or "left" of the velocity, seen from above. The azimuth axis keeps in the plane of boresight and
-    velocity, so that an aperture's rows lie along the track; its sense follows from z pointing up.
+    side  "right" or "left" of the velocity, seen from above. The azimuth axis is in the plane of boresight and
+    velocity, so that rows of an aperture lie along the track; its sense follows from z, which points up.
     """
     look = validation.number("look", look, least=0)
     squint = validation.number("squint", squint)
@@ -64,9 +64,9 @@ def stripmap(
 
 
 def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -> Trajectory:
-    """The track's attitude turned to (azimuth, elevation) rad, one or per pulse, of its own axes.
+    """The track's attitude rotated to (azimuth, elevation) rad, one or per pulse, in its own axes.
 
-    The pattern turns as a whole, as when the antenna turns: sliding spotlight, scans, platform errors.
+    The pattern rotates as a whole, as if the antenna did: sliding spotlight, scans, platform errors.
     """
     axes = _attitude(track)
     a, e = (
@@ -79,20 +79,20 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
     ahead = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
     side = [-np.sin(a), np.cos(a), zero]
     over = [-np.sin(e) * np.cos(a), -np.sin(e) * np.sin(a), np.cos(e)]
-    turn = np.stack([np.stack(column, axis=-1) for column in (ahead, side, over)], axis=-1)
-    return replace(track, attitude=axes @ turn)
+    rotation = np.stack([np.stack(column, axis=-1) for column in (ahead, side, over)], axis=-1)
+    return replace(track, attitude=axes @ rotation)
 
 
 def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
-    """The track's attitude turned by rotation vectors, rad (3,) or (n, 3), about its own axes x, y, z."""
+    """The track's attitude rotated by rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z."""
     from scipy.spatial.transform import Rotation
 
-    turn = Rotation.from_rotvec(_vectors("angles", angles, len(track)).copy()).as_matrix()
-    return replace(track, attitude=_attitude(track) @ turn)
+    rotation = Rotation.from_rotvec(_vectors("angles", angles, len(track)).copy()).as_matrix()
+    return replace(track, attitude=_attitude(track) @ rotation)
 
 
 def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first: bool = True) -> Trajectory:
-    """Attitude from unit quaternions (n, 4) that turn body axes into the scene's; w, x, y, z, or x, y, z, w."""
+    """Attitude from unit quaternions (n, 4), rotations from body to scene axes; w, x, y, z, or x, y, z, w."""
     from scipy.spatial.transform import Rotation
 
     q = validation.array("quaternions", quaternions, np.float64, (len(track), 4))
@@ -104,16 +104,16 @@ def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first:
 
 
 def velocities(track: Trajectory) -> np.ndarray:
-    """The track's velocities, m/s (n, 3), or else the slope of its positions."""
+    """The track's velocities, m/s (n, 3), or the derivative of its positions."""
     if track.velocities is not None:
         return track.velocities
     if len(track) < 2:
-        raise ValueError("a track of one pulse tells no velocity; give Trajectory(..., velocities=...)")
+        raise ValueError("a track of one pulse has no velocity; give Trajectory(..., velocities=...)")
     return np.asarray(np.gradient(track.positions, track.times, axis=0))
 
 
 def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
-    """`value` as rotation matrices lead + (3, 3); ValueError where one is none to 1e-6."""
+    """`value` as rotation matrices lead + (3, 3); ValueError where one is not, to 1e-6."""
     out = validation.array(name, value, np.float64, (*lead, 3, 3))
     off = np.abs(np.swapaxes(out, -1, -2) @ out - np.eye(3)).max(axis=(-1, -2))
     bad = np.atleast_1d((off > 1e-6) | (np.linalg.det(out) < 0))
@@ -132,7 +132,7 @@ def _attitude(track: Trajectory) -> np.ndarray:
 
 
 def _looking(track: Trajectory, look: np.ndarray, up: np.ndarray) -> Trajectory:
-    """Axes with x along `look` and z up; straight up or down, z is the scene's y (x, where that is up)."""
+    """Axes with x along `look` and z up; if `look` is vertical, z is the scene's y (x, where y is vertical)."""
     side = np.cross(up, look)
     length = np.linalg.norm(side, axis=1, keepdims=True)
     other = np.where(np.abs(look[:, 1:2]) < 0.9, [[0.0, 1.0, 0.0]], [[1.0, 0.0, 0.0]])

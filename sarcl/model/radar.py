@@ -1,4 +1,4 @@
-"""The radar equation as named factors: what a radar of some power receives from a unit cross section."""
+"""The radar equation as named factors: the signal that a radar receives from a unit cross section."""
 
 from __future__ import annotations
 
@@ -17,15 +17,15 @@ BOLTZMANN = 1.380649e-23  # J/K, exact
 
 @dataclass(frozen=True, kw_only=True)
 class Radar:
-    """What stands between a radar cross section and a received signal, beside the antennas' gains.
+    """Factors of the radar equation other than range and antenna gains.
 
-    power                W transmitted, at the pulse's peak
-    losses_db            dB, all of them, both ways, 0 or more
-    noise_temperature    K, of the whole system; None: no noise is known
+    power                W, transmitted power at the peak of the pulse
+    losses_db            dB, sum of all losses, both ways, 0 or more
+    noise_temperature    K, of the whole receiving system; None: unknown
 
-    ValueError names what does not fit. Samples with a Radar are in sqrt(W): |sample|^2 is the power received from the
-    scatterers while the pulse lasts. Without one (the default of `sarcl.echo`) a unit cross section gives samples of
-    modulus 1 at any range.
+    ValueError names the wrong argument. Samples with a Radar are in sqrt(W): |sample|^2 is the power received from the
+    scatterers during the pulse. Without one (the default of `sarcl.echo`) a unit cross section gives samples of modulus
+    1 at any range.
     """
 
     power: float
@@ -40,7 +40,7 @@ class Radar:
             object.__setattr__(self, "noise_temperature", value)
 
     def factor(self, frequency: ArrayLike) -> NDArray[np.float64]:
-        """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that depends on no place."""
+        """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that does not depend on position."""
         wave = constants.SPEED_OF_LIGHT / np.asarray(frequency, np.float64)
         loss = 10 ** (self.losses_db / 10)
         return np.asarray(np.sqrt(self.power / ((4 * np.pi) ** 3 * loss)) * wave)
@@ -65,22 +65,22 @@ def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
     """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
     out = np.asarray(tx_range, np.float64) * np.asarray(rx_range, np.float64)
     if not (out > 0).all():
-        raise ValueError("an antenna stands on a scatterer (range 0), where the radar equation has no answer; move it")
+        raise ValueError("an antenna stands on a scatterer (range 0), where the radar equation is not defined; move it")
     return 1 / out
 
 
 def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> NDArray[np.float64]:
-    """Mean |noise|^2, W, of samples of the echoes `raw` at W = 1, one a row: k T_s/(df E), E = |P|^2 at its peak, s^2.
+    """Mean |noise|^2, W, of samples of the echoes `raw` at W = 1, one per row: k T_s/(df E), E the peak of |P|^2, s^2.
 
     A sample is the received spectrum over P's largest value (times the matched filter's, of peak 1, once compressed);
-    noise of k T_s W/Hz over one period 1/df of the row has k T_s/df there. A chirp has E = duration/bandwidth, so a
+    noise of k T_s W/Hz over one period 1/df of the row contributes k T_s/df. A chirp has E = duration/bandwidth, so a
     point's focused signal-to-noise ratio is (its power) duration n_pulses/(k T_s): the energy over the noise density.
     """
     temperature = validation.number("temperature", temperature, above=0)
     pulse = raw.waveform if waveform is None else waveform
     if pulse is None:
         raise ValueError(
-            "raw names no waveform, so its pulse's energy is unknown; set raw.waveform, or give nesz_db=..."
+            "raw has no waveform, so the energy of its pulse is unknown; set raw.waveform, or give nesz_db=..."
         )
     return np.asarray(BOLTZMANN * temperature / (raw.frequency_step * peak_energy_density(pulse)))
 

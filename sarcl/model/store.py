@@ -1,4 +1,4 @@
-"""Files read as a PhaseHistory or an Image, and files in the making finished as one.
+"""Reading of files as a PhaseHistory or an Image, and completion of files that are being written.
 
 sarcl/io/formats.py is the table of file formats. An object read from sarcl's own HDF5 file keeps the file open: rows of
 samples or data are read when they are asked for.
@@ -28,9 +28,9 @@ def finish_image(
     writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, *, gain: float = 1.0, frequency: Any = None, tx: Any = None,
     rx: Any = None, report: Any = None,
 ) -> Image:  # fmt: skip
-    """Complete an image file, move it to its path and return the Image, read from there as it is needed.
+    """Complete an image file, move it to its path and return the Image, which reads it when needed.
 
-    ValueError names a field that does not fit; then the file is abandoned.
+    ValueError names a wrong field; then the file is abandoned.
     """
     writer.check_open()
     try:
@@ -44,7 +44,7 @@ def finish_image(
 
 
 def finish_phase_history(writer: sarcl_hdf5.EchoWriter, **fields: Any) -> PhaseHistory:
-    """Complete a file of echoes with the other fields of a PhaseHistory, and return that, read as it is needed."""
+    """Complete a file of echoes with the other fields of a PhaseHistory, and return it; samples stay in the file."""
     writer.close(phase_history_fields(PhaseHistory(writer.samples, **fields)))
     made: Any = read(writer.path)
     return made
@@ -53,17 +53,17 @@ def finish_phase_history(writer: sarcl_hdf5.EchoWriter, **fields: Any) -> PhaseH
 def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> PhaseHistory | Image:
     """Read a file, or several as one phase history, rows in the order given.
 
-    What a file is follows from its first bytes, not its name. HDF5 written by sarcl gives the PhaseHistory or
-    Image it holds, its samples left in the file until they are used; an AFRL Gotcha .mat gives a
-    PhaseHistory, with autofocus=True the file's own corrections (af.r_correct, af.ph_correct) applied where it
-    has them. They are off by default: measured on azimuth 1-2 deg they sharpen the one reflector they were made
-    from, blur the others by 6 % and move the scene by 0.7 m.
-    FileNotFoundError names the missing file; ValueError the file that is of no known kind, truncated or
-    damaged, or does not fit the others.
+    The format is recognised from the first bytes of a file, not from its name. HDF5 written by sarcl gives the
+    PhaseHistory or Image that it holds, whose samples stay in the file until they are used. An AFRL Gotcha .mat gives a
+    PhaseHistory; with autofocus=True the corrections in the file (af.r_correct, af.ph_correct), if any, are applied.
+    They are off by default: measured on azimuth 1-2 deg they sharpen the one reflector from which they were estimated,
+    blur the others by 6 % and move the scene by 0.7 m.
+    FileNotFoundError names the missing file; ValueError the file that is of unknown format, truncated, damaged or
+    different from the others.
     """
     if isinstance(path, (list, tuple)):
         if not path:
-            raise ValueError("read was given an empty list of files; give at least one (does the pattern match?)")
+            raise ValueError("read was given an empty list of files; give at least one (does the pattern match any?)")
         parts = [read(p, autofocus=autofocus) for p in path]
         for name, part in zip(path, parts, strict=True):
             if not isinstance(part, PhaseHistory):
@@ -76,7 +76,7 @@ def read(path: PathLike | Sequence[PathLike], *, autofocus: bool = False) -> Pha
 
 
 def _make(kind: formats.Kind, fields: Mapping[str, Any]) -> PhaseHistory | Image:
-    """The object that a file holds, of its fields by name; KeyError names a field that is missing."""
+    """The object that a file holds, of its fields by name; KeyError names a missing field."""
     return _phase_history(fields) if kind == "phase history" else _image(fields)
 
 
@@ -89,7 +89,7 @@ def _phase_history(stored: Mapping[str, Any]) -> PhaseHistory:
 
 
 def _fields(kind: Any, stored: Mapping[str, Any]) -> dict[str, Any]:
-    """The fields of a dataclass by name; None for those that the file leaves out."""
+    """The fields of a dataclass by name; None for those that the file does not have."""
     return {name: stored.get(name) for name in kind.__dataclass_fields__}
 
 

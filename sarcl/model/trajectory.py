@@ -1,4 +1,4 @@
-"""Trajectories: where the antenna is at each pulse."""
+"""Trajectories: positions, velocities and attitudes of an antenna at each pulse."""
 
 from __future__ import annotations
 
@@ -13,14 +13,14 @@ from ..base import validation
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
-    """Positions of an antenna's phase centre, one a pulse.
+    """Positions of an antenna's phase centre, one per pulse.
 
     times       s (n,), increasing
     positions   m (n, 3)
     velocities  m/s (n, 3) or None
     attitude    rotation from body to scene axes (n, 3, 3) or None
 
-    ValueError when shapes disagree, a value is not finite, or times do not increase.
+    Raises ValueError when shapes disagree, a value is not finite, or times do not increase.
     """
 
     times: NDArray[np.float64]
@@ -28,7 +28,7 @@ class Trajectory:
     velocities: NDArray[np.float64] | None = None
     attitude: NDArray[np.float64] | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -46,7 +46,7 @@ class Trajectory:
             at = int(np.argmax(np.diff(times) <= 0)) + 1
             raise ValueError(
                 f"trajectory times[{at}] is {times[at]:g} after {times[at - 1]:g}; times must increase: "
-                "a step of length zero or less has no place in a track"
+                "give every pulse a later time than the one before"
             )
         object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
@@ -61,7 +61,7 @@ class Trajectory:
         return len(self.times)
 
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:
-        """These pulses, a slice or numbers in order."""
+        """The track at the pulses of a slice, or at increasing pulse numbers."""
         whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
         some: dict[str, Any] = {name: None if value is None else value[pulses] for name, value in whole.items()}
         return replace(self, **some)
@@ -74,7 +74,7 @@ class Trajectory:
         prf = validation.number("prf", prf, above=0)
         n = validation.count("n_pulses", n_pulses)
         if n > 1 and not velocity.any():
-            raise ValueError("velocity is (0, 0, 0); a track of several pulses needs steps of some length")
+            raise ValueError("velocity is (0, 0, 0); the positions of several pulses must differ")
         times = np.arange(n) / prf
         return cls(times, start + times[:, None] * velocity, np.tile(velocity, (n, 1)))
 
@@ -92,8 +92,8 @@ class Trajectory:
     ) -> Trajectory:
         """Circle about the z axis through `center`, at `height` above it, m.
 
-        Pulse i stands at azimuth start + arc i/(n_pulses - 1), rad from +x towards +y: the first pulse at
-        `start`, the last at start + arc. prf (Hz) sets times and velocities only.
+        Pulse i is at azimuth start + arc i/(n_pulses - 1), rad from +x towards +y: the first pulse at
+        `start`, the last at start + arc. prf (Hz) affects times and velocities only.
         """
         radius = validation.number("radius", radius, above=0)
         height = validation.number("height", height)
@@ -103,7 +103,7 @@ class Trajectory:
         n = validation.count("n_pulses", n_pulses)
         center = validation.array("center", center, np.float64, (3,))
         if n > 1 and arc == 0:
-            raise ValueError("arc is 0; a track of several pulses needs steps of some length")
+            raise ValueError("arc is 0; the positions of several pulses must differ")
         angle = start + arc * (np.arange(n) / max(n - 1, 1))
         rate = arc / max(n - 1, 1) * prf
         zero = np.zeros(n)

@@ -18,13 +18,12 @@ class Waveform:
     """A transmitted pulse, complex baseband about `center`. Build one with `chirp`, `tone` or `sampled`.
 
     center     carrier, Hz
-    bandwidth  band that echoes are sampled in, Hz: [center - bandwidth/2, center + bandwidth/2]
+    bandwidth  width of the band in which echoes are sampled, Hz: [center - bandwidth/2, center + bandwidth/2]
     duration   length of the pulse, s
     kind       "chirp", "tone" or "sampled"
-    signal     complex baseband samples (n,), kind "sampled" only; rate their sampling rate, Hz
+    signal     complex baseband samples (n,), kind "sampled" only;  rate  their sampling rate, Hz
 
-    The pulse is centred on t = 0. ValueError when a value is not finite or positive, or the band reaches
-    0 Hz.
+    The pulse is centred on t = 0. Raises ValueError when a value is not finite or positive, or the band reaches 0 Hz.
     """
 
     center: float
@@ -34,7 +33,7 @@ class Waveform:
     signal: NDArray[np.complex128] | None = None
     rate: float | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,
@@ -82,7 +81,7 @@ class Waveform:
 
     @classmethod
     def sampled(cls, signal: ArrayLike, rate: float, center: float) -> Waveform:
-        """Any pulse, from complex baseband samples (n,) taken at `rate` Hz; its band is `rate` wide."""
+        """A pulse given by complex baseband samples (n,) at `rate`, Hz; its bandwidth is `rate`."""
         signal = validation.array("waveform signal", signal, np.complex128, ("n",))
         rate = validation.number("waveform rate", rate, above=0)
         return cls(center, rate, len(signal) / rate, "sampled", signal, rate)
@@ -90,7 +89,7 @@ class Waveform:
     def pulse_spectrum(self, frequency: ArrayLike) -> np.ndarray:
         """Spectrum P of the pulse at `frequency` Hz (n,), complex128, largest modulus 1.
 
-        A chirp's is its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
+        A chirp has its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
         band and 0 outside.
         """
         f = np.asarray(frequency, dtype=np.float64) - self.center
@@ -106,7 +105,7 @@ class Waveform:
         return np.abs(self.pulse_spectrum(frequency)) ** 2
 
     def _sampled_spectrum(self, f: np.ndarray) -> np.ndarray:
-        """sum_m signal_m exp(-j 2 pi f t_m), t_m centred on 0; in blocks, so that memory stays small."""
+        """sum_m signal_m exp(-j 2 pi f t_m), t_m centred on 0; computed in blocks, which bounds the memory."""
         assert self.signal is not None and self.rate is not None
         t = (np.arange(len(self.signal)) - (len(self.signal) - 1) / 2) / self.rate
         out = np.empty(f.shape, np.complex128)
@@ -117,11 +116,11 @@ class Waveform:
 
     @property
     def _unit(self) -> np.ndarray:
-        """The signal with a largest part of 1, so that sums of huge values do not overflow."""
+        """The signal over its largest real or imaginary part, so that sums of huge values do not overflow."""
         assert self.signal is not None
         return self.signal / max(np.abs(self.signal.real).max(), np.abs(self.signal.imag).max())
 
     def _sampled_peak(self) -> float:
-        """Largest modulus of the signal's spectrum, on a grid 8 times finer than its length needs."""
+        """Largest modulus of the signal's spectrum, sampled 8 times as finely as its length requires."""
         unit = self._unit
         return float(np.abs(np.fft.fft(unit, 8 * len(unit))).max())

@@ -58,7 +58,7 @@ class Scene:
     point_roughness: NDArray[np.float64] = None  # type: ignore[assignment]
     heights: terrain.Heights | None = None
 
-    if TYPE_CHECKING:  # what the fields are made from; what they hold stands above
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
         def __init__(
             self,

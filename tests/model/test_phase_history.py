@@ -459,7 +459,7 @@ def test_bad_parts_are_named():
     raw = history()
     for parts, kind, message in (
         ([], ValueError, "no phase history; give at least one"),
-        ([raw, history(noise(6, 4))], ValueError, "part 1 has 4 samples a row, part 0 has 5"),
+        ([raw, history(noise(6, 4))], ValueError, "part 1 has 4 samples per row, part 0 has 5"),
         ([raw, history(compressed=False)], ValueError, "part 1 and part 0 differ: one is compressed"),
         ([raw, 3], TypeError, "part 1 is a int; concatenate joins phase histories"),
         (raw, TypeError, r"give \[raw, \.\.\.\]"),

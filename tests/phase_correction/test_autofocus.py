@@ -503,9 +503,9 @@ def still(raw):
 @pytest.mark.parametrize(
     "change, message",
     [
-        (lambda r: (r[:11], GRID), "11 pulses that hold anything, of 11; autofocus needs 12"),
-        (lambda r: (replace(r, samples=np.zeros(r.samples.shape, np.complex64)), GRID), "0 pulses that hold anything"),
-        (lambda r: (replace(r, samples=r.samples[:, :15]), GRID), "15 samples a row.*needs 16 or more"),
+        (lambda r: (r[:11], GRID), "11 pulses with any energy, of 11; autofocus needs 12"),
+        (lambda r: (replace(r, samples=np.zeros(r.samples.shape, np.complex64)), GRID), "0 pulses with any energy"),
+        (lambda r: (replace(r, samples=r.samples[:, :15]), GRID), "15 samples per row.*needs 16 or more"),
         (lambda r: (replace(r, compressed=False), GRID), "not compressed.*sarcl.compress"),
         (lambda r: (still(r), GRID), "same in every pulse"),
         (lambda r: (r, ELSEWHERE), "zero everywhere.*center"),
