@@ -4,8 +4,8 @@
 // reference: sarcl/imaging/tiling.py:PlaneTiling.place
 
 // global size (columns of the image, rows of these bands)
-//   totals   (4, pixels)   of tiles `high` x `wide` one after another: re, im, and what rounding took from them
-//   slot     (bands, across): where a tile stands among them
+//   totals   (4, pixels)   of tiles `high` x `wide` one after another: re, im, and their rounding errors
+//   slot     (bands, across): position of a tile among them
 //   out      (rows, columns, 2)
 __kernel void untile(__global const float *restrict totals, ulong pixels, __global const int *restrict slot, int across,
                      int high, int wide, int columns, __global float *restrict out) {

@@ -5,7 +5,7 @@
 // source    the image equation of sarcl/__init__.py; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
 // symbols   delta, kappa as in geometry.clh;  s~_p  range profile, interpolated as in interp.clh
 // macros    VW, FP64, BISTATIC, WRAP, LOCAL, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers
-//           VECTORS   vectors of pixels a work-item
+//           VECTORS   vectors of pixels per work-item
 //           CHUNK     pulses added in float32 before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
 
@@ -15,7 +15,7 @@
 #include "interp.clh"
 #include "range_phase.clh"
 
-// global size (work-items a tile, tiles of this block), local size (work-items a tile, 1)
+// global size (work-items per tile, tiles of this block), local size (work-items per tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
 //   table                              interpolation weights, see interp.clh
 //   pulse       (2, N_PULSE, n)        see geometry.clh

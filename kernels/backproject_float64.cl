@@ -7,12 +7,12 @@
 //           cancel
 // symbols   T, R      antennas, m, in the caller's frame, as x is
 //           x0        a tile's reference point;  q = x - x0;  u, R0 from x0 to an antenna;  a = u.q
-//           kappa     2 fc/c, turns of phase per metre;  sigma  profile samples per metre
+//           kappa     2 fc/c, cycles of phase per metre;  sigma  profile samples per metre
 //           limit     range window: |delta| <= limit = c/(4 df)
 //           b, alpha  beam: (x - T).b >= |x - T| cos alpha
 //           s~_p      range profile between its samples
 // macros    VW, WRAP, TAPS, TERMS as in the headers
-//           BISTATIC  1: R differs from T;  BEAM  1: pulses see only what lies in their beams
+//           BISTATIC  1: R differs from T;  BEAM  1: pulses see only points in their beams
 //           ORDER     of the series of d in q: 2, 3 or 4; 0: the quotient; -1: every path in pairs of float64
 //           CHUNK     pulses added plainly before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
@@ -105,7 +105,7 @@ inline dv beam_state(__global const double *restrict pulse, size_t n, size_t p, 
 }
 #endif
 
-// What every point of a tile shares, for VW pulses a work-item. global size (n/VW, tiles of this call).
+// Constants that the points of a tile share, for VW pulses per work-item. global size (n/VW, tiles of this call).
 //   pulse   (N_PULSE, n)            see the enum above; kappa, sigma and limit as pairs
 //   tile    (3, n_tiles)            reference points, m
 //   radius  (n_tiles,)              m, of the points about their reference
@@ -171,7 +171,7 @@ inline lv in_window(__global const double *restrict pulse, size_t n, size_t p, p
     return room.hi >= 0;
 }
 
-// global size (vectors of points a tile, tiles of this call), local size (vectors a tile, 1)
+// global size (vectors of points per tile, tiles of this call), local size (vectors per tile, 1)
 //   profiles    (n, stride, 2)        complex range profiles; delay 0 stands at sample `origin`
 //   table       (TAPS/2, 2, TERMS)    see interp_float64.clh
 //   pulse, constants, tile, first     as in tile_constants
@@ -205,7 +205,7 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
                 continue;
             }
 #endif
-            // phase in turns, and place among samples, counted from sample `base`
+            // phase in cycles, and position among samples, counted from sample `base`
             dv turn, t, base, inside = 1;
 #if ORDER >= 0
             dv a = fma((dv)record[C_UX], q.x, fma((dv)record[C_UX + 1], q.y, (dv)record[C_UX + 2] * q.z));
@@ -231,7 +231,7 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
                 t = place_of(delta, make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW)), &base);
 #endif
 #if !WRAP
-                // outside, the place moves to delay 0, which every profile has, so that whatever is read there exists
+                // outside, the position moves to delay 0, which every profile has, so that whatever is read there exists
                 lv in = in_window(pulse, n, p, delta);
                 inside = in ? inside : (dv)0;
                 t = in ? t : (dv)0;

@@ -8,16 +8,16 @@
 //   T(m) = s~(m beta/FINE) exp(+j 2 pi kappa m beta/FINE),    W_b(i) = w_b(z_i) exp(+j 2 pi kappa (A_i - (n_i + b) beta/FINE))
 //
 // source    the image equation of sarcl/__init__.py. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
-//           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn turns, whose place errs by
-//           more than limit_place samples or whose step is more than limit_step samples a pixel is added pixel by
-//           pixel instead, as are window edges: what was planned is held for every pulse.
+//           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn cycles, whose position differs by
+//           more than limit_place samples or whose step is more than limit_step samples per pixel is added pixel by
+//           pixel instead, as are window edges: the planned error holds for every pulse.
 // symbols   i, j      line, and pixel in the line, about the tile's reference pixel (SIDE/2, SIDE/2)
 //           z_i       where A_i lies between samples of T; w_b weights, interp.clh's table form
 //           u, R0, a, w   as in range_phase.clh
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM as in the headers
-//           SIDE      of a tile, a multiple of VW;  FINE samples of T a pixel (1, 2, 4 or 8)
+//           SIDE      of a tile, a multiple of VW;  FINE samples of T per pixel (1, 2, 4 or 8)
 //           LINE_TAPS even; LINE_TERMS;  GROUP pulses
-//           SLOPE     1: sums of dT/dm too, so that rest_ij moves each pixel's place as well as its phase
+//           SLOPE     1: sums of dT/dm too, so that rest_ij moves each pixel's position as well as its phase
 //           LOCAL     1: every tile has profiles of its own, about its reference pixel (factorised); 0: pulses' own
 // reference: sarcl/reference/backproject.py:backproject
 
@@ -31,7 +31,7 @@
 
 #define VECS (SIDE / VW)
 #define PARTS (SLOPE ? 4 : 2)       // of a weight: re, im, and of its slope
-#define MOST (2 * SIDE + 2 * VW)    // samples of T a FINE-th phase
+#define MOST (2 * SIDE + 2 * VW)    // samples of T per FINE-th phase
 // of one pulse, in local memory: T[FINE][re, im][MOST], W[LINE_TAPS][PARTS][SIDE], at[SIDE][LINE_TAPS]
 #define T_SIZE (FINE * 2 * MOST)
 #define W_SIZE (LINE_TAPS * PARTS * SIDE)
@@ -67,7 +67,7 @@ inline fv lanes(void) {
 #endif
 }
 
-// i times turns kept in two parts (line_geometry.clh), less whole turns of the first
+// i times cycles kept in two parts (line_geometry.clh), less whole cycles of the first
 inline fv turns_of(fv i, float turn, float low) {
     fv whole = i * turn;
     return fma(i, (fv)low, whole - nearest(whole));
@@ -98,14 +98,14 @@ inline int fits(group shared, line s, float limit_turn, float limit_place) {
         fv centre = bend(s, i, none, qi), rest = bend(s, i, j, q) - centre;
         fv rest_mid = bend(shared.mid, i, j, q) - bend(shared.mid, i, none, qi);
         off = fmax(off, largest(fabs(fma((fv)s.kappa, rest, (fv)(-shared.mid.kappa) * rest_mid))));
-        // half of what a line's ends have on average is in the line's place
+        // half of the mean of a line's ends is in the line's position
         fv in_place = 0.25f * (rest + bend(s, i, -j, q) - centre);
         misplaced = fmax(misplaced, largest(fmax(fabs(rest - in_place), fabs(in_place)) * fabs(s.sigma)));
     }
     return off <= limit_turn && misplaced <= limit_place;
 }
 
-// Weights of all lines of a pulse, and n_i[]; 0 where a line's samples lie too far off to be kept, a steep line's do.
+// Weights of all lines of a pulse, and n_i[]; 0 where a line's samples lie too far off to be kept, as for a steep line.
 inline int weigh_lines(group shared, line s, __global const float *restrict weights, __local float *w, iv *n_i) {
     fv lane = lanes();
     float to_line = FINE / s.along, reach = 0;
@@ -160,7 +160,7 @@ inline void take_samples(line s, __global const float *restrict row, int stride,
         }
 }
 
-// Samples, weights and places of a pulse as the `kept`-th of its group; 0: it does not fit, add it pixel by pixel.
+// Samples, weights and positions of a pulse as the `kept`-th of its group; 0: it does not fit, add it pixel by pixel.
 inline int keep(group shared, line s, int kept, __global const float *restrict row, int stride, int origin,
                 __global const float *restrict table, __global const float *restrict weights, float limit_turn,
                 float limit_place, float limit_step, __local float *T, __local float *W, __local int *at) {
@@ -259,7 +259,7 @@ inline void sum_line(group shared, int r, int j0, int kept, __local const float 
     }
 }
 
-// One pulse at VW pixels of line i, each at a place and phase of its own.
+// One pulse at VW pixels of line i, each at a position and phase of its own.
 inline void add_each(group shared, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
                      int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
     line s = load_line(record, shared.turned);
@@ -275,7 +275,7 @@ inline void add_each(group shared, __global const float *restrict record, fv i, 
     inside = inside & (lit >= 0);
 #endif
     if (as_int(record[L_STATE]) == INSIDE) inside = -1;
-    // outside, the place is moved to delay 0, which every profile has
+    // outside, the position is moved to delay 0, which every profile has
     look_up(row, stride, origin, inside ? (iv)s.base : (iv)0, inside ? from_tile + s.frac : (fv)0.0f, table, &g, &h);
     sincos_turns(turn - nearest(turn), &sine, &cosine);
     g = inside ? g : (fv)0.0f;
@@ -299,7 +299,7 @@ inline void add_spread(__global float *total, __global float *error, size_t i, i
     }
 }
 
-// global size (tiles of this block), local size 1. Arguments as of `backproject`; step_x, step_y: m a pixel along j and
+// global size (tiles of this block), local size 1. Arguments as of `backproject`; step_x, step_y: m per pixel along j and
 // i; weights: of LINE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
 __kernel void backproject_lines(__global const float *restrict profiles, int stride, int origin,
                                 __global const float *restrict table, __global const float *restrict weights, int n,

@@ -4,20 +4,20 @@
 //   f_n (t - r_n/c) = [f_n t0 + fc s + o_n s] - [f_n R0/c + fc rho/c + o_n rho/c + f_n d_n/c]
 //   d_n = r_n - R = (|p_n|^2 - 2 p_n.v)/(R + r_n)
 //
-// The brackets are a table over times and one over points, a row an element; the field is their product.
+// The brackets are a table over times and one over points, one row per element; the field is their product.
 //
 // source    Farooq 2009, equation 3.11, with spherical ranges instead of plane waves; docs/theory/fda.md
 // symbols   f_n = f0 + offset, Hz; fc the mean of the extreme f_n; o_n = f_n - fc
 //           p_n       element from the reference point, m;  v, R  point from there and its length, m
 //           t0, s     a block's time and t - t0, s;  R0, rho  a block's range and R - R0, m
-//           base      fc s or fc rho/c less whole turns;  start  f_n t0 or f_n R0/c less whole turns: from the host
-//           beta = o_n/c, kappa = f_n/c, turns per metre
+//           base      fc s or fc rho/c less whole cycles;  start  f_n t0 or f_n R0/c less whole cycles: from the host
+//           beta = o_n/c, kappa = f_n/c, cycles per metre
 // macros    VW, FP64 as in the headers
 //           DOUBLE    1: tables and sums in float64
 //           ROWS      entries of a tile of rows;  USED  of them that are summed, all of them where there are more tiles
 //           LANES     entries of a tile of lanes, a multiple of VW
 //           FLUSH     elements added plainly before they join the compensated total
-//           CHUNK     elements a work-item of `times` or `paths` takes
+//           CHUNK     elements that a work-item of `times` or `paths` takes
 // reference: sarcl/reference/field.py:field
 
 #define REAL64 DOUBLE

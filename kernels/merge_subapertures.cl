@@ -3,7 +3,7 @@
 //   g_p(m) = sum_b w_b(z_p) s_p(k_p + m + b) exp(+j 2 pi kappa D_p),     D_p = delta_p(x') - delta_p(x)
 //   G_v(m) = sum_p W(p - v) g_p(m)
 //
-// About the centre x' of a small tile, what the tile's pixels see of a pulse changes slowly from pulse to pulse, once the
+// About the centre x' of a small tile, the contribution of a pulse to the tile's pixels changes slowly from pulse to pulse, once the
 // pulse is moved to x' (first line); so a low-pass filter W can thin the pulses out (second line): every H-th antenna
 // position remains, a node, with the profile that makes the same image of the tile.
 //
@@ -14,7 +14,7 @@
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS as in the headers
 //           FROM_CENTRE  1: profiles are the pulses' own, about their reference range; 0: about the tile's centre x
 //           NODES        taps of W
-//           SPAN         vectors of a profile a work-item
+//           SPAN         vectors of a profile per work-item
 // reference: sarcl/reference/merge.py:merge
 
 #define RANGE 0

@@ -1,4 +1,4 @@
-// Samples at uneven places of the plane of wavenumbers, spread on an even grid: a type-1 nonuniform FFT's first step.
+// Samples at uneven positions in the plane of wavenumbers, spread on an even grid: a type-1 nonuniform FFT's first step.
 //
 //   g[c0, c1] = sum_p sum_n s_pn w(c0 - t0_p(n)) w(c1 - t1_p(n)),   indices modulo (M0, M1)
 //   t_p(n) = cell_p + rest_p + (n - MIDDLE) step_p,   in cells of the grid;  w of interp.clh
@@ -6,12 +6,12 @@
 // source    Farooq 2009, equation 2.64 (its interpolation I, without a raster); sarcl/numerics/nufft2d.py
 // symbols   s_pn      sample n of row p, weighted
 //           cell, rest   (n_rows, 2) int, and in `line`: whole cells and the rest of the row's middle sample
-//           step      high + low: `high` has so few bits that n high is exact, and whole cells are told apart exactly;
+//           step      high + low: `high` has so few bits that n high is exact, and whole cells are resolved exactly;
 //                     the same sample falls into the same cell whichever tile looks at it
 //           line      (n_rows, 6): rest0, high0, low0, rest1, high1, low1
 //           table     (TAPS/2, 2, TERMS) as interp.clh reads it
 // macros    VW        1: the lanes are the taps of a sample
-//           TAPS, TERMS   of the kernel; TILE cells a side of a tile, M0, M1 >= TILE + 2 TAPS + 4
+//           TAPS, TERMS   of the kernel; TILE cells per side of a tile, M0, M1 >= TILE + 2 TAPS + 4
 // reference: sarcl/reference/polar_format.py:spread
 
 #include "common.clh"
@@ -39,7 +39,7 @@ typedef float16 taps_v;
 #define ROWS (TILE + 2 * TAPS - 2)
 #define STRIDE (TILE + TAPS - 2 + PAIRS)
 
-// Samples first ... last of a line whose place on one axis, middle + n step, may lie in [low, high].
+// Samples first ... last of a line whose position on one axis, middle + n step, may lie in [low, high].
 inline void clip(float low, float high, float middle, float step, int *first, int *last) {
     float slope = step == 0 ? 1e-30f : step, a = (low - middle) / slope, b = (high - middle) / slope;
     *first = max(*first, (int)floor(clamp(fmin(a, b), -1e9f, 1e9f)));
@@ -62,7 +62,7 @@ inline int first_cell(float n, float rest, float high, float low, float *z) {
 
 // global size (tiles along axis 1, tiles along axis 0 in this band): work-item owns one tile of the grid.
 //   samples  (n_rows, n_samples, 2)
-//   first    tile row of the band;  out (rows of the band, M1, 2);  add: to what is there, else it is overwritten
+//   first    tile row of the band;  out (rows of the band, M1, 2);  add: 1 adds to the values there, 0 overwrites them
 __kernel void spread(__global const float *restrict samples, int n_rows, int n_samples,
                      __global const int *restrict cell, __global const float *restrict line,
                      __global const float *restrict table, int m0, int m1, int first, int add, __global float *out) {

@@ -16,7 +16,7 @@
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
 //           ROUGH      1: materials with roughness finer than a facet
-//           TILE       facets a tile, a multiple of VW
+//           TILE       facets per tile, a multiple of VW
 // reference: sarcl/reference/facet.py:facet_amplitude
 
 #include "common.clh"
@@ -46,9 +46,9 @@ inline void put_channel(__global float *out, int channel, complex_v a, fv scale)
 }
 
 #if ROUGH
-// Mean of exp(j q.rho) over a facet that is rough below its size: what is left of the coherent `mean`, and a random part
+// Mean of exp(j q.rho) over a facet that is rough below its size: the rest of the coherent `mean`, and a random part
 // that re-radiates as the facet's diagram says (sarcl/scattering/_rough_surface.py:rough_mean).
-//   qn  turns/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
+//   qn  cycles/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
 //   of  planes: rms height, m; diagram (0 none, 1 isotropic, 2 cos, 3 cos^2, 4 exp); 1/width; 1/Omega; random re, im
 inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wave, __global const float *restrict of, size_t at,
                             size_t n) {
@@ -66,14 +66,14 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 #endif
 
 // Amplitudes at knots. global size (knots, tiles of this call).
-//   constants  of the knots, n of them a tile, as in backproject.cl, of all tiles
+//   constants  of the nodes, n of them per tile, as in backproject.cl, of all tiles
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
 //   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
 //   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
-//   nodes    (3, NODES)               f_m/c, turns/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
-//   up       (6)                      vertical, and what takes its place along it
+//   nodes    (3, NODES)               f_m/c, cycles/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
+//   up       (6)                      vertical, and the axis that replaces it for vectors along it
 //   patterns, second, axes (knots, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
 //   out      (knots, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
@@ -200,8 +200,8 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 // work-item (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
-//   knots    (n_used, 2)              first of the KNOTS knots of a pulse, and the nearest
-//   shares   (n_used, KNOTS)          what each of them counts for
+//   knots    (n_used, 2)              first of the KNOTS nodes of a pulse, and the nearest
+//   shares   (n_used, KNOTS)          weights of these nodes
 //   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total

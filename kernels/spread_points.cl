@@ -8,7 +8,7 @@
 //           w_k(p, f)    the weight of gains.clh: antennas' gains and spreading
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES     frequencies f_m
-//           TILE      scatterers a tile, a multiple of VW
+//           TILE      scatterers per tile, a multiple of VW
 // reference: sarcl/reference/echo.py:echo
 
 #include "common.clh"

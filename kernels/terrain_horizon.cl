@@ -4,7 +4,7 @@
 //   sample hidden = some edge of the terrain between it and the eye rises above the line of sight: zeta < H
 //
 // source    perspective about the eye onto the upright plane x = ref beyond the terrain: lines of sight become points
-//           (b, zeta), b the place across; prefix maxima are horizons. Finite distances are exact, in plan and height.
+//           (b, zeta), b the position across; prefix maxima are horizons. Finite distances are exact, in plan and height.
 // symbols   along, across   coordinates of grid lines; for lines along y the axes change roles
 //           z         heights (n_across, n_along); everything in units of the scene, see facet_points.clh
 //           line      (lines, 2): b and the slope (b - across_eye)/(ref - along_eye)
@@ -19,7 +19,7 @@
 
 #define NONE -1e30f
 
-// place of v among increasing values, 0 ... n - 2; `guess` is near it
+// position of v among increasing values, 0 ... n - 2; `guess` is near it
 inline int place_of(__global const float *value, int n, float v, float guess) {
     int i = clamp((int)guess, 0, n - 2);
     while (i > 0 && value[i] > v) i--;
@@ -141,7 +141,7 @@ inline int behind(float3 p, float3 eye, __global const float *grid_x, __global c
     int c = (i - first) * step;
     float slope = ratio(y - ey, x - ex);
     float climb = ratio(p.z - eye.z, x - ex);
-    // what is next to p itself: a table between lines would let a facet hide itself
+    // cells next to p itself: a table between lines would let a facet hide itself
     if (gap_above(g, step > 0 ? i : i - 1, x, y, p.z, slope, climb, step)) return 1;
     if (c < 0) return 0;
     Edge e = column_edge(g, i, y + slope * (along[i] - x));

@@ -65,7 +65,7 @@ INTERPOLATION_PAYS = 0.7  # share of the cost of separate channels below which i
 def profile(length: int) -> float:
     """Contributions per range profile of `length` samples: half of one per sample and doubling for the FFT.
 
-    The second term is what long rows lose to caches.
+    The second term is the cost of long rows that exceed the caches.
     """
     return float(length * (0.5 * np.log2(length) + length / 4000))
 

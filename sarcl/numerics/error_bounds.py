@@ -122,8 +122,8 @@ def sum_rounding(n_chunk: int, length: int, gain: float = 1.0, number: NumberTyp
 def darkness(cells: float, chance: float = 1e-6) -> float:
     """Ratio, exceeded with that chance, of a row's amplitude to that of its profile at `cells` positions, for noise.
 
-    Interpolation errors scale with a row's energy, the tolerance with what the pixels see. Over many resolution
-    cells the two are alike; a single one may lie where noise is dark: the mean of `cells` squared moduli is
+    Interpolation errors scale with a row's energy, the tolerance with the energy at the pixels. Over many resolution
+    cells the two are nearly equal; a single cell may lie where the noise is weak: the mean of `cells` squared moduli is
     gamma distributed.
     """
     from scipy.special import gammaincinv

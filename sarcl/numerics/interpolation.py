@@ -113,7 +113,7 @@ def _least_squares(taps: int, oversample: float) -> Interpolator:
 
 
 def least_squares_weights(taps: int, oversample: float, z: np.ndarray) -> np.ndarray:
-    """Weights (n, taps) that interpolate best at z (n,) what has no frequency above 1/(2 oversample) per sample."""
+    """Weights (n, taps) of the best interpolation at z (n,) of signals below 1/(2 oversample) cycles per sample."""
     nu = 0.5 / oversample * np.cos(np.pi * (np.arange(40) + 0.5) / 80)  # denser at the band's edge, where errors are
     angle, wanted = 2 * np.pi * nu[:, None] * _positions(taps), 2 * np.pi * nu[:, None] * z
     waves = np.concatenate([np.cos(angle), np.sin(angle)])
@@ -238,11 +238,11 @@ def choose_interpolator(
 
     The cost of a contribution is in units of one with the hat; making profiles is counted in.
 
-    n_samples      of a row before oversampling
-    pairs_per_row  contributions read from a row: they weigh taps against the length of the FFT
-    carrier        centre frequency in steps between samples, for scatterers that lie evenly: see off_carrier
+    n_samples      samples of a row before oversampling
+    pairs_per_row  contributions read from a row: they weigh the cost of taps against that of the FFT
+    carrier        centre frequency in steps between samples, for evenly spaced scatterers: see off_carrier
     The choice never depends on memory, so that results do not.
-    ToleranceUnreachable names the smallest error there is when none is small enough.
+    ToleranceUnreachable names the smallest error that can be met.
     """
 
     def cost(candidate: tuple[int, float, int]) -> float:
@@ -261,7 +261,7 @@ def choose_interpolator(
 def off_carrier(length: int, carrier: float) -> bool:
     """Whether no image of a kernel, one profile rate from the next, lies within a quarter of that from the carrier.
 
-    There scatterers that lie evenly, as the pieces of a plate, all add up, however they cancel at the carrier itself.
+    At an image evenly spaced scatterers, such as the pieces of a plate, add up although they cancel at the carrier.
     """
     images = carrier / length
     return abs(images - max(round(images), 1)) >= 0.25

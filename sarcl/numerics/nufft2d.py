@@ -20,21 +20,21 @@ from .interpolation import TERMS, Interpolator, interpolator
 from .plan import LEAST_TOLERANCE
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
-MOST_COUNTED = 2**20  # samples whose crowding is looked at
-CELLS = 64, 8  # a side of a tile on CPUs, where it stays in a cache, and on GPUs, where many must be at work
+MOST_COUNTED = 2**20  # samples that are counted to find the most in a cell
+CELLS = 64, 8  # cells per side of a tile: on CPUs it stays in a cache, on GPUs many tiles are computed at once
 
 
 @dataclass(frozen=True, eq=False)
 class GridPlan:
-    """How samples become an image: kernel, cells of the grid, and what that is predicted to err.
+    """How samples become an image: interpolation kernel, cells of the grid, predicted error.
 
-    crowding  sqrt of the most samples in one cell of 1/rows x 1/columns turns a pixel, at least 1: so much more than
-              the image's own energy may stand where the kernel's aliases come from
+    density  square root of the most samples in one cell of 1/rows x 1/columns cycles per pixel, at least 1: the
+             amplitude of the kernel's aliases may exceed that of the image by this factor
     """
 
     interpolator: Interpolator
     length: tuple[int, int]
-    crowding: float
+    density: float
     predicted_error: float
     cost: float
 
@@ -48,16 +48,16 @@ class GridPlan:
 
 
 def make_plan(
-    tolerance: float, shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, n_samples: int, tile: int
+    tolerance: float, shape: tuple[int, ...], cycles: np.ndarray, step: np.ndarray, n_samples: int, tile: int
 ) -> GridPlan:
     """The cheapest plan whose predicted error is at most `tolerance`; ToleranceUnreachable names the best there is.
 
-    turns, step  (n_rows, 2): turns from one pixel to the next, of a row's middle sample, and more with every sample
-    tile         cells a side of a tile
+    cycles, step  (n_rows, 2): cycles of phase per pixel of a row's middle sample, and their growth per sample
+    tile          cells per side of a tile
     The error is relative to the larger of |I| and sqrt(pixels sum |s|^2), the norm if samples added at random.
     """
-    most = most_in_a_cell(shape, turns, step, n_samples)
-    crowding = max(1.0, np.sqrt(most))
+    most = most_in_a_cell(shape, cycles, step, n_samples)
+    density = max(1.0, np.sqrt(most))
     best: GridPlan | None = None
     least = np.inf
     for taps in TERMS:
@@ -69,12 +69,12 @@ def make_plan(
             in_cell = most * shape[0] * shape[1] / cells
             rounding = sum_rounding(max(1, int(in_cell * taps**2)), int(min(cells, 2**60))) + 6 * FLOAT32.unit
             rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
-            error = crowding * (2 * kernel.error + kernel.error**2) + rounding
+            error = density * (2 * kernel.error + kernel.error**2) + rounding
             least = min(least, error)
-            cost = len(turns) * n_samples * (cost_model.GRID_SAMPLE + cost_model.GRID_TAP * taps**2)
+            cost = len(cycles) * n_samples * (cost_model.GRID_SAMPLE + cost_model.GRID_TAP * taps**2)
             cost += cost_model.GRID_CELL * cells * np.log2(cells)
             if error <= tolerance and (best is None or cost < best.cost):
-                best = GridPlan(kernel, (length[0], length[1]), crowding, error, cost)
+                best = GridPlan(kernel, (length[0], length[1]), density, error, cost)
     if best is None or tolerance < LEAST_TOLERANCE:
         reach = rounded_up(max(least, LEAST_TOLERANCE))
         raise ToleranceUnreachable(
@@ -85,7 +85,7 @@ def make_plan(
 
 
 def _growth(kernel: Interpolator, shape: tuple[int, ...], length: tuple[int, ...]) -> float:
-    """By how much what is rounded on the grid grows, rms, where the image is divided by the kernel's transform."""
+    """Factor by which rounding errors on the grid grow, rms, when the image is divided by the kernel's transform."""
     z = np.linspace(-0.5, 0.5, 33)
     energy = float((kernel.weights(z) ** 2).sum(axis=-1).mean())
     out = 1.0
@@ -95,24 +95,24 @@ def _growth(kernel: Interpolator, shape: tuple[int, ...], length: tuple[int, ...
     return float(out)
 
 
-def most_in_a_cell(shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, n_samples: int) -> float:
-    """Most samples in one cell of 1/rows x 1/columns turns a pixel, which an image of that size cannot tell apart.
+def most_in_a_cell(shape: tuple[int, ...], cycles: np.ndarray, step: np.ndarray, n_samples: int) -> float:
+    """Most samples in one cell of 1/rows x 1/columns cycles per pixel, which an image of that size cannot resolve.
 
-    Of more than 2^20 samples every k-th of a row is counted, in cells wide enough for a row to leave none out; those
-    are taken to stand in a line.
+    Of more than 2^20 samples every k-th of a row is counted, in cells so wide that a row meets every cell on its way;
+    the samples between are assumed on the line of those counted.
     """
-    every = -(-len(turns) * n_samples // MOST_COUNTED)
+    every = -(-len(cycles) * n_samples // MOST_COUNTED)
     n = (np.arange(0, n_samples, every) - n_samples // 2).astype(np.float32)
     size = np.array(shape)
     wide = max(1.0, float((every * np.abs(step - np.rint(step)) * size).max())) if every > 1 else 1.0
     bins = np.maximum((size / wide).astype(np.int64), 1)
-    cell = np.zeros((len(turns), len(n)), np.int64)
+    cell = np.zeros((len(cycles), len(n)), np.int64)
     for axis in (0, 1):
-        first = (turns[:, axis] % 1).astype(np.float32)[:, None]
-        place = first + (step[:, axis] - np.rint(step[:, axis])).astype(np.float32)[:, None] * n
-        place -= np.floor(place)
-        place *= bins[axis]
-        cell = cell * bins[axis] + np.minimum(place.astype(np.int32), bins[axis] - 1)
+        first = (cycles[:, axis] % 1).astype(np.float32)[:, None]
+        position = first + (step[:, axis] - np.rint(step[:, axis])).astype(np.float32)[:, None] * n
+        position -= np.floor(position)
+        position *= bins[axis]
+        cell = cell * bins[axis] + np.minimum(position.astype(np.int32), bins[axis] - 1)
     if bins.prod() > 16 * cell.size:
         counts = np.unique(cell, return_counts=True)[1]
     else:
@@ -121,21 +121,21 @@ def most_in_a_cell(shape: tuple[int, ...], turns: np.ndarray, step: np.ndarray, 
 
 
 class Gridder:
-    """A plan on a device, for rows whose wavenumbers are known."""
+    """A plan on a device, for rows whose wavenumbers are given."""
 
-    def __init__(self, device: Device, plan: GridPlan, turns: np.ndarray, step: np.ndarray, n_samples: int) -> None:
+    def __init__(self, device: Device, plan: GridPlan, cycles: np.ndarray, step: np.ndarray, n_samples: int) -> None:
         self.device, self.plan, self.n_samples = device, plan, n_samples
         self.tile = tile_of(device)
         length = np.array(plan.length, np.float64)
-        place = (turns % 1) * length
-        cell = np.floor(place)
+        position = (cycles % 1) * length
+        cell = np.floor(position)
         step = (step - np.rint(step)) * length
         # n high, |n| <= n_samples, must be exact in float32
         spare = max(0, 23 - int(np.ceil(np.log2(n_samples + 1))))
         grain = 2.0 ** (np.ceil(np.log2(np.maximum(np.abs(step), 1e-30))) - spare)
         high = np.rint(step / grain) * grain
         self.cell = cell.astype(np.int32)
-        self.line = np.stack([place - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
+        self.line = np.stack([position - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
         macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.terms, "TILE": self.tile}
         self.kernel = device.kernel("nufft2d.cl", "spread", **{**macros, "VW": 1})
         self.table = device.upload(plan.interpolator.table)
@@ -159,11 +159,12 @@ class Gridder:
         shape: tuple[int, ...],
         budget: float,
         clock: Clock,
-        tell: Callable[[float], None],
+        on_progress: Callable[[float], None],
     ) -> np.ndarray:
         """The image complex64 of `shape`, its pixel (rows//2, columns//2) where every phase is that of the samples.
 
-        read  weighted samples start ... stop - 1 of all rows, complex64;  tell: called with the share that is done
+        read         weighted samples start ... stop - 1 of all rows, complex64
+        on_progress  called with the share that is done
         """
         m0, m1 = self.plan.length
         band, block = self.blocks(budget)
@@ -186,13 +187,13 @@ class Gridder:
                 )  # fmt: skip
                 self.device.finish()
                 clock.lap("gridding")
-                tell(0.8 * (first + (last - first) * stop / n_rows) / n_tiles)
+                on_progress(0.8 * (first + (last - first) * stop / n_rows) / n_tiles)
             made = self.device.download(out, np.empty((rows, m1), np.complex64))
             wave = fft.rows(self.device, made, inverse=True)
-            _turned(wave, half[:, first * self.tile : first * self.tile + rows])
+            _transposed(wave, half[:, first * self.tile : first * self.tile + rows])
             clock.lap("fft")
         image = np.empty(shape, np.complex64)
-        _turned(fft.rows(self.device, half, inverse=True), image)
+        _transposed(fft.rows(self.device, half, inverse=True), image)
         flat = [
             1 / self.plan.interpolator.transform((np.arange(n) - n // 2) / m)
             for n, m in zip(shape, self.plan.length, strict=True)
@@ -200,12 +201,12 @@ class Gridder:
         image *= flat[0].astype(np.float32)[:, None]
         image *= flat[1].astype(np.float32)
         clock.lap("fft")
-        tell(1.0)
+        on_progress(1.0)
         return image
 
 
-def _turned(wave: np.ndarray, out: np.ndarray) -> None:
-    """Transpose columns -n//2 ... of a spectrum (m, ...) into `out` (n, m), a few rows at a time: caches like it."""
+def _transposed(wave: np.ndarray, out: np.ndarray) -> None:
+    """Transpose columns -n//2 ... of a spectrum (m, ...) into `out` (n, m), a few rows at a time for the cache."""
     low = len(out) // 2
     for start in range(0, len(wave), 32):
         part = slice(start, start + 32)
@@ -214,5 +215,5 @@ def _turned(wave: np.ndarray, out: np.ndarray) -> None:
 
 
 def tile_of(device: Device) -> int:
-    """Cells a side of a tile."""
+    """Cells per side of a tile."""
     return CELLS[0] if device.is_cpu else CELLS[1]

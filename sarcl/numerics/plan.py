@@ -1,4 +1,4 @@
-"""Plans: the cheapest way to meet a tolerance, and what it is predicted to err. Shared by echo and backproject."""
+"""Plans: the cheapest way to meet a tolerance, and its predicted error. Shared by echo and backproject."""
 
 from __future__ import annotations
 
@@ -14,17 +14,17 @@ from ..base.tolerances import rounded_up
 from . import cost_model, error_bounds, interpolation
 from .interpolation import Interpolator
 
-LEAST_TOLERANCE = 1e-6  # of complex64 results
+LEAST_TOLERANCE = 1e-6  # smallest tolerance of complex64 results
 
-FIXED = 0.8  # of a tolerance: the most that ranges and sums may take of it, the rest is for interpolation
+FIXED = 0.8  # largest share of a tolerance for the errors of ranges and sums; the rest is for interpolation
 PROFILES = "float32 range profiles"
 
 
 @dataclass(frozen=True, eq=False)
 class Plan:
-    """How a result is computed: interpolator and profile length, points a tile, range mode and series order.
+    """How a result is computed: interpolator and profile length, points per tile, range mode and series order.
 
-    cost  of a contribution, relative to one with the hat and ranges in float32
+    cost  per contribution, relative to one with the hat and ranges in float32
     """
 
     interpolator: Interpolator
@@ -78,12 +78,12 @@ def cheapest(
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
-    tiles        choices of (points a tile, radius of the largest tile in m)
+    tiles        choices of (points per tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
-    chunk        rows or points summed in float32; least_tolerance: below it none is offered
-    carrier      Hz, that no image of the kernel may lie on (interpolation.off_carrier); 0: any may
+    chunk        rows or points summed in float32; least_tolerance: a tolerance below it is refused
+    carrier      Hz, from which images of the kernel keep away (interpolation.off_carrier); 0: no such condition
     image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
-    ToleranceUnreachable names the best tolerance there is.
+    ToleranceUnreachable names the smallest tolerance that can be met.
     """
     best: tuple[float, Plan] | None = None
     steps = carrier_steps(carrier, n_samples, bandwidth)
@@ -98,11 +98,11 @@ def cheapest(
                     interpolator, length, cost = interpolation.choose_interpolator(
                         (tolerance - fixed) / image_gain, n_samples, points_per_row, steps
                     )
-                except ToleranceUnreachable:  # another range mode may leave more to the interpolator
+                except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
                     continue
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 if mode == 0 and radius * sigma > 2**20:
-                    continue  # places in a tile would not fit float32
+                    continue  # positions in a tile would not fit float32
                 cost += range_cost - 1 + cost_model.TILE / per_tile
                 cost += cost_model.SERIES[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
@@ -120,8 +120,10 @@ def carrier_steps(carrier: float, n_samples: int, bandwidth: float) -> float:
 
 
 def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
-    """The smallest tolerance that `cheapest` meets, wherever antennas and scatterers stand: ranges in wide numbers err
-    least, and by the same in a tile of any size."""
+    """The smallest tolerance that `cheapest` meets, at any position of antennas and scatterers.
+
+    Ranges in wide numbers have the smallest error, and the same one in a tile of any size.
+    """
     fixed = error_bounds.range_error(0.0, np.inf, 0.0, 0.0, 2, 0) + error_bounds.sum_rounding(chunk, n_samples)
     return float(max(fixed / FIXED, fixed + interpolation.least_error(n_samples, steps)) * (1 + 1e-9))
 

@@ -129,14 +129,14 @@ class PulseGeometry:
         delta = (tx_length + rx_length) / 2 - self.reference_range[rows]  # longdouble, perhaps thousands of kilometres
         kappa = np.longdouble(2) * self.frequency[rows] / SPEED_OF_LIGHT
         sigma = np.longdouble(2) * self.frequency_step[rows] * length / SPEED_OF_LIGHT
-        place = delta * sigma
+        position = delta * sigma
         if self.wrap:
-            place = place - length * np.rint(place / length)
+            position = position - length * np.rint(position / length)
         # positions this far outside a profile only have to stay finite: points outside the window are tested in metres
-        place = np.clip(place, -(2.0**30), 2.0**30)
-        turn = delta * kappa - np.rint(delta * kappa)
+        position = np.clip(position, -(2.0**30), 2.0**30)
+        cycle = delta * kappa - np.rint(delta * kappa)
         near, far = self.near[rows] - delta, self.far[rows] - delta
-        components = [*tx.T, tx_length, turn, place, kappa, sigma, near, far]
+        components = [*tx.T, tx_length, cycle, position, kappa, sigma, near, far]
         if not self.is_monostatic:
             components += [*rx.T, rx_length]
         if self.beam is not None:

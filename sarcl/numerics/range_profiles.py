@@ -21,7 +21,7 @@ def padding(interpolator: Interpolator) -> int:
 
 
 def correction(interpolator: Interpolator, n_samples: int, length: int) -> np.ndarray:
-    """What spectra (n_samples,) are multiplied by: 1/transform, and the sign that puts delay 0 at length/2."""
+    """Factors of spectra (n_samples,): 1/transform, and the sign that puts delay 0 at length/2."""
     k = np.arange(n_samples) - n_samples // 2
     return np.where(k % 2, -1.0, 1.0) / interpolator.transform(k / length)
 
@@ -36,8 +36,8 @@ def from_samples(
 ) -> np.ndarray:
     """Profiles (n, length + 2 pad) complex64 or complex128 of samples, each times its weight.
 
-    device            that transforms; None: the host
-    samples, weights  (n, n_samples), or what broadcasts to it
+    device            computes the FFT; None: the host does
+    samples, weights  (n, n_samples), or shapes that broadcast to it
     Delay 0 stands at pad, with a `correction` among the weights at pad + length/2. The padding repeats the profile's
     other end. ValueError where samples are too large for sums in this number type.
     """

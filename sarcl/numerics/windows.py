@@ -61,7 +61,7 @@ def _name(window: Any) -> tuple[str, tuple[float, ...]]:
 
 
 def _taylor(u: np.ndarray, sidelobe_db: float, nbar: float) -> np.ndarray:
-    """w(u) = 1 + 2 sum_m F_m cos(2 pi m u), over w(0); nbar - 1 lobes a side near -sidelobe_db."""
+    """w(u) = 1 + 2 sum_m F_m cos(2 pi m u), over w(0); nbar - 1 lobes on each side near -sidelobe_db."""
     a2 = (np.arccosh(10 ** (sidelobe_db / 20)) / np.pi) ** 2
     m = np.arange(1, int(nbar))
     stretch = nbar**2 / (a2 + (nbar - 0.5) ** 2)

@@ -33,9 +33,9 @@ def backproject(
     clear = np.ones(len(points), bool)
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
-        place = abs(delay) * (2 * raw.frequency_step[p])
-        seen = wrap | (place <= 1)
-        clear &= wrap | (abs(place - 1) >= edge)
+        position = abs(delay) * (2 * raw.frequency_step[p])
+        seen = wrap | (position <= 1)
+        clear &= wrap | (abs(position - 1) >= edge)
         if beam is not None:
             toward = np.broadcast_to(beam[1], (raw.n_rows, 3))[p]
             away = points - raw.tx[p]
@@ -44,11 +44,11 @@ def backproject(
             seen = seen & (ahead >= 0)
             clear &= abs(ahead) >= edge * max(np.sin(beam[0] / 2), edge) * reach
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
-        # the carrier's turns are reduced in extended precision, the rest in float64
+        # the carrier's cycles are reduced in extended precision, the rest in float64
         first = (raw.frequency[p] * delay) % 1
         step = (raw.frequency_step[p] * delay) % 1
-        turns = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
-        profile = (np.exp(2j * np.pi * turns) * samples).sum(axis=1) * seen
+        cycles = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
+        profile = (np.exp(2j * np.pi * cycles) * samples).sum(axis=1) * seen
         image += profile
         power += abs(profile) ** 2
     image[~clear] = np.nan

@@ -20,6 +20,6 @@ def echo(
     delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, points, reference_range)
     out = np.zeros(len(frequencies), np.complex128)
     for n, f in enumerate(frequencies):
-        turns = ((np.longdouble(f) * delay) % 1).astype(np.float64)
-        out[n] = (amplitudes * np.exp(-2j * np.pi * turns)).sum()
+        cycles = ((np.longdouble(f) * delay) % 1).astype(np.float64)
+        out[n] = (amplitudes * np.exp(-2j * np.pi * cycles)).sum()
     return out

@@ -10,9 +10,9 @@ import numpy as np
 def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray, reference_range: float) -> np.ndarray:
     """(|tx - x| + |x - rx|)/2 - reference_range, m (n,) longdouble, of points x, m (n, 3); one antenna pair, m (3,).
 
-    The root of a sum of squares, even in extended precision, errs by 2e-12 m at 36 000 km: 1e-9 rad at X band. So
-    each path is told from a length b near it by (|d|^2 - b^2)/(|d| + b), with squares and their sum in pairs of
-    extended numbers.
+    The root of a sum of squares, even in extended precision, has an error of 2e-12 m at 36 000 km: 1e-9 rad at X band.
+    Therefore each path is computed from a length b near it by (|d|^2 - b^2)/(|d| + b), with squares and their sum in
+    pairs of extended numbers.
     """
     x = points.astype(np.longdouble)
     b = np.longdouble(np.linalg.norm(points[0] - tx))
@@ -33,20 +33,20 @@ def _beyond(x: np.ndarray, end: np.ndarray, b: Any) -> np.ndarray:
         square, lost = _sum(square, one)
         low = low + (lost + one_low)
     length = np.sqrt(length)
-    if b <= 0:  # a reference range far from the path: nothing to gain
+    if b <= 0:  # a reference range far from the path: the quotient gains nothing
         return np.asarray(length - b)
     return np.asarray((square + low) / np.where(length + b > 0, length + b, 1))
 
 
 def _sum(a: Any, b: Any) -> tuple[Any, Any]:
-    """a + b and what rounding lost of it (Knuth)."""
+    """a + b and its rounding error (Knuth)."""
     total = a + b
     part = total - a
     return total, (a - (total - part)) + (b - part)
 
 
 def _square(a: Any) -> tuple[Any, Any]:
-    """a^2 and what rounding lost of it (Dekker), for any length of longdouble's mantissa."""
+    """a^2 and its rounding error (Dekker), for any length of longdouble's mantissa."""
     bits = np.finfo(np.longdouble).nmant + 1
     spread = a * np.longdouble(2 ** ((bits + 1) // 2) + 1)
     high = spread - (spread - a)

@@ -1,4 +1,4 @@
-"""Profiles about a tile's centre, and their thinning, term by term."""
+"""Profiles about a tile's centre, and their decimation, term by term."""
 
 from __future__ import annotations
 

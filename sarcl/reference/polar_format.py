@@ -1,4 +1,4 @@
-"""The image of plane waves, term by term, and what spreads samples on a grid."""
+"""The image of plane waves, term by term, and the spreading of samples on a grid."""
 
 from __future__ import annotations
 
@@ -17,7 +17,7 @@ def polar_format(
     sample_weight: np.ndarray | None = None,
     row_weight: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
-    """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), as if waves were plane.
+    """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), for plane waves.
 
     tau = (2/c)(|T - c| - u.(x - c)), u the unit vector from `center` c, m (3,), to the antenna T.
     Returns I complex128 (n,) and the norm it would have if samples had random phases.
@@ -34,17 +34,17 @@ def polar_format(
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
         first = (raw.frequency[p] * delay) % 1
         step = (raw.frequency_step[p] * delay) % 1
-        turns = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
-        image += (np.exp(2j * np.pi * turns) * samples).sum(axis=1)
+        cycles = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
+        image += (np.exp(2j * np.pi * cycles) * samples).sum(axis=1)
         power += float((abs(samples) ** 2).sum())
     return image, float(np.sqrt(len(points) * power))
 
 
-def spread(samples: np.ndarray, place: np.ndarray, kernel: Interpolator, length: tuple[int, int]) -> np.ndarray:
-    """Samples (n,) at places (n, 2), in cells, on a grid complex128 of `length` that repeats: kernels/nufft2d.cl."""
+def spread(samples: np.ndarray, position: np.ndarray, kernel: Interpolator, length: tuple[int, int]) -> np.ndarray:
+    """Samples (n,) at positions (n, 2), in cells, on a grid complex128 of `length` that repeats: kernels/nufft2d.cl."""
     out = np.zeros(length, np.complex128)
-    first = np.floor(place).astype(int) - kernel.taps // 2 + 1
-    weights = kernel.weights(place % 1 - 0.5)
+    first = np.floor(position).astype(int) - kernel.taps // 2 + 1
+    weights = kernel.weights(position % 1 - 0.5)
     for i in range(kernel.taps):
         for j in range(kernel.taps):
             at = (first[:, 0] + i) % length[0], (first[:, 1] + j) % length[1]

@@ -18,8 +18,8 @@ def measure(value: Callable[[np.ndarray], np.ndarray], near: Any, axes: Any, cel
     peak = np.array(near, np.float64)
     for zoom in 2.0 ** -np.arange(14):  # the best of 7 x 7 positions, ever closer together
         a, b = np.meshgrid(*(np.linspace(-zoom, zoom, 7) * cell for cell in cells))
-        places = peak + a.reshape(-1, 1) * axes[0] + b.reshape(-1, 1) * axes[1]
-        peak = places[np.abs(value(places)).argmax()]
+        positions = peak + a.reshape(-1, 1) * axes[0] + b.reshape(-1, 1) * axes[1]
+        peak = positions[np.abs(value(positions)).argmax()]
     out: dict[str, Any] = {"position": peak, "peak": value(peak[None])[0], "irw": [], "pslr": [], "islr": []}
     for axis, cell in zip(axes, cells, strict=True):
         t = np.linspace(-20 * cell, 20 * cell, 40 * 200 + 1)

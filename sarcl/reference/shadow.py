@@ -1,4 +1,4 @@
-"""Which samples of facets something hides: every ray against every facet, every range line against every grid line."""
+"""Occlusion of facet samples: every ray against every facet, every range line against every grid line."""
 
 from __future__ import annotations
 
@@ -8,7 +8,7 @@ CENTROID = np.array([[1 / 3, 1 / 3]])
 
 
 def sample(triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray, lift: float) -> np.ndarray:
-    """Points (k, n, 3) at barycentric places (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
+    """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
 
     By `lift` of a facet's longest edge along its normal.
     """
