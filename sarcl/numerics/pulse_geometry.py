@@ -19,7 +19,8 @@ PER_PULSE = ("reference_range", "frequency", "frequency_step", "near", "far")
 
 def half_path(tx: np.ndarray, rx: np.ndarray, points: np.ndarray) -> np.ndarray:
     """Half the path from transmitters over points to receivers, m: all (..., 3), broadcast."""
-    return np.asarray((np.linalg.norm(tx - points, axis=-1) + np.linalg.norm(rx - points, axis=-1)) / 2)
+    tx_range = np.linalg.norm(tx - points, axis=-1)
+    return np.asarray(tx_range if rx is tx else (tx_range + np.linalg.norm(rx - points, axis=-1)) / 2)
 
 
 @dataclass(frozen=True, eq=False)
@@ -87,7 +88,7 @@ class PulseGeometry:
 
     def half_path(self, point: np.ndarray) -> np.ndarray:
         """Half the two-way path of every pulse to a point (3,), m (n,)."""
-        return np.asarray(sum(np.linalg.norm(end - point, axis=1) for end in self.ends) / len(self.ends))
+        return half_path(self.tx, self.rx, point)
 
     def distance(self, bounds: np.ndarray) -> float:
         """Smallest distance of any antenna from a box (2, 3), m; 0 inside it."""

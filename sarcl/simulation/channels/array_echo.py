@@ -51,7 +51,7 @@ def array_echo(
     sent = channels_of(array, waveform.center, len(track), EQUAL in request.skips)
     carriers = np.array([c.carrier for c in sent])
     warn_of(array, waveform, carriers)
-    reference_range = echo_sampling.half_path(tx, rx, point)
+    reference_range = rows.track.half_path(point)
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
     grid = sampling(carriers, waveform, near, far, compressed)
     whole = band_of(waveform, grid.frequency + (grid.n - 1) / 2 * grid.step, grid.n * grid.step)
