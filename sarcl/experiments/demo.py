@@ -89,6 +89,7 @@ def run(
     say   called with each line of the report of the run
     Returns the image. OSError, before any work, when `out` cannot be made or written.
     """
+    from ..figures.decibels import write_png
     from ..imaging.backproject import backproject
     from ..opencl.choose_device import open_device
     from ..simulation.echo import echo
@@ -115,9 +116,11 @@ def run(
     clock.stage("focus", f"{image.grid.shape[0]} x {image.grid.shape[1]} pixels{_rate(image, 'pulse x pixel')}")
     band = f"{CENTER / 1e9:g} GHz, {setting.bandwidth / 1e6:g} MHz"
     title = f"{band}; radar beyond the top edge, {GRAZING_DEG:g} deg up"
-    image.save(picture, floor_db=FLOOR_DB, percentile=PERCENTILE, title=title)
+    shown = image.show(FLOOR_DB, percentile=PERCENTILE, title=title)
+    write_png(shown, picture)
     raw.save(raw_file)
     clock.stage("write", f"{picture}, {raw_file.name}")
+    say(f"grey    {shown.info['caption']}")
     say(f"device  {opened.info.name}, {opened.info.platform}")
     say(f"picture {picture.resolve()}  ({time.perf_counter() - start:.1f} s in all)")
     say(f"echoes  {raw_file.resolve()}; sarcl focus {raw_file} focuses them again")

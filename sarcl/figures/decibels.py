@@ -104,11 +104,11 @@ def white_level(db: np.ndarray, percentile: float | None = None) -> float:
     signal = db[db > -np.inf]
     if not signal.size:
         return -np.inf
-    middle, high = np.percentile(signal, (50, PERCENTILE))
-    peak = signal.max()
+    wanted, peak = PERCENTILE if percentile is None else percentile, signal.max()
+    middle, high, white = np.percentile(signal, (50, PERCENTILE, wanted), method="higher")
     if middle < high - FILLED or high < peak - FAINTEST:
-        signal = signal[signal >= peak - OBJECT]
-    return float(np.percentile(signal, PERCENTILE if percentile is None else percentile, method="higher"))
+        white = np.percentile(signal[signal >= peak - OBJECT], wanted, method="higher")
+    return float(white)
 
 
 def write_png(picture: Picture, path: Any) -> None:

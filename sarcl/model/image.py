@@ -117,7 +117,12 @@ class Image:
         return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
 
     def show(
-        self, floor_db: float = -50.0, *, top_db: float | None = None, percentile: float | None = None
+        self,
+        floor_db: float = -50.0,
+        *,
+        top_db: float | None = None,
+        percentile: float | None = None,
+        title: str | None = None,
     ) -> PIL.Image.Image:
         """The picture as a PIL.Image, grey in dB, with axes, a scale, and a caption that says what white and black are.
 
@@ -126,10 +131,11 @@ class Image:
         percentile  per cent of the pixels of the scene that are no brighter than white; None: 99.5, so that a few
                     bright points do not darken a scene; 100: white is the brightest pixel. Which pixels count:
                     `sarcl.figures.decibels.white_level`. Either top_db or percentile may be given
+        title       text above the picture
 
         ValueError where the image has not two axes, or for levels that no picture can have.
         """
-        return self._picture(floor_db, top_db, percentile)
+        return self._picture(floor_db, top_db, percentile, title)
 
     def _repr_png_(self) -> bytes | None:
         return self._picture(-50.0)._repr_png_()
@@ -179,8 +185,12 @@ class Image:
             along = np.eye(3)[1], np.eye(3)[0]
             if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
                 names = ("along y_axis", "along x_axis")
+        db = self.decibels()
+        if not (db < np.inf).all():
+            i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
+            raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
-            self.decibels(), grid.spacing, floor_db, title, top_db=top_db, percentile=percentile,
+            db, grid.spacing, floor_db, title, top_db=top_db, percentile=percentile,
             zero="a unit point in focus", origin=origin, names=names,
         )  # fmt: skip
 

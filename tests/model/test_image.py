@@ -183,6 +183,10 @@ BAD = {
         "multilook is for images on a plane",
     ),
     "floor above zero": (lambda: image().show(floor_db=5), "floor_db is 5"),
+    "pixel not finite": (
+        lambda: image(np.where(np.arange(11 * 14).reshape(SHAPE) == 14, np.nan, 1.0)).show(),
+        r"image data\[1, 0\] is nan; a picture needs finite pixels",
+    ),
     "floor not finite": (lambda: image().show(floor_db=np.nan), "floor_db is nan"),
     "unknown suffix": (lambda: image().save("a.bmp"), r"image path 'a.bmp' ends in '.bmp'; choose '.png' or '.h5'"),
     "no suffix": (lambda: image().save("picture"), "image path 'picture' ends in ''; choose"),
