@@ -16,6 +16,7 @@
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
 //           ROUGH      1: materials with roughness finer than a facet
+//           DIAGRAM_*  where ROUGH: number of each re-irradiation diagram (sarcl/scene/material.py:DIAGRAMS)
 //           TILE       facets per tile, a multiple of VW
 // reference: sarcl/reference/facet.py:facet_amplitude
 
@@ -49,16 +50,16 @@ inline void put_channel(__global float *out, int channel, complex_v a, fv scale)
 // Mean of exp(j q.rho) over a facet that is rough below its size: the rest of the coherent `mean`, and a random part
 // that re-radiates as the facet's diagram says (sarcl/scattering/_rough_surface.py:rough_mean).
 //   qn  cycles/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
-//   of  planes: rms height, m; diagram (0 none, 1 isotropic, 2 cos, 3 cos^2, 4 exp); 1/width; 1/Omega; random re, im
+//   of  planes: rms height, m; number of the diagram; 1/width; 1/Omega; random re, im
 inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wave, __global const float *restrict of, size_t at,
                             size_t n) {
     fv height = LOAD(at, of), diagram = LOAD(at, of + n), inverse_width = LOAD(at, of + 2 * n);
     fv turns = min(fabs(qn * height), (fv)3.0f), fall = exp((fv)-39.478418f * turns * turns);
     fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, c = max(cosine, (fv)0.0f), d = 0;
-    d = diagram == 1.0f ? (fv)1.0f : d;
-    d = diagram == 2.0f ? c : d;
-    d = diagram == 3.0f ? c * c : d;
-    d = diagram == 4.0f ? exp(-delta * delta) : d;
+    d = diagram == (fv)DIAGRAM_ISOTROPIC ? (fv)1.0f : d;
+    d = diagram == (fv)DIAGRAM_COS ? c : d;
+    d = diagram == (fv)DIAGRAM_COS2 ? c * c : d;
+    d = diagram == (fv)DIAGRAM_EXP ? exp(-delta * delta) : d;
     fv coherent = sqrt(fall);
     fv random = sqrt(d * ((fv)1.0f - fall) * LOAD(at, of + 3 * n) / max(area, (fv)1e-30f)) / wave;
     return c_make(fma(coherent, mean.re, random * LOAD(at, of + 4 * n)), fma(coherent, mean.im, random * LOAD(at, of + 5 * n)));

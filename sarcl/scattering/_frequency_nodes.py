@@ -1,4 +1,4 @@
-"""At how few frequencies facets are computed: how their amplitudes change over the band, from samples of them.
+"""Errors of facet amplitudes that are interpolated over the band between few frequencies, from samples of facets.
 
 docs/theory/facets.md derives it; tests/scattering/test_facet_engine.py holds it against facets at random phases.
 """
@@ -13,26 +13,27 @@ from ..numerics.polynomials import chebyshev
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
+from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES
 from .facets import Facets
 
 FACETS, PULSES, FREQUENCIES = 96, 4, 24
-SAFETY = 2.0  # these are samples
-BRIGHTEST = 0.1  # of facets, whose power is left out of what errors are compared with: samples seldom tell it
+SAFETY = 2.0  # the errors are estimated from samples
+BRIGHTEST = 0.1  # of sampled facets, left out of the reference power: 96 samples estimate the brightest tenth badly
 
 
 def over_band(
     scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: PulseGeometry, polarizations: Sequence[str],
     vertical: np.ndarray, center: float, bandwidth: float,
 ) -> dict[int, list[float]]:  # fmt: skip
-    """Relative errors of interpolating amplitudes over f^power between 1, 2, ... Chebyshev nodes: {power: [n]}, powers
-    1 and 0, [0] unused.
+    """Relative errors of interpolating amplitudes over f^power between n = 1, 2, ... Chebyshev nodes: {power: [n]} for
+    the powers 1 and 0; [0] is not used.
 
-    Facets are cut to edge, m, those that are no mirrors (k,) to finest. Of the worst of four pulses, by L2 over up to
-    96 facets: twice what follows the n-th Chebyshev coefficient.
+    Facets are cut to edge, m, those that are no mirrors (k,) to finest. The error is that of the worst of four pulses,
+    in L2 over up to 96 facets: twice the sum of the Chebyshev coefficients from the n-th on.
     """
     part = _sample(scene, mirror, edge, finest)
-    for pulses in (PULSES, 16 * PULSES):  # look closer where nothing is seen
+    for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
         found = _errors(part, antennas, pulses, polarizations, vertical, center, bandwidth)
         if found is not None:
             return found
@@ -43,7 +44,7 @@ def _errors(
     part: Facets, antennas: PulseGeometry, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray,
     center: float, bandwidth: float,
 ) -> dict[int, list[float]] | None:  # fmt: skip
-    """None where no pulse sees anything."""
+    """The same for n_pulses pulses along the track; None where none of them sees a facet."""
     band = chebyshev(center, bandwidth, FREQUENCIES)
     transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(chebyshev(0, 2, FREQUENCIES))))
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
@@ -69,21 +70,17 @@ def typical_power(powers: np.ndarray) -> float:
 
 
 def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float) -> Facets:
-    """Facets drawn half by number, half by area, each shrunk to what cutting would leave of it, somewhere on it."""
+    """Facets, each shrunk to the size of its pieces after cutting, somewhere on it.
+
+    All count alike: large facets, which are drawn more often, are cut into more pieces.
+    """
     random = np.random.default_rng(0)
-    n, size = len(scene.triangles), areas(scene.triangles)
-    some = np.arange(n)
-    if n > FACETS:
-        chance = 0.5 / n + 0.5 * size / size.sum()
-        some = random.choice(n, FACETS, p=chance / chance.sum())
+    some, _ = drawn(areas(scene.triangles), FACETS, random)
     triangles = scene.triangles[some]
     shrink = np.minimum(1.0, np.where(mirror[some], edge, finest) / np.maximum.reduce(edges(triangles)))
     middle = centroids(triangles)[:, None]
     inner = random.dirichlet((1.0, 1.0, 1.0), len(some))
     moved = np.einsum("ni,nij->nj", inner, triangles)[:, None] - middle
-    # anywhere where it stays inside
+    # anywhere where it stays inside the facet
     triangles = middle + (1 - shrink)[:, None, None] * moved + shrink[:, None, None] * (triangles - middle)
-    return Facets(
-        triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
-        np.ones(len(some), np.complex64),
-    )  # fmt: skip
+    return facets_at(scene, some, triangles)

@@ -1,13 +1,13 @@
-"""Echo of facets that are rough below their size, in float64: SARAS's re-irradiation diagrams, scaled to keep power.
+"""Echo of facets with roughness finer than their size, in float64: re-irradiation diagrams of SARAS that keep power.
 
 A smooth plate's bistatic pattern obeys  integral over the hemisphere of |I|^2 cos dOmega = lambda^2 A. A rough one
-spreads the same power as its diagram D(delta) says, with a Rayleigh amplitude and a uniform phase:
+spreads the same power over its diagram D(delta), with a Rayleigh amplitude and a uniform phase:
 
     mean |I|^2 = lambda^2 A D(delta)/Omega,    Omega = integral over the hemisphere of D(delta) cos(delta) dOmega
 
-so that it does not depend on how finely a surface is cut: sigma0 = pi |S|^2 D/Omega, Lambert's 4 |R|^2 cos^2 for an
-isotropic diagram. (SARAS gives the shapes of eq. (11), not their scale.) Of roughness with rms height h the coherent
-part keeps exp(-(q.n h)^2) of its power, and the diagram has the rest.
+which does not depend on how finely a surface is cut: sigma0 = pi |S|^2 D/Omega, Lambert's 4 |R|^2 cos^2 for an
+isotropic diagram. (SARAS gives the shapes in eq. (11), not their scale.) With roughness of rms height h the coherent
+part keeps exp(-(q.n h)^2) of its power; the rest is spread over the diagram.
 
 source   Franceschetti et al. 1992 (SARAS), eq. (11); docs/theory/facets.md
 """

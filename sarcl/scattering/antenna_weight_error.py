@@ -1,7 +1,7 @@
-"""How finely weights of antennas and distance have to be followed: over facets, over the band, in float32.
+"""Errors of the antenna weights: within facets, interpolated over the band, and in float32.
 
-From up to 400 facets and 200 points at up to 32 pulses, with what each of them sends back there: errors are relative to
-the echoes' norm, so that a scene in a side lobe asks for more than one amid the beam.
+Estimated from up to 400 facets and 200 points at up to 32 pulses, weighted by their echoes there. Errors are relative
+to the norm of the echoes, so that those of a scene in a side lobe must be smaller than those in the main lobe.
 docs/theory/radar.md derives each term.
 """
 
@@ -18,14 +18,17 @@ from ..model.waveform import Waveform
 from ..numerics.polynomials import chebyshev
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
+from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES, AntennaWeights, WeightError
 from .facets import Facets
 
-SAFETY = 2.0  # these are samples (a facet's corner, by which its weight is judged, lies twice as far off as its area)
+# Errors are estimated from samples. (Weights are compared at a facet's corner, twice as far from the centroid as the
+# rms radius of the facet.)
+SAFETY = 2.0
 PULSES, FACETS, POINTS = 32, 400, 200
-ANGLE = 1e-7  # rad, rms of what float32 directions err, with room: 1e-8 to 3e-8 measured
-PATTERN = 1e-6  # rms of what float32 patterns err of their peak, with room: 1e-7 to 5e-7 measured
-STEP = 1e-4  # rad, of the differences that stand for derivatives
+ANGLE = 1e-7  # rad, bound of the rms error of float32 directions: 1e-8 to 3e-8 measured
+PATTERN = 1e-6  # bound of the rms error of float32 patterns relative to their peak: 1e-7 to 5e-7 measured
+STEP = 1e-4  # rad, of the differences that approximate derivatives
 
 
 def weight_error(
@@ -34,7 +37,7 @@ def weight_error(
     """Errors for a scene. NothingSeen where it is out of the beam."""
     if not beam.is_needed:
         return WeightError()
-    for pulses, many in ((PULSES, 1), (16 * PULSES, 4)):  # look closer before saying that nothing is lit
+    for pulses, many in ((PULSES, 1), (16 * PULSES, 4)):  # more samples before a scene is refused as unlit
         found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
         if found is not None:
             return found
@@ -45,11 +48,11 @@ def _sampled(
     beam: AntennaWeights, scene: Scene, waveform: Waveform, polarizations: Sequence[str], vertical: np.ndarray,
     n_pulses: int, many: int,
 ) -> WeightError | None:  # fmt: skip
-    """None where all weights are 0."""
+    """Errors from samples at n_pulses; None where all weights are 0."""
     random = np.random.default_rng(0)
     where, facets, share = _places(scene, random, many)
     point_power = np.abs(scene.amplitudes) ** 2 * sum(name[0] == name[1] for name in polarizations)
-    some, point_share = _drawn(point_power, len(point_power), POINTS * many, random)
+    some, point_share = drawn(point_power, POINTS * many, random)
     n_facets = len(where)
     places = np.concatenate([where, scene.positions[some]])
     total = bent = seen = floor = blurred = 0.0
@@ -95,24 +98,10 @@ def _sampled(
 
 
 def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, Facets, np.ndarray]:
-    """Places drawn on facets, m (n, 3), these facets, and how many each stands for (n,)."""
-    some, share = _drawn(areas(scene.triangles), len(scene.triangles), FACETS * many, random)
-    triangles = scene.triangles[some]
-    corner = random.dirichlet((1.0, 1.0, 1.0), len(some))
-    part = Facets(
-        triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
-        np.ones(len(some), np.complex64),
-    )  # fmt: skip
-    return np.einsum("ni,nij->nj", corner, triangles).reshape(-1, 3), part, share
-
-
-def _drawn(size: np.ndarray, n: int, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of up to `most` of n things, half of them by their size, and how many each stands for."""
-    if n <= most:
-        return np.arange(n), np.ones(n)
-    chance = 0.5 / n + (0.5 * size / size.sum() if size.any() else np.full(n, 0.5 / n))
-    some = random.choice(n, most, p=chance / chance.sum())
-    return some, 1 / (most * chance[some])
+    """Random points on sampled facets, m (n, 3), these facets, and the number of facets that each stands for (n,)."""
+    some, share = drawn(areas(scene.triangles), FACETS * many, random)
+    triangles, corner = scene.triangles[some], random.dirichlet((1.0, 1.0, 1.0), len(some))
+    return np.einsum("ni,nij->nj", corner, triangles).reshape(-1, 3), facets_at(scene, some, triangles), share
 
 
 def out_of_beam(beam: AntennaWeights, scene: Scene) -> str:

@@ -1,4 +1,4 @@
-"""How facets are computed to a tolerance: how finely they are cut, at how many frequencies, and what that errs.
+"""Plans for facets: edge length, number of frequencies, and the predicted error.
 
 docs/theory/facets.md derives each term; tests/scattering/test_facet_engine.py measures the sum.
 """
@@ -22,20 +22,19 @@ from ..scene.triangles import centroids, edges
 from ._frequency_nodes import over_band
 from .antenna_weights import MOST_NODES, WeightError
 
-GIGAHERTZ = 1e9  # amplitudes are over f in GHz: so they keep away from float32's smallest numbers
-LADDER = 2.0 ** (1 / 2)  # from one length of edges that is tried to the next
-SHARE = 0.6  # of the tolerance that is for the facets themselves; the rest is for ranges and interpolation
+GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smallest float32 numbers
+LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
+SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
-TO_CORNER = 2 / 3  # from a centroid to the farthest corner, of the longest edge
+TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
 
 
 @dataclass(frozen=True, eq=False)
 class FacetPlan:
     """Facets no longer than max_edge, m, their amplitudes over f^power interpolated between `nodes`, Hz (n,).
 
-    power            1 where facets reflect as mirrors, 0 where what they send back has no k in it
-    predicted_error  relative, of what this leaves out
-    n_facets         there will be, about
+    power            1 where facets reflect coherently, 0 where their amplitude has no factor k
+    predicted_error  relative;  n_facets  number of facets after cutting, about
     """
 
     max_edge: float
@@ -45,24 +44,24 @@ class FacetPlan:
     power: int = 1
 
     def basis(self, frequencies: np.ndarray) -> np.ndarray:
-        """Lagrange's polynomials of the nodes at frequencies, Hz (m,), times these over 1 GHz to the power: (n, m).
+        """Lagrange's polynomials of the nodes at frequencies f, Hz (m,), times (f/1 GHz)^power: (n, m).
 
-        The factor k(f) of mirrors' amplitudes is thus exact, at any bandwidth, and only S I is interpolated.
+        The factor k(f) of coherent amplitudes is thus exact at any bandwidth; only S I is interpolated.
         """
         return lagrange(self.nodes, frequencies) * (frequencies / GIGAHERTZ) ** self.power
 
     def scales(self) -> np.ndarray:
-        """k/(2 sqrt(pi)) at the nodes over the same, 1/m (n,)."""
+        """k/(2 sqrt(pi)) at the nodes over (f/1 GHz)^power, 1/m (n,)."""
         wave = self.nodes / SPEED_OF_LIGHT
         return np.asarray(np.sqrt(np.pi) * wave / (self.nodes / GIGAHERTZ) ** self.power)
 
     def describe(self) -> dict[str, Any]:
-        """For a report."""
+        """Words and numbers for a report."""
         return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, "frequencies a facet": len(self.nodes)}
 
 
 def coherent(scene: Scene) -> np.ndarray:
-    """Facets (k,) of which some part reflects as a mirror their size does."""
+    """Facets (k,) that have a coherent part, reflected as by a mirror of their size."""
     return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
 
 
@@ -71,11 +70,11 @@ def plan_facets(
     polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
     weights: WeightError | None = None,
 ) -> FacetPlan:  # fmt: skip
-    """The cheapest way to cut facets and to sample the band whose error is at most its share of `tolerance`.
+    """The cheapest plan for facets whose error is at most SHARE of `tolerance`.
 
     center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
-    cut                False: facets stay as they are;  weights  what antennas and distance err
-    ToleranceUnreachable where more than 50 million facets would be needed, with what fewer could do.
+    cut                False: facets stay as they are;  weights  errors of the antenna weights
+    ToleranceUnreachable where more than 50 million facets would be needed, with the best tolerance of fewer.
     """
     longest = np.maximum.reduce(edges(scene.triangles))
     mirror, highest = coherent(scene), center + bandwidth / 2
@@ -131,7 +130,7 @@ def plan_facets(
 
 
 def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
-    """Least distance of an antenna to a facet, m, or less: by the box of all, or by centroids where that is near."""
+    """Lower bound of the distance of an antenna to a facet, m: by the box of all, or by centroids if that is near."""
     distance = antennas.distance(bounds)
     if distance > float(np.linalg.norm(bounds[1] - bounds[0])):
         return distance
@@ -149,7 +148,7 @@ def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
 
 
 def _spherical(corner: float, distance: float, highest: float) -> float:
-    """The wave's curvature over a facet, rad at its corners, and how its direction and polarisation change there."""
+    """Error of the wave's curvature over a facet, rad at its corners, with its change of direction and polarisation."""
     if corner >= distance:
         return float("inf")
     return float(
@@ -158,5 +157,5 @@ def _spherical(corner: float, distance: float, highest: float) -> float:
 
 
 def _rounding(edge: float, highest: float) -> float:
-    """Float32 directions (4e-7 |q| |edge| rad, a fifth of which counts) and integrals (kernels/facet.clh)."""
+    """Error of float32 directions (4e-7 |q| |edge| rad, a fifth of which counts) and integrals (kernels/facet.clh)."""
     return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + 2e-6

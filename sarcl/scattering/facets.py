@@ -1,4 +1,4 @@
-"""Facets as they are added up: cut, moved, culled and lit; and what each of them sends back."""
+"""Facets ready for the kernel: cut, displaced, culled and illuminated; and the amplitude of each."""
 
 from __future__ import annotations
 
@@ -13,18 +13,18 @@ from ..scene.material import DIAGRAMS, Material
 from ..scene.triangles import centroids, normals
 from ..visibility.illumination import Illumination, Span
 
-AT_ONCE = 100_000  # amplitudes in one go
+AT_ONCE = 100_000  # amplitudes computed per block
 POLARIZATIONS = ("HH", "HV", "VH", "VV")
 
 
 @dataclass(frozen=True, eq=False)
 class Facets:
-    """What is left of a scene's facets to be added up.
+    """The facets of a scene that are added up.
 
     triangles     m (k, 3, 3);  reflectivity, two_sided, material (k,), materials   as in Scene
-    light, kept   what of each facet both antennas see, by blocks of pulses, and which of its facets these are (k,);
-                  None: all of all
-    random        complex Gaussian numbers of unit power (k,): what rough facets send back besides
+    light, kept   share of each facet that both antennas see, by blocks of pulses, and the facets' indices in it (k,);
+                  None: every facet is seen whole
+    random        complex Gaussian numbers of unit power (k,), for the incoherent echo of rough facets
     """
 
     triangles: np.ndarray
@@ -65,12 +65,12 @@ class Facets:
 
     @property
     def is_rough(self) -> bool:
-        """Any material has roughness finer than a facet."""
+        """Whether any material has roughness finer than a facet."""
         return any(m.height > 0 for m in self.materials)
 
     @property
     def is_mirror(self) -> bool:
-        """Any material reflects in part as a mirror of the facet's size does."""
+        """Whether any material has a coherent part, reflected as by a mirror of the facet's size."""
         return any(np.isfinite(m.height) for m in self.materials)
 
     def picked(self, some: np.ndarray) -> Facets:
@@ -84,8 +84,8 @@ class Facets:
         self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, polarizations: Sequence[str],
         vertical: np.ndarray,
     ) -> np.ndarray:  # fmt: skip
-        """What every facet sends back from antennas at tx, rx, m (3,), about its centroid, in float64: what
-        kernels/spread_facets.cl computes, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
+        """Amplitude of every facet for antennas at tx, rx, m (3,), about its centroid, in float64: the reference of
+        kernels/spread_facets.cl, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
         n, k = len(frequencies), len(self)
         out = np.empty((n, k, len(polarizations)), np.complex128)
         step = max(1, AT_ONCE // max(k, 1))
@@ -141,4 +141,9 @@ class Facets:
 def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
     """Height, m, number of the diagram, 1/width and 1/Omega of materials as spread_facets.cl reads them: (4, n)."""
     rows = [(min(m.height, 1e3), DIAGRAMS.index(m.diagram), 1 / (m.width or 1.0), 1 / m.solid_angle) for m in materials]
-    return np.array([(h, 0 if d > 4 else d, w, o) for h, d, w, o in rows]).T
+    return np.array(rows).T
+
+
+def diagram_macros() -> dict[str, int]:
+    """Build-time macros of spread_facets.cl with the numbers of the diagrams: DIAGRAM_ISOTROPIC and so on."""
+    return {f"DIAGRAM_{name.upper()}": number for number, name in enumerate(DIAGRAMS)}

@@ -1,6 +1,6 @@
-"""How many pulses share what facets send back: knots, whose amplitudes are computed, and Lagrange's cubics between.
+"""Pulse nodes: pulses at which facet amplitudes are computed, with Lagrange cubics between them.
 
-docs/theory/facets.md says what that errs: it is measured on samples, and held by tests.
+docs/theory/facets.md derives the error; it is measured on samples, and held by tests.
 """
 
 from __future__ import annotations
@@ -13,24 +13,25 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..numerics.polynomials import lagrange
-from ..scene.triangles import centroids, edges
+from ..scene.triangles import areas, centroids, edges
+from ._facet_sampling import drawn
 from ._frequency_nodes import typical_power
 from .antenna_weights import AntennaWeights
 from .facets import Facets
 
-ORDER = 4  # knots a cubic goes through
-SPACINGS = (64, 32, 16, 8, 4)  # pulses between knots that are tried
-FACETS, WINDOWS = 200, 6  # looked at, and where along the track
-WORTH = 2e7  # pairs of facet and pulse: below, looking would cost more than it saves
-MOST_TURN = 1.0  # rad between knots, of the phase from a facet's corner to its centre: no flash falls between
-SAFETY = 2.0  # these are samples
+ORDER = 4  # nodes that a cubic goes through
+SPACINGS = (64, 32, 16, 8, 4)  # pulses between nodes that are tried
+FACETS, WINDOWS = 200, 6  # samples: facets, and intervals between nodes along the track
+WORTH = 2e7  # pairs of facet and pulse: below, estimating the error would cost more than the nodes save
+MOST_TURN = 1.0  # rad between nodes, of the phase from a facet's corner to its centre: no specular flash lies between
+SAFETY = 2.0  # the error is estimated from samples
 
 
 @dataclass(frozen=True, eq=False)
-class Knots:
-    """Pulses that amplitudes are computed at, rising (n,), and how far apart they lie; 1: all of them.
+class PulseNodes:
+    """Pulses at which amplitudes are computed, rising (n,), and the spacing between them; 1: every pulse.
 
-    error  relative, of what lies between
+    error  relative, of amplitudes interpolated between them
     """
 
     pulses: np.ndarray
@@ -39,12 +40,12 @@ class Knots:
 
     @property
     def order(self) -> int:
-        """Knots that a pulse's amplitude is made from."""
+        """Nodes from which the amplitude of one pulse is interpolated."""
         return 1 if self.spacing == 1 else ORDER
 
     def of(self, start: int, stop: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-        """For pulses start ... stop - 1: the knots they need, and which of these (first, nearest), int32 (n, 2), with
-        what shares, float32 (n, order)."""
+        """Nodes of the pulses start ... stop - 1; per pulse the indices in them of its (first, nearest) node, int32
+        (n, 2), and the Lagrange factors of its nodes, float32 (n, order)."""
         rows = np.arange(start, stop)
         if self.spacing == 1:
             here = rows - start
@@ -57,85 +58,78 @@ class Knots:
         return self.pulses[low:high], both, lagrange(near.T, rows).T.astype(np.float32, order="C")
 
 
-def every(n_pulses: int) -> Knots:
-    """Each pulse its own."""
-    return Knots(np.arange(n_pulses), 1, 0.0)
+def every(n_pulses: int) -> PulseNodes:
+    """A node at each pulse."""
+    return PulseNodes(np.arange(n_pulses), 1, 0.0)
 
 
-def spaced(n_pulses: int, spacing: int, error: float = 0.0) -> Knots:
-    """Every `spacing`-th pulse, and the last."""
-    return Knots(np.append(np.arange(0, n_pulses - 1, spacing), n_pulses - 1), spacing, error)
+def spaced(n_pulses: int, spacing: int, error: float = 0.0) -> PulseNodes:
+    """A node at every `spacing`-th pulse, and at the last."""
+    return PulseNodes(np.append(np.arange(0, n_pulses - 1, spacing), n_pulses - 1), spacing, error)
 
 
-def plan_knots(
-    part: Facets,
-    beam: AntennaWeights,
-    polarizations: Sequence[str],
-    vertical: np.ndarray,
-    frequency: float,
+def plan_pulse_nodes(
+    part: Facets, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray, frequency: float,
     tolerance: float,
-) -> Knots:
-    """The widest knots that err by no more than `tolerance`, relative to facets at random phases.
+) -> PulseNodes:  # fmt: skip
+    """The widest nodes whose error is at most `tolerance`, relative to facets at random phases.
 
-    frequency  the highest, Hz. Mirrors are kept from flashing between knots whatever the samples say.
+    frequency  the highest, Hz. For mirrors the spacing is also limited by MOST_TURN, whatever the samples say.
     """
-    n_pulses = len(beam.geometry)
+    n_pulses = len(weights.geometry)
     if len(part) * n_pulses < WORTH:
         return every(n_pulses)
-    some = np.random.default_rng(0).permutation(len(part))[:FACETS]
+    some, share = drawn(areas(part.triangles), FACETS, np.random.default_rng(0))
     sample = part.picked(some)
     corner = float(np.maximum.reduce(edges(part.triangles)).max()) * 2 / 3 if part.is_mirror else 0.0
     for spacing in SPACINGS:
         if n_pulses < 4 * spacing + 1:
             continue
-        turn = 2 * np.pi * frequency / SPEED_OF_LIGHT * corner * _turning(beam, centroids(sample.triangles), spacing)
+        turn = 2 * np.pi * frequency / SPEED_OF_LIGHT * corner * _turning(weights, centroids(sample.triangles), spacing)
         if turn > MOST_TURN:
             continue
-        error = _between(sample, beam, polarizations, vertical, frequency, spaced(n_pulses, spacing))
+        error = _error(sample, share, weights, polarizations, vertical, frequency, spaced(n_pulses, spacing))
         if SAFETY * error <= tolerance:
             return spaced(n_pulses, spacing, SAFETY * error)
     return every(n_pulses)
 
 
-def _turning(beam: AntennaWeights, places: np.ndarray, spacing: int) -> float:
-    """How much u_t + u_r turns over so many pulses at most, rad, as places' middle and farthest ends see it."""
+def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float:
+    """Largest rotation of u_t + u_r over `spacing` pulses, rad, seen from the places' middle and from their nearest."""
     most = 0.0
-    for place in (places.mean(axis=0), places[np.argmin(np.linalg.norm(places - beam.geometry.tx[0], axis=1))]):
-        look = unit(beam.geometry.tx - place) + unit(beam.geometry.rx - place)
+    for place in (places.mean(axis=0), places[np.argmin(np.linalg.norm(places - weights.geometry.tx[0], axis=1))]):
+        look = unit(weights.geometry.tx - place) + unit(weights.geometry.rx - place)
         most = max(most, float(np.linalg.norm(look[spacing:] - look[:-spacing], axis=1).max()))
     return most
 
 
-def _between(
-    part: Facets,
-    beam: AntennaWeights,
-    polarizations: Sequence[str],
-    vertical: np.ndarray,
-    frequency: float,
-    knots: Knots,
-) -> float:
-    """Relative error of amplitudes a quarter, a half and three quarters on from knots here and there."""
-    n_pulses, places = len(beam.geometry), centroids(part.triangles)
+def _error(
+    part: Facets, share: np.ndarray, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+    frequency: float, nodes: PulseNodes,
+) -> float:  # fmt: skip
+    """Relative error of amplitudes a quarter, a half and three quarters on from some of the nodes.
+
+    share  (k,), the number of facets that each of `part` stands for
+    """
+    n_pulses, places = len(weights.geometry), centroids(part.triangles)
     wrong = right = 0.0
     made: dict[int, np.ndarray] = {}
 
     def at(pulse: int) -> np.ndarray:
         if pulse not in made:
-            ends = beam.geometry.tx[pulse], beam.geometry.rx[pulse]
+            ends = weights.geometry.tx[pulse], weights.geometry.rx[pulse]
             sent = part.amplitudes(*ends, np.array([frequency]), polarizations, vertical)[0]
-            made[pulse] = sent * beam.weights(places, pulse, frequency)[:, None]
+            made[pulse] = sent * weights.weights(places, pulse, frequency)[:, None]
         return made[pulse]
 
-    starts = np.unique(
-        np.linspace(0, n_pulses - 1 - knots.spacing, WINDOWS).astype(int) // knots.spacing * knots.spacing
-    )
-    for start in starts.tolist():
+    starts = np.linspace(0, n_pulses - 1 - nodes.spacing, WINDOWS).astype(int) // nodes.spacing * nodes.spacing
+    for start in np.unique(starts).tolist():
         for step in (1, 2, 3):
-            pulse = start + max(1, step * knots.spacing // 4)
-            needed, which, shares = knots.of(pulse, pulse + 1)
+            pulse = start + max(1, step * nodes.spacing // 4)
+            needed, which, factors = nodes.of(pulse, pulse + 1)
             guess = sum(
-                share * at(int(needed[which[0, 0] + q])) for q, share in enumerate(shares[0].astype(float).tolist())
+                factor * at(int(needed[which[0, 0] + q])) for q, factor in enumerate(factors[0].astype(float).tolist())
             )
-            wrong += float((np.abs(guess - at(pulse)) ** 2).sum())
-            right += typical_power((np.abs(at(pulse)) ** 2).sum(axis=1))
+            wrong += float(share @ (np.abs(guess - at(pulse)) ** 2).sum(axis=1))
+            right += typical_power(share * (np.abs(at(pulse)) ** 2).sum(axis=1))
     return float(np.sqrt(wrong / right)) if right else 0.0

@@ -1,4 +1,4 @@
-"""From a scene to what a kernel adds up: points, and facets moved, culled and lit."""
+"""From a scene to the points and facets that a kernel adds up: displaced, culled and illuminated."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import lit
 from .facets import Facets
 
-RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of what rough facets send back
+RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,14 +36,14 @@ class Points:
         return float(np.abs(self.amplitudes).max())
 
     def planes(self, order: np.ndarray) -> np.ndarray:
-        """Rows of numbers as kernels/spread_points.cl reads them, float32, in `order`; repeats at its end are blank."""
+        """Rows of numbers as kernels/spread_points.cl reads them, float32, in `order`; padding at its end is blank."""
         out = np.stack([self.amplitudes.real, self.amplitudes.imag])[:, order].astype(np.float32)
         out[:, len(self) :] = 0
         return out
 
 
 def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | None, dict[str, int]]:
-    """The scene's points, and pairs with pulses left out: reason -> count."""
+    """The scene's points, and counts of pairs of point and pulse that are left out: reason -> count."""
     keep = scene.amplitudes != 0 if "zero reflectivity" in skips else np.ones(len(scene.positions), bool)
     left_out = {"zero reflectivity": int((~keep).sum()) * n_pulses}
     return Points(scene.positions[keep], scene.amplitudes[keep]) if keep.any() else None, left_out
@@ -53,9 +53,9 @@ def facets_of(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, seed: int, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object],
 ) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
-    """Facets that are cut already: moved, culled and lit, and pairs with pulses left out: reason -> count.
+    """Facets of a scene that is cut, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
-    tell is called with 2, 3 when facets are culled and lit.
+    tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
     n_pulses = len(antennas.tx)
     terrain = _terrain(scene, antennas)
@@ -77,7 +77,7 @@ def facets_of(
     tell(2)
     light = None
     if shadows and keep.any():
-        # by the surface without its random heights: facets moved along their normals would hide their neighbours
+        # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         light = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
             two_sided=scene.two_sided, wanted=keep,
@@ -92,7 +92,7 @@ def facets_of(
         return None, left_out
     random = np.zeros(0, np.complex64)
     if any(m.height > 0 for m in scene.materials):
-        # by the facets' own places: neither order nor neighbours matter
+        # from the facets' own positions: order and neighbours have no influence
         places = geometry.centroids(scene.triangles)[keep]
         parts = [counter_rng.gaussian(places, seed, stream) for stream in RANDOM_STREAMS]
         random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
@@ -103,7 +103,7 @@ def facets_of(
 
 
 def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
-    """What `lit` wants to know of a scene's terrain, if it is whole. ValueError for an antenna under it."""
+    """Arguments of `lit` for a scene's terrain, where it is complete. ValueError for an antenna under it."""
     on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
     if scene.heights is None or on is None:
         return {}
@@ -113,10 +113,10 @@ def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
 
 
 def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: PulseGeometry) -> float:
-    """How much a facet's lit share may err: a quarter, or more where facets are small beside a resolution cell.
+    """Tolerance of a facet's illuminated share: a quarter, or more where facets are small beside a resolution cell.
 
-    The bound on how far a shadow's edge moves (docs/theory/shadows.md) is several times what it moves: the edge is then
-    off by about half a cell at most, or by a quarter of a facet.
+    The bound on how far a shadow's edge moves (docs/theory/shadows.md) is several times the actual shift: the
+    error of the edge is then about half a cell at most, or a quarter of a facet.
     """
     typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
     edge, _ = _half_cell(waveform, antennas, scene)
@@ -128,7 +128,7 @@ def resolution_edge(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -
     edge, standing = _half_cell(waveform, antennas, scene)
     if standing is not None:
         raise ValueError(
-            f"an antenna stands at the scene's centre at pulse {standing}, where no resolution can be told to cut "
+            f"an antenna stands at the scene's centre at pulse {standing}, where there is no resolution to cut "
             "facets to; pass max_edge=... in metres, or None"
         )
     if not np.isfinite(edge):
@@ -138,7 +138,7 @@ def resolution_edge(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -
 
 def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> tuple[float, int | None]:
     """Half the finer of range and cross-range resolution at the scene's centre, m, inf where nothing is resolved; and
-    the pulse at which an antenna stands there, which resolves nothing either."""
+    the pulse at which an antenna stands there, where nothing is resolved either."""
     look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
     for ends in (antennas.tx, antennas.rx):
         distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)

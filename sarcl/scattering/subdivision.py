@@ -1,4 +1,4 @@
-"""Facets cut as finely as their plan wants them."""
+"""Facets cut to the edges of their plan."""
 
 from __future__ import annotations
 
@@ -14,26 +14,29 @@ from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.material import COHERENT
 from ..scene.scene import Scene
-from ..scene.triangles import centroids, edges
+from ..scene.triangles import areas, centroids, edges
+from ._facet_sampling import drawn
 from .antenna_weights import WeightError
 from .facet_plan import FacetPlan, coherent, plan_facets
 from .scatterers import resolution_edge
 
+FACETS = 200  # sampled, for the gain of subdivision
+
 
 @dataclass(frozen=True, eq=False)
-class Cut:
-    """How a scene's facets are cut: by which plan, those without a coherent part to about `finest`, m.
+class Subdivision:
+    """How a scene's facets are cut: coherent ones to the edges of the plan, the others to about `finest`, m.
 
-    crowd  what `crowding` says, with room;  cuts  False: facets are left as they are
+    gain  bound of `subdivision_gain`;  cuts  False: facets stay as they are
     """
 
     plan: FacetPlan
     finest: float
-    crowd: float
+    gain: float
     cuts: bool
 
-    def made(self, scene: Scene) -> tuple[FacetPlan, Scene]:
-        """The scene's facets, without its points, and the plan with their number."""
+    def apply(self, scene: Scene) -> tuple[FacetPlan, Scene]:
+        """The plan with the number of facets, and the cut facets of the scene without its points."""
         scene = _without_points(scene)
         made = cut_facets(scene, self.plan, self.finest) if self.cuts else scene
         return replace(self.plan, n_facets=len(made.triangles)), made
@@ -42,11 +45,11 @@ class Cut:
 def plan_cut(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, polarizations: Sequence[str], vertical: np.ndarray,
     max_edge: float | str | None, share: float, weights: WeightError,
-) -> Cut:  # fmt: skip
+) -> Subdivision:  # fmt: skip
     """How to cut a scene's facets within `share` of a tolerance.
 
-    max_edge  as `sarcl.echo` takes it;  weights  what antennas and distance err
-    ValueError where max_edge means nothing, ToleranceUnreachable where the share cannot be kept.
+    max_edge  as `sarcl.echo` takes it;  weights  errors of the antenna weights
+    ValueError for another max_edge, ToleranceUnreachable where the share cannot be met.
     """
     scene = _without_points(scene)
     finest = np.inf
@@ -56,22 +59,22 @@ def plan_cut(
         finest = number("max_edge", max_edge, above=0)
     elif max_edge not in ("auto", None):
         raise ValueError(f"max_edge is {max_edge!r}; give a length in m, 'auto', or None")
-    crowd = 1.0
+    gain = 1.0
     for _ in range(6):
         try:
             plan = plan_facets(
-                share / crowd, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
+                share / gain, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
                 vertical, finest, cut=max_edge is not None, weights=weights,
             )  # fmt: skip
         except ToleranceUnreachable as refused:
-            raise refused.restated(share, None if refused.best is None else refused.best * crowd) from None
-        found = 1.0 if max_edge is None else crowding(scene, plan.max_edge, antennas, plan.nodes)
-        if found <= crowd:
-            return Cut(plan, finest, crowd, max_edge is not None)
-        crowd = 1.1 * found
+            raise refused.restated(share, None if refused.best is None else refused.best * gain) from None
+        found = 1.0 if max_edge is None else subdivision_gain(scene, plan.max_edge, antennas, plan.nodes)
+        if found <= gain:
+            return Subdivision(plan, finest, gain, max_edge is not None)
+        gain = 1.1 * found
     raise ToleranceUnreachable(
         share, None, "edges of cut facets", "let fewer facets make up a plane",
-        how=f"with these facets: cut finely enough, their edges' echoes cancel to less than a {crowd:.0f}th",
+        how=f"with these facets: cut finely enough, their edges' echoes cancel to less than 1/{gain:.0f}",
     )  # fmt: skip
 
 
@@ -80,25 +83,25 @@ def _without_points(scene: Scene) -> Scene:
 
 
 def cut_facets(scene: Scene, plan: FacetPlan, finest: float) -> Scene:
-    """The scene's facets as the plan wants them; those without a coherent part only to about `finest`, m."""
+    """The scene's facets cut to the edges of the plan; those without a coherent part only to about `finest`, m."""
     mirror = coherent(scene)
     parts = [scene.part(which).split(edge) if np.isfinite(edge) else scene.part(which)
              for which, edge in ((mirror, plan.max_edge), (~mirror, 1.05 * finest)) if which.any()]  # fmt: skip
     return parts[0] if len(parts) == 1 else parts[0] + parts[1]
 
 
-def crowding(scene: Scene, max_edge: float, antennas: PulseGeometry, frequencies: np.ndarray) -> float:
-    """How much more the norm of cut facets is than that of uncut ones, were each added with a random phase; at least 1.
+def subdivision_gain(scene: Scene, max_edge: float, antennas: PulseGeometry, frequencies: np.ndarray) -> float:
+    """Norm of cut facets over that of uncut ones, both added with random phases; at least 1.
 
-    Cutting a smooth facet makes edges whose echoes cancel again; what they err does not. From up to 200 facets at
-    three pulses, as perfect conductors.
+    Cutting a smooth facet makes edges whose echoes cancel again; their errors do not. Estimated from up to 200 facets
+    at three pulses, as perfect conductors.
     """
     from .physical_optics import triangle_integral
 
     some = np.flatnonzero((np.maximum.reduce(edges(scene.triangles)) > max_edge) & coherent(scene))
     if len(some) == 0:
         return 1.0
-    some = some[np.unique(np.linspace(0, len(some) - 1, 200).astype(int))]
+    some = some[drawn(areas(scene.triangles[some]), FACETS, np.random.default_rng(0))[0]]
     whole = Scene.facets(scene.triangles[some])
     cut = whole.split(max(max_edge, float(np.maximum.reduce(edges(whole.triangles)).max()) / 64))
     power = [0.0, 0.0]

@@ -15,8 +15,8 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import POLARIZATIONS, Facets
-from ..scattering.pulse_nodes import plan_knots
+from ..scattering.facets import POLARIZATIONS, Facets, diagram_macros
+from ..scattering.pulse_nodes import plan_pulse_nodes
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
 from ._kernel_images import sample_patches
@@ -80,7 +80,7 @@ class FacetSpreader:
         left = tolerance - facet_plan.predicted_error
         band = Band(self.n_samples, bandwidth, float(antennas.frequency.mean()))
         room = left - band.least_tolerance(len(facets), left)  # what range profiles need comes first
-        self.pulse_nodes = plan_knots(
+        self.pulse_nodes = plan_pulse_nodes(
             facets, weights, self.made, vertical, float(frequencies[-1]), min(NODES_SHARE * left, room)
         )
         left -= self.pulse_nodes.error
@@ -102,6 +102,7 @@ class FacetSpreader:
             "ROUGH": int(self.facets.is_rough),
             "KNOTS": self.pulse_nodes.order,
             **{name: int(name in self.made) for name in POLARIZATIONS},
+            **(diagram_macros() if self.facets.is_rough else {}),
         }
         names = ("tile_constants", "facet_amplitudes", "spread_facets")
         self.constants, self.amplitudes, self.spread = (

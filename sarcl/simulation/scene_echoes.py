@@ -22,7 +22,7 @@ from ..scattering.facet_plan import MOST_FACETS
 from ..scattering.facets import Facets
 from ..scattering.mesh_quality import facet_error, speckle_contrast
 from ..scattering.scatterers import Points, facets_of, points_of
-from ..scattering.subdivision import Cut, plan_cut
+from ..scattering.subdivision import Subdivision, plan_cut
 from ..scene.scene import Scene
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._point_spreading import spread_points, tiled_points
@@ -76,7 +76,7 @@ class SceneEchoes:
     """The points and facets that are left of a scene, prepared for all channels: `prepare_scene` makes it.
 
     weights, weight_error  of antennas and distances, and their errors
-    cut                    how facets were cut, None where there are none
+    subdivision            how facets were cut, None where there are none
     points, facets         None where none are left;  tiled_points, tiled_facets  the same on the device
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
@@ -86,7 +86,7 @@ class SceneEchoes:
     request: EchoRequest
     weights: AntennaWeights
     weight_error: WeightError
-    cut: Cut | None
+    subdivision: Subdivision | None
     points: Points | None
     facets: Facets | None
     tiled_points: TiledScatterers | None
@@ -116,16 +116,16 @@ class SceneEchoes:
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
             plan = self.tiled_points.plan(antennas, band, self.error_budget - error)
             parts.append((plan.predicted_error + error, plan.describe("spread")))
-        if self.facets is not None and self.tiled_facets is not None and self.cut is not None:
+        if self.facets is not None and self.tiled_facets is not None and self.subdivision is not None:
             facets, stop = self.facets, first + len(antennas)
             spreader = FacetSpreader(
                 self.tiled_facets, facets if stop - first == self.n_pulses else facets.between(first, stop), antennas,
-                waveform.bandwidth, frequencies, self.error_budget / self.cut.crowd, request.budget, request.gated,
-                request.polarizations, request.vertical, weights,
+                waveform.bandwidth, frequencies, self.error_budget / self.subdivision.gain, request.budget,
+                request.gated, request.polarizations, request.vertical, weights,
             )  # fmt: skip
             words = spreader.plan.describe("spread") | self.tiled_facets.facet_plan.describe()
             words |= {"pulses an amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
-            parts.append((self.cut.crowd * spreader.predicted_error, words))
+            parts.append((self.subdivision.gain * spreader.predicted_error, words))
         chosen = max(parts, key=lambda part: part[0])[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(
@@ -217,13 +217,13 @@ def prepare_scene(
     device, vertical = request.device, request.vertical
     error_budget = request.tolerance / parts_of(scene)
     weight_error = error_of_weights(weights, scene, waveform, request.polarizations, vertical)
-    cut = _plan(request, scene, waveform, antennas, weight_error, tuple(dict.fromkeys(bands)))
+    subdivision = _plan(request, scene, waveform, antennas, weight_error, tuple(dict.fromkeys(bands)))
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
     points, skipped = points_of(scene, request.skips, len(antennas))
     facets, held_points, held_facets, mesh_warnings = None, None, None, dict[str, Any]()
-    if cut is not None:
-        facet_plan, pieces = cut.made(scene)
+    if subdivision is not None:
+        facet_plan, pieces = subdivision.apply(scene)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         mesh_warnings = _warned(
             facet_error.judge(original_scene, antennas, waveform), speckle_contrast.judge(pieces, antennas, waveform)
@@ -253,7 +253,7 @@ def prepare_scene(
             held_points = tiled_points(device, points, antennas, waveform, weights)
     request.clock.lap("scene")
     return SceneEchoes(
-        request, weights, weight_error, cut, points, facets, held_points, held_facets, skipped, mesh_warnings,
+        request, weights, weight_error, subdivision, points, facets, held_points, held_facets, skipped, mesh_warnings,
         error_budget, len(antennas),
     )  # fmt: skip
 
@@ -261,10 +261,10 @@ def prepare_scene(
 def _plan(
     request: EchoRequest, scene: Scene, waveform: Waveform, antennas: PulseGeometry, weight_error: WeightError,
     bands: Sequence[Band],
-) -> Cut | None:  # fmt: skip
+) -> Subdivision | None:  # fmt: skip
     """How facets are cut, None where there are none. ToleranceUnreachable in the caller's own numbers."""
 
-    def plan(tolerance: float, max_edge: float | str | None = request.max_edge) -> Cut | None:
+    def plan(tolerance: float, max_edge: float | str | None = request.max_edge) -> Subdivision | None:
         return plan_scene(request, scene, waveform, antennas, weight_error, bands, tolerance, max_edge)
 
     try:
@@ -285,7 +285,7 @@ def parts_of(scene: Scene) -> float:
 def plan_scene(
     request: EchoRequest, scene: Scene, waveform: Waveform, antennas: PulseGeometry, weight_error: WeightError,
     bands: Iterable[Band], tolerance: float, max_edge: float | str | None,
-) -> Cut | None:  # fmt: skip
+) -> Subdivision | None:  # fmt: skip
     """How a scene's facets are cut for `tolerance`, None where there are none.
 
     ToleranceUnreachable where gains, facets, or samples of one of `bands` exceed their shares of it.
@@ -296,8 +296,8 @@ def plan_scene(
         made = plan_cut(
             scene, waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error
         )
-        left = share / made.crowd - made.plan.predicted_error
-        _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.crowd)  # pieces: not counted yet
+        left = share / made.gain - made.plan.predicted_error
+        _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)  # pieces: not counted yet
     n_points = len(scene.amplitudes)
     if "zero reflectivity" in request.skips:
         n_points = int(np.count_nonzero(scene.amplitudes))
@@ -328,7 +328,7 @@ def band_of(waveform: Waveform, center: float, bandwidth: float) -> Waveform:
     return Waveform.chirp(center=center, bandwidth=bandwidth, duration=waveform.duration)
 
 
-def _warned(*judgements: facet_error.Fineness | speckle_contrast.Speckle) -> dict[str, Any]:
+def _warned(*judgements: facet_error.FacetError | speckle_contrast.Speckle) -> dict[str, Any]:
     """Warn of meshes that are too coarse; returns what a report says of them."""
     out: dict[str, Any] = {}
     for judgement in judgements:

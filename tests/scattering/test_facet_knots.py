@@ -7,7 +7,7 @@ import sarcl
 from sarcl import pointing
 from sarcl.model.antenna import Antenna
 from sarcl.scattering import pulse_nodes
-from sarcl.scattering.pulse_nodes import Knots, every, spaced
+from sarcl.scattering.pulse_nodes import PulseNodes, every, spaced
 from sarcl.scene.material import Material
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=600e6, duration=1e-6)
@@ -49,7 +49,7 @@ def test_cubics_go_through_knots_and_are_exact_for_cubics(n, spacing):
 def test_each_its_own():
     needed, which, shares = every(9).of(3, 7)
     assert needed.tolist() == [3, 4, 5, 6] and which.tolist() == [[i, i] for i in range(4)] and (shares == 1).all()
-    assert isinstance(every(9), Knots) and every(9).order == 1
+    assert isinstance(every(9), PulseNodes) and every(9).order == 1
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-3])

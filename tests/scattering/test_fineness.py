@@ -13,8 +13,8 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference.facet import facet_amplitude
 from sarcl.scattering.mesh_quality import facet_error, speckle_contrast
-from sarcl.scattering.mesh_quality._adjacency import joints, uncut
-from sarcl.scattering.mesh_quality._curvature import bulges
+from sarcl.scattering.mesh_quality._adjacency import adjacency_of, uncut
+from sarcl.scattering.mesh_quality._curvature import curvature_of
 from sarcl.scene import triangles as geometry
 from sarcl.scene.material import MATERIALS
 from sarcl.scene.scene import Scene
@@ -230,12 +230,12 @@ FLAT = {
 @pytest.mark.parametrize("name", FLAT)
 def test_flat_bodies_with_edges_are_what_they_are(name):
     for elevation in (0.0, 0.5, 1.5):
-        assert facet_error.judge(FLAT[name], antennas(arc(elevation, -0.2, 0.2)), X_BAND) == facet_error.Fineness()
+        assert facet_error.judge(FLAT[name], antennas(arc(elevation, -0.2, 0.2)), X_BAND) == facet_error.FacetError()
 
 
 def test_a_plane_between_rounded_corners_stays_a_plane():
     triangles = rounded_box().triangles
-    found = bulges(triangles, np.zeros(len(triangles), bool), joints(triangles))
+    found = curvature_of(triangles, np.zeros(len(triangles), bool), adjacency_of(triangles))
     wide = np.abs(found.edge[:, :, :2]).max(axis=(1, 2)) > 1
     assert wide.sum() == 8 and (found.height[wide] == 0).all()
     # of three steps of 30 deg the middle one has neighbours like itself: 0.02 m (1 - cos 15 deg)
@@ -272,20 +272,20 @@ def test_uncut_keeps_the_surface():
         (shapes.plate((1, 1)), 24),
     ):
         cut = body.split(0.2).triangles
-        made, stands = uncut(cut, joints(cut), np.zeros(len(cut), int))
+        made, stands = uncut(cut, adjacency_of(cut), np.zeros(len(cut), int))
         assert len(made) == least
         assert geometry.areas(made).sum() == pytest.approx(geometry.areas(cut).sum())
         np.testing.assert_allclose(geometry.normals(made), geometry.normals(cut)[stands], atol=1e-9)
     x = np.arange(6.0)
     both = shapes.plate((1.0, 1.0)).split(0.1).triangles
     halves = (both.mean(axis=1)[:, 0] > 0).astype(int)  # of two kinds
-    made, stands = uncut(both, joints(both), halves)
+    made, stands = uncut(both, adjacency_of(both), halves)
     areas = np.bincount(halves[stands], geometry.areas(made))
     np.testing.assert_allclose(areas, np.bincount(halves, geometry.areas(both)))
     hole = Scene.from_heights(x, x, np.zeros((6, 6))).triangles
     middle = hole.mean(axis=1)
     hole = hole[(np.abs(middle[:, :2] - 2.5) > 0.5).any(axis=1)]  # no convex outline
-    kept = uncut(hole, joints(hole), np.zeros(len(hole), int))
+    kept = uncut(hole, adjacency_of(hole), np.zeros(len(hole), int))
     assert kept is None or geometry.areas(kept[0]).sum() == pytest.approx(24)
 
 
@@ -321,9 +321,9 @@ def test_only_what_the_radar_sees_counts():
     assert facet_error.judge(body, replace(from_afar(POLE), **beam), wave).error_db == pytest.approx(3.84, abs=0.05)
     beside = {"beam": np.array([[0.0, 1.0, 0.0]]), "beam_angle": 1e-5}
     assert facet_error.judge(body, replace(from_afar(POLE), **beside), wave).judged == 0
-    assert facet_error.judge(Scene.points([[0.0, 0, 0]]), from_afar(POLE), wave) == facet_error.Fineness()
+    assert facet_error.judge(Scene.points([[0.0, 0, 0]]), from_afar(POLE), wave) == facet_error.FacetError()
     black = replace(body, reflectivity=np.zeros(len(body.triangles)))
-    assert facet_error.judge(black, from_afar(POLE), wave) == facet_error.Fineness()
+    assert facet_error.judge(black, from_afar(POLE), wave) == facet_error.FacetError()
     # cylinders without a specular echo from their sides are not judged by the remaining echo
     assert facet_error.judge(shapes.cylinder(1.0, 2.0), antennas(arc(0.7, 0, 0.2)), X_BAND).warnings() == []
 
@@ -340,7 +340,7 @@ def test_rough_surfaces_lose_their_mirror_and_its_error():
     root = np.sqrt(complex(MATERIALS["concrete"].permittivity(wave.center)))
     share = judged(material="concrete").rcs / smooth.rcs
     assert share == pytest.approx(abs((1 - root) / (1 + root)) ** 2, rel=1e-3)
-    assert judged(material=ISOTROPIC) == facet_error.Fineness()
+    assert judged(material=ISOTROPIC) == facet_error.FacetError()
     rough = [judged(material=sarcl.Material(diagram="isotropic", height=h * wavelength)).error_db
              for h in (0.0, 0.1, 1.0)]  # fmt: skip
     assert rough[0] == pytest.approx(smooth.error_db) and rough[0] > rough[1] > rough[2] and rough[2] < 0.05

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from importlib.resources import files
+
 import numpy as np
 import pytest
 from helpers.facet_cases import WET, seen_from, still
@@ -10,7 +12,7 @@ from scipy import stats
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.scattering.physical_optics import fresnel
-from sarcl.scene.material import Material
+from sarcl.scene.material import COHERENT, DIAGRAMS, Material
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
 
@@ -45,6 +47,12 @@ def test_power_follows_the_diagram_and_is_kept(material, omega, lobe, elevation)
     assert material.solid_angle == pytest.approx(omega, rel=1e-9)
     # 8 seeds, 12 aspects, some 80 frequencies: a standard error of 1 to 2 %
     assert nrcs(flat(12.0, material), 144.0, elevation) == pytest.approx(wanted, rel=0.08)
+
+
+def test_the_kernel_has_a_line_for_every_diagram():
+    kernel = files("sarcl.kernels").joinpath("spread_facets.cl").read_text()
+    for name in set(DIAGRAMS) - set(COHERENT):
+        assert f"diagram == (fv)DIAGRAM_{name.upper()} ?" in kernel, name
 
 
 def test_power_does_not_depend_on_how_finely_a_surface_is_cut():

@@ -1,4 +1,4 @@
-"""Which facets meet where, and triangles as they were before flat ones were cut."""
+"""Which facets share edges, and the fewest triangles that make up the same surface."""
 
 from __future__ import annotations
 
@@ -9,13 +9,13 @@ import numpy as np
 from ...base import boxes
 from ...scene.triangles import areas, solid
 
-SAME_PLACE = 1e-8  # of a mesh's size: corners closer than this are one
-PLANE = 1e-12  # 1 - cosine of what two facets of one plane may tilt, 1.4e-6 rad
-GAIN = 0.7  # of the corners: where more than these have to stay, facets stay as they are
+SAME_PLACE = 1e-8  # of a mesh's size: corners closer than this are the same
+PLANE = 1e-12  # 1 - cosine of the largest tilt between two facets of one plane, 1.4e-6 rad
+GAIN = 0.7  # of the corners: where more of them must stay, all facets stay as they are
 
 
 @dataclass(frozen=True, eq=False)
-class Joints:
+class MeshAdjacency:
     """Facets (k,) that meet at edges; an edge is numbered 3 facet + i, from corner i to i + 1.
 
     corner      (k, 3): a number that corners in the same place share, below `places`
@@ -35,8 +35,8 @@ class Joints:
     twice: np.ndarray
 
 
-def joints(triangles: np.ndarray) -> Joints:
-    """Of triangles, m (k, 3, 3). Edges of one facet, or of more than two, join nothing."""
+def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
+    """Adjacency of triangles, m (k, 3, 3). Edges of one facet alone, or of more than two, join none."""
     corner, places = _welded(triangles)
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     twice = np.sqrt(np.einsum("ij,ij->i", normal, normal))
@@ -51,7 +51,7 @@ def joints(triangles: np.ndarray) -> Joints:
     against = start[one] == start[other]
     tilt = np.einsum("ij,ij->i", np.take(normal, one // 3, axis=0), np.take(normal, other // 3, axis=0))
     tilt[against] *= -1
-    return Joints(corner, places, one, other, against, tilt, normal, twice)
+    return MeshAdjacency(corner, places, one, other, against, tilt, normal, twice)
 
 
 def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
@@ -63,7 +63,7 @@ def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(connected_components(links, directed=False)[1])
 
 
-def uncut(triangles: np.ndarray, j: Joints, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
     """The same surface with flat parts in as few triangles as their outlines need, and a facet each stands for (n,).
 
     j     of the triangles, m (k, 3, 3);  kind  (k,): facets of different kinds stay apart

@@ -1,10 +1,10 @@
-"""How far the curved surfaces that a mesh stands for stand off its flat facets.
+"""Height of the curved surface that a mesh approximates over its flat facets.
 
     h = (n_b - n_a).e/8      over the middle of an edge e from corner a to corner b, along the facets' normals
 
 n_a is the surface's unit normal at a corner: the mean of the facets' around it with weights
-sin(angle)/(|e_1| |e_2|), exact on spheres and circular cylinders however they are meshed (Max 1999). What is curved is
-told from what has edges by three rules:
+sin(angle)/(|e_1| |e_2|), exact on spheres and circular cylinders however they are meshed (Max 1999). Three rules
+distinguish curves from edges:
 
 - facets that tilt by more than 35 deg from their neighbour meet at an edge; so do a narrow and a wide one, by more than
   a factor of 3 across what they share: there a rounded corner ends and a plane begins
@@ -24,17 +24,17 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._adjacency import Joints, components
+from ._adjacency import MeshAdjacency, components
 
-CREASE = np.cos(np.radians(35))  # of what facets of one surface may tilt from their neighbour: eleven make a turn
-UNLIKE = 3.0  # times as wide as its neighbour: no longer the same curve
-FLAT = 1e-3  # rad: what tilts less goes on as a plane
+CREASE = np.cos(np.radians(35))  # largest tilt between neighbours of one surface: eleven facets make a full circle
+UNLIKE = 3.0  # ratio of the widths of neighbours, from which on they are not of the same curve
+FLAT = 1e-3  # rad, tilt between neighbours, below which they continue a plane
 BENDS = 0.5  # |(n_a + n_b).e|/|(n_b - n_a).e| of an edge that follows a curve
-SMOOTH = 0.4  # of a surface's edges that have to
+SMOOTH = 0.4  # share of a surface's edges that must follow a curve
 
 
 @dataclass(frozen=True, eq=False)
-class Bulge:
+class SurfaceCurvature:
     """Heights of the smooth surface over k facets.
 
     height   m (k, 3): over the middle of the edges from corner i to i + 1, along `normal`; 0 where nothing is curved
@@ -52,8 +52,8 @@ class Bulge:
     surface: np.ndarray
 
 
-def bulges(triangles: np.ndarray, two_sided: np.ndarray, j: Joints) -> Bulge:
-    """Heights of the surface that triangles, m (k, 3, 3), with their joints stand for.
+def curvature_of(triangles: np.ndarray, two_sided: np.ndarray, j: MeshAdjacency) -> SurfaceCurvature:
+    """Heights of the surface that triangles, m (k, 3, 3), with their adjacency approximate.
 
     two_sided  (k,): such facets need not be wound as their neighbours
     """
@@ -85,11 +85,11 @@ def bulges(triangles: np.ndarray, two_sided: np.ndarray, j: Joints) -> Bulge:
         tried, kept, one_way, either = (np.bincount(whole, a) for a in share)
         curved &= ((kept >= SMOOTH * tried) | (np.abs(one_way) >= either / 2))[whole]
     height = np.where(even & curved[:, None], bend / 8, 0.0)
-    return Bulge(height, normal, turn, j.twice / 2, edge, surface)
+    return SurfaceCurvature(height, normal, turn, j.twice / 2, edge, surface)
 
 
 def _corner_normals(
-    j: Joints, one: np.ndarray, other: np.ndarray, against: np.ndarray, normal: np.ndarray, square: np.ndarray
+    j: MeshAdjacency, one: np.ndarray, other: np.ndarray, against: np.ndarray, normal: np.ndarray, square: np.ndarray
 ) -> np.ndarray:
     """The smooth surface's unit normals at facets' corners (k, 3, 3), the same for all that smooth edges join there.
 

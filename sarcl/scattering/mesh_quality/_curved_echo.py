@@ -1,12 +1,13 @@
-"""Echoes of facets, and of the curved surface over them: what one pulse and frequency get of each, to be compared.
+"""Echoes of facets, and of the curved surface over them, at one pulse and frequency, for comparison.
 
     flat    = sum over facets of w integral of n.u exp(j q.x) dA             q = k (u_t + u_r), u = q/|q|
     curved  = sum of w integral of (n - grad h).u exp(j (q.x + q.n h)) dA    where that faces the antennas
     h       = 4 (h_1 l_1 l_2 + h_2 l_2 l_3 + h_3 l_3 l_1)                    l barycentric; h_i as of _curvature.py
 
 (k^2/pi) |sum|^2 is the radar cross section, m^2, seen monostatically: S = 2 n.u of a conductor. Both sums are taken at
-the same Gauss-Legendre nodes, so that what those err cancels. w = reflectivity x |R| at normal incidence x
-exp(-(q.n s)^2/2), s the rms height of all roughness; what that takes from the mirror is incoherent power, in both.
+the same Gauss-Legendre nodes, so that errors of the quadrature cancel. w = reflectivity x |R| at normal incidence x
+exp(-(q.n s)^2/2), s the rms height of all roughness; the power that it removes from the coherent echo is incoherent
+power, in both.
 """
 
 from __future__ import annotations
@@ -22,24 +23,22 @@ from ...scene.material import Material
 from ...scene.scene import Scene
 from ...scene.triangles import centroids
 from ..physical_optics import triangle_mean
-from ._curvature import Bulge
+from ._curvature import SurfaceCurvature
 
-NEAR = (
-    25.0,
-    200.0,
-)  # rad of phase over an edge, beyond what the curve makes up for: farther off specular both are alike
-ENOUGH = 5e5  # integrands a look: the more facets there are, the nearer to specular they have to be
-MOST_NODES = 56  # a side; facets that need more are taken by stationary phase
-FEW = 4.0  # rad over a facet that seven nodes are enough for
+# rad of phase over an edge, beyond that which the curvature compensates: farther off specular both echoes are equal
+NEAR = (25.0, 200.0)
+ENOUGH = 5e5  # integrands per pulse and frequency: with more facets, only those nearer to specular are integrated
+MOST_NODES = 56  # per side; facets that need more are computed by stationary phase
+FEW = 4.0  # rad over a facet, for which seven nodes are enough
 CHUNK = 2**16  # integrands at a time: they stay in the cache
 
 
 @dataclass(frozen=True, eq=False)
 class Sums:
-    """Of n surfaces, seen on the side of their normals and on the other, (2, n).
+    """Sums of n surfaces, seen on the side of their normals and on the other, (2, n).
 
-    flat, curved  coherent sums, m^2;  flat_power, curved_power  of what is random, m^4
-    blame         what each facet changes, m^4 (k,);  cost  integrands taken, about
+    flat, curved  coherent sums, m^2;  flat_power, curved_power  incoherent power, m^4
+    blame         difference that each facet makes, m^4 (k,);  cost  number of integrands, about
     """
 
     flat: np.ndarray
@@ -50,7 +49,7 @@ class Sums:
     cost: int
 
 
-def sums(scene: Scene, b: Bulge, antennas: PulseGeometry, row: int, frequency: float) -> Sums:
+def sums(scene: Scene, b: SurfaceCurvature, antennas: PulseGeometry, row: int, frequency: float) -> Sums:
     """Sums over a scene's facets, with `b` of the same facets, at one row of the antennas and a frequency, Hz."""
     centers, n = centroids(scene.triangles), int(b.surface.max()) + 1
     ends = [positions[row] for positions in antennas.ends]
@@ -102,7 +101,9 @@ class _Facets:
     q: np.ndarray
 
 
-def _facets(b: Bulge, some: np.ndarray, side: int, facing: np.ndarray, u: np.ndarray, q: np.ndarray) -> _Facets:
+def _facets(
+    b: SurfaceCurvature, some: np.ndarray, side: int, facing: np.ndarray, u: np.ndarray, q: np.ndarray
+) -> _Facets:
     """Facets `some` of b seen from direction u (n, 3), on the side their normals point to or on the other (-1)."""
     edge, area, normal = b.edge[some], b.area[some], b.normal[some]
     across = np.cross(u, normal) * (b.turn[some] / (2 * area))[:, None]

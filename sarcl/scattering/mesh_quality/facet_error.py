@@ -19,8 +19,8 @@ from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.scene import Scene
 from ...scene.triangles import edges
 from ..facet_plan import coherent
-from ._adjacency import joints, uncut
-from ._curvature import Bulge, bulges
+from ._adjacency import adjacency_of, uncut
+from ._curvature import SurfaceCurvature, curvature_of
 from ._curved_echo import Sums, sums
 
 WARN = 0.5  # dB
@@ -36,7 +36,7 @@ GOLDEN = 0.6180339887498949
 
 
 @dataclass(frozen=True)
-class Fineness:
+class FacetError:
     """What flat facets in place of curved surfaces change; error and sizes of the surface that errs most.
 
     error_db    rms change of its level over pulses and band, weighted by power; 0 where nothing is curved
@@ -65,7 +65,7 @@ class Fineness:
         return {"flat for curved, dB": round(self.error_db, 2)} if self.judged else {}
 
     def warnings(self) -> list[str]:
-        """What a user should know; nothing below 0.5 dB."""
+        """Warnings for a user; none below 0.5 dB."""
         if self.error_db < WARN:
             return []
         waves = 1 / self.wavelength
@@ -75,17 +75,18 @@ class Fineness:
             f"mesh too coarse for the wavelength: about ({place}) m facets of {self.edge:.2g} m "
             f"({self.edge * waves:.2g} wavelengths) stand for a curve of radius {self.radius:.2g} m, which stands up "
             f"to {self.standoff:.2g} m ({self.standoff * waves:.2g} wavelengths) off them; echoes of that surface, "
-            f"{10 * np.log10(max(self.rcs, 1e-30)):.0f} dBsm, err by {self.error_db:.1f} dB rms over pulses and band "
-            f"and by up to {self.worst_db:.1f} dB{more}. Mesh the curve itself with edges of at most {self.needed:.2g} "
-            "m (sarcl.shapes: edge=...); cutting flat facets (max_edge, split) does not make them curved"
+            f"{10 * np.log10(max(self.rcs, 1e-30)):.0f} dBsm, differ by {self.error_db:.1f} dB rms over pulses and "
+            f"band and by up to {self.worst_db:.1f} dB{more}. Mesh the curve itself with edges of at most "
+            f"{self.needed:.2g} m (sarcl.shapes: edge=...); cutting flat facets (max_edge, split) does not make them "
+            "curved"
         ]
 
 
-def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Fineness:
-    """What a scene's facets change in the echoes of the curved surfaces they stand for. TypeError names what is none.
+def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> FacetError:
+    """Error of a scene's facets in the echoes of the curved surfaces that they approximate.
 
-    Facets count as far as they reflect like mirrors, face the antennas, and lie in their beam and range window; shadows
-    are left out. Give facets as they came, before random heights (`Scene.realized`) hide curves; cutting does not.
+    Only facets count that reflect coherently and face the antennas; shadows are neglected. Give the scene without
+    random heights (`Scene.realized`), which hide curves; cutting does not. TypeError names a wrong type.
     """
     for name, value, kind in zip(
         ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, PulseGeometry, Waveform), strict=True
@@ -94,10 +95,10 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Fineness
     turns = 4 * np.pi * (waveform.center + waveform.bandwidth / 2) / constants.SPEED_OF_LIGHT  # rad/m
     mirror = coherent(scene) & (scene.reflectivity > 0) if len(scene.triangles) else np.zeros(0, bool)
     if not mirror.any():
-        return Fineness()
+        return FacetError()
     scene = scene if mirror.all() else scene.part(mirror)
     if np.max(edges(scene.triangles)) * turns < FINE:
-        return Fineness()
+        return FacetError()
     scene, b = _curved(scene)
     longest = np.maximum.reduce(edges(scene.triangles)) * turns
     bend = np.maximum.reduce(np.abs(b.height), axis=1) * turns
@@ -105,17 +106,17 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Fineness
     matters[b.surface[(longest >= FINE) & (bend > STEEP)]] = True
     some = np.flatnonzero(matters[b.surface])
     if len(some) == 0:
-        return Fineness()
+        return FacetError()
     if len(some) < len(b.surface):
         scene = scene.part(some)
-        b = Bulge(*(getattr(b, name)[some] for name in Bulge.__dataclass_fields__))
+        b = SurfaceCurvature(*(getattr(b, name)[some] for name in SurfaceCurvature.__dataclass_fields__))
     b = replace(b, surface=(np.cumsum(matters) - 1)[b.surface])
     return _verdict(scene, b, waveform, _looks(scene, b, antennas, waveform))
 
 
-def _curved(scene: Scene) -> tuple[Scene, Bulge]:
-    """A scene's facets, as few as flat parts need, and the curves they stand for."""
-    j, kind = joints(scene.triangles), np.zeros(len(scene.triangles), np.int64)
+def _curved(scene: Scene) -> tuple[Scene, SurfaceCurvature]:
+    """A scene with the fewest facets for its flat parts, and the curvature of the surfaces that they approximate."""
+    j, kind = adjacency_of(scene.triangles), np.zeros(len(scene.triangles), np.int64)
     for values in (scene.material, scene.two_sided, scene.reflectivity, scene.roughness):
         if (values != values[0]).any():
             names, index = np.unique(values, return_inverse=True)
@@ -123,11 +124,11 @@ def _curved(scene: Scene) -> tuple[Scene, Bulge]:
     fewer = None if scene.has_random_points else uncut(scene.triangles, j, kind)
     if fewer is not None:
         scene = replace(scene.part(fewer[1]), triangles=validation.sealed(fewer[0]))
-        j = joints(scene.triangles)
-    return scene, bulges(scene.triangles, scene.two_sided, j)
+        j = adjacency_of(scene.triangles)
+    return scene, curvature_of(scene.triangles, scene.two_sided, j)
 
 
-def _looks(scene: Scene, b: Bulge, antennas: PulseGeometry, waveform: Waveform) -> list[tuple[Sums, float]]:
+def _looks(scene: Scene, b: SurfaceCurvature, antennas: PulseGeometry, waveform: Waveform) -> list[tuple[Sums, float]]:
     """Sums at pulses and frequencies spread over track and band, and what radar cross section, m^2, 1 m^4 is in them,
     times how strong the frequency is in the waveform."""
     out, cost = [], 0
@@ -148,15 +149,15 @@ def _looks(scene: Scene, b: Bulge, antennas: PulseGeometry, waveform: Waveform) 
     return out
 
 
-def _verdict(scene: Scene, b: Bulge, waveform: Waveform, looks: list[tuple[Sums, float]]) -> Fineness:
-    """On the surface that errs most of those strong enough."""
+def _verdict(scene: Scene, b: SurfaceCurvature, waveform: Waveform, looks: list[tuple[Sums, float]]) -> FacetError:
+    """The error of the worst surface of those that are strong enough."""
     flat = np.stack([(np.abs(s.flat) ** 2 + s.flat_power) * scale for s, scale in looks])  # (looks, 2, n)
     curved = np.stack([(np.abs(s.curved) ** 2 + s.curved_power) * scale for s, scale in looks])
     weight = (flat + curved) / 2
     strength = weight.mean(axis=0)
     judged = strength > np.maximum(WEAK * strength.max(), DULL * np.bincount(b.surface, b.area))
     if not judged.any():
-        return Fineness()
+        return FacetError()
     least = np.where(judged, 1e-12 * strength, 1.0)
     level = np.clip(10 * np.log10((flat + least) / (curved + least)), -LIMIT, LIMIT)
     error = np.sqrt((weight * level**2).sum(axis=0) / np.where(judged, weight.sum(axis=0), 1)) * judged
@@ -173,7 +174,7 @@ def _verdict(scene: Scene, b: Bulge, waveform: Waveform, looks: list[tuple[Sums,
     wavelength, rms = constants.SPEED_OF_LIGHT / waveform.center, float(error[side, worst])
     fine = min(edge * np.sqrt(AIM / max(rms, AIM)), np.sqrt(radius * wavelength) / 4)
     middle = box(scene.triangles[b.surface == worst].reshape(-1, 3)).mean(axis=0)
-    return Fineness(
+    return FacetError(
         error_db=rms,
         worst_db=float(np.abs(level)[seen, side, worst].max()),
         judged=int(judged.any(axis=0).sum()),
@@ -189,7 +190,7 @@ def _verdict(scene: Scene, b: Bulge, waveform: Waveform, looks: list[tuple[Sums,
 
 
 def _median(values: np.ndarray, weights: np.ndarray) -> float:
-    """Of values (n,) with weights (n,)."""
+    """Median of values (n,) with weights (n,)."""
     order = np.argsort(values)
     total = np.cumsum(weights[order])
     return float(values[order][np.searchsorted(total, total[-1] / 2)])

@@ -1,4 +1,4 @@
-"""Are there enough facets in a resolution cell for speckle? The contrast their image will have.
+"""Speckle contrast of an image, from the number of facets per resolution cell.
 
 Triangles with random phases and equal power, two to a parallelogram of s1 x s2 resolution cells, sinc responses:
 
@@ -7,9 +7,10 @@ Triangles with random phases and equal power, two to a parallelogram of s1 x s2 
 
 C, standard deviation over mean of the intensity, is 1 for speckle. g, the mean square of what the responses' power adds
 up to over its squared mean, says how unevenly a lattice of pairs, a third of a diagonal apart, covers the image: 1 for
-s1, s2 <= 1; sinc^2 has a triangle for a transform. s1 s2/2 is a facet's area, and 4/9 = (integral sinc^4/(integral
-sinc^2)^2)^2: what a sum of few unit phasors lacks of a Gaussian. Facets whose diagram makes their amplitudes Rayleigh
-do not lack it. docs/theory/facets.md and tests/scattering/test_fineness.py hold this against such sums.
+s1, s2 <= 1; sinc^2 has a triangle for a transform. s1 s2/2 is a facet's area, in cells. The term (4/9) s1 s2/2, with
+4/9 = (integral sinc^4/(integral sinc^2)^2)^2, corrects for the finite number of unit-amplitude scatterers per cell; it
+vanishes for facets whose diagram gives them Rayleigh amplitudes. tests/scattering/test_fineness.py holds this against
+such sums; docs/theory/facets.md.
 
 source   moments of sums of independent phasors: Goodman 2007, "Speckle phenomena in optics", section 3.6
 """
@@ -29,22 +30,22 @@ from ...scene.material import COHERENT
 from ...scene.scene import Scene
 from ...scene.triangles import edges, normals
 
-OFF = 0.05  # of contrast: what is worth a warning
-GAPS = 1.1  # of g: contrast may come out right by chance where the image has holes
-TURNED = 1.0  # rad, rms, of phase that heights have to spread
-LONE = 1.5  # cells: what is smaller is one, as (integral sinc^2)^2/integral sinc^4 = 1.5 cells are
-MOST_TERMS = 30  # of G_1, which is nothing beside G_0 where there are more
-ENOUGH = 8.0  # facets a cell that are advised: C = 0.97
+OFF = 0.05  # deviation of the contrast from 1 that is worth a warning
+GAPS = 1.1  # g that is worth a warning: the contrast may be right by chance where the image has holes
+TURNED = 1.0  # rad, rms phase of random heights, from which on phases count as random
+LONE = 1.5  # cells, extent below which a surface counts as one cell: (integral sinc^2)^2/integral sinc^4 = 1.5
+MOST_TERMS = 30  # of G_1, which is negligible beside G_0 where there are more
+ENOUGH = 8.0  # facets per cell that are advised: C = 0.97
 
 
 @dataclass(frozen=True)
 class Speckle:
-    """Of facets with random phases that face the antennas at mid-track.
+    """Speckle of facets with random phases that face the antennas at mid-track.
 
-    facets    how many;  per_cell  of them in a resolution cell
+    facets    their number;  per_cell  number per resolution cell
     contrast  standard deviation of the intensity over its mean, 1 for speckle;  gaps  g, 1 for none
     cell      m (2,): resolution in slant range and cross range; inf: none
-    needed    m: edges that make enough
+    needed    m, edges short enough for speckle
     """
 
     facets: int = 0
@@ -59,7 +60,7 @@ class Speckle:
         return {"rough facets a resolution cell": float(f"{self.per_cell:.2g}")} if self.facets else {}
 
     def warnings(self) -> list[str]:
-        """What a user should know: contrast off by more than 5 %, or holes."""
+        """Warnings for a user: contrast off by more than 5 %, or holes."""
         if abs(self.contrast - 1) <= OFF and self.gaps <= GAPS:
             return []
         holes = ", and the image has holes" if self.gaps > GAPS else ""
@@ -72,9 +73,10 @@ class Speckle:
 
 
 def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
-    """Of a scene's facets as echo adds them up, once they are cut: rough ones, and those that random heights move.
+    """Speckle of a scene's facets after cutting: of rough ones, and of those that random heights displace.
 
-    An antenna at the scene's centre and forward scattering resolve nothing to be judged. TypeError: not a scene.
+    With an antenna at the scene's centre, or forward scattering, there is no resolution cell and no verdict. TypeError
+    names a wrong type.
     """
     for name, value, kind in zip(
         ("scene", "antennas", "waveform"), (scene, antennas, waveform), (Scene, PulseGeometry, Waveform), strict=True
@@ -93,7 +95,7 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
 
 
 def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
-    """(u_T + u_R)/2 at a point (n, 3), the gradient of half the path; None where it says nothing."""
+    """(u_T + u_R)/2 at a point (n, 3), the gradient of half the path; None where it is 0 or undefined."""
     out = np.zeros_like(antennas.tx)
     for ends in (antennas.tx, antennas.rx):
         distance = np.linalg.norm(ends - center, axis=1, keepdims=True)
@@ -104,7 +106,7 @@ def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
 
 
 def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, waveform: Waveform) -> Speckle:
-    """Of triangles, m (k, 3, 3), some with Rayleigh amplitudes (k,), under look (n, 3) over the track."""
+    """Contrast of triangles, m (k, 3, 3), some with Rayleigh amplitudes (k,), for gradients look (n, 3) of the path."""
     middle = look[len(look) // 2]
     along = middle / np.linalg.norm(middle)
     turn = look - look[0]
@@ -112,7 +114,7 @@ def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, wav
     turn = turn - along * (turn @ along)
     axes = (
         2 / constants.SPEED_OF_LIGHT * np.stack([waveform.bandwidth * middle, waveform.center * turn])
-    )  # cells a metre
+    )  # cells per metre
     places = triangles @ axes.T  # (k, 3, 2)
     low, high = box(places.reshape(-1, 2))
     resolved = (high - low)[high - low > LONE]  # cells
@@ -135,7 +137,7 @@ def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, wav
 
 
 def _parallelograms(places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """s1, s2 (k, 2) of triangles (k, 3, 2) in cells, in the ratio of what they span, and areas s1 s2/2 (k,)."""
+    """s1, s2 (k, 2), in cells, of triangles (k, 3, 2), in the ratio of their extents, and areas s1 s2/2 (k,)."""
     (ax, ay), (bx, by) = ((places[:, i] - places[:, 0]).T for i in (1, 2))
     area = np.abs(ax * by - ay * bx) / 2
     span = np.maximum(places.max(axis=1) - places.min(axis=1), 1e-12)

@@ -1,0 +1,30 @@
+"""A few facets or points that stand for all of a scene, from which planners estimate errors."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..scene.scene import Scene
+from .facets import Facets
+
+
+def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of up to `most` of n things, and how many of the n each stands for.
+
+    size  (n,), such as areas or powers: half of the draws are as likely as the size, half alike for all. Sums over the
+          draws, each times the number it stands for, estimate sums over all without bias.
+    """
+    n = len(size)
+    if n <= most:
+        return np.arange(n), np.ones(n)
+    chance = 0.5 / n + (0.5 * size / size.sum() if size.any() else np.full(n, 0.5 / n))
+    some = random.choice(n, most, p=chance / chance.sum())
+    return some, 1 / (most * chance[some])
+
+
+def facets_at(scene: Scene, some: np.ndarray, triangles: np.ndarray) -> Facets:
+    """Facets `some` of a scene, all of each seen, in place of whose triangles stand `triangles`, m (k, 3, 3)."""
+    return Facets(
+        triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
+        np.ones(len(some), np.complex64),
+    )  # fmt: skip
