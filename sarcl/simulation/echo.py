@@ -102,33 +102,33 @@ def echo(
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
                   coefficients, the exact phase of the wave over every facet, single scattering (docs/theory/facets.md)
     track         transmitter; receiver  a track of as many pulses, default the transmitter's
-    polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": a row a pulse for
-                  each, pulse by pulse. Points send back what they are sent: nothing in HV and VH
-    vertical      (3,), which H lies across and V in a plane with; default z, or in Earth-centred coordinates the
-                  ellipsoid's normal at the scene's centre
+    polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": one row per
+                  pulse for each, pulse by pulse. Points keep the polarisation: they have no echo in HV and VH
+    vertical      (3,), direction: H is perpendicular to it, V in a plane with it; default z, or in Earth-centred
+                  coordinates the ellipsoid's normal at the scene's centre
     range_window  (near, far) m about the reference, default the smallest that holds the scene plus 10 %;
-                  scatterers outside it are gated out, row by row
+                  scatterers outside it are left out, row by row
     reference     point of zero phase, m (3,), default the centre of the scene's box
     array         sarcl.AntennaArray at the transmitter, along the axes of the track's attitude where it has one:
-                  element n sends the waveform moved by its offset; None: one element
+                  element n sends the waveform shifted by its offset, Hz; None: one element
     channels      "simultaneous": all channels are added up, each after its own matched filter, a row for every pulse
                   and receiver; "separated": a row of its own for every pulse, sending element and receiver
-    receive       "reference": at the array's reference point; "own": every element hears its own channel
-                  ("separated" only); "all": every element hears all
+    receive       "reference": at the array's reference point; "own": every element receives its own channel
+                  ("separated" only); "all": every element receives all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
-    shadows       True: of every facet only the share counts that both antennas see, along the track; "embree": the
-                  same, rays by that library (package embreex), quicker, and not to the bit the same on all devices
+    shadows       True: of every facet only the share counts that both antennas see at each pulse; "embree": the
+                  same, with rays by that library (package embreex), faster, but not bit-identical on all devices
                   (docs/theory/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
-                  "out of beam", "equal channels" (of one carrier and place), "interpolated channels" (echoes from few
-                  places of an array stand for all its elements)
+                  "out of beam", "equal channels" (of one carrier and position), "interpolated channels" (from echoes at
+                  a few positions of an array to all its elements)
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
-    max_edge      facets are cut until no edge is longer, m; "auto": as the tolerance needs, rough ones to half a
-                  resolution cell too; None: left as they are
+    max_edge      facets are cut until no edge is longer, m; "auto": as finely as the tolerance needs, rough ones at
+                  least to half a resolution cell; None: they are not cut
     max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU
-    out           a file of sarcl's (.h5): samples are written there pulse after pulse, and read as they are needed
+    out           an HDF5 file of sarcl's (.h5): samples are written there pulse after pulse, and read when needed
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
     check         recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %

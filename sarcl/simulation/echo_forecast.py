@@ -1,4 +1,4 @@
-"""What echoes will take before they are made: rows, bytes, time, error."""
+"""Forecast of echoes before they are computed: rows, bytes, time, error."""
 
 from __future__ import annotations
 
@@ -21,16 +21,16 @@ from . import echo_sampling
 from .echo import EchoOptions, echo
 from .echo_output import log as output_log
 
-FEW, MORE = 8, 40  # pulses from the middle of the track that are really made
+FEW, MORE = 8, 40  # pulses from the middle of the track that are computed and timed
 
 
 @dataclass(frozen=True, eq=False)
 class EchoForecast:
-    """What `echo` would do with the same arguments.
+    """Forecast of `echo` with the same arguments.
 
     n_rows, n_samples  of the phase history;  bytes  of its samples and geometry, in a file or in memory
-    seconds            about, on this device as fast as it is now
-    contributions      pairs of scatterer, pulse and channel that will be added up, about
+    seconds            about, on this device at its present speed
+    contributions      about the number of pairs of scatterer, pulse and channel that will be added up
     plan               as in the report;  predicted_error  bound of the relative error
     """
 
@@ -49,9 +49,9 @@ class EchoForecast:
 
 
 def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Unpack[EchoOptions]) -> EchoForecast:
-    """How `echo(scene, waveform, track, ...)` would go with these options: an EchoForecast, before any of it is kept.
+    """Forecast of `echo(scene, waveform, track, ...)` with these options, as an EchoForecast.
 
-    Up to 40 pulses from the middle of the track are made, and timed. Raises what `echo` would, `out` is not touched.
+    Up to 40 pulses from the middle of the track are computed and timed. Raises as `echo` does; `out` is not written.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         validation.instance(name, value, kind)
@@ -72,7 +72,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
         n_samples = grid.width if options.get("channels") == "separated" else grid.n
 
     def made(n: int) -> tuple[float, Any]:
-        """Seconds of n pulses from the middle of the track, else from where there is something to be seen."""
+        """Seconds for n pulses from the middle of the track, else from where anything is seen; and their echoes."""
         said: ValueError | None = None
         for first in ((len(track) - n) // 2, 0, len(track) - n):
             at, some = slice(first, first + n), array
@@ -92,7 +92,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
         raise said
 
     level = output_log.level
-    output_log.setLevel(logging.WARNING)  # these few pulses are not what was asked for
+    output_log.setLevel(logging.WARNING)  # the log is for the echoes that were asked for, not for these pulses
     try:
         few, more = min(FEW, len(track)), min(MORE, len(track))
         made(few)  # builds kernels

@@ -1,4 +1,4 @@
-"""Where samples of echoes go, some pulses at a time: into memory, or into a file of sarcl's."""
+"""Destination of the samples of echoes, block of pulses by block: memory, or an HDF5 file of sarcl's."""
 
 from __future__ import annotations
 
@@ -16,15 +16,15 @@ from ..model import store
 from ..model.phase_history import PhaseHistory
 
 log = logging.getLogger(__name__)
-COPIES = 3  # of rows' geometry, while a PhaseHistory is made of it: 320 bytes a row were measured
-SHARE = 0.25  # of max_bytes, for samples on their way into a file
+COPIES = 3  # of the rows' geometry, while a PhaseHistory is made of it: 320 bytes per row were measured
+SHARE = 0.25  # of max_bytes, for samples that are about to be written to a file
 
 
 class EchoOutput:
-    """Samples (n_pulses, ..., n_samples), complex64; a row is all but the first axis' last.
+    """Samples (n_pulses, ..., n_samples), complex64; a row is the last axis.
 
-    out  the file they are written to, or None: memory. Its size is logged before the work.
-    MemoryError says how many bytes they would take; for a file, raises what `output_paths.check_writable` does.
+    out  the file they are written to, or None: memory. Its size is logged before the computation starts.
+    MemoryError gives the bytes that they would take; for a file, the errors of `output_paths.check_writable`.
     """
 
     def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
@@ -52,7 +52,7 @@ class EchoOutput:
             self.whole = np.zeros(shape, np.complex64)
         except (MemoryError, ValueError):
             raise MemoryError(
-                f"echoes of {shape[0]} pulses, {text}, are more than there is memory for; write them to a file "
+                f"echoes of {shape[0]} pulses, {text}, do not fit in memory; write them to a file "
                 f"(out=...), narrow range_window (now {window[0]:g} to {window[1]:g} m), or split the track"
             ) from None
 
@@ -64,7 +64,7 @@ class EchoOutput:
         return self.whole[start:stop]
 
     def keep(self, start: int, block: np.ndarray) -> None:
-        """Take a block that is filled."""
+        """Store a block that is filled."""
         if self.writer is not None:
             rows = block.reshape(-1, self.shape[-1])
             self.writer.samples[start * self.a_pulse : start * self.a_pulse + len(rows)] = rows
@@ -94,7 +94,7 @@ class EchoOutput:
 
 
 def _memory() -> float:
-    """Bytes of memory of this machine, inf where it does not say."""
+    """Bytes of memory of this machine, inf where it is not known."""
     try:
         return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
     except (AttributeError, OSError, ValueError):

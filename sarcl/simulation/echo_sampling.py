@@ -1,4 +1,4 @@
-"""Rows that echoes are written to: whose antennas, which ranges, which frequencies."""
+"""Rows of echoes: positions of the antennas, range window, frequencies of the samples."""
 
 from __future__ import annotations
 
@@ -14,7 +14,7 @@ from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import half_path
 from ..scene.scene import Scene
 
-LEAST_SAMPLES = 64  # of the default range window: a lone point still gets a profile to look at
+LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
 def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.ndarray:
@@ -30,7 +30,7 @@ def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.nda
 def window(
     scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
 ) -> tuple[float, float]:
-    """The range gate (near, far) about the reference, m: as asked, or what holds the scene's box plus 10 %."""
+    """The range gate (near, far) about the reference, m: as asked, or that which holds the scene's box plus 10 %."""
     if asked is not None:
         pair = np.asarray(asked, np.float64)
         if pair.shape != (2,):
