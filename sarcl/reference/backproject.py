@@ -26,7 +26,10 @@ def backproject(
 
     Returns I complex128 (n,) and the norm it would have if contributions had random phases.
     """
-    n = np.arange(raw.n_samples)
+    # n = width a + b: exp(j 2 pi n s) is a product of one power for each digit, which takes far fewer exponentials
+    width = int(np.ceil(np.sqrt(raw.n_samples)))
+    digits = np.arange(-(-raw.n_samples // width)) * width, np.arange(width)
+    padding = digits[0].size * width - raw.n_samples
     sample_weight = np.ones(raw.n_samples) if sample_weight is None else sample_weight
     row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
     image, power = np.zeros(len(points), np.complex128), np.zeros(len(points))
@@ -47,8 +50,9 @@ def backproject(
         # the carrier's cycles are reduced in extended precision, the rest in float64
         first = (raw.frequency[p] * delay) % 1
         step = (raw.frequency_step[p] * delay) % 1
-        cycles = first.astype(np.float64)[:, None] + step.astype(np.float64)[:, None] * n
-        profile = (np.exp(2j * np.pi * cycles) * samples).sum(axis=1) * seen
+        high, low = (np.exp(2j * np.pi * (step.astype(np.float64)[:, None] * n)) for n in digits)
+        sums = np.einsum("pa,ab,pb->p", high, np.pad(samples, (0, padding)).reshape(-1, width), low)
+        profile = np.exp(2j * np.pi * first.astype(np.float64)) * sums * seen
         image += profile
         power += abs(profile) ** 2
     image[~clear] = np.nan
