@@ -110,8 +110,14 @@ def test_figures_are_those_of_a_uniform_aperture():
         assert got.reach == (10, 10)
 
 
-@pytest.mark.parametrize("window", [None, "hamming", TAYLOR])
-@pytest.mark.parametrize("case", [{}, {"baseline": (-3e3, 2e3, 1e3)}, {"distance": 800e3}])
+@pytest.mark.parametrize(
+    "case, window",
+    [  # each pass and each window once; the other six pairs are slow
+        pytest.param(case, window, marks=[] if i == j else [pytest.mark.slow])
+        for i, case in enumerate([{}, {"baseline": (-3e3, 2e3, 1e3)}, {"distance": 800e3}])
+        for j, window in enumerate(["hamming", None, TAYLOR])
+    ],
+)
 def test_figures_are_those_of_brute_force_on_the_exact_image(case, window):
     seen = Pass(window=window, **case)
     place = AWAY

@@ -42,7 +42,7 @@ def hold_all(seeds, share, **limits):
 
 
 # plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance
-@pytest.mark.parametrize("seeds", [range(100), pytest.param(range(100, 200), marks=SLOW)], ids=str)
+@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 200), marks=SLOW)], ids=str)
 def test_hundreds_of_random_tasks(seeds):
     assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= 1 / 30
 
@@ -57,7 +57,7 @@ def test_a_task_of_a_billion_terms():
     assert hold(12, terms=1e9) is not None
 
 
-@pytest.mark.parametrize("seeds", [range(500, 520), pytest.param(range(520, 540), marks=SLOW)], ids=str)
+@pytest.mark.parametrize("seeds", [range(500, 510), pytest.param(range(510, 540), marks=SLOW)], ids=str)
 def test_random_tasks_in_float64(seeds):
     hold_all(seeds, 0.5, terms=3e5, lowest=-9.0)
 

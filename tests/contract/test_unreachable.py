@@ -10,8 +10,9 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from helpers.array_cases import TONE, line, passing
 from helpers.cases import noise_history, noise_on, straight
-from simulation.test_array_echo import TONE, line, passing
+from helpers.scenario_cases import SCENARIO
 
 import sarcl
 from sarcl import pointing, shapes
@@ -186,21 +187,8 @@ def test_a_remedy_is_named_only_where_it_works(monkeypatch):
     assert "let echo cut them" not in str(caught.value)
 
 
-SCENARIO = """\
-[waveform.chirp]
-center = 9e9
-bandwidth = 300e6
-duration = 1e-6
-
-[trajectory.circle]
-radius = 7e3
-height = 5e3
-arc = 0.07
-n_pulses = 4
-
-[[scene.points]]
-positions = [[0, 0, 0]]
-
+TOO_FINE = f"""\
+{SCENARIO}
 [echo]
 tolerance = 1e-7
 
@@ -214,8 +202,8 @@ tolerance = 1e-3
 
 
 def test_a_scenario_names_the_line_and_keeps_the_refusal():
-    with pytest.raises(ToleranceUnreachable, match=r"^f\.toml:16: \[echo\] tolerance 1\.0e-07 cannot") as caught:
-        loads(SCENARIO, name="f.toml").simulate()
+    with pytest.raises(ToleranceUnreachable, match=r"^f\.toml:17: \[echo\] tolerance 1\.0e-07 cannot") as caught:
+        loads(TOO_FINE, name="f.toml").simulate()
     assert caught.value.asked == 1e-7 and caught.value.best == 1e-6
 
 
@@ -224,7 +212,7 @@ def test_a_scenario_hands_on_the_image_that_missed_its_tolerance(monkeypatch):
         raise sarcl.ToleranceMissed(1e-3, 2e-3, "the image")
 
     monkeypatch.setattr("sarcl.imaging.backproject.backproject", missed)
-    scenario = loads(SCENARIO, name="f.toml")
+    scenario = loads(TOO_FINE, name="f.toml")
     with pytest.raises(sarcl.ToleranceMissed, match=r"^tolerance 1\.0e-03 was missed") as caught:
         scenario.focus(RAW, PLANE)
     assert caught.value.image == "the image"

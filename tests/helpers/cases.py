@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import numpy as np
+import pytest
 
 import sarcl
 from sarcl.reference.backproject import backproject as exact_image
@@ -53,3 +54,17 @@ def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model
     wanted, random_norm = exact(raw, image.grid.positions.reshape(-1, 3)[at], **model)
     scale = max(np.linalg.norm(wanted), random_norm)
     return float(np.linalg.norm(np.asarray(image.data).ravel()[at] - wanted) / (scale or 1.0))
+
+
+def thinned(first, second, every=2):
+    """Every pair of two lists as parameters, its tuples flattened; the quick ones lie `every` apart along both lists.
+
+    Each value has quick partners, so each formula and kernel that one of them chooses is run; all pairs run with
+    `-m slow`.
+    """
+    pairs = [(i + j, (*_tuple(a), *_tuple(b))) for i, a in enumerate(first) for j, b in enumerate(second)]
+    return [pytest.param(*values, marks=[pytest.mark.slow] if at % every else []) for at, values in pairs]
+
+
+def _tuple(value):
+    return value if isinstance(value, tuple) else (value,)

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import noise_history
+from helpers.cases import noise_history, thinned
 from helpers.precise_cases import decimal_image, error, focus, task_of
 
 import sarcl
@@ -19,8 +19,10 @@ from sarcl.reference.backproject import backproject as exact_image
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(9, 11), spacing=(0.9, 0.7))
 
 
-@pytest.mark.parametrize("distance", [1.0, 30.0, 10e3, 800e3, 36e6])
-@pytest.mark.parametrize("tolerance, bistatic", [(1e-7, False), (1e-8, True), (1e-9, False), (1e-9, True)])
+@pytest.mark.parametrize(
+    "distance, tolerance, bistatic",
+    thinned([1.0, 30.0, 10e3, 800e3, 36e6], [(1e-7, False), (1e-9, True), (1e-9, False), (1e-8, True)]),
+)
 def test_error_is_below_prediction_and_prediction_below_tolerance(double, distance, tolerance, bistatic):
     raw = noise_history(n_rows=7, distance=distance, bistatic=bistatic)
     data, plan, _ = focus(raw, PLANE, tolerance, double)

@@ -59,6 +59,15 @@ def test_cutting_a_mesh_keeps_its_surface(mesh):
     assert areas(cut.triangles).sum() == pytest.approx(areas(scene.triangles).sum(), rel=1e-9)
 
 
+SEEN = ("hatchback.obj", "pickup.dae", "roboboat01.dae", "tank.obj")  # one of each format, size and source
+
+
+@pytest.mark.parametrize(
+    "mesh",
+    [pytest.param(name, marks=[] if name.endswith(SEEN) else [pytest.mark.slow]) for name in MESHES],
+    ids=lambda name: name.split("/")[-1],
+    indirect=True,
+)
 @pytest.mark.filterwarnings("ignore:mesh too coarse")  # as such models are
 def test_a_mesh_echoes_and_focuses_where_it_stands(mesh):
     scene, _ = mesh
