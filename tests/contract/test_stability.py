@@ -67,10 +67,16 @@ def hold_at_a_thousand_and(n, method, device):
     assert errors[1] <= 1.1 * errors[0] + 3e-7
 
 
+# rounding of a float32 total that is not compensated could reach n/64 2^-25: 1e-4 for 200 000 pulses
 @pytest.mark.parametrize(
-    "method, n", [("direct", 1_000_000), ("factorized", 100_000), pytest.param("factorized", 1_000_000, marks=SLOW)]
+    "method, n",
+    [
+        ("direct", 200_000),
+        ("factorized", 50_000),
+        *(pytest.param(method, 1_000_000, marks=SLOW) for method in ("direct", "factorized")),
+    ],
 )
-def test_the_error_of_a_million_pulses_is_that_of_a_thousand(method, n):
+def test_the_error_does_not_grow_with_the_number_of_pulses(method, n):
     hold_at_a_thousand_and(n, method, None)
 
 
