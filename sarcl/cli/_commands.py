@@ -141,8 +141,8 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
     raw = _compressed(raw, job)
     grid = grid or _default_grid(raw, job, given)
-    asked = {f.name: getattr(args, f.name) for f in fields(FocusOptions) if hasattr(args, f.name)}
-    options: dict[str, Any] = {**asked, "device": devices}
+    names = {f.name for f in fields(FocusOptions)}
+    options: dict[str, Any] = {**{k: v for k, v in vars(args).items() if k in names}, "device": devices}
     if args.dry_run:
         from ..imaging.forecast import plan
 
