@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base import float_pairs
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 
 UNLIMITED = 1e30  # m: a limit of a range window that no range reaches and that float32 holds
 PER_PULSE = ("reference_range", "frequency", "frequency_step", "near", "far")
@@ -85,6 +86,14 @@ class PulseGeometry:
         some: dict[str, Any] = {name: getattr(self, name)[rows] for name in ("tx", *PER_PULSE)}
         some["rx"] = some["tx"] if self.is_monostatic else self.rx[rows]
         return replace(self, **some, beam=None if self.beam is None else self.beam[rows], runs=())
+
+    def mean_direction(self, point: np.ndarray) -> np.ndarray:
+        """Mean of the unit vectors from a point, m (3,), to both antennas, (n, 3): minus the gradient of half the path.
+
+        NaN where an antenna stands at the point.
+        """
+        with np.errstate(invalid="ignore"):
+            return np.asarray(sum(unit(end - point) for end in self.ends) / len(self.ends))
 
     def half_path(self, point: np.ndarray) -> np.ndarray:
         """Half the two-way path of every pulse to a point (3,), m (n,)."""

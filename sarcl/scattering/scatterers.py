@@ -139,12 +139,10 @@ def resolution_edge(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -
 def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> tuple[float, int | None]:
     """Half the finer of range and cross-range resolution at the scene's centre, m, inf where nothing is resolved; and
     the pulse at which an antenna stands there, where nothing is resolved either."""
-    look = np.zeros_like(antennas.tx)  # (u_T + u_R)/2, the gradient of half the path
-    for ends in (antennas.tx, antennas.rx):
-        distance = np.linalg.norm(ends - scene.center, axis=1, keepdims=True)
-        if not distance.all():
-            return np.inf, int(np.argmin(distance))
-        look += (ends - scene.center) / distance / 2
+    look = antennas.mean_direction(scene.center)
+    standing = np.isnan(look).any(axis=1)
+    if standing.any():
+        return np.inf, int(np.argmax(standing))
     along = float(np.linalg.norm(look, axis=1).max())
     turn = float(np.linalg.norm(look - look[0], axis=1).max())
     range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf

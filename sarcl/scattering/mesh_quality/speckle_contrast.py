@@ -95,14 +95,9 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
 
 
 def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
-    """(u_T + u_R)/2 at a point (n, 3), the gradient of half the path; None where it is 0 or undefined."""
-    out = np.zeros_like(antennas.tx)
-    for ends in (antennas.tx, antennas.rx):
-        distance = np.linalg.norm(ends - center, axis=1, keepdims=True)
-        if not distance.all():
-            return None
-        out += (ends - center) / distance / 2
-    return out if np.linalg.norm(out[len(out) // 2]) > 1e-6 else None
+    """Mean directions to the antennas from a point (n, 3); None where they are not defined or cancel."""
+    look = antennas.mean_direction(center)
+    return look if np.linalg.norm(look[len(look) // 2]) > 1e-6 and not np.isnan(look).any() else None
 
 
 def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, waveform: Waveform) -> Speckle:
