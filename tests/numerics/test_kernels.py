@@ -22,6 +22,12 @@ WIDE = {
 }
 
 
+@pytest.fixture
+def device(every_device):
+    """All twins: lanes and number types in every combination, which costs little here."""
+    return every_device
+
+
 def pairs(random, n):
     """Numbers over many magnitudes as hi and lo float32 parts, and their exact sum."""
     wide = float_pairs.wide(random.uniform(1, 2, n) * 10.0 ** random.integers(-3, 8, n))
