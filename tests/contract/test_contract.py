@@ -41,10 +41,15 @@ def hold_all(seeds, share, **limits):
     return met
 
 
-# plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance
-@pytest.mark.parametrize("seeds", [range(40), pytest.param(range(40, 200), marks=SLOW)], ids=str)
-def test_hundreds_of_random_tasks(seeds):
-    assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= 1 / 30
+# plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance. The median of 40 tasks is
+# uncertain by a quarter, so that a third less is accepted of it
+@pytest.mark.parametrize(
+    "seeds, least",
+    [(range(40), 1 / 45), *(pytest.param(seeds, 1 / 30, marks=SLOW) for seeds in (range(100), range(100, 200)))],
+    ids=str,
+)
+def test_hundreds_of_random_tasks(seeds, least):
+    assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= least
 
 
 @SLOW
