@@ -77,7 +77,7 @@ def beam_of(raw: PhaseHistory, beam: Any, center: np.ndarray) -> tuple[np.ndarra
     if pointed:
         given = converted("beam[1]", beam[1], np.float64)
         if given.shape not in ((3,), (raw.n_rows, 3)):
-            raise ValueError(f"beam[1] has shape {given.shape}, wanted a direction (3,) or one a row ({raw.n_rows}, 3)")
+            raise ValueError(f"beam[1] has shape {given.shape}, wanted (3,) or one direction per row ({raw.n_rows}, 3)")
         finite("beam[1]", given)
         toward = np.broadcast_to(given, (raw.n_rows, 3))
     else:

@@ -135,7 +135,7 @@ class Tiling(ABC):
 
     @abstractmethod
     def parts(self, run: Run, factor: int, most: Callable[[int], int], whole: bool) -> Iterator[Part]:
-        """A run of bands in parts of whole roots, or of roots cut to some bands, of `factor` leaves a side.
+        """A run of bands in parts of whole roots, or of roots cut to some bands, of `factor` leaves per side.
 
         most   called as most(bands): how many roots, cut to so many bands each, can be made at a time; 0: not one
         whole  all can be made at a time
@@ -151,7 +151,7 @@ class Tiling(ABC):
 
     @abstractmethod
     def n_roots(self, first: int, last: int, factor: int) -> int:
-        """Roots of `factor` leaves a side in bands first ... last - 1."""
+        """Roots of `factor` leaves per side in bands first ... last - 1."""
 
     @abstractmethod
     def part_size(self, part: Part, factor: int) -> tuple[int, int]:
@@ -159,11 +159,11 @@ class Tiling(ABC):
 
     @abstractmethod
     def root_bands(self, factor: int) -> int:
-        """Bands that a root of `factor` leaves a side reaches over."""
+        """Bands that a root of `factor` leaves per side reaches over."""
 
     @abstractmethod
     def root_leaves(self, factor: int, bands: int) -> int:
-        """Leaves of a root of `factor` leaves a side, cut to so many bands, at most."""
+        """Leaves of a root of `factor` leaves per side, cut to so many bands, at most."""
 
     @abstractmethod
     def leaf_radius(self, side: int) -> float:
@@ -350,7 +350,7 @@ class PlaneTiling(Tiling):
         return Tree(tuple(centers[::-1]), tuple(children[::-1]), leaves, order)
 
     def _center_of(self, down: np.ndarray, right: np.ndarray, factor: int) -> np.ndarray:
-        """Centres, m about the scene's centre (n, 3), of tiles of `factor` leaves a side."""
+        """Centres, m about the scene's centre (n, 3), of tiles of `factor` leaves per side."""
         rows, columns = (down * factor + factor / 2) * self.high, (right * factor + factor / 2) * self.wide
         return self.grid.at(rows, columns) - self.center
 

@@ -424,7 +424,7 @@ BAD_BEAMS = {
     "no direction": ((0.1, (0, 0, 0)), r"beam\[1\] is \(0, 0, 0\); a direction needs a length"),
     "one zero direction": ((0.1, np.eye(3)[[0, 1]] * [[1], [0]]), r"beam\[1\]\[1\] is \(0, 0, 0\)"),
     "direction not finite": ((0.1, (0, np.nan, 1)), r"beam\[1\]\[1\] is nan"),
-    "wrong shape": ((0.1, np.ones((4, 3))), r"beam\[1\] has shape \(4, 3\), wanted .* a row \(2, 3\)"),
+    "wrong shape": ((0.1, np.ones((4, 3))), r"beam\[1\] has shape \(4, 3\), wanted .* per row \(2, 3\)"),
     "flat": ((0.1, (1, 0)), r"beam\[1\] has shape \(2,\)"),
     "ragged": ((0.1, ((1, 0, 0), (1, 0))), r"beam\[1\]"),
 }  # fmt: skip

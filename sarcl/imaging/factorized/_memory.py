@@ -49,7 +49,7 @@ class MemoryPlan:
         if nbytes < least:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profiles of 16 rows, and a tile of "
-                f"{self.plan.levels[0].side} pixels a side with its profiles, need {text.size_text(least)}; give "
+                f"{self.plan.levels[0].side} pixels per side with its profiles, need {text.size_text(least)}; give "
                 f"max_bytes={least * 1.01:.2e} or more, or method='direct'"
             )
         blocks, first = [], 0

@@ -72,7 +72,7 @@ def polar_format(
     if not raw.is_monostatic:
         row = int(np.argmax((raw.rx != raw.tx).any(axis=1)))
         raise ValueError(
-            f"raw is bistatic: rx[{row}] is not tx[{row}], and polar_format knows one direction a row; use backproject"
+            f"raw is bistatic: rx[{row}] is not tx[{row}], and polar_format has one direction per row; use backproject"
         )
     if task.raw.n_rows < 2:
         raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
