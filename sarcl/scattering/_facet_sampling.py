@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..scene.scene import Scene
-from .facets import Facets
+from .facets import FacetSet
 
 
 def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
@@ -22,9 +22,9 @@ def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.
     return some, 1 / (most * chance[some])
 
 
-def facets_at(scene: Scene, some: np.ndarray, triangles: np.ndarray) -> Facets:
+def facets_at(scene: Scene, some: np.ndarray, triangles: np.ndarray) -> FacetSet:
     """Facets `some` of a scene, all of each seen, in place of whose triangles stand `triangles`, m (k, 3, 3)."""
-    return Facets(
+    return FacetSet(
         triangles, scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials, None, some,
         np.ones(len(some), np.complex64),
     )  # fmt: skip

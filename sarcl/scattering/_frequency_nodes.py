@@ -15,7 +15,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
 from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES
-from .facets import Facets
+from .facets import FacetSet
 
 FACETS, PULSES, FREQUENCIES = 96, 4, 24
 SAFETY = 2.0  # the errors are estimated from samples
@@ -41,7 +41,7 @@ def over_band(
 
 
 def _errors(
-    part: Facets, antennas: PulseGeometry, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray,
+    part: FacetSet, antennas: PulseGeometry, n_pulses: int, polarizations: Sequence[str], vertical: np.ndarray,
     center: float, bandwidth: float,
 ) -> dict[int, list[float]] | None:  # fmt: skip
     """The same for n_pulses pulses along the track; None where none of them sees a facet."""
@@ -69,7 +69,7 @@ def typical_power(powers: np.ndarray) -> float:
     return float(np.sort(powers)[: len(powers) - int(BRIGHTEST * len(powers))].sum())
 
 
-def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float) -> Facets:
+def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float) -> FacetSet:
     """Facets, each shrunk to the size of its pieces after cutting, somewhere on it.
 
     All count alike: large facets, which are drawn more often, are cut into more pieces.

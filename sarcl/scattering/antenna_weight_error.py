@@ -20,7 +20,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids
 from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES, AntennaWeights, WeightError
-from .facets import Facets
+from .facets import FacetSet
 
 # Errors are estimated from samples. (Weights are compared at a facet's corner, twice as far from the centroid as the
 # rms radius of the facet.)
@@ -97,7 +97,7 @@ def _sampled(
     return WeightError(dim, rounding, float(np.sqrt(bent / seen)), SAFETY * np.sqrt(left / seen))
 
 
-def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, Facets, np.ndarray]:
+def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, FacetSet, np.ndarray]:
     """Random points on sampled facets, m (n, 3), these facets, and the number of facets that each stands for (n,)."""
     some, share = drawn(areas(scene.triangles), FACETS * many, random)
     triangles, corner = scene.triangles[some], random.dirichlet((1.0, 1.0, 1.0), len(some))

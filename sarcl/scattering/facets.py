@@ -18,12 +18,12 @@ POLARIZATIONS = ("HH", "HV", "VH", "VV")
 
 
 @dataclass(frozen=True, eq=False)
-class Facets:
+class FacetSet:
     """The facets of a scene that are added up.
 
     triangles     m (k, 3, 3);  reflectivity, two_sided, material (k,), materials   as in Scene
-    light, kept   share of each facet that both antennas see, by blocks of pulses, and the facets' indices in it (k,);
-                  None: every facet is seen whole
+    illumination  share of each facet that both antennas see, by blocks of pulses; None: every facet is seen whole
+    kept          indices of the facets in the illumination (k,)
     random        complex Gaussian numbers of unit power (k,), for the incoherent echo of rough facets
     """
 
@@ -32,7 +32,7 @@ class Facets:
     two_sided: np.ndarray
     material: np.ndarray
     materials: tuple[Material, ...]
-    light: Illumination | None
+    illumination: Illumination | None
     kept: np.ndarray
     random: np.ndarray
 
@@ -47,21 +47,21 @@ class Facets:
 
     def spans(self, n_pulses: int) -> Iterator[Span]:
         """The track in parts, in each of which the share of each facet that is seen, uint8 (k,), changes evenly."""
-        if self.light is None:
+        if self.illumination is None:
             all_of_all = np.full(len(self), 255, np.uint8)
             yield Span(0, n_pulses, all_of_all, all_of_all)
             return
-        for span in self.light.spans():
+        for span in self.illumination.spans():
             share = span.share[self.kept]
             yield Span(span.first, span.stop, share, share if span.later is span.share else span.later[self.kept])
 
-    def between(self, first: int, stop: int) -> Facets:
+    def between(self, first: int, stop: int) -> FacetSet:
         """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
-        return self if self.light is None else replace(self, light=self.light.between(first, stop))
+        return self if self.illumination is None else replace(self, illumination=self.illumination.between(first, stop))
 
     def share_at(self, pulse: int) -> np.ndarray:
         """Share of each facet that a pulse sees, 0 to 1 (k,)."""
-        return np.ones(len(self)) if self.light is None else self.light.fraction_at(pulse)[self.kept]
+        return np.ones(len(self)) if self.illumination is None else self.illumination.fraction_at(pulse)[self.kept]
 
     @property
     def is_rough(self) -> bool:
@@ -73,9 +73,9 @@ class Facets:
         """Whether any material has a coherent part, reflected as by a mirror of the facet's size."""
         return any(np.isfinite(m.height) for m in self.materials)
 
-    def picked(self, some: np.ndarray) -> Facets:
+    def picked(self, some: np.ndarray) -> FacetSet:
         """These facets, in this order, without shadows."""
-        return Facets(
+        return FacetSet(
             self.triangles[some], self.reflectivity[some], self.two_sided[some], self.material[some], self.materials,
             None, self.kept[some], self.random[some] if len(self.random) else self.random,
         )  # fmt: skip

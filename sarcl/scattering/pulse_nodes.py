@@ -17,7 +17,7 @@ from ..scene.triangles import areas, centroids, edges
 from ._facet_sampling import drawn
 from ._frequency_nodes import typical_power
 from .antenna_weights import AntennaWeights
-from .facets import Facets
+from .facets import FacetSet
 
 ORDER = 4  # nodes that a cubic goes through
 SPACINGS = (64, 32, 16, 8, 4)  # pulses between nodes that are tried
@@ -69,7 +69,7 @@ def spaced(n_pulses: int, spacing: int, error: float = 0.0) -> PulseNodes:
 
 
 def plan_pulse_nodes(
-    part: Facets, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray, frequency: float,
+    part: FacetSet, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray, frequency: float,
     tolerance: float,
 ) -> PulseNodes:  # fmt: skip
     """The widest nodes whose error is at most `tolerance`, relative to facets at random phases.
@@ -104,7 +104,7 @@ def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float
 
 
 def _error(
-    part: Facets, share: np.ndarray, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
+    part: FacetSet, share: np.ndarray, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
     frequency: float, nodes: PulseNodes,
 ) -> float:  # fmt: skip
     """Relative error of amplitudes a quarter, a half and three quarters on from some of the nodes.

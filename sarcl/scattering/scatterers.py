@@ -16,7 +16,7 @@ from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import lit
-from .facets import Facets
+from .facets import FacetSet
 
 RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
 
@@ -52,7 +52,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 def facets_of(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, seed: int, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object],
-) -> tuple[Facets | None, dict[str, int]]:  # fmt: skip
+) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene that is cut, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
@@ -75,18 +75,18 @@ def facets_of(
         left_out["facing away"] = int(away.sum()) * n_pulses
         keep &= ~away
     tell(2)
-    light = None
+    illumination = None
     if shadows and keep.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
-        light = lit(
+        illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
             two_sided=scene.two_sided, wanted=keep,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
             engine="embree" if shadows == "embree" else "opencl",
         )  # fmt: skip
-        dark = keep & light.dark
-        left_out["shadowed"] = int(dark.sum()) * n_pulses
-        keep &= ~dark
+        occluded = keep & illumination.dark
+        left_out["shadowed"] = int(occluded.sum()) * n_pulses
+        keep &= ~occluded
     tell(3)
     if not keep.any():
         return None, left_out
@@ -96,9 +96,9 @@ def facets_of(
         places = geometry.centroids(scene.triangles)[keep]
         parts = [counter_rng.gaussian(places, seed, stream) for stream in RANDOM_STREAMS]
         random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
-    return Facets(
-        triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials, light,
-        np.flatnonzero(keep), random,
+    return FacetSet(
+        triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
+        illumination, np.flatnonzero(keep), random,
     ), left_out  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import POLARIZATIONS, Facets, diagram_macros
+from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros
 from ..scattering.pulse_nodes import plan_pulse_nodes
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
@@ -34,7 +34,7 @@ class TiledFacets(TiledScatterers):
     """
 
     def __init__(
-        self, device: Device, facets: Facets, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
+        self, device: Device, facets: FacetSet, plan: FacetPlan, antennas: PulseGeometry, waveform: Waveform,
         weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
     ) -> None:  # fmt: skip
         """antennas, waveform, weights, polarizations  of all channels: samples of patches are computed for them"""
@@ -64,7 +64,7 @@ class FacetSpreader:
     """
 
     def __init__(
-        self, held: TiledFacets, facets: Facets, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray,
+        self, held: TiledFacets, facets: FacetSet, antennas: PulseGeometry, bandwidth: float, frequencies: np.ndarray,
         tolerance: float, budget: float, gated: bool, polarizations: Sequence[str], vertical: np.ndarray,
         weights: AntennaWeights,
     ) -> None:  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
-from ..scattering.facets import Facets
+from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
 from .scene_echoes import SceneEchoes
 
@@ -70,7 +70,7 @@ def exact(
 
 
 def _exact(
-    part: Points | Facets,
+    part: Points | FacetSet,
     antennas: PulseGeometry,
     p: int,
     frequencies: np.ndarray,

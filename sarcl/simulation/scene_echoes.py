@@ -19,7 +19,7 @@ from ..opencl.device import Device
 from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facet_plan import MOST_FACETS
-from ..scattering.facets import Facets
+from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision, plan_cut
@@ -88,7 +88,7 @@ class SceneEchoes:
     weight_error: WeightError
     subdivision: Subdivision | None
     points: Points | None
-    facets: Facets | None
+    facets: FacetSet | None
     tiled_points: TiledScatterers | None
     tiled_facets: TiledFacets | None
     skipped: dict[str, int]

@@ -14,7 +14,7 @@ from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
 from sarcl.scattering import facet_plan
 from sarcl.scattering._frequency_nodes import over_band
-from sarcl.scattering.facets import Facets
+from sarcl.scattering.facets import FacetSet
 from sarcl.scene.material import Material
 from sarcl.scene.triangles import centroids, normals
 
@@ -205,7 +205,7 @@ def test_the_error_between_frequencies_is_no_more_than_samples_say(material, edg
     vertical, band = np.array([0.0, 0, 1]), bandwidth * fc
     mirror = facet_plan.coherent(scene)
     errors = over_band(scene, mirror, np.inf, np.inf, antennas, ["HH", "HV"], vertical, fc, band)
-    part = Facets(
+    part = FacetSet(
         scene.triangles, scene.reflectivity, scene.two_sided, scene.material, scene.materials, None, np.arange(400),
         np.exp(2j * np.pi * random.uniform(size=400)).astype(np.complex64),
     )  # fmt: skip
