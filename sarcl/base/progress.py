@@ -60,7 +60,16 @@ def _line(stage: str, done: int, total: int, stream: TextIO | None) -> Any:
 
     stream = sys.stderr if stream is None else stream
     quiet = stream is None or stream.closed or os.environ.get("TERM") == "dumb"
+    width = {"ncols": 80} if not quiet and _columns(stream) == 0 else {"dynamic_ncols": True}
     return tqdm(
         desc=stage, initial=done, total=total, file=stream, disable=True if quiet else None, leave=False, miniters=1,
-        dynamic_ncols=True, unit="", unit_scale=True, bar_format=FORMAT,
+        unit="", unit_scale=True, bar_format=FORMAT, **width,
     )  # fmt: skip
+
+
+def _columns(stream: TextIO) -> int | None:
+    """Width of the terminal, 0 where it does not know its own, for which tqdm would draw nothing; None: no terminal."""
+    try:
+        return os.get_terminal_size(stream.fileno()).columns
+    except (OSError, AttributeError):
+        return None

@@ -1,6 +1,7 @@
 """The progress bar: drawn on terminals and in notebooks only, and only for long stages."""
 
 import io
+import os
 import subprocess
 import sys
 
@@ -103,6 +104,23 @@ def test_a_lost_terminal_costs_no_result(terminal):
     closed = Terminal()
     closed.close()
     work(Bar(closed))
+
+
+@pytest.mark.skipif(os.name != "posix", reason="opens a pseudo-terminal")
+@pytest.mark.parametrize("columns", [0, 60])
+def test_a_real_terminal_shows_the_line_even_where_it_does_not_know_its_width(terminal, columns):
+    import fcntl
+    import struct
+    import termios
+
+    far, near = os.openpty()
+    fcntl.ioctl(near, termios.TIOCSWINSZ, struct.pack("HHHH", 24, columns, 0, 0))
+    with os.fdopen(near, "w") as stream, Bar(stream) as bar:
+        bar("echo", 0, 10)
+        bar("echo", 5, 10)
+        shown = os.read(far, 1000).decode()
+    os.close(far)
+    assert "echo  50% |" in shown and len(shown) <= (columns or 80) + 5
 
 
 @pytest.mark.parametrize("total", [0, 1])
