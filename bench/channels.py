@@ -74,7 +74,7 @@ def growth(args: argparse.Namespace) -> list[Row]:
                 "one call, each channel made": partial(
                     sarcl.echo, *what, array=array, skip=OTHERS | {"equal channels"}, **options
                 ),
-                "a call a channel": partial(singly, *what, array, options),
+                "one call per channel": partial(singly, *what, array, options),
             }
             out += measured(args, name, n, n * PULSES * count, ways)
     return out
@@ -147,7 +147,7 @@ def measured(
                 way,
                 {"scene": name, "n": n, "way": way, "contributions": contributions, "seconds": [],
                  "error": raw.report.measured_error, "predicted": raw.report.predicted_error,
-                 "visited": raw.report.contributions_done, "places": raw.report.plan.get("places")},
+                 "visited": raw.report.contributions_done, "positions": raw.report.plan.get("array positions")},
             )  # fmt: skip
             if turn:
                 row["seconds"].append(seconds)

@@ -19,8 +19,8 @@ HEAD = [
     "seconds / seconds of one call",
 ]
 EXPLAINED = """A contribution is one scatterer in one pulse from one transmitter to one receiver. Few contributions are
-computed where channels are interpolated between positions ("places") of the array (docs/theory/fda.md). The last column
-compares shortest runs. "a call a channel" is one call per channel; its error is the largest of nine channels.
+computed where channels are interpolated between positions of the array (docs/theory/fda.md). The last column
+compares shortest runs. With "one call per channel" the error is the largest of nine channels.
 """
 
 
@@ -42,10 +42,10 @@ def section(name: str, document: Row) -> str:
 def _line(row: Row, rows: list[Row]) -> list[str]:
     first = next(r for r in rows if (r["scene"], r["n"]) == (row["scene"], row["n"]))
     seconds = sorted(row["seconds"])
-    places = f", {row['places']} places" if row["places"] else ""
+    positions = f", {row['positions']} positions" if row["positions"] else ""
     error = "" if row["error"] is None else f"{row['error']:.1e}"
     return [
-        row["scene"], str(row["n"]), row["way"] + places, error, f"{row['predicted']:.1e}", f"{seconds[0]:.3g}",
+        row["scene"], str(row["n"]), row["way"] + positions, error, f"{row['predicted']:.1e}", f"{seconds[0]:.3g}",
         f"{seconds[len(seconds) // 2]:.3g}", f"{row['contributions'] / seconds[0] / 1e9:.3g}",
         f"{seconds[0] / min(first['seconds']):.2f}",
     ]  # fmt: skip

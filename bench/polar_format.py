@@ -69,7 +69,7 @@ def main() -> None:
                 f"| {tolerance:.0e} | {errors[0]:.1e} | {bound:.1e} | {quick:.2f} | {errors[1]:.1e} | {careful:.2f} | "
                 f"{errors[2]:.1e} |"
             )
-        words = ("plane waves err", "that blurs", "displaced by", "sharp within")
+        words = ("plane-wave phase error", "defocusing phase error", "displaced by", "sharp within")
         print(", ".join(f"{word} {fast.report.plan[word]}" for word in words))
 
 

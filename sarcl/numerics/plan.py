@@ -41,7 +41,7 @@ class Plan:
             "method": method,
             "taps": self.interpolator.taps,
             "profile samples": self.length,
-            "points a tile": self.per_tile,
+            "points per tile": self.per_tile,
             "ranges": ("float32", "wide linear term", "wide")[self.range_mode],
             "series": f"order {self.order}" if self.order else "exact",
         }

@@ -57,7 +57,11 @@ class FacetPlan:
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
-        return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, "frequencies a facet": len(self.nodes)}
+        return {
+            "facets": round(self.n_facets),
+            "facet edges, m": self.max_edge,
+            "frequencies per facet": len(self.nodes),
+        }
 
 
 def coherent(scene: Scene) -> np.ndarray:

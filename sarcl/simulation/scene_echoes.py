@@ -124,7 +124,7 @@ class SceneEchoes:
                 request.gated, request.polarizations, request.vertical, weights,
             )  # fmt: skip
             words = spreader.plan.describe("spread") | self.tiled_facets.facet_plan.describe()
-            words |= {"pulses an amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
+            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
             parts.append((self.subdivision.gain * spreader.predicted_error, words))
         chosen = max(parts, key=lambda part: part[0])[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}

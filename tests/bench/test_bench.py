@@ -437,14 +437,14 @@ def test_documents_of_channels_become_tables(tmp_path):
 
     row = {"scene": "points", "n": 45, "contributions": 9_000_000_000, "error": 2e-5, "predicted": 8e-4, "visited": 1}
     rows = [
-        row | {"way": "one call", "seconds": [3.0, 2.0, 4.0], "places": 3},
-        row | {"way": "a call a channel", "seconds": [9.0, 8.0, 7.0], "places": None},
+        row | {"way": "one call", "seconds": [3.0, 2.0, 4.0], "positions": 3},
+        row | {"way": "one call per channel", "seconds": [9.0, 8.0, 7.0], "positions": None},
     ]
     document = backproject.header([]) | {"kind": "channels", "pulses": 101, "growth": rows, "one": [], "many": rows[:1]}
     (tmp_path / "results").mkdir()
     backproject.write(document, tmp_path / "results" / "4-channels.json")
     page.write(tmp_path / "results", tmp_path)
     text = (tmp_path / "results.md").read_text()
-    assert "| points | 45 | one call, 3 places | 2.0e-05 | 8.0e-04 | 2 | 3 | 4.5 | 1.00 |" in text
-    assert "| points | 45 | a call a channel | 2.0e-05 | 8.0e-04 | 7 | 8 | 1.29 | 3.50 |" in text
+    assert "| points | 45 | one call, 3 positions | 2.0e-05 | 8.0e-04 | 2 | 3 | 4.5 | 1.00 |" in text
+    assert "| points | 45 | one call per channel | 2.0e-05 | 8.0e-04 | 7 | 8 | 1.29 | 3.50 |" in text
     assert "Carriers of 900 MHz in all x 101 pulses" in text and "One carrier" not in text

@@ -301,7 +301,7 @@ def test_what_progress_raises_comes_out_of_interpolated_channels():
 
 
 def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_any_work(monkeypatch):
-    assert "places" in interpolated().report.plan
+    assert "array positions" in interpolated().report.plan
     from sarcl.simulation import scene_echoes
     from sarcl.simulation.channels._interpolated import InterpolatedChannels
 
@@ -314,7 +314,7 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
 
     monkeypatch.setattr(scene_echoes, "plan_scene", tight)
     monkeypatch.setattr(InterpolatedChannels, "fill", broken)
-    assert "places" not in interpolated().report.plan
+    assert "array positions" not in interpolated().report.plan
 
 
 def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):

@@ -20,7 +20,7 @@ ROUGH, SMOOTH = Material(**EARTH, diagram="cos2"), Material(**EARTH)
 
 FLAT = Radar(look=np.radians(35), bandwidth=300e6, turn=0.05, n_pulses=52)
 NULLS = 40  # cells a side of an image, one null apart
-# facets a resolution cell along y (azimuth) and x (range), material, sigma of the heights
+# facets per resolution cell along y (azimuth) and x (range), material, sigma of the heights
 CASES = {
     "a": ((4, 4), ROUGH, 0.0312),
     "b": ((4, 4), ROUGH, 0.0),

@@ -60,7 +60,7 @@ def test_shared_amplitudes_keep_the_tolerance(device, always, material, toleranc
     tx = pointing.spotlight(track(), (0, 0, 0))
     options = {"polarization": ["HH", "HV"], "antenna": Antenna.gaussian(width=0.002), "device": device}
     raw = sarcl.echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
-    assert raw.report.plan["pulses an amplitude"] >= 4
+    assert raw.report.plan["pulses per amplitude"] >= 4
     assert raw.report.measured_error <= raw.report.predicted_error <= tolerance
 
 
@@ -77,7 +77,7 @@ def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
         options = {"receiver": rx, "range_window": (-3, 20), "tolerance": 1e-3, "max_edge": 0.2, "device": device}
         made.append(sarcl.echo(scene, CHIRP, tx, polarization="all", **options))
     shared, own = made
-    assert shared.report.plan["pulses an amplitude"] > 1 == own.report.plan["pulses an amplitude"]
+    assert shared.report.plan["pulses per amplitude"] > 1 == own.report.plan["pulses per amplitude"]
     assert np.linalg.norm(shared.samples - own.samples) <= 1e-3 * np.linalg.norm(own.samples)
     assert shared.report.contributions_done == pytest.approx(own.report.contributions_done, rel=2e-3)
     sums = [r.contributions_done + sum(r.contributions_skipped.values()) for r in (shared.report, own.report)]
@@ -90,7 +90,7 @@ def test_a_jumping_track_shares_nothing(device, always):
     order = np.random.default_rng(2).permutation(len(tx))
     jumping = sarcl.Trajectory(tx.times, tx.positions[order])
     raw = sarcl.echo(hills(8), CHIRP, jumping, tolerance=1e-2, check=True, device=device)
-    assert raw.report.plan["pulses an amplitude"] == 1
+    assert raw.report.plan["pulses per amplitude"] == 1
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
 
 
@@ -100,7 +100,7 @@ def test_no_flash_falls_between_knots(device, always):
     tx = sarcl.Trajectory.line(start=(-900, 0, 6e5), velocity=(1800e2, 0, 0), prf=100 * 200.0, n_pulses=200)
     tx = sarcl.Trajectory(tx.times, tx.positions * (60, 1, 1))
     raw = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, check=True, device=device)
-    own = raw.report.plan["pulses an amplitude"]
+    own = raw.report.plan["pulses per amplitude"]
     assert own == 1 or 2 * np.pi / 0.031 * 2 * own * 9e-4 * raw.report.plan["facet edges, m"] * 2 / 3 <= 1.01
     pulse_nodes.WORTH = 1e12
     wanted = sarcl.echo(plate, CHIRP, tx, tolerance=1e-2, device=device)

@@ -422,7 +422,7 @@ def test_few_facets_a_cell_warn_with_number_and_remedy():
         found = speckle_contrast.judge(scene, antennas(SIGHT), X_BAND)
         assert f"{found.per_cell:.2g} rough ones per resolution cell" in text and f"{found.contrast:.2f}" in text
         assert ("holes" in text) == ("material" in options)
-        assert found.describe() == {"rough facets a resolution cell": pytest.approx(found.per_cell, rel=0.05)}
+        assert found.describe() == {"rough facets per resolution cell": pytest.approx(found.per_cell, rel=0.05)}
         cut = speckle_contrast.judge(scene.split(found.needed), antennas(SIGHT), X_BAND)
         assert cut.warnings() == [] and cut.contrast == pytest.approx(1, abs=0.05)
 
@@ -469,4 +469,4 @@ def test_echo_warns_of_too_few_facets_only_where_it_may_not_cut_them():
     with pytest.warns(sarcl.SarclWarning, match="too few facets for speckle"):
         sarcl.echo(coarse, X_BAND, track, max_edge=None, tolerance=1e-2, shadows=False)
     raw = sarcl.echo(coarse, X_BAND, track, tolerance=1e-2, shadows=False)
-    assert raw.report.plan["rough facets a resolution cell"] >= 2
+    assert raw.report.plan["rough facets per resolution cell"] >= 2

@@ -146,7 +146,7 @@ def test_every_element_to_every_other_takes_few_places():
         scene, tone, passing(2), array=array, channels="separated", receive="all", reference=(0, 0, 0),
         range_window=(-36, 36), tolerance=1e-3, check=True,
     )  # fmt: skip
-    assert raw.n_rows == 2 * 120 * 120 and raw.report.plan["places"] <= 16
+    assert raw.n_rows == 2 * 120 * 120 and raw.report.plan["array positions"] <= 16
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-3
     row = 120 * 17 + 93  # pulse 0, sender 17, receiver 93
     tx, rx = raw.tx[row].astype(np.longdouble), raw.rx[row].astype(np.longdouble)

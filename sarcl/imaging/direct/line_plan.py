@@ -66,8 +66,8 @@ class LinePlan:
             "method": method,
             "taps": self.interpolator.taps,
             "profile samples": self.length,
-            "points a tile": self.side**2,
-            "ranges": f"lines, {self.line.taps} taps, {self.fine} samples a pixel",
+            "points per tile": self.side**2,
+            "ranges": f"lines, {self.line.taps} taps, {self.fine} samples per pixel",
             "series": f"order {self.order}" if self.order else "exact",
         }
 

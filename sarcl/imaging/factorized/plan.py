@@ -74,7 +74,7 @@ class FactorPlan:
         return {
             "method": method,
             "tiles": " > ".join(str(level.side) for level in self.levels),
-            "pulses a tile": " > ".join(
+            "pulses per tile": " > ".join(
                 str(n) for n in [len(self.order), *(len(v.decimation.nodes) for v in self.levels)]
             ),
             "taps": self.between.taps,

@@ -49,7 +49,7 @@ class Float64Plan:
             "method": method,
             "taps": self.interpolator.taps,
             "profile samples": self.length,
-            "points a tile": self.per_tile,
+            "points per tile": self.per_tile,
             "ranges": "pairs of float64" if self.order == WIDE else "float64",
             "series": f"order {self.order}" if self.order > 0 else "exact",
         }

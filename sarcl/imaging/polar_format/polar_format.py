@@ -55,11 +55,11 @@ def polar_format(
     progress   called as progress(stage, done, total), in thousandths
 
     The plan in the report gives the error of plane wavefronts against `backproject`, which the tolerance does not
-    include: the largest neglected phase, its part that blurs, the largest displacement of a pixel, and the radius in
-    which images are sharp. sarcl.SarclWarning where images are not sharp up to the border of the grid, and where the
-    border lies beyond the range window, so that echoes repeat. ValueError: bistatic or uncompressed data, listed
-    points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an error
-    above the tolerance. MemoryError: max_bytes too small.
+    include: the largest neglected phase, the part of it that defocuses, the largest displacement of a pixel, and the
+    radius in which images are sharp. sarcl.SarclWarning where images are not sharp up to the border of the grid, and
+    where the border lies beyond the range window, so that echoes repeat. ValueError: bistatic or uncompressed data,
+    listed points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an
+    error above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()
@@ -179,8 +179,8 @@ def _corners(grid: ImageGrid) -> np.ndarray:
 def _describe(bent: Curvature) -> dict[str, str]:
     """The error of plane wavefronts, for a report."""
     return {
-        "plane waves err": f"{bent.phase:.2g} rad",
-        "that blurs": f"{bent.defocus:.2g} rad",
+        "plane-wave phase error": f"{bent.phase:.2g} rad",
+        "defocusing phase error": f"{bent.defocus:.2g} rad",
         "displaced by": f"{bent.distortion:.2g} m",
         "sharp within": f"{bent.radius:.3g} m",
     }

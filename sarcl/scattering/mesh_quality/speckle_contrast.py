@@ -57,7 +57,7 @@ class Speckle:
 
     def describe(self) -> dict[str, Any]:
         """For a report's plan."""
-        return {"rough facets a resolution cell": float(f"{self.per_cell:.2g}")} if self.facets else {}
+        return {"rough facets per resolution cell": float(f"{self.per_cell:.2g}")} if self.facets else {}
 
     def warnings(self) -> list[str]:
         """Warnings for a user: contrast off by more than 5 %, or holes."""

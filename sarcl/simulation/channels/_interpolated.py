@@ -211,7 +211,7 @@ class InterpolatedChannels:
 
     def describe(self) -> dict[str, int]:
         """Words and numbers for a report."""
-        return {"places": len(self.tx) * len(self.rx)}
+        return {"array positions": len(self.tx) * len(self.rx)}
 
 
 def _paths(antennas: np.ndarray, points: np.ndarray) -> np.ndarray:
