@@ -2,7 +2,8 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -107,14 +108,47 @@ class SceneEchoes:
 
         antennas  of pulses of the track from `first` on, at the channel's place;  waveform  of the channel
         """
+        with self._unreachable_for_the_caller():
+            return self._channel(antennas, waveform, frequencies, first)
+
+    def check_plans(self, antennas: PulseGeometry, bands: Iterable[Band]) -> None:
+        """ToleranceUnreachable where scatterers lie so evenly that samples of a band cannot meet the tolerance."""
+        with self._unreachable_for_the_caller():
+            for band in bands:
+                if self.tiled_points is not None:
+                    self._plan_points(self.tiled_points, antennas, band)
+                if self.tiled_facets is not None and self.subdivision is not None:
+                    left = self.error_budget / self.subdivision.gain - self.tiled_facets.facet_plan.predicted_error
+                    self.tiled_facets.plan(antennas, band, left, least_tolerance=0.0)
+
+    @contextmanager
+    def _unreachable_for_the_caller(self) -> Iterator[None]:
+        """ToleranceUnreachable names the tolerance of the request, not the share of it that was left to a plan."""
+        try:
+            yield
+        except ToleranceUnreachable as refused:
+            raise refused.restated(self.request.tolerance, None, "take a larger tolerance") from None
+
+    def _plan_points(self, points: TiledScatterers, antennas: PulseGeometry, band: Band) -> tuple[Plan, float]:
+        """The plan of points, and the error of their weights over the band."""
+        error = self.weight_error.of(self.n_nodes, self.error_budget)
+        return points.plan(antennas, band, self.error_budget - error), error
+
+    @property
+    def n_nodes(self) -> int:
+        """Number of frequencies at which the weights of points are computed."""
+        return self.weight_error.nodes(NODES * self.error_budget)
+
+    def _channel(
+        self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int
+    ) -> ChannelEchoes:
         request = self.request
         weights = self.weights.at(antennas, slice(first, first + len(antennas)))
         plan, nodes, spreader, parts = None, np.zeros(0), None, []
         if self.points is not None and self.tiled_points is not None and request.same:
-            nodes = chebyshev(waveform.center, waveform.bandwidth, self.weight_error.nodes(NODES * self.error_budget))
-            error = self.weight_error.of(len(nodes), self.error_budget)
+            nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
-            plan = self.tiled_points.plan(antennas, band, self.error_budget - error)
+            plan, error = self._plan_points(self.tiled_points, antennas, band)
             parts.append((plan.predicted_error + error, plan.describe("spread")))
         if self.facets is not None and self.tiled_facets is not None and self.subdivision is not None:
             facets, stop = self.facets, first + len(antennas)
@@ -217,7 +251,8 @@ def prepare_scene(
     device, vertical = request.device, request.vertical
     error_budget = request.tolerance / parts_of(scene)
     weight_error = error_of_weights(weights, scene, waveform, request.polarizations, vertical)
-    subdivision = _plan(request, scene, waveform, antennas, weight_error, tuple(dict.fromkeys(bands)))
+    bands = tuple(dict.fromkeys(bands))
+    subdivision = _plan(request, scene, waveform, antennas, weight_error, bands)
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
     points, skipped = points_of(scene, request.skips, len(antennas))
@@ -252,10 +287,12 @@ def prepare_scene(
         if request.same:
             held_points = tiled_points(device, points, antennas, waveform, weights)
     request.clock.lap("scene")
-    return SceneEchoes(
+    prepared = SceneEchoes(
         request, weights, weight_error, subdivision, points, facets, held_points, held_facets, skipped, mesh_warnings,
         error_budget, len(antennas),
     )  # fmt: skip
+    prepared.check_plans(antennas, bands)
+    return prepared
 
 
 def _plan(

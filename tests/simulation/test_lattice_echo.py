@@ -59,6 +59,18 @@ def test_a_check_that_measures_more_than_the_tolerance_raises_and_keeps_the_echo
     assert missed.value.image is None
 
 
+@pytest.mark.parametrize("array", [None, sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e6)])
+@pytest.mark.parametrize("add", [sarcl.Scene.points([[1.0, 2.0, 0.0]]), shapes.plate((2, 2), two_sided=False)])
+def test_a_lattice_that_no_plan_can_take_is_refused_in_the_numbers_of_the_caller(monkeypatch, array, add):
+    monkeypatch.setattr(_kernel_images, "SAFETY", 1e9)  # images of every kernel exceed the tolerance
+    track = sarcl.Trajectory.line(start=(8e3, 3e3, 6e3), velocity=(0, 10, 0), prf=100.0, n_pulses=24)
+    scene = lattice(track, 9e9) + add
+    options = {k: v for k, v in WINDOW.items() if k != "check"} | {"array": array}
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"1.0e-03 cannot be met with .*; take a larger") as refused:
+        sarcl.echo(scene, CHIRP, track, **options)
+    assert refused.value.asked == 1e-3
+
+
 @pytest.mark.slow
 def test_the_pieces_of_a_plate_keep_the_tolerance(monkeypatch):
     # measured 1.5e-3 for 9.98e-4 predicted where the pieces were taken to add up at random phases
