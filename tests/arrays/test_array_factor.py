@@ -220,7 +220,7 @@ def test_the_papers_waveform_is_far_beyond_its_own_bound():
         (lambda: closed.dirichlet([1.0, np.nan], 3), r"angle\[1\] is nan"),
         (lambda: closed.peak_delay(0.0, spacing=1, frequency_step=1, azimuth=0), "f0 is 0"),
         (lambda: closed.quadratic_phase(shape=(9, 9), spacing=(1, np.nan), frequency_step=(1, 1)), "finite"),
-        (lambda: closed.beam_angles(F0, spacing=(0, 1), frequency_step=(1, 1), retarded=0), "at one place"),
+        (lambda: closed.beam_angles(F0, spacing=(0, 1), frequency_step=(1, 1), retarded=0), "at one position"),
         (lambda: closed.power_pattern([1, 2], peak=0), "peak is 0"),
     ],
 )

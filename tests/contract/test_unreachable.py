@@ -79,7 +79,7 @@ REFUSED = {
     "float32": (focused(RAW, PLANE, device=None), 1e-16, "float64 range profiles"),
     "float32 without float64": (lambda t: focused(RAW, PLANE, device=no_fp64())(t), 2e-7, "float32"),
     "float64 of listed points": (focused(RAW, LISTED), 3.25e-17, "float64 range profiles"),
-    "sub-apertures": (focused(SMOOTH, PLANE, method="factorized"), 1.25e-6, "thinning out the pulses"),
+    "sub-apertures": (focused(SMOOTH, PLANE, method="factorized"), 1.25e-6, "decimation of the pulses"),
     "sub-apertures below float32": (focused(SMOOTH, PLANE, method="factorized"), 1e-8, "float32 range profiles"),
     "polar format": (lambda t: sarcl.polar_format(SMOOTH, PLANE, tolerance=t, check=False), 1e-9, "float32 grid"),
     "field": (field, 1e-17, "path differences"),

@@ -229,8 +229,8 @@ def test_noise_of_no_known_level_is_refused(options, says):
 
 def test_rows_that_are_no_single_sweep_need_their_cell_told():
     for raw, says in (
-        (circle(arc=4 * np.pi), "single sweep"),
-        (silence()[[0, 5, 3, 9]], "single sweep"),
+        (circle(arc=4 * np.pi), "do not pass the point in one direction"),
+        (silence()[[0, 5, 3, 9]], "do not pass the point in one direction"),
         (silence()[[0]], "one pulse"),
         (silence(tx_channel=np.arange(129) % 2), "several channels"),
     ):
