@@ -1,17 +1,17 @@
 // Echoes of planar facets by physical optics: amplitudes at some pulses, spread into the range profiles of all.
 //
 //   g_pm[i] = sum_k a_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   x_k centroids
-//   a_k(p)  = sum_q c_pq a_k(q),   q pulses near p that amplitudes are computed at (knots), c Lagrange's weights
+//   a_k(p)  = sum_q c_pq a_k(q),   q pulses near p that amplitudes are computed at (pulse nodes), c Lagrange's weights
 //   s_p(f)  = f^e sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
 //
-// source    sarcl/scattering/physical_optics.py; amplitudes between NODES frequencies f_m and between knots by interpolation
+// source    sarcl/scattering/physical_optics.py; amplitudes interpolated between NODES frequencies f_m and between pulse nodes
 //           (docs/theory/facets.md)
 // symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of gains.clh; delta, kappa, sigma as in
 //                      geometry.clh
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES      frequencies f_m
-//           KNOTS      pulses that an amplitude is interpolated from; 1: each pulse has its own
+//           PULSE_NODES  pulses that an amplitude is interpolated from; 1: each pulse has its own
 //           HH, HV, VH, VV   1: wanted (first letter received)
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
@@ -38,7 +38,7 @@ inline triple load_triple(__global const float *restrict planes, size_t at, size
     return t_make(LOAD(at, planes), LOAD(at, planes + n), LOAD(at, planes + 2 * n));
 }
 
-#define FRONT 1  // bits of a facet's mark at a knot: seen from its front; sends something back
+#define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
 #define BRIGHT 2
 
 inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
@@ -66,19 +66,19 @@ inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wav
 }
 #endif
 
-// Amplitudes at knots. global size (knots, tiles of this call).
+// Amplitudes at pulse nodes. global size (pulse nodes, tiles of this call).
 //   constants  of the nodes, n of them per tile, as in backproject.cl, of all tiles
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
 //   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
-//   moments  (knots)                  where between these two a knot lies: 0 at the one, 1 at the other, or beyond
+//   moments  (pulse nodes)            where between these two a pulse node lies: 0 at the one, 1 at the other, or beyond
 //   nodes    (3, NODES)               f_m/c, cycles/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and the axis that replaces it for vectors along it
-//   patterns, second, axes (knots, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
+//   patterns, second, axes (pulse nodes, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
-//   out      (knots, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
-//   marks    (knots, tiles of this call, TILE)                       FRONT, BRIGHT
+//   out      (pulse nodes, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
+//   marks    (pulse nodes, tiles of this call, TILE)                       FRONT, BRIGHT
 __kernel void facet_amplitudes(int n, __global const float *restrict constants, __global const float *restrict offsets,
                                int n_offsets, __global const float *restrict facets, __global const uchar *restrict seen,
                                __global const uchar *restrict later, __global const float *restrict moments,
@@ -197,12 +197,12 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
     }
 }
 
-// What facets send back at a knot, or between knots, added to profiles. global size (pulses of this call, splits):
+// What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call, splits):
 // work-item (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
-//   knots    (n_used, 2)              first of the KNOTS nodes of a pulse, and the nearest
-//   shares   (n_used, KNOTS)          weights of these nodes
+//   pulse_nodes (n_used, 2)           first of the PULSE_NODES nodes of a pulse, and the nearest
+//   shares   (n_used, PULSE_NODES)    weights of these nodes
 //   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
@@ -213,13 +213,13 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                             __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
                             __global const float *restrict offsets, int n_offsets,
                             __global const float *restrict amplitudes, __global const uchar *restrict marks, int first,
-                            int n_here, __global const int *restrict knots, __global const float *restrict shares,
+                            int n_here, __global const int *restrict pulse_nodes, __global const float *restrict shares,
                             __global const float *restrict axes, __global const float *restrict reach,
                             __global const float *restrict radius, __global const float *restrict table, int last, int flush,
                             __global float *rows, int stride, int origin, __global int *restrict done) {
     int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
     __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
-    int from = knots[2 * p], nearest_knot = knots[2 * p + 1];
+    int from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
     for (int k = first + split; k < first + n_here; k += get_global_size(1)) {
         __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
@@ -236,10 +236,10 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
         }
 #endif
         for (int i = 0; i < TILE / VW; i++) {
-            size_t at = (size_t)k * (TILE / VW) + i, held[KNOTS];
+            size_t at = (size_t)k * (TILE / VW) + i, held[PULSE_NODES];
 #pragma unroll
-            for (int q = 0; q < KNOTS; q++) held[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
-            size_t judge = ((size_t)nearest_knot * n_here + (k - first)) * (TILE / VW) + i;
+            for (int q = 0; q < PULSE_NODES; q++) held[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
+            size_t judge = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
             offset x = load_offset(offsets, at, n_offsets);
             about_centre(&x, tile, k, n_tiles);
             place where = locate(c, pulse, p, n, x);
@@ -254,7 +254,7 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                 inside_count += counts;
                 front_count += counts && (marks[judge * VW + l] & FRONT);
 #pragma unroll
-                for (int q = 0; q < KNOTS; q++) any |= counts ? marks[held[q] * VW + l] : 0;
+                for (int q = 0; q < PULSE_NODES; q++) any |= counts ? marks[held[q] * VW + l] : 0;
             }
             if (!(any & BRIGHT)) continue;
 
@@ -267,11 +267,11 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             for (int channel = 0; channel < CHANNELS; channel++) {
                 complex_v a = c_make((fv)0.0f, (fv)0.0f);
 #pragma unroll
-                for (int q = 0; q < KNOTS; q++) {
-                    __global const float *from_knot = amplitudes + (held[q] * CHANNELS + channel) * 2 * VW;
-                    fv part = (fv)(KNOTS == 1 ? 1.0f : shares[KNOTS * p + q]);
-                    a.re = fma(part, LOAD(0, from_knot), a.re);
-                    a.im = fma(part, LOAD(1, from_knot), a.im);
+                for (int q = 0; q < PULSE_NODES; q++) {
+                    __global const float *from_node = amplitudes + (held[q] * CHANNELS + channel) * 2 * VW;
+                    fv part = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
+                    a.re = fma(part, LOAD(0, from_node), a.re);
+                    a.im = fma(part, LOAD(1, from_node), a.im);
                 }
                 // times exp(-j 2 pi turn)
                 add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),

@@ -100,7 +100,7 @@ class FacetSpreader:
             "METAL": int(held.metal),
             "DISPERSIVE": int(held.dispersive),
             "ROUGH": int(self.facets.is_rough),
-            "KNOTS": self.pulse_nodes.order,
+            "PULSE_NODES": self.pulse_nodes.order,
             **{name: int(name in self.made) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }

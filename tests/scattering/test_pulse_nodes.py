@@ -1,4 +1,4 @@
-"""Amplitudes that pulses share: what lies between knots, within what samples promise, and counted alike."""
+"""Amplitudes that pulses share: what lies between nodes, within what samples promise, and counted alike."""
 
 import numpy as np
 import pytest
@@ -33,12 +33,12 @@ def always(monkeypatch):
 
 
 @pytest.mark.parametrize(("n", "spacing"), [(17, 4), (18, 4), (65, 16), (100, 8), (257, 64)])
-def test_cubics_go_through_knots_and_are_exact_for_cubics(n, spacing):
-    knots = spaced(n, spacing)
-    assert knots.pulses[0] == 0 and knots.pulses[-1] == n - 1
+def test_cubics_go_through_nodes_and_are_exact_for_cubics(n, spacing):
+    nodes = spaced(n, spacing)
+    assert nodes.pulses[0] == 0 and nodes.pulses[-1] == n - 1
     rows = np.arange(n)
     for start, stop in ((0, n), (n // 3, n // 2), (n - 1, n)):
-        needed, which, shares = knots.of(start, stop)
+        needed, which, shares = nodes.of(start, stop)
         assert len(np.unique(needed)) == len(needed) and shares.shape == (stop - start, 4)
         curve = (needed / n - 0.3) ** 3 - needed / n
         made = (shares * curve[which[:, :1] + np.arange(4)]).sum(axis=1)
@@ -94,8 +94,8 @@ def test_a_jumping_track_shares_nothing(device, always):
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
 
 
-def test_no_flash_falls_between_knots(device, always):
-    """A plate that mirrors for three pulses of two hundred: knots are denser than its flash, whatever samples say."""
+def test_no_flash_falls_between_nodes(device, always):
+    """A plate that mirrors for three pulses of two hundred: nodes are denser than its flash, whatever samples say."""
     plate = sarcl.Scene.facets([[[-1.0, -1, 0], [1, -1, 0], [1, 1, 0]], [[-1.0, -1, 0], [1, 1, 0], [-1, 1, 0]]])
     tx = sarcl.Trajectory.line(start=(-900, 0, 6e5), velocity=(1800e2, 0, 0), prf=100 * 200.0, n_pulses=200)
     tx = sarcl.Trajectory(tx.times, tx.positions * (60, 1, 1))
