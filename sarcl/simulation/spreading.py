@@ -182,5 +182,5 @@ def splits(device: Device, n_pulses: int, n_tiles: int) -> int:
 
 
 def terms(tolerance: float) -> float:
-    """Terms of one float32 sum: n equal terms err by up to n/2 roundings, which may take a fifth of the tolerance."""
+    """Terms of one float32 sum: the error of n equal terms, up to n/2 roundings, may take a fifth of the tolerance."""
     return 0.2 * tolerance * 2 / FLOAT32.unit

@@ -1,4 +1,4 @@
-"""Is a mesh fine enough for the wavelength and the curves it stands for? What its flat facets change, in dB.
+"""Whether a mesh is fine enough for the wavelength and the curved surfaces it approximates: its error in dB.
 
 dB = 10 log10(|flat|^2/|curved|^2) of every smooth surface as a whole, from the sums of _curved_echo.py over the mesh at
 hand, at up to 16 pulses and frequencies of the band. No bound, but what flat facets change, to the physics of echoes:
@@ -25,7 +25,7 @@ from ._curved_echo import Sums, sums
 
 WARN = 0.5  # dB
 AIM = 0.25  # dB, of the edges that are advised
-FINE = 2.0  # rad, two-way, over an edge of lambda/6.3: what is finer errs less than WARN, however it is curved
+FINE = 2.0  # rad, two-way, over an edge of lambda/6.3: finer facets have an error below WARN, whatever their curvature
 STEEP = 1e-4  # rad, two-way, of a height that is worth a look
 LOOKS = 16
 MOST_COST = 1.2e7  # integrands after which there is no further look
@@ -37,12 +37,12 @@ GOLDEN = 0.6180339887498949
 
 @dataclass(frozen=True)
 class FacetError:
-    """What flat facets in place of curved surfaces change; error and sizes of the surface that errs most.
+    """Change of the echo by flat facets in place of curved surfaces: error and sizes of the worst surface.
 
     error_db    rms change of its level over pulses and band, weighted by power; 0 where nothing is curved
     worst_db    largest change of its level where it is no more than 10 dB below its strongest
     judged      curved surfaces with something specular, within 20 dB of the strongest
-    coarse      those of them that err by more than 0.5 dB
+    coarse      those of them with an error of more than 0.5 dB
     edge, radius, standoff, needed   m: of its facets across the bend, of the bend, how far that stands off them, and
                 the edges that would do
     wavelength  m;  rcs  m^2;  place  m (3,), its middle
