@@ -43,7 +43,7 @@ def picture(
     top_db      level of white, in dB; None: taken from the data, see `white_level`
     percentile  per cent of the pixels of the scene that are no brighter than white, above 0 to 100; None: 99.5.
                 100 makes the brightest pixel white. Not to be given together with top_db
-    zero        what 0 dB stands for, for the caption
+    zero        meaning of 0 dB, for the caption
     origin      (row, column) coordinates, m, of pixel [rows//2, columns//2];  names: the names of these coordinates
 
     Returns a PIL.Image. A caption under the axes says what white and black are. Entries of its `info`: "frame", the

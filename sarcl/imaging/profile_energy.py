@@ -56,7 +56,7 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     usual = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
     best = np.setdiff1d(np.argsort(bright)[-count:], usual)
     _, x = grid.sample(PIXELS, seed=1)
-    # weights: the strongest rows count once, the others stand for all rows that are not read
+    # weights: the strongest rows count once, the others represent all rows that are not read
     stands_for = {int(r): (raw.n_rows - len(best)) / len(usual) for r in usual} | {int(r): 1.0 for r in best}
     read = {r: raw.read(r, r + 1)[0] * (task.sample_weight * task.row_weight[r]) for r in stands_for}
     scale = max(1e-290, *(float(np.abs(samples).max()) for samples in read.values()))  # squares must not overflow

@@ -127,7 +127,7 @@ class Tiling(ABC):
 
     @abstractmethod
     def outline(self) -> np.ndarray:
-        """Points, m (n, 3), that stand for all pixels where errors are estimated."""
+        """Sample points, m (n, 3), of the region of all pixels, at which errors are estimated."""
 
     @abstractmethod
     def tree(self, first: int, last: int, factors: Sequence[int]) -> Tree:

@@ -112,13 +112,13 @@ def _listed(names: list[str], word: str) -> str:
 
 
 def named(path: Any, among: list[Format]) -> Format | None:
-    """The format, of those given, that the ending of a path stands for."""
+    """The format, of those given, that has the suffix of a path."""
     ending = Path(path).suffix.lower()
     return next((f for f in among if ending in f.endings), None)
 
 
 def writer_functions(path: Any, kind: Written) -> Any:
-    """The functions of the format that `path` is written in: the one that its ending stands for, else sarcl's own."""
+    """Functions of the format in which `path` is written: by its suffix, else sarcl's own format."""
     return (named(path, writing(kind)) or HDF5).functions
 
 

@@ -14,7 +14,7 @@ For other folders:
 
 For this folder alone:
 
-    _facet_sampling        a few facets or points that stand for all of a scene
+    _facet_sampling        random samples of the facets or points of a scene
     _frequency_nodes       frequencies at which amplitudes are computed
     _rough_surface         scattering diagrams of rough facets (SARAS)
 """

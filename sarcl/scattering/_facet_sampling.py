@@ -1,4 +1,4 @@
-"""A few facets or points that stand for all of a scene, from which planners estimate errors."""
+"""Random samples of the facets or points of a scene, from which planners estimate errors."""
 
 from __future__ import annotations
 
@@ -9,7 +9,7 @@ from .facets import FacetSet
 
 
 def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Indices of up to `most` of n things, and how many of the n each stands for.
+    """Indices of up to `most` of n elements, and the number of the n that each represents.
 
     size  (n,), such as areas or powers: half of the draws are as likely as the size, half alike for all. Sums over the
           draws, each times the number it stands for, estimate sums over all without bias.
