@@ -1,7 +1,7 @@
 // Sums of tiles as rows of an image.
 //
 // macros    none
-// reference: sarcl/imaging/tiling.py:PlaneTiling.place
+// reference: sarcl/imaging/tiling/plane.py:PlaneTiling.place
 
 // global size (columns of the image, rows of these bands)
 //   totals   (4, pixels)   of tiles `high` x `wide` one after another: re, im, and their rounding errors

@@ -11,13 +11,12 @@ For other folders:
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
-    tile_tree        quadtree of tiles
-    tiling           a grid in tiles, the tiles in bands: one class for each kind of grid
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
     polar_format/    polar_format(): plane wavefronts and one two-dimensional FFT
     run/             the work in blocks: devices, checkpoints, output files
+    tiling/          a grid in tiles, the tiles in bands: one class for each kind of grid
 """
 
 __all__ = [
@@ -35,6 +34,5 @@ __all__ = [
     "polar_format",
     "profile_energy",
     "run",
-    "tile_tree",
     "tiling",
 ]

@@ -30,7 +30,7 @@ from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
-from .tiling import Run
+from .tiling.tiling import Run
 
 if TYPE_CHECKING:
     import distributed

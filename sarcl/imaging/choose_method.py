@@ -23,7 +23,7 @@ from .factorized.plan import FactorPlan
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
 from .focusing_task import FocusingTask
-from .tiling import Tiling
+from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
 TINY = 1e-35  # rms amplitude of the samples of a row below which pixels approach the smallest numbers of complex64

@@ -14,7 +14,7 @@ from ..numerics import range_profiles
 from ..numerics.interpolation import Interpolator
 from ..opencl.device import Device
 from .focusing_task import FocusingTask
-from .tiling import Run, Tiling
+from .tiling.tiling import Run, Tiling
 
 
 @dataclass(frozen=True)

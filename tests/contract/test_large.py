@@ -16,7 +16,7 @@ import sarcl
 from sarcl.imaging import choose_method
 from sarcl.imaging.factorized._memory import MemoryPlan
 from sarcl.imaging.focusing_task import make_task
-from sarcl.imaging.tiling import Part
+from sarcl.imaging.tiling.tiling import Part
 from sarcl.opencl.choose_device import open_device
 
 WIDE = sarcl.ImageGrid.plane(shape=(150, 1700), spacing=0.25)

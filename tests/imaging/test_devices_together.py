@@ -13,7 +13,7 @@ from helpers.cases import image_error, noise_history
 import sarcl
 from sarcl.imaging.direct.direct import Direct
 from sarcl.imaging.run.workers import cut
-from sarcl.imaging.tiling import PlaneTiling
+from sarcl.imaging.tiling.plane import PlaneTiling
 from sarcl.opencl.choose_device import open_device, open_devices
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices

@@ -15,7 +15,7 @@ from sarcl.imaging import choose_method
 from sarcl.imaging.direct import direct
 from sarcl.imaging.engine import Skipped
 from sarcl.imaging.focusing_task import SKIPS, make_task
-from sarcl.imaging.tiling import PointTiling
+from sarcl.imaging.tiling._points import PointTiling
 from sarcl.model.image_grid import ImageGrid
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact

@@ -5,7 +5,8 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarcl.imaging.tiling import PointTiling, tiling_of
+from sarcl.imaging.tiling._points import PointTiling
+from sarcl.imaging.tiling.of_grid import tiling_of
 from sarcl.model.image_grid import ImageGrid
 
 PLANE = ImageGrid.plane(center=(3, 1, 2), shape=(37, 91), spacing=(0.3, 0.2), normal=(0.1, 0.2, 1))

@@ -14,7 +14,8 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling import Tiling, tiling_of
+from ..tiling.of_grid import tiling_of
+from ..tiling.tiling import Tiling
 from . import line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, kernel_of

@@ -15,7 +15,7 @@ from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
 from ...numerics.tiles import Tiles
-from ..tiling import PlaneTiling, outline
+from ..tiling.plane import PlaneTiling, outline
 
 LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
 SIDES = (64, 32, 16)  # pixels along a side of a tile

@@ -14,7 +14,7 @@ from ...base import float_pairs
 from ...numerics.plan import Plan
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
-from ..tiling import Tiling
+from ..tiling.tiling import Tiling
 from . import line_plan
 from .line_plan import LinePlan, LineTiling, steps
 

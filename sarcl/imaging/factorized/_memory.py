@@ -8,8 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import text
-from ..tile_tree import Tree
-from ..tiling import Part, Tiling
+from ..tiling.tiling import Part, Tiling
+from ..tiling.tree import Tree
 from .plan import FactorPlan
 
 ROWS = 256  # rows per block of the first level

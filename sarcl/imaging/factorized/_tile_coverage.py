@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...numerics.pulse_geometry import PulseGeometry
-from ..tiling import Roots
+from ..tiling.tiling import Roots
 
 MORE = 1.5  # rows added directly to a root, relative to those it needs: neighbouring roots share range profiles
 

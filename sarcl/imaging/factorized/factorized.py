@@ -21,8 +21,8 @@ from ..direct.direct import Direct
 from ..direct.tile_kernels import TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tile_tree import Tree
-from ..tiling import Roots, Tiling
+from ..tiling.tiling import Roots, Tiling
+from ..tiling.tree import Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level

@@ -19,7 +19,8 @@ from ..direct import line_plan
 from ..direct.line_plan import LinePlan, LineTiling
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
-from ..tiling import Tiling, tiling_of
+from ..tiling.of_grid import tiling_of
+from ..tiling.tiling import Tiling
 from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of
 
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth

@@ -13,7 +13,7 @@ from ...opencl.device import Device
 from ...opencl.device_list import devices
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling import Tiling, download_sums
+from ..tiling.tiling import Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 

@@ -16,7 +16,8 @@ from ...numerics.interpolation import Interpolator
 from .. import profile_energy
 from ..focusing_task import FocusingTask
 from ..profile_energy import ProfileEnergy
-from ..tiling import Tiling, tiling_of
+from ..tiling.of_grid import tiling_of
+from ..tiling.tiling import Tiling
 
 CHUNK = 64  # rows added without compensation before the compensated total; blocks of rows are multiples of it
 SIDES = (16, 8)  # pixels along a side of a tile

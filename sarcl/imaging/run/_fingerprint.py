@@ -13,7 +13,7 @@ import numpy as np
 
 from ..engine import ImagePlan
 from ..focusing_task import FocusingTask
-from ..tiling import Tiling
+from ..tiling.tiling import Tiling
 
 
 def job(

@@ -17,7 +17,7 @@ from ...model.image import Image
 from ..choose_method import MethodChoice
 from ..engine import Skipped
 from ..focusing_task import FocusingTask
-from ..tiling import Run
+from ..tiling.tiling import Run
 from . import _fingerprint
 from .tile_files import TileStore, discard, folder_of, gaps
 

@@ -24,7 +24,7 @@ from ...opencl.device import Device
 from ..choose_method import MethodChoice
 from ..engine import Engine, Skipped
 from ..focusing_task import FocusingTask
-from ..tiling import Run
+from ..tiling.tiling import Run
 from .image_output import BandBuffer
 from .workers import FinishedBlock, OutputFor, cut
 

@@ -13,7 +13,7 @@ from ...io import formats
 from ...model import store
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
-from ..tiling import Tiling
+from ..tiling.tiling import Tiling
 
 
 class ImageOutput:

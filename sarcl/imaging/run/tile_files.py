@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 
 from ..engine import Skipped
-from ..tiling import Run, Tiling
+from ..tiling.tiling import Run, Tiling
 from ._fingerprint import as_bytes, checker, difference, mark
 
 log = logging.getLogger(__name__)

@@ -11,7 +11,7 @@ import numpy as np
 
 from ...base.stage_timer import Clock
 from ..engine import Engine, Skipped
-from ..tiling import Run, Tiling
+from ..tiling.tiling import Run, Tiling
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
 OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..numerics.tiles import Tiles
+from ...numerics.tiles import Tiles
 
 
 @dataclass(frozen=True, eq=False)

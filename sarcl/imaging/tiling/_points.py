@@ -1,0 +1,157 @@
+"""The tiling of listed points: tiles along a space-filling curve, in bands of the list."""
+
+from __future__ import annotations
+
+import itertools
+from collections.abc import Callable, Iterable, Iterator, Sequence
+from typing import Any
+
+import numpy as np
+
+from ...model.image_grid import ImageGrid
+from ...numerics.tiles import Tiles, tile_points
+from ...opencl.device import Device
+from .tiling import Orders, Part, Roots, Run, Section, Tiling
+from .tree import Tree
+
+
+class PointTiling(Tiling):
+    """Listed points in tiles along a space-filling curve. A band is LISTED_BAND points in the order of the list."""
+
+    LISTED_BAND = 2**18
+
+    row_shape, in_rows, offset_bytes, leaf_sides = (), False, 24, (16,)
+
+    def __init__(self, grid: ImageGrid, side: int) -> None:
+        super().__init__(grid, side)
+        self.empty = None if grid.empty is None else grid.empty.ravel()
+        self.n_bands = -(-grid.size // self.LISTED_BAND)
+        self._full = [self._cells(b) for b in range(self.n_bands)]
+        self.radius = max(float(self.band(b)[0].radius.max()) for b in range(self.n_bands))
+
+    def extent(self, first: int, last: int) -> slice:
+        return slice(first * self.LISTED_BAND, min(last * self.LISTED_BAND, self.grid.size))
+
+    def pixels(self, first: int, last: int) -> int:
+        return sum(self._padded(b) for b in range(first, last))
+
+    def _empty_in(self, band: int) -> np.ndarray | None:
+        """Which cells of a band are empty, (n,) bool; None: no cell of the grid is."""
+        return None if self.empty is None else self.empty[self.extent(band, band + 1)]
+
+    def _cells(self, band: int) -> int:
+        """Cells of a band that are not empty."""
+        empty = self._empty_in(band)
+        return self.count(band, band + 1) if empty is None else int((~empty).sum())
+
+    def _padded(self, band: int) -> int:
+        return -(-max(self._full[band], 1) // self.per_tile) * self.per_tile
+
+    def _points(self, band: int) -> np.ndarray:
+        """Positions of the cells of a band, m (n, 3)."""
+        return self.grid.positions.reshape(-1, 3)[self.extent(band, band + 1)]
+
+    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
+        points, empty = self._points(index), self._empty_in(index)
+        if empty is None:
+            return tile_points(points, self.center, self.per_tile)
+        # a band without a point keeps a tile, of one cell whose pixel is set to 0
+        cells = np.flatnonzero(~empty) if self._full[index] else np.zeros(1, np.int64)
+        tiles, order = tile_points(points[cells], self.center, self.per_tile)
+        return tiles, cells[order]
+
+    def tile_sizes(self, first: int, last: int) -> np.ndarray:
+        sizes = []
+        for b in range(first, last):
+            full = np.full(self._padded(b) // self.per_tile, self.per_tile)
+            full[-1] -= self._padded(b) - self._full[b]
+            sizes.append(full)
+        return np.concatenate(sizes)
+
+    def positions(self, first: int, last: int, orders: Orders) -> np.ndarray:
+        parts = [self._points(b)[order] for b, order in zip(range(first, last), orders, strict=True)]
+        return np.concatenate(parts).reshape(-1, self.per_tile, 3)
+
+    def place(self, values: np.ndarray, run: Run, start: int, orders: Orders, flat: Any) -> None:
+        skipped, taken = start * self.per_tile, 0  # values before those given, and those placed
+        for band, order in zip(range(*run), orders, strict=True):
+            assert order is not None
+            cells = order[skipped : skipped + len(values) - taken]
+            skipped = max(0, skipped - len(order))
+            if len(cells) == 0:
+                continue
+            pixels, empty = flat[self.extent(band, band + 1)], self._empty_in(band)
+            pixels[cells] = values[taken : taken + len(cells)]
+            if empty is not None:
+                pixels[empty] = 0
+            taken += len(cells)
+
+    def outline(self) -> np.ndarray:
+        """Middle and four corners of the bounds, m (5, 3)."""
+        low, high = self.grid.bounds
+        signs = np.array([[0, 0, 0], [1, 1, 1], [1, -1, -1], [-1, 1, -1], [-1, -1, 1]])
+        return np.asarray((low + high) / 2 + signs * (high - low) / 2)
+
+    def tree(self, first: int, last: int, factors: Sequence[int]) -> Tree:
+        return self._tree(self.bands(first, last)[0], (first, last), factors)
+
+    def _tree(self, tiles: Tiles, run: Run, factors: Sequence[int]) -> Tree:
+        """Tree over the tiles of a run of bands: tiles of a level are runs of leaves along the curve."""
+        edge = np.cumsum([0, *(self._padded(b) // self.per_tile for b in range(*run))])
+        starts = [
+            np.unique(np.concatenate([[*range(a, b, factor**2), b] for a, b in itertools.pairwise(edge.tolist())]))
+            for factor in factors
+        ]
+        centers = []
+        for begin in starts:
+            low = np.minimum.reduceat(tiles.references, begin[:-1])
+            high = np.maximum.reduceat(tiles.references, begin[:-1])
+            centers.append((low + high) / 2)
+        children = [np.searchsorted(below, above) for above, below in itertools.pairwise(starts)]
+        return Tree(tuple(centers), tuple(children), tiles, np.arange(tiles.n_tiles))
+
+    def parts(self, run: Run, factor: int, most: Callable[[int], int], whole: bool) -> Iterator[Part]:
+        roots = self.n_roots(*run, factor)
+        step = max(1, most(factor))
+        for low in range(0, roots, step):
+            yield Part(*run, low, min(low + step, roots))
+
+    def sections(self, parts: Iterable[Part], factors: Sequence[int]) -> Iterator[Section]:
+        for run, some in itertools.groupby(parts, lambda part: part[:2]):
+            tiles, orders = self.bands(*run)
+            tree, sizes = self._tree(tiles, run, factors), self.tile_sizes(*run)
+            line = np.repeat(range(*run), [self.n_roots(b, b + 1, factors[0]) for b in range(*run)])
+            roots = Roots(tree.centers[0], line)
+            for part in some:
+                below = tree.part(part.low, part.high)
+                yield Section(part, below, roots, np.arange(part.low, part.high), sizes[below.slot], orders)
+
+    def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
+        slot = section.tree.slot
+        self.place_sums(device, sums, section.part[:2], (slot[0], slot[-1] + 1), section.orders, flat)
+
+    def n_roots(self, first: int, last: int, factor: int) -> int:
+        return sum(-(-self._padded(b) // self.per_tile // factor**2) for b in range(first, last))
+
+    def part_size(self, part: Part, factor: int) -> tuple[int, int]:
+        roots = part.high - part.low
+        return roots, min(self.pixels(*part[:2]), roots * factor**2 * self.per_tile)
+
+    def root_bands(self, factor: int) -> int:
+        return 1
+
+    def root_leaves(self, factor: int, bands: int) -> int:
+        return factor**2
+
+    def leaf_radius(self, side: int) -> float:
+        return self.radius
+
+    def level_radii(self, factors: Sequence[int]) -> list[float]:
+        return self.tree(0, self.n_bands, factors).radii()
+
+    def child_distance(self, radius: float, below: float) -> float:
+        return radius
+
+    @property
+    def longest_side(self) -> int:
+        return int(np.sqrt(self.grid.size))
