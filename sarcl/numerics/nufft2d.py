@@ -16,7 +16,7 @@ from ..opencl import fft
 from ..opencl.device import Device
 from . import cost_model
 from .error_bounds import FLOAT32, sum_rounding
-from .interpolation import TERMS, Interpolator, interpolator
+from .interpolation import TERMS, Interpolator, interpolator, lower_bound
 from .plan import LEAST_TOLERANCE
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
@@ -54,34 +54,52 @@ def make_plan(
 
     cycles, step  (n_rows, 2): cycles of phase per pixel of a row's middle sample, and their growth per sample
     tile          cells per side of a tile
-    The error is relative to the larger of |I| and sqrt(pixels sum |s|^2), the norm if samples added at random.
+    The error is relative to the larger of |I| and sqrt(pixels sum |s|^2), the norm if samples added at random. Only
+    interpolation tables of plans that can be the cheapest are made.
     """
     most = most_in_a_cell(shape, cycles, step, n_samples)
     density = max(1.0, np.sqrt(most))
-    best: GridPlan | None = None
+
+    def aliases(kernel_error: float) -> float:
+        return float(density * (2 * kernel_error + kernel_error**2))
+
+    def error_of(kernel: Interpolator, length: tuple[int, int]) -> float:
+        cells = float(length[0]) * length[1]
+        in_cell = most * shape[0] * shape[1] / cells
+        rounding = sum_rounding(max(1, int(in_cell * kernel.taps**2)), int(min(cells, 2**60))) + 6 * FLOAT32.unit
+        rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
+        return aliases(kernel.error) + rounding
+
+    candidates = _candidates(shape, len(cycles) * n_samples, tile)
+    if tolerance >= LEAST_TOLERANCE:
+        for taps, oversample, length, cost in sorted(candidates, key=lambda candidate: candidate[-1]):
+            if aliases(lower_bound(taps, oversample)) <= tolerance:
+                kernel = interpolator(taps, oversample)
+                error = error_of(kernel, length)
+                if error <= tolerance:
+                    return GridPlan(kernel, length, density, error, cost)
     least = np.inf
+    for bound, taps, oversample, length in sorted((lower_bound(t, s), t, s, n) for t, s, n, _ in candidates):
+        if aliases(bound) < least:
+            least = min(least, error_of(interpolator(taps, oversample), length))
+    reach = rounded_up(max(least, LEAST_TOLERANCE))
+    raise ToleranceUnreachable(
+        tolerance, reach if reach < 1 else None, "rounding of the float32 grid", "backproject goes further",
+        how="by a polar format image",
+    )  # fmt: skip
+
+
+def _candidates(shape: tuple[int, ...], n_samples: int, tile: int) -> list[tuple[int, float, tuple[int, int], float]]:
+    """Taps, oversampling, cells of the grid (rows, columns) and cost of every plan for so many samples of all rows."""
+    out = []
     for taps in TERMS:
         for oversample in OVERSAMPLE:
-            kernel = interpolator(taps, oversample)
             room = max(2 * taps + tile + 4, 4 * taps)
-            length = tuple(2 * fft.good_length(-(-int(max(np.ceil(oversample * n), room)) // 2)) for n in shape)
-            cells = float(length[0]) * length[1]
-            in_cell = most * shape[0] * shape[1] / cells
-            rounding = sum_rounding(max(1, int(in_cell * taps**2)), int(min(cells, 2**60))) + 6 * FLOAT32.unit
-            rounding *= _growth(kernel, shape, length) * max(1.0, np.sqrt(in_cell))  # samples of a cell may be alike
-            error = density * (2 * kernel.error + kernel.error**2) + rounding
-            least = min(least, error)
-            cost = len(cycles) * n_samples * (cost_model.GRID_SAMPLE + cost_model.GRID_TAP * taps**2)
-            cost += cost_model.GRID_CELL * cells * np.log2(cells)
-            if error <= tolerance and (best is None or cost < best.cost):
-                best = GridPlan(kernel, (length[0], length[1]), density, error, cost)
-    if best is None or tolerance < LEAST_TOLERANCE:
-        reach = rounded_up(max(least, LEAST_TOLERANCE))
-        raise ToleranceUnreachable(
-            tolerance, reach if reach < 1 else None, "rounding of the float32 grid", "backproject goes further",
-            how="by a polar format image",
-        )  # fmt: skip
-    return best
+            rows, columns = (2 * fft.good_length(-(-int(max(np.ceil(oversample * n), room)) // 2)) for n in shape)
+            cells = float(rows) * columns
+            cost = n_samples * (cost_model.GRID_SAMPLE + cost_model.GRID_TAP * taps**2)
+            out.append((taps, oversample, (rows, columns), cost + cost_model.GRID_CELL * cells * np.log2(cells)))
+    return out
 
 
 def _growth(kernel: Interpolator, shape: tuple[int, ...], length: tuple[int, ...]) -> float:

@@ -295,6 +295,32 @@ def test_progress_of_polar_format_is_reported_up_to_its_end():
     assert list(done) == sorted(done) and done[-1] == 1000
 
 
+def test_a_plan_is_the_same_when_more_interpolation_tables_are_made(monkeypatch):
+    cycles, step = np.linspace(-0.3, 0.3, 80).reshape(40, 2), np.full((40, 2), 8e-4)
+    tables = []
+
+    def counted(taps, oversample):
+        tables.append((taps, oversample))
+        return interpolator(taps, oversample)
+
+    def plan(tolerance):
+        tables.clear()
+        try:
+            made = nufft2d.make_plan(tolerance, (60, 70), cycles, step, 64, 8)
+        except sarcl.ToleranceUnreachable as refused:
+            return refused.best, len(tables)
+        return (made.interpolator.taps, made.length, made.predicted_error, made.cost), len(tables)
+
+    monkeypatch.setattr(nufft2d, "interpolator", counted)
+    for tolerance in (0.5, 1e-1, 1e-3, 1e-5, 1e-6, 1e-7):
+        chosen, few = plan(tolerance)
+        with monkeypatch.context() as patch:
+            patch.setattr(nufft2d, "lower_bound", lambda taps, oversample: 0.0)  # no candidate is passed over
+            every, many = plan(tolerance)
+        assert chosen == every and few <= min(many, 12)
+    assert many == 48
+
+
 def test_an_image_of_larger_error_than_its_tolerance_is_an_error(monkeypatch):
     plan = nufft2d.make_plan
 

@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl.base import constants
-from sarcl.numerics import cost_model, error_bounds, interpolation, range_profiles
+from sarcl.numerics import cost_model, error_bounds, interpolation, nufft2d, range_profiles
 from sarcl.numerics.interpolation import interpolator
 
 
@@ -43,7 +43,7 @@ def test_more_taps_and_finer_profiles_reduce_the_error():
 
 @pytest.mark.parametrize("taps", interpolation.TERMS)
 def test_the_lower_bound_of_an_interpolation_error_is_below_it_and_close(taps):
-    for oversample in interpolation.OVERSAMPLE:
+    for oversample in (*interpolation.OVERSAMPLE, *nufft2d.OVERSAMPLE):
         bound, error = interpolation.lower_bound(taps, oversample), interpolator(taps, float(oversample)).error
         assert bound <= error <= 5 * bound
 
