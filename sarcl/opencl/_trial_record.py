@@ -22,7 +22,7 @@ def find(key: str) -> bool | None:
 
 
 def keep(key: str, fp64: bool) -> None:
-    """Record that the device of `key` passed its trial."""
+    """Record that the device of `key` passed its trial, and whether it computes in float64."""
     import tempfile
 
     _record()[key] = fp64

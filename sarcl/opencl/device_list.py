@@ -44,8 +44,8 @@ def devices() -> tuple[DeviceInfo, ...]:
     """Every OpenCL device of this machine with the result of its trial; empty where there is no OpenCL platform.
 
     A trial that succeeds is recorded in the user's cache folder (sarcl/devices.json) with the versions of driver and
-    platform; later processes do not repeat it. A device that fails is tried again in each process, and `sarcl devices`
-    tries every device again.
+    platform; later processes do not repeat it. A device whose trial fails, in float32 or in the float64 that it offers,
+    is tried again in each process, and `sarcl devices` tries every device again.
     """
     return tuple(tried(info.index) for info, _ in listed())
 
@@ -102,8 +102,10 @@ def tried(index: int) -> DeviceInfo:
         why = _trial(handle, np.float32)
         if why:
             return replace(info, why=why)
-        fp64 = bool(handle.double_fp_config) and not _trial(handle, np.float64)
-        _trial_record.keep(key, fp64)
+        offered = bool(handle.double_fp_config)
+        fp64 = offered and not _trial(handle, np.float64)
+        if fp64 == offered:  # a trial in float64 may have failed by chance: the next process repeats it
+            _trial_record.keep(key, fp64)
     return replace(info, works=True, why="", fp64=fp64)
 
 

@@ -187,6 +187,36 @@ def test_a_device_that_fails_is_passed_over_not_recorded_and_tried_by_the_next_p
         open_device("gpu")
 
 
+def test_a_trial_in_float64_that_failed_once_is_repeated_by_the_next_process(record, monkeypatch):
+    two_devices(monkeypatch, works=("gpu", "cpu"))
+    for _, handle in device_list.listed():
+        handle.double_fp_config = 63  # both offer float64
+    failing, trials = {"gpu"}, []
+
+    def trial(handle, dtype):
+        trials.append((handle.kind, dtype))
+        return "out of memory" if dtype is np.float64 and handle.kind in failing else ""
+
+    monkeypatch.setattr(device_list, "_trial", trial)
+    assert [(d.works, d.fp64) for d in sarcl.devices()] == [(True, False), (True, True)]
+    assert "gpu" not in record.path.read_text()
+    failing.clear()
+    record.new_process()
+    trials.clear()
+    assert [(d.works, d.fp64) for d in sarcl.devices()] == [(True, True), (True, True)]
+    assert trials == [("gpu", np.float32), ("gpu", np.float64)]  # the cpu's verdict was recorded
+    record.new_process()
+    assert all(d.fp64 for d in sarcl.devices()) and len(trials) == 2
+
+
+def test_a_device_that_offers_no_float64_is_not_tried_again(record, monkeypatch):
+    tried = two_devices(monkeypatch, works=("gpu", "cpu"))
+    for _ in range(2):
+        assert not any(d.fp64 for d in sarcl.devices())
+        record.new_process()
+    assert tried == ["gpu", "cpu"]
+
+
 def test_without_any_platform_the_remedy_is_named(tmp_path):
     code = (
         "import sarcl\nprint(sarcl.devices())\nsarcl.backproject.__module__\n"
