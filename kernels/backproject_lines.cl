@@ -8,11 +8,15 @@
 //   T(m) = s~(m beta/FINE) exp(+j 2 pi kappa m beta/FINE),    W_b(i) = w_b(z_i) exp(+j 2 pi kappa (A_i - (n_i + b) beta/FINE))
 //
 // source    the image equation of sarcl/__init__.py. The part of the curvature that is not in A_i, rest_ij, is that of the pulse in
-//           the middle of GROUP pulses; a pulse whose own differs by more than limit_turn cycles, whose position differs by
-//           more than limit_place samples or whose step is more than limit_step samples per pixel is added pixel by
+//           the middle of GROUP pulses; a pulse whose own differs by more than limit_cycles cycles, whose position differs
+//           by more than limit_position samples or whose step is more than limit_step samples per pixel is added pixel by
 //           pixel instead, as are window edges: the planned error holds for every pulse.
-// symbols   i, j      line, and pixel in the line, about the tile's reference pixel (SIDE/2, SIDE/2)
-//           z_i       where A_i lies between samples of T; w_b weights, interp.clh's table form
+// symbols   i, j      line, and pixel in the line, about the tile's reference pixel (SIDE/2, SIDE/2); the lines are rows of the
+//                     image, or its columns where `transposed`
+//           A_i       half path of the middle of line i, with the constant part of its curvature, m
+//           beta      half path that a pixel along the line adds, m
+//           n_i, z_i  first sample of T for line i, and where A_i lies between samples; w_b weights, interp.clh's table form
+//           q         square of a pixel's offset from the reference pixel, m^2
 //           u, R0, a, w   as in range_phase.clh
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM as in the headers
 //           SIDE      of a tile, a multiple of VW;  FINE samples of T per pixel (1, 2, 4 or 8)
@@ -67,106 +71,111 @@ inline fv lanes(void) {
 #endif
 }
 
-// i times cycles kept in two parts (line_geometry.clh), less whole cycles of the first
-inline fv turns_of(fv i, float turn, float low) {
-    fv whole = i * turn;
-    return fma(i, (fv)low, whole - nearest(whole));
+// i times cycles per pixel in two parts (line_geometry.clh), less whole cycles of the first part
+inline fv cycles_of(fv i, float cycles, float cycles_low) {
+    fv product = i * cycles;
+    return fma(i, (fv)cycles_low, product - nearest(product));
 }
 
-// A group's pulse in the middle, and a pixel's steps: `step_i` from line to line, `step_j` along, m.
+// A group of pulses: the one in its middle, and the steps of pixels, m: `step_i` from line to line, `step_j` along a line.
 typedef struct {
-    line mid;
+    line_geometry middle;
     float step_i, step_j;
-    int turned;  // 1: lines run along columns
+    int transposed;
 } group;
 
-inline fv square_i(group s, fv i) { return i * i * (s.step_i * s.step_i); }
-inline fv square(group s, fv i, fv j) { return fma(j * j, (fv)(s.step_j * s.step_j), square_i(s, i)); }
+inline fv q_of_line(group pulses, fv i) { return i * i * (pulses.step_i * pulses.step_i); }
+inline fv q_of(group pulses, fv i, fv j) {
+    return fma(j * j, (fv)(pulses.step_j * pulses.step_j), q_of_line(pulses, i));
+}
 
-// May the pulse have the group's curvature off its lines' middles? Looks where rest_ij is largest: at the corners or half
-// way between them.
-inline int fits(group shared, line s, float limit_turn, float limit_place) {
-    float off = 0, misplaced = 0;
-    for (int e = 0; e < 6; e += VW) {
+// Whether rest_ij of a pulse may be that of the group's middle pulse: compared where it is largest, at the corners of the
+// tile and half-way between them.
+inline int fits(group pulses, line_geometry line, float limit_cycles, float limit_position) {
+    float cycles = 0, position = 0;  // largest differences
+    for (int corner = 0; corner < 6; corner += VW) {
         fv i, j, none = 0;
 #pragma unroll
         for (int l = 0; l < VW; l++) {
-            ((float *)&i)[l] = ((e + l) % 3 - 1) * (SIDE / 2);
-            ((float *)&j)[l] = ((e + l) / 3 % 2 ? 1 : -1) * (SIDE / 2);
+            ((float *)&i)[l] = ((corner + l) % 3 - 1) * (SIDE / 2);
+            ((float *)&j)[l] = ((corner + l) / 3 % 2 ? 1 : -1) * (SIDE / 2);
         }
-        fv qi = square_i(shared, i), q = square(shared, i, j);
-        fv centre = bend(s, i, none, qi), rest = bend(s, i, j, q) - centre;
-        fv rest_mid = bend(shared.mid, i, j, q) - bend(shared.mid, i, none, qi);
-        off = fmax(off, largest(fabs(fma((fv)s.kappa, rest, (fv)(-shared.mid.kappa) * rest_mid))));
-        // half of the mean of a line's ends is in the line's position
-        fv in_place = 0.25f * (rest + bend(s, i, -j, q) - centre);
-        misplaced = fmax(misplaced, largest(fmax(fabs(rest - in_place), fabs(in_place)) * fabs(s.sigma)));
+        fv q_line = q_of_line(pulses, i), q = q_of(pulses, i, j), centre = curvature_at(line, i, none, q_line);
+        fv rest = curvature_at(line, i, j, q) - centre;
+        fv rest_middle = curvature_at(pulses.middle, i, j, q) - curvature_at(pulses.middle, i, none, q_line);
+        fv difference = fma((fv)line.kappa, rest, (fv)(-pulses.middle.kappa) * rest_middle);
+        cycles = fmax(cycles, largest(fabs(difference)));
+        // half of the mean of rest_ij at a line's ends is in the line's position
+        fv in_position = 0.25f * (rest + curvature_at(line, i, -j, q) - centre);
+        position = fmax(position, largest(fmax(fabs(rest - in_position), fabs(in_position)) * fabs(line.sigma)));
     }
-    return off <= limit_turn && misplaced <= limit_place;
+    return cycles <= limit_cycles && position <= limit_position;
 }
 
-// Weights of all lines of a pulse, and n_i[]; 0 where a line's samples lie too far off to be kept, as for a steep line.
-inline int weigh_lines(group shared, line s, __global const float *restrict weights, __local float *w, iv *n_i) {
+// Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
+// steep line.
+inline int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
     fv lane = lanes();
-    float to_line = FINE / s.along, reach = 0;
+    float samples_of_T = FINE / line.along, farthest = 0;  // samples of T per sample of the profile
 #pragma unroll
     for (int v = 0; v < VECS; v++) {
         fv i = lane + (fv)(v * VW - SIDE / 2), none = 0, end = (fv)(SIDE / 2);
-        fv b = bend(s, i, none, square_i(shared, i)), q = square(shared, i, end);
-        fv in_place = 0.25f * (bend(s, i, end, q) + bend(s, i, -end, q)) + (fv)0.5f * b;
-        fv place = fma(in_place, (fv)s.sigma, i * s.across);
-        fv e = place * to_line - (fv)(0.5f * (LINE_TAPS - 1)), first = nearest(e), z = e - first;
-        reach = fmax(reach, largest(fabs(e)));
-        n_i[v] = nearest_int(e);
+        fv centre = curvature_at(line, i, none, q_of_line(pulses, i)), q = q_of(pulses, i, end);
+        fv in_position = 0.25f * (curvature_at(line, i, end, q) + curvature_at(line, i, -end, q)) + (fv)0.5f * centre;
+        fv position = fma(in_position, (fv)line.sigma, i * line.across);
+        fv t = position * samples_of_T - (fv)(0.5f * (LINE_TAPS - 1)), first = nearest(t), z = t - first;
+        farthest = fmax(farthest, largest(fabs(t)));
+        n_i[v] = nearest_int(t);
         fv weight[LINE_TAPS];
         line_weights(z, weights, weight);
 #if SLOPE
         fv slope[LINE_TAPS];
         line_slopes(z, weights, slope);
 #endif
-        fv turn = fma(b, (fv)s.kappa, turns_of(i, s.turn_across, s.turn_across_low) + s.turn);
-        turn -= nearest(turn);
-        turn -= turns_of(first, s.fine, s.fine_low);
-        turn -= nearest(turn);
+        fv cycles = fma(centre, (fv)line.kappa, cycles_of(i, line.cycles_across, line.cycles_across_low) + line.cycles);
+        cycles -= nearest(cycles);
+        cycles -= cycles_of(first, line.fine_cycles, line.fine_cycles_low);
+        cycles -= nearest(cycles);
 #pragma unroll
-        for (int t = 0; t < LINE_TAPS; t++) {
-            fv x = turn - (fv)(t * s.fine), sine, cosine;
-            x = x - (fv)(t * s.fine_low);
-            x -= nearest(x);
-            sincos_turns(x, &sine, &cosine);
-            STORE(weight[t] * cosine, v, w + PARTS * t * SIDE);
-            STORE(weight[t] * sine, v, w + (PARTS * t + 1) * SIDE);
+        for (int b = 0; b < LINE_TAPS; b++) {
+            fv of_tap = cycles - (fv)(b * line.fine_cycles), sine, cosine;
+            of_tap = of_tap - (fv)(b * line.fine_cycles_low);
+            of_tap -= nearest(of_tap);
+            sincos_turns(of_tap, &sine, &cosine);
+            STORE(weight[b] * cosine, v, W + PARTS * b * SIDE);
+            STORE(weight[b] * sine, v, W + (PARTS * b + 1) * SIDE);
 #if SLOPE
-            fv per_metre = slope[t] * (to_line * s.sigma);
-            STORE(per_metre * cosine, v, w + (PARTS * t + 2) * SIDE);
-            STORE(per_metre * sine, v, w + (PARTS * t + 3) * SIDE);
+            fv per_metre = slope[b] * (samples_of_T * line.sigma);
+            STORE(per_metre * cosine, v, W + (PARTS * b + 2) * SIDE);
+            STORE(per_metre * sine, v, W + (PARTS * b + 3) * SIDE);
 #endif
         }
     }
-    return reach <= (float)(FINE * (SIDE / 2 + VW) - LINE_TAPS);
+    return farthest <= (float)(FINE * (SIDE / 2 + VW) - LINE_TAPS);
 }
 
-// T of a pulse: its profile at a line's step, carrier included. Sample FINE k + a is kept at T[a][k - from].
-inline void take_samples(line s, __global const float *restrict row, int stride, int origin,
+// T of a pulse: its profile at the step of a line, carrier included. Sample FINE k + a is stored at T[a][k - from].
+inline void take_samples(line_geometry line, __global const float *restrict row, int stride, int origin,
                          __global const float *restrict table, int from, int vectors, __local float *T) {
     fv lane = lanes();
     for (int a = 0; a < FINE; a++)
         for (int v = 0; v < vectors; v++) {
-            fv m = (lane + (fv)(v * VW + from)) * (fv)FINE + (fv)a, g, h, sine, cosine;
-            look_up(row, stride, origin, (iv)s.base, fma(m, (fv)(s.along * (1.0f / FINE)), (fv)s.frac), table, &g, &h);
-            sincos_turns(turns_of(m, s.fine, s.fine_low), &sine, &cosine);
-            STORE(fma(g, cosine, -h * sine), v, T + 2 * a * MOST);
-            STORE(fma(g, sine, h * cosine), v, T + (2 * a + 1) * MOST);
+            fv m = (lane + (fv)(v * VW + from)) * (fv)FINE + (fv)a, re, im, sine, cosine;
+            fv t = fma(m, (fv)(line.along * (1.0f / FINE)), (fv)line.frac);
+            look_up(row, stride, origin, (iv)line.base, t, table, &re, &im);
+            sincos_turns(cycles_of(m, line.fine_cycles, line.fine_cycles_low), &sine, &cosine);
+            STORE(fma(re, cosine, -im * sine), v, T + 2 * a * MOST);
+            STORE(fma(re, sine, im * cosine), v, T + (2 * a + 1) * MOST);
         }
 }
 
-// Samples, weights and positions of a pulse as the `kept`-th of its group; 0: it does not fit, add it pixel by pixel.
-inline int keep(group shared, line s, int kept, __global const float *restrict row, int stride, int origin,
-                __global const float *restrict table, __global const float *restrict weights, float limit_turn,
-                float limit_place, float limit_step, __local float *T, __local float *W, __local int *at) {
+// Makes T, W and the positions `at` of a pulse, number `made` of its group; 0 where the pulse must be added pixel by pixel.
+inline int make_lines(group pulses, line_geometry line, int made, __global const float *restrict row, int stride, int origin,
+                      __global const float *restrict table, __global const float *restrict weights, float limit_cycles,
+                      float limit_position, float limit_step, __local float *T, __local float *W, __local int *at) {
     iv n_i[VECS];
-    if (!(fabs(s.along) <= limit_step) || !fits(shared, s, limit_turn, limit_place)) return 0;
-    if (!weigh_lines(shared, s, weights, W + kept * W_SIZE, n_i)) return 0;
+    if (!(fabs(line.along) <= limit_step) || !fits(pulses, line, limit_cycles, limit_position)) return 0;
+    if (!weigh_lines(pulses, line, weights, W + made * W_SIZE, n_i)) return 0;
     int lowest = 1 << 20, highest = -(1 << 20);
     for (int r = 0; r < SIDE; r++) {
         lowest = min(lowest, ((int *)n_i)[r]);
@@ -178,11 +187,11 @@ inline int keep(group shared, line s, int kept, __global const float *restrict r
 #pragma unroll
         for (int b = 0; b < LINE_TAPS; b++) {
             int m = ((int *)n_i)[r] + b;
-            at[kept * AT_SIZE + r * LINE_TAPS + b] =
-                kept * T_SIZE + (m & (FINE - 1)) * 2 * MOST + (m >> FINE_BITS) - SIDE / 2 - from;
+            at[made * AT_SIZE + r * LINE_TAPS + b] =
+                made * T_SIZE + (m & (FINE - 1)) * 2 * MOST + (m >> FINE_BITS) - SIDE / 2 - from;
         }
     }
-    take_samples(s, row, stride, origin, table, from, vectors, T + kept * T_SIZE);
+    take_samples(line, row, stride, origin, table, from, vectors, T + made * T_SIZE);
     return 1;
 }
 
@@ -198,100 +207,104 @@ inline int keep(group shared, line s, int kept, __global const float *restrict r
 #define EACH(what) what(0)
 #endif
 #define BEGIN(v) fv re##v = 0, im##v = 0;
-#define ADD(v)                                   \
-    {                                            \
-        fv g = LOAD(v, t), h = LOAD(v, t + MOST); \
-        re##v = fma(g, wr, fma(-h, wi, re##v));  \
-        im##v = fma(g, wi, fma(h, wr, im##v));   \
-        ADD_SLOPE(v)                             \
+#define ADD(v)                                               \
+    {                                                        \
+        fv t_re = LOAD(v, t), t_im = LOAD(v, t + MOST);       \
+        re##v = fma(t_re, w_re, fma(-t_im, w_im, re##v));    \
+        im##v = fma(t_re, w_im, fma(t_im, w_re, im##v));     \
+        ADD_SLOPE(v)                                         \
     }
 #define END(v) re[v] = re##v, im[v] = im##v;
 #if SLOPE
 #define BEGIN_SLOPE(v) fv slope_re##v = 0, slope_im##v = 0;
-#define ADD_SLOPE(v)                                         \
-    slope_re##v = fma(g, dr, fma(-h, di, slope_re##v));      \
-    slope_im##v = fma(g, di, fma(h, dr, slope_im##v));
+#define ADD_SLOPE(v)                                                       \
+    slope_re##v = fma(t_re, dw_re, fma(-t_im, dw_im, slope_re##v));        \
+    slope_im##v = fma(t_re, dw_im, fma(t_im, dw_re, slope_im##v));
 #define END_SLOPE(v) slope_re[v] = slope_re##v, slope_im[v] = slope_im##v;
 #else
 #define ADD_SLOPE(v)
 #endif
 
-// SUMS vectors of line r from pixel j0 on: the group's pulses, then the curvature they share.
-inline void sum_line(group shared, int r, int j0, int kept, __local const float *T, __local const float *W,
+// SUMS vectors of pixels of line r from pixel j0 on, both counted from 0: the `made` pulses of the group, then the rest_ij
+// that they share.
+inline void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
                      __local const int *at, fv *re, fv *im) {
     EACH(BEGIN)
 #if SLOPE
     fv slope_re[SUMS], slope_im[SUMS];
     EACH(BEGIN_SLOPE)
 #endif
-    for (int f = 0; f < kept; f++) {
-        __local const float *w = W + f * W_SIZE + r;
-        __local const int *row_at = at + f * AT_SIZE + r * LINE_TAPS;
+    for (int p = 0; p < made; p++) {
+        __local const float *w = W + p * W_SIZE + r;
+        __local const int *at_line = at + p * AT_SIZE + r * LINE_TAPS;
 #pragma unroll
         for (int b = 0; b < LINE_TAPS; b++) {
-            fv wr = (fv)w[PARTS * b * SIDE], wi = (fv)w[(PARTS * b + 1) * SIDE];
+            fv w_re = (fv)w[PARTS * b * SIDE], w_im = (fv)w[(PARTS * b + 1) * SIDE];
 #if SLOPE
-            fv dr = (fv)w[(PARTS * b + 2) * SIDE], di = (fv)w[(PARTS * b + 3) * SIDE];
+            fv dw_re = (fv)w[(PARTS * b + 2) * SIDE], dw_im = (fv)w[(PARTS * b + 3) * SIDE];
 #endif
-            __local const float *t = T + row_at[b] + j0;
+            __local const float *t = T + at_line[b] + j0;
             EACH(ADD)
         }
     }
     EACH(END)
-    fv i = (fv)(r - SIDE / 2), none = 0, centre = bend(shared.mid, i, none, square_i(shared, i));
+    line_geometry line = pulses.middle;
+    fv i = (fv)(r - SIDE / 2), none = 0, centre = curvature_at(line, i, none, q_of_line(pulses, i));
 #if SLOPE
     EACH(END_SLOPE)
-    fv end = (fv)(SIDE / 2), qe = square(shared, i, end);
-    fv in_place = 0.25f * (bend(shared.mid, i, end, qe) + bend(shared.mid, i, -end, qe)) - (fv)0.5f * centre;
+    fv end = (fv)(SIDE / 2), q_end = q_of(pulses, i, end);
+    fv in_position = 0.25f * (curvature_at(line, i, end, q_end) + curvature_at(line, i, -end, q_end)) - (fv)0.5f * centre;
 #endif
 #pragma unroll
     for (int v = 0; v < SUMS; v++) {
         fv j = lanes() + (fv)(j0 + v * VW - SIDE / 2), sine, cosine;
-        fv rest = bend(shared.mid, i, j, square(shared, i, j)) - centre, turn = rest * shared.mid.kappa;
+        fv rest = curvature_at(line, i, j, q_of(pulses, i, j)) - centre, cycles = rest * line.kappa;
 #if SLOPE
-        re[v] = fma(slope_re[v], rest - in_place, re[v]);
-        im[v] = fma(slope_im[v], rest - in_place, im[v]);
+        re[v] = fma(slope_re[v], rest - in_position, re[v]);
+        im[v] = fma(slope_im[v], rest - in_position, im[v]);
 #endif
-        sincos_turns(turn - nearest(turn), &sine, &cosine);
-        fv x = fma(re[v], cosine, -im[v] * sine);
+        sincos_turns(cycles - nearest(cycles), &sine, &cosine);
+        fv rotated = fma(re[v], cosine, -im[v] * sine);
         im[v] = fma(re[v], sine, im[v] * cosine);
-        re[v] = x;
+        re[v] = rotated;
     }
 }
 
 // One pulse at VW pixels of line i, each at a position and phase of its own.
-inline void add_each(group shared, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
-                     int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
-    line s = load_line(record, shared.turned);
-    fv q = square(shared, i, j), b = bend(s, i, j, q), g, h, sine, cosine;
-    fv from_tile = fma(b, (fv)s.sigma, fma(i, (fv)s.across, j * s.along));
-    fv turn = turns_of(i, s.turn_across, s.turn_across_low) + turns_of(j, s.turn_along, s.turn_along_low);
-    turn = fma(b, (fv)s.kappa, turn + s.turn);
+inline void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
+                       int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
+    line_geometry line = load_line(record, pulses.transposed);
+    fv q = q_of(pulses, i, j), bend = curvature_at(line, i, j, q), sample_re, sample_im, sine, cosine;
+    fv from_tile = fma(bend, (fv)line.sigma, fma(i, (fv)line.across, j * line.along));
+    fv cycles = cycles_of(i, line.cycles_across, line.cycles_across_low) + cycles_of(j, line.cycles_along, line.cycles_along_low);
+    cycles = fma(bend, (fv)line.kappa, cycles + line.cycles);
     iv inside = (from_tile >= (fv)record[L_NEAR]) & (from_tile <= (fv)record[L_FAR]);
 #if BEAM
-    fv toward = fma((fv)s.u.y, i, (fv)s.u.x * j);
-    fv lit = fma((fv)record[L_BY - shared.turned], i, (fv)record[L_BX + shared.turned] * j);
-    lit = fma((fv)-record[L_COS], curvature(s.u, toward, q) - toward, lit) + (fv)record[L_EDGE];
-    inside = inside & (lit >= 0);
+    // (x - T).b - |x - T| cos alpha
+    fv along_u = fma((fv)line.u.y, i, (fv)line.u.x * j);
+    fv margin = fma((fv)record[L_BY - pulses.transposed], i, (fv)record[L_BX + pulses.transposed] * j);
+    margin = fma((fv)-record[L_COS], curvature(line.u, along_u, q) - along_u, margin) + (fv)record[L_EDGE];
+    inside = inside & (margin >= 0);
 #endif
     if (as_int(record[L_STATE]) == INSIDE) inside = -1;
     // outside, the position is moved to delay 0, which every profile has
-    look_up(row, stride, origin, inside ? (iv)s.base : (iv)0, inside ? from_tile + s.frac : (fv)0.0f, table, &g, &h);
-    sincos_turns(turn - nearest(turn), &sine, &cosine);
-    g = inside ? g : (fv)0.0f;
-    h = inside ? h : (fv)0.0f;
-    *re = fma(g, cosine, fma(-h, sine, *re));
-    *im = fma(g, sine, fma(h, cosine, *im));
+    look_up(row, stride, origin, inside ? (iv)line.base : (iv)0, inside ? from_tile + line.frac : (fv)0.0f, table,
+            &sample_re, &sample_im);
+    sincos_turns(cycles - nearest(cycles), &sine, &cosine);
+    sample_re = inside ? sample_re : (fv)0.0f;
+    sample_im = inside ? sample_im : (fv)0.0f;
+    *re = fma(sample_re, cosine, fma(-sample_im, sine, *re));
+    *im = fma(sample_re, sine, fma(sample_im, cosine, *im));
 }
 
 // total[i], total[i + step], ... += x, as add_compensated
-inline void add_spread(__global float *total, __global float *error, size_t i, int step, fv x) {
+inline void add_with_step(__global float *total, __global float *error, size_t i, int step, fv x) {
     float hi[VW], lo[VW];
 #pragma unroll
     for (int l = 0; l < VW; l++) hi[l] = total[i + l * step];
-    pair s = exact_sum(LOAD(0, hi), x);
-    STORE(s.hi, 0, hi);
-    STORE(s.lo, 0, lo);
+    pair sum = exact_sum(LOAD(0, hi), x);
+    STORE(sum.hi, 0, hi);
+    STORE(sum.lo, 0, lo);
 #pragma unroll
     for (int l = 0; l < VW; l++) {
         total[i + l * step] = hi[l];
@@ -304,58 +317,60 @@ inline void add_spread(__global float *total, __global float *error, size_t i, i
 __kernel void backproject_lines(__global const float *restrict profiles, int stride, int origin,
                                 __global const float *restrict table, __global const float *restrict weights, int n,
                                 int n_used, __global const float *restrict constants, float step_x, float step_y,
-                                int first, int n_tiles, float limit_turn, float limit_place, float limit_step,
+                                int first, int n_tiles, float limit_cycles, float limit_position, float limit_step,
                                 __global float *restrict image, ulong pixels, __global int *restrict skipped,
                                 ulong local_offset) {
     __local float T[GROUP * T_SIZE];
     __local float W[GROUP * W_SIZE];
     __local int at[GROUP * AT_SIZE];
-    int k = first + get_global_id(0), missed = 0, unlit = 0;
+    int tile = first + get_global_id(0), missed = 0, unlit = 0;
 #if LOCAL
     profiles += 2 * (local_offset + (size_t)get_global_id(0) * n_used * stride);
 #endif
     profiles += 2 * origin;
-    __global const float *c = constants + get_global_id(0) * (size_t)n * N_LINE;
+    __global const float *records = constants + get_global_id(0) * (size_t)n * N_LINE;
     for (int start = 0; start < n_used; start += GROUP) {
-        int fast[GROUP], edge[GROUP], n_fast = 0, n_edge = 0, kept = 0;
+        int by_lines[GROUP], by_pixels[GROUP], n_lines = 0, n_pixels = 0, made = 0;  // pulses
         for (int p = start; p < min(start + GROUP, n_used); p++) {
-            int state = as_int(c[(size_t)p * N_LINE + L_STATE]);
+            int state = as_int(records[(size_t)p * N_LINE + L_STATE]);
             if (state == OUTSIDE) missed++;
             else if (state == UNLIT) unlit++;
-            else if (state == INSIDE) fast[n_fast++] = p;
-            else edge[n_edge++] = p;
+            else if (state == INSIDE) by_lines[n_lines++] = p;
+            else by_pixels[n_pixels++] = p;
         }
-        if (n_fast + n_edge == 0) continue;
-        __global const float *middle = c + (size_t)(n_fast ? fast[n_fast / 2] : edge[0]) * N_LINE;
-        group shared;
+        if (n_lines + n_pixels == 0) continue;
+        __global const float *middle = records + (size_t)(n_lines ? by_lines[n_lines / 2] : by_pixels[0]) * N_LINE;
+        group pulses;
         // lines run along the axis on which the range grows faster
-        shared.turned = fabs(middle[L_STEP_Y]) > fabs(middle[L_STEP_X]);
-        shared.step_i = shared.turned ? step_x : step_y;
-        shared.step_j = shared.turned ? step_y : step_x;
-        shared.mid = load_line(middle, shared.turned);
+        pulses.transposed = fabs(middle[L_STEP_Y]) > fabs(middle[L_STEP_X]);
+        pulses.step_i = pulses.transposed ? step_x : step_y;
+        pulses.step_j = pulses.transposed ? step_y : step_x;
+        pulses.middle = load_line(middle, pulses.transposed);
 
-        for (int f = 0; f < n_fast; f++) {
-            line s = load_line(c + (size_t)fast[f] * N_LINE, shared.turned);
-            __global const float *row = profiles + 2 * (size_t)fast[f] * stride;
-            if (keep(shared, s, kept, row, stride, origin, table, weights, limit_turn, limit_place, limit_step, T, W, at))
-                kept++;
+        for (int f = 0; f < n_lines; f++) {
+            line_geometry line = load_line(records + (size_t)by_lines[f] * N_LINE, pulses.transposed);
+            __global const float *row = profiles + 2 * (size_t)by_lines[f] * stride;
+            if (make_lines(pulses, line, made, row, stride, origin, table, weights, limit_cycles, limit_position, limit_step, T,
+                           W, at))
+                made++;
             else
-                edge[n_edge++] = fast[f];
+                by_pixels[n_pixels++] = by_lines[f];
         }
         for (int r = 0; r < SIDE; r++)
             for (int j0 = 0; j0 < SIDE; j0 += SUMS * VW) {
                 fv re[SUMS], im[SUMS];
-                sum_line(shared, r, j0, kept, T, W, at, re, im);
+                sum_line(pulses, r, j0, made, T, W, at, re, im);
 #pragma unroll
                 for (int v = 0; v < SUMS; v++) {
                     int j = j0 + v * VW;
-                    for (int f = 0; f < n_edge; f++)
-                        add_each(shared, c + (size_t)edge[f] * N_LINE, (fv)(r - SIDE / 2), lanes() + (fv)(j - SIDE / 2),
-                                 profiles + 2 * (size_t)edge[f] * stride, stride, origin, table, &re[v], &im[v]);
-                    size_t pixel = (size_t)k * (SIDE * SIDE) + (shared.turned ? j * SIDE + r : r * SIDE + j);
-                    if (shared.turned) {
-                        add_spread(image, image + 2 * pixels, pixel, SIDE, re[v]);
-                        add_spread(image + pixels, image + 3 * pixels, pixel, SIDE, im[v]);
+                    for (int f = 0; f < n_pixels; f++)
+                        add_pixels(pulses, records + (size_t)by_pixels[f] * N_LINE, (fv)(r - SIDE / 2),
+                                   lanes() + (fv)(j - SIDE / 2), profiles + 2 * (size_t)by_pixels[f] * stride, stride, origin,
+                                   table, &re[v], &im[v]);
+                    size_t pixel = (size_t)tile * (SIDE * SIDE) + (pulses.transposed ? j * SIDE + r : r * SIDE + j);
+                    if (pulses.transposed) {
+                        add_with_step(image, image + 2 * pixels, pixel, SIDE, re[v]);
+                        add_with_step(image + pixels, image + 3 * pixels, pixel, SIDE, im[v]);
                     } else {
                         add_compensated(image, image + 2 * pixels, pixel / VW, re[v]);
                         add_compensated(image + pixels, image + 3 * pixels, pixel / VW, im[v]);
@@ -364,9 +379,9 @@ __kernel void backproject_lines(__global const float *restrict profiles, int str
             }
     }
 #if !LOCAL
-    skipped[k] += missed;
+    skipped[tile] += missed;
 #if BEAM
-    skipped[n_tiles + k] += unlit;
+    skipped[n_tiles + tile] += unlit;
 #endif
 #endif
 }

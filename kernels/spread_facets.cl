@@ -8,6 +8,7 @@
 //           (docs/theory/facets.md)
 // symbols   a_k(p, f)  f^-e times the amplitude k/(2 sqrt(pi)) S I, and the weight of gains.clh; delta, kappa, sigma as in
 //                      geometry.clh
+//           in loops   p pulse, q pulse node, k tile, i vector of facets of a tile, l lane, m frequency
 //           channel    one polarisation at one frequency f_m: polarisation by polarisation, each with all f_m
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES      frequencies f_m
@@ -49,20 +50,21 @@ inline void put_channel(__global float *out, int channel, complex_v a, fv scale)
 #if ROUGH
 // Mean of exp(j q.rho) over a facet that is rough below its size: the rest of the coherent `mean`, and a random part
 // that re-radiates as the facet's diagram says (sarcl/scattering/_rough_surface.py:rough_mean).
-//   qn  cycles/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
-//   of  planes: rms height, m; number of the diagram; 1/width; 1/Omega; random re, im
-inline complex_v rough_mean(complex_v mean, fv qn, fv cosine, fv area, float wave, __global const float *restrict of, size_t at,
-                            size_t n) {
-    fv height = LOAD(at, of), diagram = LOAD(at, of + n), inverse_width = LOAD(at, of + 2 * n);
-    fv turns = min(fabs(qn * height), (fv)3.0f), fall = exp((fv)-39.478418f * turns * turns);
-    fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, c = max(cosine, (fv)0.0f), d = 0;
-    d = diagram == (fv)DIAGRAM_ISOTROPIC ? (fv)1.0f : d;
-    d = diagram == (fv)DIAGRAM_COS ? c : d;
-    d = diagram == (fv)DIAGRAM_COS2 ? c * c : d;
-    d = diagram == (fv)DIAGRAM_EXP ? exp(-delta * delta) : d;
-    fv coherent = sqrt(fall);
-    fv random = sqrt(d * ((fv)1.0f - fall) * LOAD(at, of + 3 * n) / max(area, (fv)1e-30f)) / wave;
-    return c_make(fma(coherent, mean.re, random * LOAD(at, of + 4 * n)), fma(coherent, mean.im, random * LOAD(at, of + 5 * n)));
+//   q_normal  cycles/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
+//   planes    rms height, m; number of the diagram; 1/width; 1/Omega; random re, im;  `at` counts vectors
+inline complex_v rough_mean(complex_v mean, fv q_normal, fv cosine, fv area, float wave, __global const float *restrict planes,
+                            size_t at, size_t n) {
+    fv height = LOAD(at, planes), diagram = LOAD(at, planes + n), inverse_width = LOAD(at, planes + 2 * n);
+    fv cycles = min(fabs(q_normal * height), (fv)3.0f), coherent_power = exp((fv)-39.478418f * cycles * cycles);
+    fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, ahead = max(cosine, (fv)0.0f), D = 0;
+    D = diagram == (fv)DIAGRAM_ISOTROPIC ? (fv)1.0f : D;
+    D = diagram == (fv)DIAGRAM_COS ? ahead : D;
+    D = diagram == (fv)DIAGRAM_COS2 ? ahead * ahead : D;
+    D = diagram == (fv)DIAGRAM_EXP ? exp(-delta * delta) : D;
+    fv coherent = sqrt(coherent_power);
+    fv random = sqrt(D * ((fv)1.0f - coherent_power) * LOAD(at, planes + 3 * n) / max(area, (fv)1e-30f)) / wave;
+    return c_make(fma(coherent, mean.re, random * LOAD(at, planes + 4 * n)),
+                  fma(coherent, mean.im, random * LOAD(at, planes + 5 * n)));
 }
 #endif
 
@@ -96,42 +98,42 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #elif CULL
     direction from_rx = from_tx;
 #endif
-    int dark = as_int(c[C_STATE]) == OUTSIDE;
+    int unseen = as_int(c[C_STATE]) == OUTSIDE;
 #if CULL
-    dark = dark || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
+    unseen = unseen || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
 #endif
     for (int i = 0; i < TILE / VW; i++) {
-        size_t at = (size_t)k * (TILE / VW) + i, to = here * (TILE / VW) + i;
-        __global float *put = out + to * CHANNELS * 2 * VW;
+        size_t at = (size_t)k * (TILE / VW) + i, node_vector = here * (TILE / VW) + i;
+        __global float *out_i = out + node_vector * CHANNELS * 2 * VW;
         float share[VW], is_front[VW], is_bright[VW];
 #pragma unroll
         for (int l = 0; l < VW; l++) {
             float now = seen[at * VW + l];
-            share[l] = dark ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
+            share[l] = unseen ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
         }
 
         offset x = load_offset(offsets, at, n_offsets);
-        triple one = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
-        triple two = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
+        triple edge_1 = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
+        triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
         fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
         fv tx_range, rx_range;
-        triple normal = t_cross(one, two), u = toward(from_tx, x, &tx_range);
+        triple normal = t_cross(edge_1, edge_2), u_t = toward(from_tx, x, &tx_range);
         fv twice_area = sqrt(t_dot(normal, normal));
         // blanks have no area
         normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
-        fv cosine_tx = t_dot(normal, u);
-        iv turn_over = (factor < 0) & (cosine_tx < 0);
-        normal = t_scale(turn_over ? (fv)-1.0f : (fv)1.0f, normal);
-        cosine_tx = turn_over ? -cosine_tx : cosine_tx;
-        triple h, v;
-        polarisation(u, vertical, other, &h, &v);
+        fv cosine_tx = t_dot(normal, u_t);
+        iv faces_away = (factor < 0) & (cosine_tx < 0);
+        normal = t_scale(faces_away ? (fv)-1.0f : (fv)1.0f, normal);
+        cosine_tx = faces_away ? -cosine_tx : cosine_tx;
+        triple h_t, v_t;
+        polarisation(u_t, vertical, other, &h_t, &v_t);
 #if BISTATIC
-        triple ur = toward(from_rx, x, &rx_range), hr, vr;
-        polarisation(ur, vertical, other, &hr, &vr);
-        triple both = t_add(u, ur);
-        iv front = (cosine_tx > 0) & (t_dot(normal, ur) > 0);
+        triple u_r = toward(from_rx, x, &rx_range), h_r, v_r;
+        polarisation(u_r, vertical, other, &h_r, &v_r);
+        triple u_sum = t_add(u_t, u_r);
+        iv front = (cosine_tx > 0) & (t_dot(normal, u_r) > 0);
 #else
-        triple both = t_scale((fv)2.0f, u), ur = u;
+        triple u_sum = t_scale((fv)2.0f, u_t), u_r = u_t;
         iv front = cosine_tx > 0;
         rx_range = tx_range;
 #endif
@@ -139,59 +141,59 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
         STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
         STORE(fabs(amplitude), 0, is_bright);
 #pragma unroll
-        for (int l = 0; l < VW; l++) marks[to * VW + l] = (is_front[l] != 0 ? FRONT : 0) | (is_bright[l] > 0 ? BRIGHT : 0);
+        for (int l = 0; l < VW; l++) marks[node_vector * VW + l] = (is_front[l] != 0 ? FRONT : 0) | (is_bright[l] > 0 ? BRIGHT : 0);
         if (largest(fabs(amplitude)) <= 0) {
             for (int channel = 0; channel < CHANNELS; channel++)
-                put_channel(put, channel, c_make((fv)0.0f, (fv)0.0f), (fv)0.0f);
+                put_channel(out_i, channel, c_make((fv)0.0f, (fv)0.0f), (fv)0.0f);
             continue;
         }
 
-        fv b = t_dot(both, one), g = t_dot(both, two);
-        scattering s;
+        fv path_1 = t_dot(u_sum, edge_1), path_2 = t_dot(u_sum, edge_2);
+        scattering S;
 #if WEIGHTS
-        sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)q, range);
+        antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, range);
         complex_v gain;
 #endif
         for (int m = 0; m < NODES; m++) {
             if (m == 0 || DISPERSIVE) {
 #if METAL
-                complex_v root = c_make((fv)0.0f, (fv)0.0f);
+                complex_v inverse_root = c_make((fv)0.0f, (fv)0.0f);
 #else
-                __global const float *of = facets + (F_M + 2 * m) * (size_t)n_offsets;
-                complex_v root = c_make(LOAD(at, of), LOAD(at, of + n_offsets));
+                __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)n_offsets;
+                complex_v inverse_root = c_make(LOAD(at, root_planes), LOAD(at, root_planes + n_offsets));
 #endif
 #if BISTATIC
-                s = scatter(normal, u, h, v, ur, hr, vr, root);
+                S = scatter(normal, u_t, h_t, v_t, u_r, h_r, v_r, inverse_root);
 #else
-                s = scatter_back(normal, u, h, v, root);
+                S = scatter_back(normal, u_t, h_t, v_t, inverse_root);
 #endif
             }
-            complex_v mean = triangle_mean(b * nodes[m], g * nodes[m]);
+            complex_v mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
 #if ROUGH
-            fv along = t_dot(both, normal), size = max(sqrt(t_dot(both, both)), (fv)1e-6f);
-            mean = rough_mean(mean, along * nodes[m], along / size, (fv)0.5f * twice_area, nodes[m],
+            fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
+            mean = rough_mean(mean, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area, nodes[m],
                               facets + F_ROUGH * (size_t)n_offsets, at, n_offsets);
 #endif
 #if WEIGHTS
-            if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[2 * NODES + m]);
+            if (m == 0 || VARIES) gain = weight(view, patterns, second, nodes[2 * NODES + m]);
             mean = c_mul(mean, gain);
 #endif
             fv scale = amplitude * nodes[NODES + m];
             int channel = m;
 #if HH
-            put_channel(put, channel, c_mul(s.hh, mean), scale);
+            put_channel(out_i, channel, c_mul(S.hh, mean), scale);
             channel += NODES;
 #endif
 #if HV
-            put_channel(put, channel, c_mul(s.hv, mean), scale);
+            put_channel(out_i, channel, c_mul(S.hv, mean), scale);
             channel += NODES;
 #endif
 #if VH
-            put_channel(put, channel, c_mul(s.vh, mean), scale);
+            put_channel(out_i, channel, c_mul(S.vh, mean), scale);
             channel += NODES;
 #endif
 #if VV
-            put_channel(put, channel, c_mul(s.vv, mean), scale);
+            put_channel(out_i, channel, c_mul(S.vv, mean), scale);
 #endif
         }
     }
@@ -224,22 +226,22 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
         __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
         if (state == OUTSIDE) continue;
-        int real = k == n_tiles - 1 ? last : TILE;
+        int n_facets = k == n_tiles - 1 ? last : TILE;
 #if CULL
         direction from_tx = load_direction(c, C_UX, C_LOW), from_rx = from_tx;
 #if BISTATIC
         from_rx = load_direction(c, C_RX, C_RX_LOW);
 #endif
         if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
-            unlit_count += real;
+            unlit_count += n_facets;
             continue;
         }
 #endif
         for (int i = 0; i < TILE / VW; i++) {
-            size_t at = (size_t)k * (TILE / VW) + i, held[PULSE_NODES];
+            size_t at = (size_t)k * (TILE / VW) + i, at_node[PULSE_NODES];
 #pragma unroll
-            for (int q = 0; q < PULSE_NODES; q++) held[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
-            size_t judge = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
+            for (int q = 0; q < PULSE_NODES; q++) at_node[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
+            size_t at_nearest = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
             offset x = load_offset(offsets, at, n_offsets);
             about_centre(&x, tile, k, n_tiles);
             place where = locate(c, pulse, p, n, x);
@@ -247,16 +249,16 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             if (state == CROSSING) inside = keep_inside(c, &where);
             float is_inside[VW];
             STORE(inside, 0, is_inside);
-            int any = 0;
+            int any_mark = 0;
 #pragma unroll
             for (int l = 0; l < VW; l++) {
-                int counts = is_inside[l] != 0 && i * VW + l < real;
+                int counts = is_inside[l] != 0 && i * VW + l < n_facets;
                 inside_count += counts;
-                front_count += counts && (marks[judge * VW + l] & FRONT);
+                front_count += counts && (marks[at_nearest * VW + l] & FRONT);
 #pragma unroll
-                for (int q = 0; q < PULSE_NODES; q++) any |= counts ? marks[held[q] * VW + l] : 0;
+                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts ? marks[at_node[q] * VW + l] : 0;
             }
-            if (!(any & BRIGHT)) continue;
+            if (!(any_mark & BRIGHT)) continue;
 
             fv sine, cosine, w[TAPS];
             sincos_turns(where.turn, &sine, &cosine);
@@ -268,10 +270,10 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                 complex_v a = c_make((fv)0.0f, (fv)0.0f);
 #pragma unroll
                 for (int q = 0; q < PULSE_NODES; q++) {
-                    __global const float *from_node = amplitudes + (held[q] * CHANNELS + channel) * 2 * VW;
-                    fv part = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
-                    a.re = fma(part, LOAD(0, from_node), a.re);
-                    a.im = fma(part, LOAD(1, from_node), a.im);
+                    __global const float *from_node = amplitudes + (at_node[q] * CHANNELS + channel) * 2 * VW;
+                    fv weight_of_node = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
+                    a.re = fma(weight_of_node, LOAD(0, from_node), a.re);
+                    a.im = fma(weight_of_node, LOAD(1, from_node), a.im);
                 }
                 // times exp(-j 2 pi turn)
                 add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),
@@ -282,8 +284,8 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
     }
     for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
-    size_t mine = (size_t)split * n_used + p, all = (size_t)get_global_size(1) * n_used;
-    done[mine] += inside_count;
-    done[all + mine] += front_count;
-    done[2 * all + mine] += unlit_count;
+    size_t at = (size_t)split * n_used + p, n_counts = (size_t)get_global_size(1) * n_used;
+    done[at] += inside_count;
+    done[n_counts + at] += front_count;
+    done[2 * n_counts + at] += unlit_count;
 }

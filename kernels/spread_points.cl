@@ -44,7 +44,7 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
         __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
         if (state == OUTSIDE) continue;
-        int real = k == n_tiles - 1 ? last : TILE;
+        int n_points = k == n_tiles - 1 ? last : TILE;
 #if WEIGHTS
         direction from_tx = load_direction(c, C_UX, C_LOW);
 #if BISTATIC
@@ -55,11 +55,11 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
 #endif
 #if CULL
         if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
-            unlit_count += real;
+            unlit_count += n_points;
             continue;
         }
 #endif
-        if (state == INSIDE) count += real;
+        if (state == INSIDE) count += n_points;
         for (int i = 0; i < TILE / VW; i++) {
             size_t at_vector = (size_t)k * (TILE / VW) + i;
             offset x = load_offset(offsets, at_vector, n_offsets);
@@ -70,39 +70,40 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
                 fv inside = keep_inside(c, &at);
                 re *= inside;
                 im *= inside;
-                float seen[VW];
-                STORE(inside, 0, seen);
-                for (int l = 0; l < VW; l++) count += seen[l] != 0 && i * VW + l < real;
+                float is_inside[VW];
+                STORE(inside, 0, is_inside);
+                for (int l = 0; l < VW; l++) count += is_inside[l] != 0 && i * VW + l < n_points;
             }
             fv sine, cosine;
             sincos_turns(at.turn, &sine, &cosine);
-            fv a = fma(re, cosine, im * sine), b = fma(im, cosine, -re * sine);
+            // times exp(-j 2 pi turn)
+            fv echo_re = fma(re, cosine, im * sine), echo_im = fma(im, cosine, -re * sine);
             iv j;
             fv w[TAPS];
             tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
 #if WEIGHTS
             fv tx_range, rx_range;
-            triple u = toward(from_tx, x, &tx_range), ur = u;
+            triple u_t = toward(from_tx, x, &tx_range), u_r = u_t;
             rx_range = tx_range;
 #if BISTATIC
-            ur = toward(from_rx, x, &rx_range);
+            u_r = toward(from_rx, x, &rx_range);
 #endif
-            sighted place_in_beam = sight(u, tx_range, ur, rx_range, axes + 18 * (size_t)p, range);
+            antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)p, range);
             complex_v gain;
             for (int m = 0; m < NODES; m++) {
-                if (m == 0 || VARIES) gain = weight(place_in_beam, patterns, second, nodes[m]);
-                complex_v weighted = c_mul(gain, c_make(a, b));
+                if (m == 0 || VARIES) gain = weight(view, patterns, second, nodes[m]);
+                complex_v weighted = c_mul(gain, c_make(echo_re, echo_im));
                 add_taps(row + 6 * (size_t)m * stride, j, w, weighted.re, weighted.im);
             }
 #else
-            add_taps(row, j, w, a, b);
+            add_taps(row, j, w, echo_re, echo_im);
 #endif
         }
         if (++added % flush == 0)
             for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
     }
     for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
-    size_t mine = (size_t)split * n_used + p;
-    done[mine] = count;
-    done[(size_t)get_global_size(1) * n_used + mine] = unlit_count;
+    size_t at = (size_t)split * n_used + p;
+    done[at] = count;
+    done[(size_t)get_global_size(1) * n_used + at] = unlit_count;
 }
