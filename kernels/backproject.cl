@@ -4,7 +4,7 @@
 //
 // source    the image equation of sarcl/__init__.py; Farooq 2009, section 2.2.2 (backprojection with FFT upsampling)
 // symbols   delta, kappa as in geometry.clh;  s~_p  range profile, interpolated as in interp.clh
-// macros    VW, FP64, BISTATIC, WRAP, LOCAL, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers
+// macros    VW, FP64, BISTATIC, WRAP, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers;  LOCAL as in tile_constants.cl
 //           VECTORS   vectors of pixels per work-item
 //           CHUNK     pulses added in float32 before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
@@ -19,7 +19,7 @@
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
 //   table                              interpolation weights, see interp.clh
 //   pulse       (2, N_PULSE, n)        see geometry.clh
-//   constants   (tiles, n, N_CONST)    from tile_constants
+//   constants   (tiles, n, N_CONST)    from tile_constants.cl
 //   tile        (2, 3, n_tiles)        reference points, m about the scene's centre; this block starts at `first`
 //   offsets     (planes, n_offsets)    m; tile k reads from vector k offset_step on (0: all tiles are alike)
 //   used        n_used <= n            pulses that are real; the rest pads the vectors

@@ -11,6 +11,7 @@ For other folders:
     polynomials             Lagrange polynomials, Chebyshev nodes
     pulse_geometry          antenna positions per pulse, as kernels/geometry.clh reads them
     range_profiles          samples in frequency to oversampled range profiles and back
+    tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
     windows                 windows over frequency and over the aperture
 """
@@ -25,6 +26,7 @@ __all__ = [
     "polynomials",
     "pulse_geometry",
     "range_profiles",
+    "tile_constants",
     "tiles",
     "windows",
 ]

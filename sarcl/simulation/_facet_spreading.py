@@ -12,6 +12,7 @@ from ..base.stage_timer import Clock
 from ..model.waveform import Waveform
 from ..numerics import range_profiles
 from ..numerics.pulse_geometry import PulseGeometry
+from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
@@ -104,9 +105,9 @@ class FacetSpreader:
             **{name: int(name in self.made) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
-        names = ("tile_constants", "facet_amplitudes", "spread_facets")
-        self.constants, self.amplitudes, self.spread = (
-            device.kernel("spread_facets.cl", name, **macros) for name in names
+        self.constants = TileConstants(device, plan, bistatic=bistatic)
+        self.amplitudes, self.spread = (
+            device.kernel("spread_facets.cl", name, **macros) for name in ("facet_amplitudes", "spread_facets")
         )
         at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
@@ -116,7 +117,6 @@ class FacetSpreader:
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
         self.channels = len(nodes) * len(self.made)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.record = 4 * plan.components(bistatic)
         self.splits = splits(device, len(self.antennas), tiles.n_tiles)
 
     def _blocks(self, budget: float) -> tuple[int, int]:
@@ -125,7 +125,7 @@ class FacetSpreader:
         most, spacing = max(64, 16 * device.info.units), self.pulse_nodes.spacing
         if spacing > 1:
             most = max(most, MOST_PULSES)
-        per_pulse = self.record * tiles.n_tiles * (2 if spacing > 1 else 1)
+        per_pulse = self.constants.nbytes * tiles.n_tiles * (2 if spacing > 1 else 1)
         per_pulse += 24 * self.stride * self.splits * self.channels
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
@@ -204,11 +204,8 @@ class FacetSpreader:
         device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles.tiles
         packed = self.antennas.picked(rows).packed(self.held.center, self.plan.length, 0, len(rows), lanes)
         n = packed.shape[2]
-        pulse, constants = device.upload(packed), device.empty(self.record * n * tiles.n_tiles)
-        device.run(
-            self.constants, (n // lanes, tiles.n_tiles), None,
-            pulse, self.tiles.references, self.tiles.radius, n, tiles.n_tiles, 0, int(gated), constants,
-        )  # fmt: skip
+        pulse, held, whole = device.upload(packed), self.tiles, (0, tiles.n_tiles)
+        constants = self.constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
         return pulse, constants, n
 
 

@@ -11,6 +11,7 @@ from ..model.waveform import Waveform
 from ..numerics import range_profiles
 from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
+from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
@@ -48,7 +49,7 @@ def spread_points(
     held = points.tiles(plan.per_tile)
     tiles, bistatic, channels = held.tiles, not antennas.is_monostatic, len(nodes)
     macros = {**plan.macros(bistatic), **weights.macros(channels), "TILE": tiles.per_tile}
-    constants_kernel = device.kernel("spread_points.cl", "tile_constants", **macros)
+    tile_constants = TileConstants(device, plan, bistatic=bistatic)
     kernel = device.kernel("spread_points.cl", "spread", **macros)
     table = device.upload(plan.interpolator.table)
     ratios = device.upload((nodes / weights.frequency).astype(np.float32))
@@ -58,9 +59,8 @@ def spread_points(
     clock.lap("scene")
 
     stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-    record = 4 * plan.components(bistatic)
     parts = splits(device, len(antennas), tiles.n_tiles)
-    per_pulse = record * tiles.n_tiles + 24 * stride * parts * channels
+    per_pulse = tile_constants.nbytes * tiles.n_tiles + 24 * stride * parts * channels
     # enough pulses at once to keep every unit busy, few enough for the progress to be seen
     most = max(64, 16 * device.info.units)
     at_once = max(1, min(most, int(budget / 2 / per_pulse)) // lanes) * lanes
@@ -70,12 +70,9 @@ def spread_points(
         packed = antennas.packed(points.center, plan.length, start, stop, lanes)
         n, used = packed.shape[2], stop - start
         pulse = device.upload(packed)
-        constants = device.empty(record * n * tiles.n_tiles)
+        whole = 0, tiles.n_tiles
+        constants = tile_constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
         rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
-        device.run(
-            constants_kernel, (n // lanes, tiles.n_tiles), None,
-            pulse, held.references, held.radius, n, tiles.n_tiles, 0, int(gated), constants,
-        )  # fmt: skip
         axes = device.upload(weights.packed_axes(np.arange(start, stop)))
         device.run(
             kernel, (used, parts), (1, 1) if device.is_cpu else None,

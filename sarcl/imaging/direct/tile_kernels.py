@@ -12,6 +12,7 @@ import numpy as np
 
 from ...base import float_pairs
 from ...numerics.plan import Plan
+from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..tiling.tiling import Tiling
@@ -38,7 +39,7 @@ class GatherKernel:
         macros = {**plan.macros(bistatic, wrap), "LOCAL": int(local), "VECTORS": VECTORS, "CHUNK": CHUNK}
         macros["BEAM"] = int(beam)
         self.components = plan.components(bistatic, beam)
-        self.constants = device.kernel("backproject.cl", "tile_constants", **macros)
+        self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
@@ -56,11 +57,7 @@ class GatherKernel:
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         centers, radius, offsets = on.buffers
-        constants = device.empty(4 * self.components * n * (high - low))
-        device.run(
-            self.constants, (n // self.lanes, high - low), None,
-            pulse, centers, radius, n, tiles.n_tiles, low, on.skip, constants,
-        )  # fmt: skip
+        constants = self.constants.compute(pulse, n, centers, radius, (low, high), tiles.n_tiles, on.skip)
         items = tiles.per_tile // self.lanes // VECTORS
         device.run(
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,

@@ -1,0 +1,100 @@
+// Constants that the points of a tile share for a pulse: directions and distances of the antennas, phase and position of the
+// tile's reference point.
+//
+// A program of its own, so that it is compiled for the few macros that it depends on: not for every interpolation kernel and
+// every length of a profile.
+//
+// source    geometry.clh
+// symbols   delta, kappa, sigma, u, R0   as in geometry.clh
+// macros    VW, FP64, BISTATIC, BEAM as in the headers;  RANGE  1: records hold low parts too; 0: they need none
+//           LOCAL  1: every tile has profiles of its own, about its reference point (factorised); 0: pulses' own
+// reference: sarcl/reference/geometry.py:half_path
+
+#include "common.clh"
+#include "doubleword.clh"
+#include "geometry.clh"
+
+inline void put_direction(__global float *records, int first, int low, point d, wv r) {
+    fv R0 = w_float(r);
+    // an antenna on the reference point has no direction: any will do, R0 = 0 says so
+    wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
+    wv u[3];
+    u[0] = w_mul(d.x, inverse);
+    u[1] = w_mul(d.y, inverse);
+    u[2] = w_mul(d.z, inverse);
+#pragma unroll
+    for (int i = 0; i < 3; i++) {
+        put(records, N_CONST, first + i, w_float(u[i]));
+#if N_BASE > 16
+        put(records, N_CONST, low + i, w_low(u[i]));
+#endif
+    }
+    put(records, N_CONST, first + 3, R0 > 0 ? w_float(inverse) : (fv)0);
+    put(records, N_CONST, first + 4, R0);
+}
+
+// Constants that the points of a tile share, for VW pulses per work-item. global size (n/VW, tiles of this call).
+//   pulse   (2, N_PULSE, n)         hi and lo parts
+//   tile    (2, 3, n_tiles)         reference points about the centre, m, hi and lo parts
+//   radius  (n_tiles,)              m, of the points about their reference
+//   first   this call's first tile
+//   out     (tiles of this call, n, N_CONST)   see the enum above
+//   skip    SKIP_WINDOW, SKIP_BEAM: leave tiles out, instead of looking at each of their points
+//   wrap    M > 0: profiles repeat every M samples; 0: they do not
+__kernel void tile_constants(__global const float *restrict pulse, __global const float *restrict tile,
+                             __global const float *restrict radius, int n, int n_tiles, int first, int skip, int wrap,
+                             __global float *restrict out) {
+    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
+    point x = load_point(tile, k, n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
+
+    point d;
+    wv r;
+    wv delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &r, &d);
+    put_direction(out, C_UX, C_LOW, d, r);
+#if BEAM
+    point to_tx = d;
+    wv tx_r = r;
+#endif
+#if BISTATIC
+    wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &r, &d);
+    put_direction(out, C_RX, C_RX_LOW, d, r);
+    delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
+#endif
+
+    iv base, unused;
+    wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
+#if LOCAL
+    put(out, N_CONST, C_TURN, (fv)0);
+    put(out, N_CONST, C_FRAC, (fv)0);
+    base = 0;
+#else
+    put(out, N_CONST, C_TURN, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_TURN * n, g, lo)), &unused));
+    put(out, N_CONST, C_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_PLACE * n, g, lo)), &base));
+    if (wrap) base = base % wrap;
+#endif
+    put(out, N_CONST, C_BASE, AS_FLOAT(base));
+    put(out, N_CONST, C_KAPPA, w_float(kappa));
+    put(out, N_CONST, C_SIGMA, w_float(sigma));
+#if N_BASE > 16
+    put(out, N_CONST, C_KAPPA_LOW, w_low(kappa));
+    put(out, N_CONST, C_SIGMA_LOW, w_low(sigma));
+#endif
+
+#if LOCAL
+    iv state = INSIDE;
+#else
+    wv near = w_sub(w_load(pulse + P_NEAR * n, g, lo), delta), far = w_sub(w_load(pulse + P_FAR * n, g, lo), delta);
+    put(out, N_CONST, C_NEAR, w_float(w_mul(near, sigma)));
+    put(out, N_CONST, C_FAR, w_float(w_mul(far, sigma)));
+    iv state = window_state(near, far, radius[k], skip);
+#endif
+#if BEAM
+    wv edge;
+    state = beam_state(pulse, g, n, to_tx, tx_r, radius[k], skip, state, &edge);
+    put(out, N_CONST, C_EDGE, w_float(edge));
+#pragma unroll
+    for (int i = 0; i < 4; i++) put(out, N_CONST, C_BX + i, w_float(w_load(pulse + (P_BX + i) * n, g, lo)));
+#endif
+    put(out, N_CONST, C_STATE, AS_FLOAT(state));
+}
