@@ -86,41 +86,44 @@ class FacetSet:
     ) -> np.ndarray:  # fmt: skip
         """Amplitude of every facet for antennas at tx, rx, m (3,), about its centroid, in float64: the reference of
         kernels/spread_facets.cl, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
-        n, k = len(frequencies), len(self)
-        out = np.empty((n, k, len(polarizations)), np.complex128)
-        step = max(1, AT_ONCE // max(k, 1))
-        for first in range(0, n, step):
-            matrix = self._matrices(tx, rx, frequencies[first : first + step], vertical)
-            for i, name in enumerate(polarizations):
-                out[first : first + step, :, i] = matrix[..., "HV".index(name[0]), "HV".index(name[1])]
-        return out * self.reflectivity[:, None]
-
-    def _matrices(self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, vertical: np.ndarray) -> np.ndarray:
-        """k/(2 sqrt(pi)) S I: complex128 (n, k, 2, 2)."""
         from ._rough_surface import rough_mean
-        from .physical_optics import normals_and_areas, scattering_matrix, triangle_mean
+        from .physical_optics import fresnel, normals_and_areas, scattering_parts, triangle_mean
 
         places = centroids(self.triangles)
         to_tx, to_rx = (unit(end - places) for end in (tx, rx))
         behind = self.two_sided & ((normals(self.triangles) * to_tx).sum(axis=1) < 0)
         triangles = np.where(behind[:, None, None], self.triangles[:, ::-1], self.triangles)
-        out, areas = normals_and_areas(triangles)
-        wave, both = frequencies[:, None] / SPEED_OF_LIGHT, to_tx + to_rx
+        facing, areas = normals_and_areas(triangles)
+        both = to_tx + to_rx
         phases = (triangles[:, 1:] - triangles[:, :1]) @ both[:, :, None]
-        mean = triangle_mean(2 * np.pi * wave * phases[:, 0, 0], 2 * np.pi * wave * phases[:, 1, 0])
-        if self.is_rough:
-            q = 2 * np.pi * wave[..., None] * both
-            for i, material in enumerate(self.materials):
-                of = self.material == i
-                if of.any():
-                    mean[:, of] = rough_mean(
-                        mean[:, of], material, q[:, of], out[of], areas[of], 1 / wave, self.random[of]
-                    )
-        eps = np.array([[m.permittivity(f) for m in self.materials] for f in frequencies.tolist()])
-        if (eps == eps[:1]).all():
-            eps = eps[:1]
-        matrix = scattering_matrix(out, to_tx, to_rx, eps[:, self.material], tuple(vertical.tolist()))
-        return np.asarray((np.sqrt(np.pi) * wave * areas * mean)[..., None, None] * matrix)
+        cosine, parts = scattering_parts(facing, to_tx, to_rx, tuple(vertical.tolist()))
+        some = [("HV".index(name[0]), "HV".index(name[1])) for name in polarizations]
+        parts = np.stack([parts[..., i, j] for i, j in some], axis=-1)
+        n, k = len(frequencies), len(self)
+        out = np.empty((n, k, len(polarizations)), np.complex128)
+        step = max(1, AT_ONCE // max(k, 1))
+        for first in range(0, n, step):
+            wave = frequencies[first : first + step, None] / SPEED_OF_LIGHT
+            mean = triangle_mean(2 * np.pi * wave * phases[:, 0, 0], 2 * np.pi * wave * phases[:, 1, 0])
+            if self.is_rough:
+                q = 2 * np.pi * wave[..., None] * both
+                for i, material in enumerate(self.materials):
+                    of = self.material == i
+                    if of.any():
+                        mean[:, of] = rough_mean(
+                            mean[:, of], material, q[:, of], facing[of], areas[of], 1 / wave, self.random[of]
+                        )
+            eps = np.array(
+                [[m.permittivity(float(f)) for m in self.materials] for f in frequencies[first : first + step]]
+            )
+            if (eps == eps[:1]).all():
+                eps = eps[:1]
+            r_h, r_v = fresnel(np.clip(cosine, 0, 1), eps[:, self.material])
+            mean *= np.sqrt(np.pi) * wave * areas * self.reflectivity
+            for i in range(len(some)):
+                matrix = parts[0, :, i] + r_h * parts[1, :, i] + r_v * parts[2, :, i]
+                np.multiply(mean, matrix, out=out[first : first + step, :, i])
+        return out
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
         """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""

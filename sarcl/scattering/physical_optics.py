@@ -119,26 +119,43 @@ def scattering_matrix(
     A perfect conductor seen monostatically has S_HH = S_VV = 2 cos, S_HV = 0. Reciprocal (S_HV = S_VH) monostatically;
     bistatically the tangent-plane approximation is not.
     """
-    n, u, r, eps = (np.asarray(a) for a in (normal, to_tx, to_rx, permittivity))
-    n, u, r = np.broadcast_arrays(n, u, r)
+    cosine, parts = scattering_parts(normal, to_tx, to_rx, up)
+    r_h, r_v = (a[..., None, None] for a in fresnel(np.clip(cosine, 0, 1), permittivity))
+    return np.asarray(parts[0] + r_h * parts[1] + r_v * parts[2], complex)
+
+
+def scattering_parts(
+    normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, up: tuple[float, float, float] = UP
+) -> tuple[np.ndarray, np.ndarray]:
+    """Cosine of the angle of incidence (...), and the real matrices (3, ..., 2, 2) P in S = P_0 + R_h P_1 + R_v P_2.
+
+    What does not depend on the frequency. By e_r.k_s = 0: e_r.k_s x a = (e_r x k_s).a and e_r.k_s x (k_s x a) = -e_r.a.
+    """
+    n, u, r = np.broadcast_arrays(*(np.asarray(a) for a in (normal, to_tx, to_rx)))
     k = -u
     cosine = (n * u).sum(axis=-1)
     lit = (cosine > 0) & ((n * r).sum(axis=-1) > 0)
-    r_h, r_v = (a[..., None] for a in fresnel(np.clip(cosine, 0, 1), eps))
     across = np.cross(k, n)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     # at normal incidence any tangent does: R_v = -R_h there
     t = np.where(length < 1e-8, polarisation(k)[0], across / np.where(length > 0, length, 1))
     d, nt = np.cross(k, t), np.cross(n, t)
-    out = np.empty((*np.broadcast_shapes(lit.shape, eps.shape), 2, 2), complex)
+    h, v = polarisation(-r, up)
+    turned = -v, h  # e_r x k_s
+    out = np.empty((3, *lit.shape, 2, 2))
     for j, e in enumerate(polarisation(k, up)):
-        et, ed = (e * t).sum(axis=-1, keepdims=True), (e * d).sum(axis=-1, keepdims=True)
-        electric = (1 + r_h) * et * nt + (1 - r_v) * cosine[..., None] * ed * t
-        magnetic = (1 - r_h) * cosine[..., None] * et * t - (1 + r_v) * ed * nt
-        field = np.cross(r, electric - np.cross(r, magnetic))
-        for i, received in enumerate(polarisation(-r, up)):
-            out[..., i, j] = np.where(lit, (received * field).sum(axis=-1), 0)
-    return out
+        et, ed = _dot(e, t), _dot(e, d)
+        for i, (received, across) in enumerate(zip((h, v), turned, strict=True)):
+            horizontal = et * _dot(across, nt), cosine * et * _dot(received, t)  # of n x E, and of eta n x H
+            vertical = cosine * ed * _dot(across, t), -ed * _dot(received, nt)
+            parts = sum(horizontal) + sum(vertical), horizontal[0] - horizontal[1], vertical[1] - vertical[0]
+            for part, value in zip(out, parts, strict=True):
+                part[..., i, j] = np.where(lit, value, 0)
+    return cosine, out
+
+
+def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
+    return np.asarray(np.einsum("...i,...i->...", a, b))
 
 
 def saras_matrix(normal: np.ndarray, look: float, permittivity: complex) -> np.ndarray:

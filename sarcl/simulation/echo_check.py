@@ -16,8 +16,8 @@ from .scene_echoes import SceneEchoes
 
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
-FACET_SAMPLES = 256 * 20_000  # facets times samples: about two seconds
-PER_FACET, PER_POINT = 4e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
+FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
+PER_FACET, PER_POINT = 5e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
 
 
 def draws_of(scene: SceneEchoes) -> int:
@@ -37,7 +37,7 @@ def measure_error(
     scene: SceneEchoes, antennas: PulseGeometry, frequencies: np.ndarray, spectrum: np.ndarray, samples: Any
 ) -> float:
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of as many as
-    take about two seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
+    take two or three seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
 
     Relative to the larger of their norm and the norm they would have if scatterers added with random phases. Facets as
     they were cut, each by its centroid's plane wave at every frequency.
