@@ -5,6 +5,7 @@ from __future__ import annotations
 from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
@@ -28,6 +29,9 @@ TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
 TRIES = 8  # candidates whose errors are computed in full
 MOST_MERGED = 4096  # pulses per node at most: more would not reduce the cost
 GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may read
+
+# Errors of decimations, by what determines them: the candidates of a task share most, at other tolerances too.
+_filter_errors: WeakKeyDictionary[FocusingTask, dict[tuple[Any, ...], float]] = WeakKeyDictionary()
 
 
 @dataclass(frozen=True, eq=False)
@@ -194,17 +198,21 @@ class _Case:
         factors = tuple(side // chain[-1] for side in chain)
         radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []
+        known = _filter_errors.setdefault(self.task, {})
         error, source = first.error + error_bounds.sum_rounding(64, raw.n_samples) * len(chain), self.track
         for radius, ratio in zip(radii, ratios, strict=True):
+            above = tuple(d.ratio for d in decimations)
             while True:
-                made = decimated(source, ratio, nodes, fine)
-                worst = filter_error(source, made, self.points, radius, self.highest, self.axes)
-                if worst <= 1.3 * share or ratio <= 2:
+                key, made = (nodes, fine, *above, ratio, radius), None
+                if key not in known:
+                    made = decimated(source, ratio, nodes, fine)
+                    known[key] = filter_error(source, made, self.points, radius, self.highest, self.axes)
+                if known[key] <= 1.3 * share or ratio <= 2:
                     break
                 ratio = max(2, int(ratio * 0.75))
-            error += worst + (between.error if decimations else 0.0)
-            decimations.append(made)
-            source = made.nodes
+            error += known[key] + (between.error if decimations else 0.0)
+            decimations.append(made or decimated(source, ratio, nodes, fine))
+            source = decimations[-1].nodes
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
             return "decimation of the pulses leaves too small a share of the tolerance for the pixels"
