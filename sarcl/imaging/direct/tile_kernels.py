@@ -79,8 +79,10 @@ class LineKernel:
         # the pulses of a group share one curvature, so blocks of rows are whole groups
         self.chunk = self.least_rows = plan.group
         self.lanes = device.info.vector_width
-        macros = {**plan.macros(bistatic, wrap, local), "BEAM": int(beam)}
-        self.constants = device.kernel("backproject_lines.cl", "line_constants", **macros)
+        macros, geometry = plan.macros(bistatic, wrap, local), {"BISTATIC": int(bistatic), "BEAM": int(beam)}
+        macros |= geometry
+        self.constants = device.kernel("line_constants.cl", "line_constants", **geometry, LOCAL=int(local))
+        self.wrap_and_fine = plan.length if wrap else 0, plan.fine
         self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **macros)
         self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
@@ -103,7 +105,8 @@ class LineKernel:
         constants = device.empty(4 * self.components * n * (high - low))
         device.run(
             self.constants, (n // self.lanes, high - low), None,
-            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip, self.axes, constants,
+            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
+            *self.wrap_and_fine, self.axes, constants,
         )  # fmt: skip
         device.run(
             self.kernel, (high - low,), (1,),
