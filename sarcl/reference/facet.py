@@ -11,21 +11,11 @@ from ..base.vectors import unit
 from ..scattering.physical_optics import (
     UP,
     _nodes,
-    _sinc,
     normals_and_areas,
     scattering_matrix,
     triangle_integral,
 )
 from .geometry import half_path
-
-
-def rectangle_integral(edge1: np.ndarray, edge2: np.ndarray, q: np.ndarray) -> np.ndarray:
-    """Integral of exp(j q.rho) dA about a parallelogram's centre, m^2 (k,); edges m (k, 3), q rad/m (3,) or (k, 3).
-
-    A sinc(q.edge1/2) sinc(q.edge2/2): SARAS below eq. (10); Wan et al. 2004 for 2 Lx x 2 Ly seen in projection.
-    """
-    area = np.linalg.norm(np.cross(edge1, edge2), axis=-1)
-    return np.asarray(area * _sinc((edge1 * q).sum(axis=-1) / 2) * _sinc((edge2 * q).sum(axis=-1) / 2))
 
 
 def facet_amplitude(
