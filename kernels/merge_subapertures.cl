@@ -4,16 +4,16 @@
 //   G_v(m) = sum_p W(p - v) g_p(m)
 //
 // About the centre x' of a small tile, the contribution of a pulse to the tile's pixels changes slowly from pulse to pulse, once the
-// pulse is moved to x' (first line); so a low-pass filter W can thin the pulses out (second line): every H-th antenna
-// position remains, a node, with the profile that makes the same image of the tile.
+// pulse is moved to x' (first line); so a low-pass filter W can decimate the pulses (second line): every H-th antenna
+// position is kept, with a profile that makes the same image of the tile.
 //
 // source    quadtree backprojection (McCorkle and Rofheart 1996), with interpolation between pulses instead of plain sums
 // symbols   x, x'     centres of the tile the profiles are about, and of the new one, m;  delta, kappa, sigma as in geometry.clh
 //           k_p, z_p  sample and fraction of D_p, see interp.clh;  m sample of the new profile, 0 at x'
-//           W         (taps of W, per pulse of a block): the pulses between two nodes share their nodes
+//           W         (taps of W, per pulse of a block): the pulses between two kept pulses v share the kept pulses around them
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS as in the headers
 //           FROM_CENTRE  1: profiles are the pulses' own, about their reference range; 0: about the tile's centre x
-//           NODES        taps of W
+//           FILTER_TAPS  of W
 //           SPAN         vectors of a profile per work-item
 // reference: sarcl/reference/merge.py:merge
 
@@ -130,26 +130,26 @@ typedef float8 cv;
 // global size (spans of a profile, new tiles of this call)
 //   source     profiles (old tiles from `first_parent` on, n_used, stride, 2); delay 0 or x stands at `origin`
 //   shift      from `shifts`
-//   blocks     (n_blocks, 4): first pulse, pulses, first node, first row of `filter`
-//   filter     (rows, NODES): W
-//   out        (tiles from out_first on, n_nodes, out_stride, 2), added to; x' stands at `reach`
+//   blocks     (n_blocks, 4): first pulse, pulses, first kept pulse, first row of `filter`
+//   filter     (rows, FILTER_TAPS): W
+//   out        (tiles from out_first on, n_kept, out_stride, 2), added to; x' stands at `reach`
 __kernel void merge(__global const float *restrict source, int stride, int origin, int first_parent,
                     __global const int *restrict parent, __global const float *restrict shift, int n_used,
                     __global const int *restrict blocks, int n_blocks, __global const float *restrict filter, int reach,
-                    int first, int out_first, int n_nodes, int out_stride, __global float *restrict out) {
+                    int first, int out_first, int n_kept, int out_stride, __global float *restrict out) {
     int span = get_global_id(0) * SPAN, k = first + get_global_id(1);
     __global const float *records = shift + get_global_id(1) * (size_t)n_used * N_SHIFT;
 #if !FROM_CENTRE
     source += 2 * (size_t)(parent[k] - first_parent) * n_used * stride;
 #endif
-    out += (size_t)(k - out_first) * n_nodes * out_stride * 2;
+    out += (size_t)(k - out_first) * n_kept * out_stride * 2;
     int last = min(span + SPAN, (2 * out_stride + WIDTH - 1) / WIDTH);
     for (int b = 0; b < n_blocks; b++) {
-        int p0 = blocks[4 * b], count = blocks[4 * b + 1], node = blocks[4 * b + 2], row = blocks[4 * b + 3];
+        int p0 = blocks[4 * b], count = blocks[4 * b + 1], kept = blocks[4 * b + 2], row = blocks[4 * b + 3];
         for (int v = span; v < last; v++) {
-            cv total[NODES];
+            cv total[FILTER_TAPS];
 #pragma unroll
-            for (int a = 0; a < NODES; a++) total[a] = 0;
+            for (int a = 0; a < FILTER_TAPS; a++) total[a] = 0;
             for (int i = 0; i < count; i++) {
                 __global const float *c = records + (size_t)(p0 + i) * N_SHIFT;
                 __global const float *s = source + 2 * ((size_t)(p0 + i) * stride + origin - reach + as_int(c[0])) + v * WIDTH;
@@ -161,13 +161,13 @@ __kernel void merge(__global const float *restrict source, int stride, int origi
                     y = fma(value, (cv)c[3 + 2 * t], y);
                 }
                 x += TURNED(y);
-                __global const float *w = filter + (size_t)(row + i) * NODES;
+                __global const float *w = filter + (size_t)(row + i) * FILTER_TAPS;
 #pragma unroll
-                for (int a = 0; a < NODES; a++) total[a] = fma(x, (cv)w[a], total[a]);
+                for (int a = 0; a < FILTER_TAPS; a++) total[a] = fma(x, (cv)w[a], total[a]);
             }
 #pragma unroll
-            for (int a = 0; a < NODES; a++) {
-                __global float *o = out + (size_t)(node + a) * out_stride * 2 + v * WIDTH;
+            for (int a = 0; a < FILTER_TAPS; a++) {
+                __global float *o = out + (size_t)(kept + a) * out_stride * 2 + v * WIDTH;
                 STORE_CV(LOAD_CV(o) + total[a], o);
             }
         }

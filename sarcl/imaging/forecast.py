@@ -103,7 +103,7 @@ def _work(task: FocusingTask, chosen: MethodChoice) -> float:
     if not isinstance(plan, FactorPlan):
         return pixels * chosen.cost
     # the plan assumes tiles that fill the grid exactly
-    sources = [rows, *(len(level.decimation.nodes) for level in plan.levels)]
+    sources = [rows, *(len(level.decimation.kept) for level in plan.levels)]
     extra = (pixels - task.grid.size) * sources[-1] * plan.leaf.cost
     for level, factor, n in zip(plan.levels, plan.factors, sources, strict=False):
         tiles = float(tiling.n_roots(0, tiling.n_bands, factor))

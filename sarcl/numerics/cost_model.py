@@ -26,7 +26,8 @@ LINE_PULSE = 30.0  # per tile and pulse
 LINE_GROUP = 0.4  # per pixel and group of pulses
 
 # Merging of sub-apertures, in contributions (2026-11-21).
-MOVE_TAP, MOVE_NODE = 0.052, 0.017  # per sample that is moved to a new tile: per tap, per node that it is spread over
+# Per sample that is moved to a new tile: per tap of the interpolation, per tap of the filter that decimates pulses.
+MOVE_TAP, MOVE_FILTER_TAP = 0.052, 0.017
 MOVE_PULSE = 10.0  # per tile and pulse that is moved
 MERGED_PROFILE = 6.0  # per sample of a range profile
 LEAF = {64: 0.35, 32: 0.45, 16: 0.8}  # per contribution to a leaf tile computed by lines, by its side in pixels

@@ -152,7 +152,7 @@ def test_tolerances_below_complex64_name_the_method_that_meets_them():
         choose_method.choose(make_task(noise_on(straight(40)), GRID, None, None, False, True), "factorized", 1e-8)
 
 
-def test_profiles_of_nodes_are_those_of_the_twin(device):
+def test_profiles_of_kept_pulses_are_those_of_the_twin(device):
     from sarcl.base.constants import SPEED_OF_LIGHT
     from sarcl.base.stage_timer import Clock
     from sarcl.imaging.factorized.factorized import Factorized
@@ -165,7 +165,7 @@ def test_profiles_of_nodes_are_those_of_the_twin(device):
     descend = engine._descend
 
     def spy(down, level, low, high, source, first, *rest):
-        shape = (high - first, engine.nodes[level][2], engine.strides[level])
+        shape = (high - first, engine.kept[level][2], engine.strides[level])
         seen.append((level, low, first, device.download(source, np.empty(shape, np.complex64))))
         descend(down, level, low, high, source, first, *rest)
 

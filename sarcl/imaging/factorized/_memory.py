@@ -23,8 +23,8 @@ class MemoryPlan:
 
     strides        complex samples of the profile of a tile, for each level
     source_stride  complex samples of the profile of a row
-    last_nodes     nodes of the last level, with padding
-    components     floats of a (leaf, node) record
+    last_kept      kept pulses of the last level, with padding
+    components     floats of a (leaf, kept pulse) record
     max_alloc      bytes of the largest buffer
     """
 
@@ -33,7 +33,7 @@ class MemoryPlan:
     n_rows: int
     strides: list[int]
     source_stride: int
-    last_nodes: int
+    last_kept: int
     components: int
     max_alloc: float
     is_cpu: bool
@@ -119,10 +119,10 @@ class MemoryPlan:
 
     def tile_bytes(self, level: int) -> float:
         """Bytes per tile of a lower level: its profiles, and the records for moving profiles from the level above."""
-        records = 4 * (2 + 2 * self.plan.between.taps) * len(self.plan.levels[level - 1].decimation.nodes)
+        records = 4 * (2 + 2 * self.plan.between.taps) * len(self.plan.levels[level - 1].decimation.kept)
         return float(self.plan.levels[level].n_bytes(self.strides[level]) + records)
 
     @property
     def constants(self) -> float:
-        """Bytes of the constants per leaf, for all its nodes."""
-        return 4.0 * self.components * self.last_nodes
+        """Bytes of the constants per leaf, for all kept pulses."""
+        return 4.0 * self.components * self.last_kept

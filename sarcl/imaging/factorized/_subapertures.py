@@ -1,7 +1,4 @@
-"""Sub-apertures: smooth runs of pulses, decimated level by level. Geometry and errors, without a device.
-
-The decimated pulses are called nodes: antenna positions at which the profiles of a tile are kept.
-"""
+"""Sub-apertures: smooth runs of pulses, decimated level by level. Geometry and errors, without a device."""
 
 from __future__ import annotations
 
@@ -41,16 +38,16 @@ def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
 
 @dataclass(frozen=True, eq=False)
 class Decimation:
-    """Decimation of the pulses of a track to every `ratio`-th position, the nodes.
+    """Decimation of the pulses of a track to every `ratio`-th position.
 
-    nodes   the positions that are kept, with the range to the origin as reference and no window: profiles at nodes
-            are made about tiles, whose centres are their reference
-    blocks  (n_blocks, 4) int32: first pulse, number of pulses, first node, first row of the filter
-    filter  (ratio, taps) float32: weights of the nodes around a pulse, by its position between two nodes
+    kept    the pulses that are kept, with the range to the origin as reference and no window: their profiles are made
+            about tiles, whose centres are their reference
+    blocks  (n_blocks, 4) int32: first pulse, number of pulses, first kept pulse, first row of the filter
+    filter  (ratio, taps) float32: weights of the kept pulses around a pulse, by its position between two of them
     error   relative error of the filter at the oversampling it was made for
     """
 
-    nodes: PulseGeometry
+    kept: PulseGeometry
     ratio: int
     blocks: np.ndarray
     filter: np.ndarray
@@ -58,7 +55,7 @@ class Decimation:
 
 
 def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) -> Decimation:
-    """Decimate each run by `ratio`; beyond its ends there are as many nodes as the filter of `taps` needs."""
+    """Decimate each run by `ratio`; beyond its ends as many are kept as the filter of `taps` needs."""
     runs, parts, first = [], [], 0
     blocks: list[np.ndarray] = []
     rx_parts, rows = [], []
@@ -78,16 +75,16 @@ def decimated(track: PulseGeometry, ratio: int, taps: int, oversample: float) ->
     z = np.arange(ratio) / ratio - 0.5
     weights = interpolation.least_squares_weights(taps, oversample, z)
     tx = np.concatenate(parts)
-    nodes = PulseGeometry(
+    kept = PulseGeometry(
         tx,
         np.concatenate(rx_parts) if rx_parts else tx,
         frequency=track.frequency[rows],
         frequency_step=track.frequency_step[rows],
         runs=tuple(runs),
     )
-    nodes = replace(nodes, reference_range=nodes.half_path(np.zeros(3)))
+    kept = replace(kept, reference_range=kept.half_path(np.zeros(3)))
     error = interpolation.line_interpolator(taps, oversample).error
-    return Decimation(nodes, ratio, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
+    return Decimation(kept, ratio, np.concatenate(blocks).astype(np.int32), weights.astype(np.float32), error)
 
 
 def _positions(run: np.ndarray, at: np.ndarray) -> np.ndarray:
@@ -135,7 +132,7 @@ def filter_error(
     frequency: float,
     axes: np.ndarray | None,
 ) -> float:
-    """Largest relative error of a pulse as its nodes represent it, `radius` m away from each of `centers`, m (m, 3).
+    """Largest relative error of a pulse made from the kept ones, `radius` m away from each of `centers`, m (m, 3).
 
     Computed for the track as it is, not for a smooth one: for the pulses of 32 blocks spread over the track, and for
     the 1024 pulses where the track deviates most from a smooth one.
@@ -150,24 +147,24 @@ def filter_error(
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
     pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]
-    nodes = block[:, 2:3] + np.arange(made.filter.shape[1])
+    kept = block[:, 2:3] + np.arange(made.filter.shape[1])
     filters, worst = made.filter.astype(np.float64)[block[:, 3] + pulses - block[:, 0]], 0.0
     for center in centers:
         points = center + radius * directions
         exact = _phases(track, pulses, points, center, frequency)
-        known = _phases(made.nodes, nodes, points, center, frequency)
+        known = _phases(made.kept, kept, points, center, frequency)
         worst = max(worst, float(np.abs(np.einsum("pn,pnm->pm", filters, known) - exact).max()))
     return worst
 
 
 def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: int = 1024) -> np.ndarray:
-    """Pulses whose direction from `center` deviates most from linear interpolation between the nodes around them."""
-    first, count, node = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
+    """Pulses whose direction from `center` deviates most from linear interpolation between the kept pulses."""
+    first, count, before = made.blocks[:, 0], made.blocks[:, 1], made.blocks[:, 2] + made.filter.shape[1] // 2 - 1
     way = ((np.arange(len(track)) - np.repeat(first, count)) / made.ratio)[:, None]
-    node, off = np.repeat(node, count), np.zeros(len(track))
-    for antenna, ends in zip(track.ends, made.nodes.ends, strict=True):
-        pulses, nodes = _directions(antenna, center), _directions(ends, center)
-        apart = pulses - (1 - way) * nodes[node] - way * nodes[node + 1]
+    before, off = np.repeat(before, count), np.zeros(len(track))
+    for antenna, ends in zip(track.ends, made.kept.ends, strict=True):
+        pulses, kept = _directions(antenna, center), _directions(ends, center)
+        apart = pulses - (1 - way) * kept[before] - way * kept[before + 1]
         off = np.maximum(off, np.einsum("ij,ij->i", apart, apart))
     return np.argpartition(off, max(len(off) - most, 0))[-most:]
 

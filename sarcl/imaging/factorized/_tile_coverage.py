@@ -126,9 +126,9 @@ def without(cut: np.ndarray, left_out: np.ndarray) -> np.ndarray:
     edges = np.flatnonzero(np.diff(np.concatenate([[True], left_out, [True]])))
     begins, ends = edges[::2], edges[1::2]  # runs of rows that are not left out
     parts = [cut[:0]]
-    for first, count, node, row in cut:
+    for first, count, kept, row in cut:
         begin, end = np.maximum(begins, first), np.minimum(ends, first + count)
         some = end > begin
         begin, end = begin[some], end[some]
-        parts.append(np.stack([begin, end - begin, np.full(len(begin), node), row + begin - first], axis=1))
+        parts.append(np.stack([begin, end - begin, np.full(len(begin), kept), row + begin - first], axis=1))
     return np.concatenate(parts)

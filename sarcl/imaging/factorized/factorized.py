@@ -67,7 +67,7 @@ class Factorized(Engine):
                 "TAPS": made.taps,
                 "TERMS": made.terms,
                 "FROM_CENTRE": int(i == 0),
-                "NODES": level.decimation.filter.shape[1],
+                "FILTER_TAPS": level.decimation.filter.shape[1],
             }
             self.merges.append(
                 (
@@ -79,12 +79,12 @@ class Factorized(Engine):
         self.tables = [device.upload(made.table) for made in (plan.first, plan.between)]
         self.filters = [device.upload(v.decimation.filter) for v in plan.levels]
         self.blocks_of = [device.upload(v.decimation.blocks) for v in plan.levels]
-        # nodes of each level in the layout of the kernels, about the scene's centre
-        self.nodes = []
+        # kept pulses of each level in the layout of the kernels, about the scene's centre
+        self.kept = []
         for v in plan.levels:
-            antennas = v.decimation.nodes
+            antennas = v.decimation.kept
             packed = antennas.packed(tiling.center, plan.length, 0, len(antennas), self.lanes)
-            self.nodes.append((device.upload(packed), packed.shape[2], len(antennas)))
+            self.kept.append((device.upload(packed), packed.shape[2], len(antennas)))
         self.strides = [self._stride(v) for v in plan.levels]
         # a root inside the range window still needs guard samples beyond the window for interpolation
         root = plan.levels[0]
@@ -93,7 +93,7 @@ class Factorized(Engine):
         self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
         self.least_pixels = 1000.0 * plan.length
         self.memory = MemoryPlan(
-            plan, tiling, task.raw.n_rows, self.strides, self.profiles.stride, self.nodes[-1][1],
+            plan, tiling, task.raw.n_rows, self.strides, self.profiles.stride, self.kept[-1][1],
             self.leaves.components, device.info.max_alloc, device.is_cpu,
         )  # fmt: skip
 
@@ -153,7 +153,7 @@ class Factorized(Engine):
         step, within, below = self.memory.at_once(tree, budget)
         edges = np.flatnonzero(np.diff(np.concatenate([[False], coverage.merged, [False]])))
         for low, high in edges.reshape(-1, 2).tolist():
-            gathered = device.zeros(8 * (high - low) * self.nodes[0][2] * self.strides[0])
+            gathered = device.zeros(8 * (high - low) * self.kept[0][2] * self.strides[0])
 
             def rows_done(rows: float, low: int = low, high: int = high) -> None:
                 on_progress((low * n_rows + (high - low) * rows / 2) / n_roots)
@@ -207,7 +207,7 @@ class Factorized(Engine):
         self, down: _Descent, low: int, high: int, left_out: list[np.ndarray | None], out: Any, budget: float,
         clock: Clock, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
-        """First level: add the profiles of all pulses to the nodes of roots low ... high - 1.
+        """First level: add the profiles of all pulses to the kept pulses of roots low ... high - 1.
 
         left_out  for each root: rows that are not merged into it (n_rows,) bool, or None
         """
@@ -225,18 +225,18 @@ class Factorized(Engine):
             packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
             pulse, n, used = device.upload(packed), packed.shape[2], stop - start
             clock.lap("profiles")
-            # blocks of pulses with the same nodes, cut at the ends of this block of rows
+            # blocks of pulses between the same kept pulses, cut at the ends of this block of rows
             begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
             cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
             step = max(1, int(min(budget / 8, device.info.max_alloc) / (4 * n_shift * used)))
             records = device.empty(4 * n_shift * used * min(step, high - low))
-            kept = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
+            in_use = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
             for tile, count, without_rows in same_coverage(left_out, low, high, step):
                 seen = cut if without_rows is None else without(cut, without_rows[start:stop])
                 if len(seen) == 0:
                     continue
                 cut_buffer = device.upload(seen.astype(np.int32))
-                kept.append(cut_buffer)
+                in_use.append(cut_buffer)
                 device.run(
                     shifts, (n // self.lanes, count), None,
                     pulse, centers, roots, centers, nowhere, self.tables[0], n, used, roots, tile, level.reach,
@@ -245,7 +245,7 @@ class Factorized(Engine):
                 device.run(
                     merge, (self._spans(0), count), None,
                     source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
-                    level.reach, tile, low, self.nodes[0][2], self.strides[0], out,
+                    level.reach, tile, low, self.kept[0][2], self.strides[0], out,
                 )  # fmt: skip
             device.finish()
             clock.lap("backproject")
@@ -262,12 +262,12 @@ class Factorized(Engine):
         within  bytes per level below at a time
         """
         device, plan, tree = self.device, self.plan, down.tree
-        pulse, n, used = self.nodes[level]
+        pulse, n, used = self.kept[level]
         if level == len(plan.levels) - 1:
             stride = self.strides[level]
             for begin, end in _runs(low, high, within / self.memory.constants):
                 self.leaves.add(
-                    down.ready, begin, end, self.nodes[level], source, stride, plan.levels[level].reach,
+                    down.ready, begin, end, self.kept[level], source, stride, plan.levels[level].reach,
                     (begin - first) * used * stride, down.image,
                 )  # fmt: skip
                 if end < high:
@@ -275,11 +275,11 @@ class Factorized(Engine):
             return
         shifts, merge = self.merges[level + 1]
         below, parents = plan.levels[level + 1], down.parents[level + 1]
-        nodes, stride = self.nodes[level + 1][2], self.strides[level + 1]
+        n_kept, stride = self.kept[level + 1][2], self.strides[level + 1]
         children = tree.children[level]
         whole = int(children[low]), int(children[high])
         for begin, end in _runs(*whole, within / self.memory.tile_bytes(level + 1)):
-            made = device.zeros(8 * (end - begin) * nodes * stride)
+            made = device.zeros(8 * (end - begin) * n_kept * stride)
             records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
             device.run(
                 shifts, (n // self.lanes, end - begin), None,
@@ -291,7 +291,7 @@ class Factorized(Engine):
                 merge, (self._spans(level + 1), end - begin), None,
                 source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
                 self.blocks_of[level + 1], len(below.decimation.blocks), self.filters[level + 1], below.reach, begin,
-                begin, nodes, stride, made,
+                begin, n_kept, stride, made,
             )  # fmt: skip
             self._descend(down, level + 1, begin, end, made, begin, within)
             if (begin, end) != whole:

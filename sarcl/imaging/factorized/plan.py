@@ -27,7 +27,7 @@ from ._subapertures import Decimation, chains, decimated, filter_error, rate, ru
 SPACINGS = (1.5, 1.75, 2.0, 2.5, 3.0, 4.0, 5.0, 6.0)  # profile samples per 1/bandwidth
 TAPS = (4, 6, 8)  # taps of the interpolators along range and along the track
 TRIES = 8  # candidates whose errors are computed in full
-MOST_MERGED = 4096  # pulses per node at most: more would not reduce the cost
+MOST_MERGED = 4096  # pulses between two kept pulses at most: more would not reduce the cost
 GUARD, LEAF_GUARD = 14, 8  # samples beyond a tile that interpolation and whole vectors may read
 
 # Errors of decimations, by what determines them: the candidates of a task share most, at other tolerances too.
@@ -48,7 +48,7 @@ class Level:
 
     def n_bytes(self, stride: int) -> int:
         """Bytes of a tile's profiles of `stride` samples."""
-        return 8 * stride * len(self.decimation.nodes)
+        return 8 * stride * len(self.decimation.kept)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +80,7 @@ class FactorPlan:
             "method": method,
             "tiles": " > ".join(str(level.side) for level in self.levels),
             "pulses per tile": " > ".join(
-                str(n) for n in [len(self.order), *(len(v.decimation.nodes) for v in self.levels)]
+                str(n) for n in [len(self.order), *(len(v.decimation.kept) for v in self.levels)]
             ),
             "taps": self.between.taps,
             "profile samples": self.length,
@@ -139,20 +139,20 @@ class _Case:
         for leaf in self.leaves:
             for chain in chains(leaf, self.largest):
                 share = 0.75 * self.tolerance / (2 * len(chain) + 1)
-                for taps, nodes in ((t, n) for t in TAPS for n in TAPS):
-                    spacing, fine = _spacing(taps, share), _spacing(nodes, share)
+                for taps, filter_taps in ((t, n) for t in TAPS for n in TAPS):
+                    spacing, fine = _spacing(taps, share), _spacing(filter_taps, share)
                     if spacing is None or fine is None:
                         continue
-                    made = self._cost(chain, taps, spacing, nodes, fine)
+                    made = self._cost(chain, taps, spacing, filter_taps, fine)
                     if made:
-                        yield made[0], (chain, taps, spacing, nodes, fine, made[1], share)
+                        yield made[0], (chain, taps, spacing, filter_taps, fine, made[1], share)
 
     def untried(self) -> str:
         """The reason why there is no candidate at all."""
         share = 0.75 * self.tolerance / 3  # of a tree of one level, which has the fewest errors
-        fine = [s for s in (_spacing(nodes, share) for nodes in TAPS) if s is not None]
+        fine = [s for s in (_spacing(filter_taps, share) for filter_taps in TAPS) if s is not None]
         if not fine:
-            return f"interpolation with {TAPS[-1]} taps between nodes has an error above its share of the tolerance"
+            return f"the error of a filter of {TAPS[-1]} taps over the pulses is above its share of the tolerance"
         n_rows, leaf = self.task.raw.n_rows, min(self.leaves.values())
         if n_rows < 4:
             return f"the aperture has {n_rows} pulses; at least 4 are needed to merge any"
@@ -162,7 +162,7 @@ class _Case:
         )
 
     def _cost(
-        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float
+        self, chain: tuple[int, ...], taps: int, spacing: float, filter_taps: int, fine: float
     ) -> tuple[float, list[int]] | None:
         """Cost in contributions, and the decimation ratio of each level; None where a level cannot decimate."""
         n_rows, size = self.task.raw.n_rows, self.task.grid.size
@@ -175,14 +175,14 @@ class _Case:
             if ratio < 2:
                 return None
             ratios.append(ratio)
-            total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, nodes)
-            sources, spaced = sources / ratio + nodes, spaced * ratio
+            total += size / side**2 * sources * moving_cost(2 * radius * sigma + 2 * GUARD, taps, filter_taps)
+            sources, spaced = sources / ratio + filter_taps, spaced * ratio
         leaf = cost_model.LEAF[chain[-1]] if self.lines else cost_model.TAPS[taps] + cost_model.LEAF_PIXELS
         total += size * sources * leaf
         return total + n_rows * cost_model.MERGED_PROFILE * spacing * self.task.raw.n_samples, ratios
 
     def build(
-        self, chain: tuple[int, ...], taps: int, spacing: float, nodes: int, fine: float, ratios: list[int],
+        self, chain: tuple[int, ...], taps: int, spacing: float, filter_taps: int, fine: float, ratios: list[int],
         share: float,
     ) -> tuple[FactorPlan, Tiling] | str:  # fmt: skip
         """The plan of a candidate, its errors computed for the track as it is; or the reason why they are too large."""
@@ -203,16 +203,16 @@ class _Case:
         for radius, ratio in zip(radii, ratios, strict=True):
             above = tuple(d.ratio for d in decimations)
             while True:
-                key, made = (nodes, fine, *above, ratio, radius), None
+                key, made = (filter_taps, fine, *above, ratio, radius), None
                 if key not in known:
-                    made = decimated(source, ratio, nodes, fine)
+                    made = decimated(source, ratio, filter_taps, fine)
                     known[key] = filter_error(source, made, self.points, radius, self.highest, self.axes)
                 if known[key] <= 1.3 * share or ratio <= 2:
                     break
                 ratio = max(2, int(ratio * 0.75))
             error += known[key] + (between.error if decimations else 0.0)
-            decimations.append(made or decimated(source, ratio, nodes, fine))
-            source = decimations[-1].nodes
+            decimations.append(made or decimated(source, ratio, filter_taps, fine))
+            source = decimations[-1].kept
         leaf = self._leaf(self.tolerance - error, source, (between, length), tiling)
         if leaf is None:
             return "decimation of the pulses leaves too small a share of the tolerance for the pixels"
@@ -227,10 +227,10 @@ class _Case:
         if self.task.wrap and reach[-1] + 4 * GUARD > length:
             return "the largest tiles are wider than the period in which ranges repeat"
         levels = tuple(Level(*v) for v in zip(chain, radii, reach[::-1], decimations, strict=True))
-        sources = [raw.n_rows, *(len(v.decimation.nodes) for v in levels)]
+        sources = [raw.n_rows, *(len(v.decimation.kept) for v in levels)]
         cost = grid.size * sources[-1] * leaf.cost + raw.n_rows * cost_model.MERGED_PROFILE * spacing * raw.n_samples
         for v, n in zip(levels, sources, strict=False):
-            cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, nodes)
+            cost += grid.size / v.side**2 * n * moving_cost(2 * v.reach, taps, filter_taps)
         return FactorPlan(
             levels, factors, first, between, length, leaf, edge,
             max(error + leaf.predicted_error, edge.predicted_error),  # a row is merged into a tile or added directly
@@ -238,7 +238,7 @@ class _Case:
         ), tiling  # fmt: skip
 
     def _leaf(
-        self, tolerance: float, nodes: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
+        self, tolerance: float, kept: PulseGeometry, source: tuple[Interpolator, int], tiling: Tiling
     ) -> LinePlan | Plan | None:
         """Plan from leaves to pixels within a tolerance; None: there is none."""
         raw, n_samples = self.task.raw, self.task.raw.n_samples
@@ -246,7 +246,7 @@ class _Case:
             return None
         if self.lines:
             return line_plan.choose(
-                tolerance, self.task.grid, nodes, n_samples=n_samples, bandwidth=self.bandwidth,
+                tolerance, self.task.grid, kept, n_samples=n_samples, bandwidth=self.bandwidth,
                 highest=self.highest, source=source, sides=(tiling.side,),
             )  # fmt: skip
         best = None
@@ -279,6 +279,6 @@ class _Case:
             return None
 
 
-def moving_cost(samples: float, taps: int, nodes: int) -> float:
-    """Cost of moving the profile of a pulse to a new tile and adding it to the nodes there."""
-    return samples * (taps * cost_model.MOVE_TAP + nodes * cost_model.MOVE_NODE) + cost_model.MOVE_PULSE
+def moving_cost(samples: float, taps: int, filter_taps: int) -> float:
+    """Cost of moving the profile of a pulse to a new tile and adding it to the pulses that are kept there."""
+    return samples * (taps * cost_model.MOVE_TAP + filter_taps * cost_model.MOVE_FILTER_TAP) + cost_model.MOVE_PULSE
