@@ -17,6 +17,9 @@ RANGE_MODE = {0: 1.0, 1: 1.5, 2: 2.2}  # per contribution, by range mode of kern
 SERIES = {2: 1.0, 3: 1.05, 0: 1.33}  # per contribution, by order of the range series; 0: exact root
 TILE = 20.0  # per tile and row: constants that the tile's points share
 
+# Patches from which the images of an interpolation kernel are measured, in contributions (2026-11-22).
+PATCHES = 6e7
+
 # Backprojection by lines of pixels (kernels/backproject_lines.cl), in contributions (2026-11-21).
 LINE_TAP = 0.045  # per contribution and tap of a line
 LINE_SLOPE = 1.8  # factor on LINE_TAP where the curvature moves pixels' positions too

@@ -45,14 +45,14 @@ class TiledFacets(TiledScatterers):
         self.dispersive = not self.metal and bool(np.ptp(roots, axis=0).any())
         positions = centroids(facets.triangles)
 
-        def amplitudes(some: np.ndarray, pulse: int, frequencies: np.ndarray) -> np.ndarray:
-            ends = antennas.tx[pulse], antennas.rx[pulse]
-            gains = [weights.weights(positions[some], pulse, f) for f in frequencies.tolist()]
-            sent = facets.picked(some).amplitudes(*ends, frequencies, polarizations, vertical)
-            return np.asarray(sent * np.stack(gains)[..., None])
+        def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
+            ends, f = (antennas.tx[pulse], antennas.rx[pulse]), np.array([frequency])
+            sent = facets.picked(some).amplitudes(*ends, f, polarizations, vertical)[0]
+            return np.asarray(sent * weights.weights(positions[some], pulse, frequency)[:, None])
 
         super().__init__(
             device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive),
+            len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
             lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
         )  # fmt: skip
 

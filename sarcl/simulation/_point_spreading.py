@@ -24,12 +24,11 @@ def tiled_points(
 ) -> TiledScatterers:
     """Points prepared for every channel, within the band of the waveform."""
 
-    def amplitudes(some: np.ndarray, pulse: int, frequencies: np.ndarray) -> np.ndarray:
-        gains = [weights.weights(points.positions[some], pulse, f) for f in frequencies.tolist()]
-        return (np.stack(gains) * points.amplitudes[some])[..., None]
+    def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
+        return (weights.weights(points.positions[some], pulse, frequency) * points.amplitudes[some])[:, None]
 
     return TiledScatterers(
-        device, points.positions, points.planes,
+        device, points.positions, points.planes, len(antennas),
         lambda order: sample_patches(points.positions, order, antennas, waveform, amplitudes),
     )  # fmt: skip
 

@@ -12,6 +12,7 @@ from ..base import float_pairs
 from ..base.boxes import box
 from ..base.errors import ToleranceUnreachable
 from ..base.morton import morton_order
+from ..numerics import cost_model
 from ..numerics.error_bounds import FLOAT32
 from ..numerics.plan import LEAST_TOLERANCE, Plan, carrier_steps, cheapest, least
 from ..numerics.pulse_geometry import PulseGeometry
@@ -89,13 +90,15 @@ class TiledScatterers:
     """
 
     def __init__(
-        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray],
+        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray], n_coherent: int,
         patches: Callable[[np.ndarray], PatchSamples],
     ) -> None:  # fmt: skip
         """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them
-        patches  of the Morton order: samples from which the error of evenly spaced scatterers is measured
+        n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all phases are random
+        patches     of the Morton order: samples from which the error of evenly spaced scatterers is measured
         """
         self.device, self.positions, self._planes, self._patches = device, positions, planes, patches
+        self._n_coherent = n_coherent
         self.bounds, self._order = box(positions), morton_order(positions)
         self.center = self.bounds.mean(axis=0)
         self._tiles = {n: self._tiled(n) for n in PER_TILE}
@@ -111,37 +114,46 @@ class TiledScatterers:
         self, antennas: PulseGeometry, band: Band, tolerance: float, least_tolerance: float = LEAST_TOLERANCE
     ) -> Plan:
         """The cheapest plan for these scatterers. ToleranceUnreachable where none meets the tolerance."""
-        gain, n = 1.0, len(self)
+        n = len(self)
+
+        def with_gain(gain: float) -> Plan:
+            return cheapest(
+                tolerance,
+                self._radius.items(),
+                distance=antennas.distance(self.bounds),
+                frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
+                bandwidth=band.bandwidth,
+                n_samples=band.n_samples,
+                points_per_row=n,
+                chunk=_chunk(n, tolerance),
+                least_tolerance=least_tolerance,
+                carrier=band.carrier,
+                image_gain=gain,
+            )
+
+        plan = with_gain(1.0)
+        if not self._n_coherent:
+            return plan
+        try:  # n echoes are at most the root of n times their power's root
+            bounded = with_gain(np.sqrt(n))
+        except ToleranceUnreachable:
+            bounded = None
+        if bounded is not None and (bounded.cost - plan.cost) * n * self._n_coherent <= cost_model.PATCHES:
+            return bounded
+        gain = 1.0
         while True:
-            try:
-                plan = cheapest(
-                    tolerance,
-                    self._radius.items(),
-                    distance=antennas.distance(self.bounds),
-                    frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
-                    bandwidth=band.bandwidth,
-                    n_samples=band.n_samples,
-                    points_per_row=n,
-                    chunk=_chunk(n, tolerance),
-                    least_tolerance=least_tolerance,
-                    carrier=band.carrier,
-                    image_gain=gain,
-                )
-            except ToleranceUnreachable as refused:
-                if gain == 1:
-                    raise
-                lattice = "with scatterers that lie so evenly: the images of the interpolation kernel add up"
-                raise ToleranceUnreachable(tolerance, None, refused.limit, "take a larger tolerance", lattice) from None
             kernel = plan.interpolator.error
-            fixed = plan.predicted_error - gain * kernel
-            if fixed + np.sqrt(n) * kernel <= tolerance:  # n echoes are at most the root of n times their power's root
-                return plan
-            images = self._image_error(plan, band)
+            fixed, images = plan.predicted_error - gain * kernel, self._image_error(plan, band)
             if gain == 1 and images <= kernel:
                 return plan
             if fixed + images <= tolerance:
                 return replace(plan, predicted_error=fixed + max(images, kernel))
             gain = max(images / kernel, 2 * gain)
+            try:
+                plan = with_gain(gain)
+            except ToleranceUnreachable as refused:
+                lattice = "with scatterers that lie so evenly: the images of the interpolation kernel add up"
+                raise ToleranceUnreachable(tolerance, None, refused.limit, "take a larger tolerance", lattice) from None
 
     def tiles(self, per_tile: int) -> DeviceTiles:
         """Tiles of `per_tile` scatterers on the device."""
