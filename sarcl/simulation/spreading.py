@@ -94,7 +94,7 @@ class TiledScatterers:
         patches: Callable[[np.ndarray], PatchSamples],
     ) -> None:  # fmt: skip
         """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them
-        n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all phases are random
+        n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all are
         patches     of the Morton order: samples from which the error of evenly spaced scatterers is measured
         """
         self.device, self.positions, self._planes, self._patches = device, positions, planes, patches
