@@ -9,6 +9,18 @@ import pytest
 from helpers.devices import opened, variants
 
 
+def pytest_collection_modifyitems(config, items):
+    """Leave out repeated tests on twins of devices: these run every value of every parameter with quick partners."""
+    left_out = [item for item in items if item.get_closest_marker("repeated") and _on_a_twin(item)]
+    if left_out:
+        config.hook.pytest_deselected(items=left_out)
+        items[:] = [item for item in items if item not in set(left_out)]
+
+
+def _on_a_twin(item):
+    return any(name in ("device", "double") and value and value[1] for name, value in item.callspec.params.items())
+
+
 @pytest.fixture(params=variants())
 def device(request):
     """An open device; a kernel that fails on it fails the test."""

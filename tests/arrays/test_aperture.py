@@ -154,6 +154,7 @@ def width(raw):
     return np.ptp(y[a >= np.sqrt(0.5)])
 
 
+@pytest.mark.slow
 def test_frequency_steps_do_not_resolve_more_than_phase_centres_do():
     # 10 GHz, 10 km, 100 m, widths at half power of the sums of exact phases; 8 elements half a wave, or 10 m, apart
     wave, flight = SPEED_OF_LIGHT / F0, track(100, 99.0, 10e3)  # 100 steps of 1 m

@@ -42,19 +42,15 @@ def hold_all(seeds, share, **limits):
 
 
 # plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance. The median of 40 tasks is
-# uncertain by a quarter, so that a third less is accepted of it
-@pytest.mark.parametrize(
-    "seeds, least",
-    [(range(40), 1 / 45), *(pytest.param(seeds, 1 / 30, marks=SLOW) for seeds in (range(100), range(100, 200)))],
-    ids=str,
-)
-def test_hundreds_of_random_tasks(seeds, least):
+# uncertain by a quarter, that of 24 by a third, so that a third less is accepted of it
+@pytest.mark.parametrize("seeds, least", [(range(24), 1 / 45), pytest.param(range(100), 1 / 30, marks=SLOW)], ids=str)
+def test_random_tasks(seeds, least):
     assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= least
 
 
 @SLOW
-def test_hundreds_of_larger_random_tasks():
-    assert np.median(hold_all(range(200, 500), 0.97, terms=3e7)) >= 1 / 30
+def test_larger_random_tasks():
+    assert np.median(hold_all(range(200, 300), 0.97, terms=3e7)) >= 1 / 30
 
 
 @SLOW

@@ -8,6 +8,9 @@ import pytest
 import sarcl
 from sarcl.reference.backproject import backproject as exact_image
 
+# further partners of values that have quick ones: run with -m slow, on the devices themselves (tests/conftest.py)
+REPEATED = (pytest.mark.slow, pytest.mark.repeated)
+
 
 def noise_on(tx, rx=None, *, center=9.6e9, bandwidth=300e6, n_samples=96, seed=0, **fields):
     """White noise in every sample, on any track, so that no error cancels by alignment. Ranges are from the origin."""
@@ -59,11 +62,11 @@ def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model
 def thinned(first, second, every=2):
     """Every pair of two lists as parameters, its tuples flattened; the quick ones lie `every` apart along both lists.
 
-    Each value has quick partners, so each formula and kernel that one of them chooses is run; all pairs run with
-    `-m slow`.
+    Each value has quick partners, so each formula and kernel that one of them chooses is run, on each device and its
+    twins. The other pairs are REPEATED.
     """
     pairs = [(i + j, (*_tuple(a), *_tuple(b))) for i, a in enumerate(first) for j, b in enumerate(second)]
-    return [pytest.param(*values, marks=[pytest.mark.slow] if at % every else []) for at, values in pairs]
+    return [pytest.param(*values, marks=REPEATED if at % every else []) for at, values in pairs]
 
 
 def _tuple(value):

@@ -278,11 +278,13 @@ def said(tmp_path_factory):
     return right, [(int(m[1]), m[2]) for m in found if m], out
 
 
+@pytest.mark.slow
 def test_mypy_accepts_a_program_of_a_user(said):
     right, found, out = said
     assert not [text for line, text in found if line <= right], out
 
 
+@pytest.mark.slow
 def test_mypy_reports_mistakes_of_a_user(said):
     right, found, out = said
     for number, line in enumerate(MISTAKES.splitlines(), right + 1):

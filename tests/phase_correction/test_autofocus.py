@@ -246,7 +246,7 @@ def test_what_only_moves_the_image_is_left_alone(points):
     assert at == pytest.approx((0, -1.5, 0), abs=0.1 * CELL) or at == pytest.approx((0, 1.5, 0), abs=0.1 * CELL)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 12))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))])
 def test_noise_comes_back_as_it_was_and_the_estimate_says_so(points, seed):
     random = np.random.default_rng(seed)
     shape = points.samples.shape
@@ -352,15 +352,17 @@ def assert_gotcha_refocused(raw, phase, grid):
     assert_as_sharp(better, raw, grid=grid)
 
 
+@pytest.mark.slow
 def test_gotcha_with_ten_radians_comes_back(gotcha):
     patch = sarcl.ImageGrid.plane(center=REFLECTOR, shape=(128, 128), spacing=0.2)
     assert_gotcha_refocused(gotcha, smooth(gotcha.n_rows, 0, rms=10), patch)
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("modes", [3, 8, 20])
-@pytest.mark.parametrize("seed", range(3))
-@pytest.mark.parametrize("scale", ["rms", "peak"])
+@pytest.mark.parametrize(
+    "modes, seed, scale",
+    [(3, 0, "rms"), (8, 1, "rms"), (20, 2, "rms"), (3, 2, "peak"), (8, 0, "peak"), (20, 1, "peak")],
+)
 def test_gotcha_with_any_ten_radians_comes_back(gotcha, modes, seed, scale):
     scene = sarcl.ImageGrid.plane(shape=(500, 500), spacing=0.2)
     assert_gotcha_refocused(gotcha, smooth(gotcha.n_rows, seed, modes=modes, **{scale: 10}), scene)
