@@ -66,7 +66,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
             __global const float *row = profiles + 2 * ((size_t)p * stride + origin);
 #pragma unroll
             for (int r = 0; r < VECTORS; r++) {
-                place at = locate(record, pulse, p, n, x[r]);
+                phase_position at = locate(record, pulse, p, n, x[r]);
                 fv v = 1;
                 if (state == CROSSING) v = keep_inside(record, &at);
 #if BEAM
@@ -74,7 +74,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
 #endif
                 fv g, h, sine, cosine;
                 look_up(row, stride, origin, at.base, at.t, table, &g, &h);
-                sincos_turns(at.turn, &sine, &cosine);
+                sincos_cycles(at.cycles, &sine, &cosine);
                 if (state == CROSSING) {
                     g *= v;
                     h *= v;

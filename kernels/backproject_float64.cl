@@ -25,7 +25,7 @@
 enum { P_TX, P_TY, P_TZ, P_REFERENCE, P_KAPPA, P_KAPPA_LOW, P_SIGMA, P_SIGMA_LOW, P_LIMIT, P_LIMIT_LOW, P_RX, P_RY, P_RZ };
 #define P_BX (BISTATIC ? 13 : 10)  // b, then cos and sin of alpha
 // Record of a (tile, pulse): [tile][pulse][component].
-enum { C_UX, C_UY, C_UZ, C_R0, C_INVERSE, C_TURN, C_FRAC, C_BASE, C_KAPPA, C_SIGMA, C_STATE, C_RX, C_RR = C_RX + 3, C_RINVERSE };
+enum { C_UX, C_UY, C_UZ, C_R0, C_INVERSE, C_CYCLES, C_FRAC, C_BASE, C_KAPPA, C_SIGMA, C_STATE, C_RX, C_RR = C_RX + 3, C_RINVERSE };
 #define N_CONST 16
 // C_STATE: see tile_state.clh
 
@@ -73,13 +73,14 @@ inline void put_direction(__global double *records, int first, int length, point
     put(records, N_CONST, length + 1, inverse);
 }
 
-inline dv place_of(pair delta, pair sigma, dv *base) {
-    pair place = pair_mul(delta, sigma);
+// Position of delta among samples, counted from *base.
+inline dv position_of(pair delta, pair sigma, dv *base) {
+    pair position = pair_mul(delta, sigma);
 #if WRAP
-    dv turns = whole(place.hi * (1.0 / WRAP));
-    place = pair_add(place, exact_product(turns, (dv)-WRAP));
+    dv periods = whole(position.hi * (1.0 / WRAP));
+    position = pair_add(position, exact_product(periods, (dv)-WRAP));
 #endif
-    return pair_split(place, base);
+    return pair_split(position, base);
 }
 
 #if BEAM
@@ -127,8 +128,8 @@ __kernel void tile_constants(__global const double *restrict pulse, __global con
 #endif
     pair kappa = make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW)), sigma = make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW));
     dv base, unused;
-    put(out, N_CONST, C_TURN, pair_split(pair_mul(delta, kappa), &unused));
-    put(out, N_CONST, C_FRAC, place_of(delta, sigma, &base));
+    put(out, N_CONST, C_CYCLES, pair_split(pair_mul(delta, kappa), &unused));
+    put(out, N_CONST, C_FRAC, position_of(delta, sigma, &base));
     put(out, N_CONST, C_BASE, base);
     put(out, N_CONST, C_KAPPA, kappa.hi);
     put(out, N_CONST, C_SIGMA, sigma.hi);
@@ -206,7 +207,7 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
             }
 #endif
             // phase in cycles, and position among samples, counted from sample `base`
-            dv turn, t, base, inside = 1;
+            dv cycles, t, base, inside = 1;
 #if ORDER >= 0
             dv a = fma((dv)record[C_UX], q.x, fma((dv)record[C_UX + 1], q.y, (dv)record[C_UX + 2] * q.z));
             dv d = difference(a, qq, record[C_R0], record[C_INVERSE]);
@@ -214,8 +215,8 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
             a = fma((dv)record[C_RX], q.x, fma((dv)record[C_RX + 1], q.y, (dv)record[C_RX + 2] * q.z));
             d = 0.5 * (d + difference(a, qq, record[C_RR], record[C_RINVERSE]));
 #endif
-            turn = fma(d, (dv)record[C_KAPPA], (dv)record[C_TURN]);
-            turn -= whole(turn);
+            cycles = fma(d, (dv)record[C_KAPPA], (dv)record[C_CYCLES]);
+            cycles -= whole(cycles);
             t = fma(d, (dv)record[C_SIGMA], (dv)record[C_FRAC]);
             base = (dv)record[C_BASE];
             if (state == CROSSING)
@@ -227,8 +228,8 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
                 pair delta = half_path(pulse, n, p, spread, x, &R0, &u, &S0, &v);
 #if ORDER < 0
                 dv unused;
-                turn = pair_split(pair_mul(delta, make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW))), &unused);
-                t = place_of(delta, make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW)), &base);
+                cycles = pair_split(pair_mul(delta, make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW))), &unused);
+                t = position_of(delta, make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW)), &base);
 #endif
 #if !WRAP
                 // outside, the position moves to delay 0, which every profile has, so that whatever is read there exists
@@ -246,7 +247,7 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
             lv j;
             tap_weights(first_tap(t, base, stride, origin, &j), table, w);
             weighted_sum(profiles + 2 * ((size_t)p * stride + origin), j, w, &g, &h);
-            sincos_double(turn, &sine, &cosine);
+            sincos_double(cycles, &sine, &cosine);
             if (state == CROSSING) {
                 g *= inside;
                 h *= inside;

@@ -141,7 +141,7 @@ inline int weigh_lines(group pulses, line_geometry line, __global const float *r
             fv of_tap = cycles - (fv)(b * line.fine_cycles), sine, cosine;
             of_tap = of_tap - (fv)(b * line.fine_cycles_low);
             of_tap -= nearest(of_tap);
-            sincos_turns(of_tap, &sine, &cosine);
+            sincos_cycles(of_tap, &sine, &cosine);
             STORE(weight[b] * cosine, v, W + PARTS * b * SIDE);
             STORE(weight[b] * sine, v, W + (PARTS * b + 1) * SIDE);
 #if SLOPE
@@ -163,7 +163,7 @@ inline void take_samples(line_geometry line, __global const float *restrict row,
             fv m = (lane + (fv)(v * VW + from)) * (fv)FINE + (fv)a, re, im, sine, cosine;
             fv t = fma(m, (fv)(line.along * (1.0f / FINE)), (fv)line.frac);
             look_up(row, stride, origin, (iv)line.base, t, table, &re, &im);
-            sincos_turns(cycles_of(m, line.fine_cycles, line.fine_cycles_low), &sine, &cosine);
+            sincos_cycles(cycles_of(m, line.fine_cycles, line.fine_cycles_low), &sine, &cosine);
             STORE(fma(re, cosine, -im * sine), v, T + 2 * a * MOST);
             STORE(fma(re, sine, im * cosine), v, T + (2 * a + 1) * MOST);
         }
@@ -263,7 +263,7 @@ inline void sum_line(group pulses, int r, int j0, int made, __local const float 
         re[v] = fma(slope_re[v], rest - in_position, re[v]);
         im[v] = fma(slope_im[v], rest - in_position, im[v]);
 #endif
-        sincos_turns(cycles - nearest(cycles), &sine, &cosine);
+        sincos_cycles(cycles - nearest(cycles), &sine, &cosine);
         fv rotated = fma(re[v], cosine, -im[v] * sine);
         im[v] = fma(re[v], sine, im[v] * cosine);
         re[v] = rotated;
@@ -290,7 +290,7 @@ inline void add_pixels(group pulses, __global const float *restrict record, fv i
     // outside, the position is moved to delay 0, which every profile has
     look_up(row, stride, origin, inside ? (iv)line.base : (iv)0, inside ? from_tile + line.frac : (fv)0.0f, table,
             &sample_re, &sample_im);
-    sincos_turns(cycles - nearest(cycles), &sine, &cosine);
+    sincos_cycles(cycles - nearest(cycles), &sine, &cosine);
     sample_re = inside ? sample_re : (fv)0.0f;
     sample_im = inside ? sample_im : (fv)0.0f;
     *re = fma(sample_re, cosine, fma(-sample_im, sine, *re));

@@ -42,14 +42,14 @@ enum { V_X, V_Y, V_Z, V_RANGE, V_SHIFT, V_BASE };               // of a point
 enum { O_OFFSET, O_START };                                     // of an element, over times
 enum { P_X, P_Y, P_Z, P_KAPPA, P_BETA, P_START };               // of an element, over points
 
-inline void unit_circle(wv turn, rv *sine, rv *cosine) {
+inline void unit_circle(wv cycles, rv *sine, rv *cosine) {
 #if DOUBLE
-    wv rest = turn - rint(turn);
+    wv rest = cycles - rint(cycles);
     *sine = sinpi(rest + rest);
     *cosine = cospi(rest + rest);
 #else
     iv whole;
-    sincos_turns(w_split(turn, &whole), sine, cosine);
+    sincos_cycles(w_split(cycles, &whole), sine, cosine);
 #endif
 }
 
@@ -66,10 +66,10 @@ __kernel void times(__global const stored *restrict entries, int step, __global 
     int i = get_global_id(0), from = get_global_id(1) * CHUNK, to = min(n, from + CHUNK);
     wv shift = WIDE(PLANE(entries, S_SHIFT, step), i, step), base = WIDE(PLANE(entries, S_BASE, step), i, step);
     for (int k = from; k < to; k++) {
-        wv turn = w_mul(WIDE1(PLANE(elements, O_OFFSET, n), k, n), shift);
-        turn = w_add(turn, w_add(base, WIDE1(PLANE(elements, O_START, n), k, n)));
+        wv cycles = w_mul(WIDE1(PLANE(elements, O_OFFSET, n), k, n), shift);
+        cycles = w_add(cycles, w_add(base, WIDE1(PLANE(elements, O_START, n), k, n)));
         rv sine, cosine;
-        unit_circle(turn, &sine, &cosine);
+        unit_circle(cycles, &sine, &cosine);
         size_t at = entry(i, k, n, width);
         STORE(cosine, 0, table + at);
         STORE(sine, 0, table + at + width);
@@ -94,11 +94,11 @@ __kernel void paths(__global const stored *restrict entries, int step, __global 
             cross = a ? w_add(cross, d) : d;  // p.(2 v - p)
         }
         wv less = w_div(cross, w_add(range, w_sqrt(square)));  // R - r_n
-        wv turn = w_mul(WIDE1(PLANE(elements, P_KAPPA, n), k, n), less);
-        turn = w_sub(turn, w_mul(WIDE1(PLANE(elements, P_BETA, n), k, n), shift));
-        turn = w_sub(turn, w_add(base, WIDE1(PLANE(elements, P_START, n), k, n)));
+        wv cycles = w_mul(WIDE1(PLANE(elements, P_KAPPA, n), k, n), less);
+        cycles = w_sub(cycles, w_mul(WIDE1(PLANE(elements, P_BETA, n), k, n), shift));
+        cycles = w_sub(cycles, w_add(base, WIDE1(PLANE(elements, P_START, n), k, n)));
         rv sine, cosine;
-        unit_circle(turn, &sine, &cosine);
+        unit_circle(cycles, &sine, &cosine);
         REAL re = weights[k], im = weights[n + k];
         size_t at = entry(i, k, n, width);
         STORE(re * cosine - im * sine, 0, table + at);

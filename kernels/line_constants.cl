@@ -35,10 +35,10 @@ inline void project(__global float *out, int first, point d, wv r, __global cons
 }
 
 // Writes cycles less whole ones, in two parts: a multiple of 2^-14, whose products with integers up to 2^10 are exact, and the rest.
-inline void put_turns(__global float *out, int component, wv turns) {
+inline void put_cycles(__global float *out, int component, wv cycles) {
     iv whole;
-    fv part = w_split(turns, &whole), high = nearest(part * 16384.0f) * (1.0f / 16384.0f);
-    wv lost = w_sub(w_sub(turns, w_make(TO_FLOAT_INT(whole), (fv)0)), w_make(part, (fv)0));  // by rounding to float
+    fv part = w_split(cycles, &whole), high = nearest(part * 16384.0f) * (1.0f / 16384.0f);
+    wv lost = w_sub(w_sub(cycles, w_make(TO_FLOAT_INT(whole), (fv)0)), w_make(part, (fv)0));  // by rounding to float
     put(out, N_LINE, component, high);
     put(out, N_LINE, component + 1, (part - high) + w_float(lost));
 }
@@ -77,12 +77,12 @@ __kernel void line_constants(__global const float *restrict pulse, __global cons
     iv base, unused;
     wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
 #if LOCAL
-    put(out, N_LINE, L_TURN, (fv)0);
+    put(out, N_LINE, L_CYCLES, (fv)0);
     put(out, N_LINE, L_FRAC, (fv)0);
     base = 0;
 #else
-    put(out, N_LINE, L_TURN, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_TURN * n, g, lo)), &unused));
-    put(out, N_LINE, L_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_PLACE * n, g, lo)), &base));
+    put(out, N_LINE, L_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
+    put(out, N_LINE, L_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
     if (wrap) base = base % wrap;
 #endif
     put(out, N_LINE, L_BASE, AS_FLOAT(base));
@@ -90,11 +90,11 @@ __kernel void line_constants(__global const float *restrict pulse, __global cons
     put(out, N_LINE, L_SIGMA, w_float(sigma));
     put(out, N_LINE, L_STEP_X, w_float(w_mul(along_x, sigma)));
     put(out, N_LINE, L_STEP_Y, w_float(w_mul(along_y, sigma)));
-    wv turns_x = w_mul(along_x, kappa), turns_y = w_mul(along_y, kappa), part = w_make((fv)(1.0f / fine), (fv)0);
-    put_turns(out, L_TURN_X, turns_x);
-    put_turns(out, L_TURN_Y, turns_y);
-    put_turns(out, L_FINE_X, w_mul(turns_x, part));
-    put_turns(out, L_FINE_Y, w_mul(turns_y, part));
+    wv cycles_x = w_mul(along_x, kappa), cycles_y = w_mul(along_y, kappa), part = w_make((fv)(1.0f / fine), (fv)0);
+    put_cycles(out, L_CYCLES_X, cycles_x);
+    put_cycles(out, L_CYCLES_Y, cycles_y);
+    put_cycles(out, L_FINE_X, w_mul(cycles_x, part));
+    put_cycles(out, L_FINE_Y, w_mul(cycles_y, part));
 
 #if LOCAL
     iv state = INSIDE;

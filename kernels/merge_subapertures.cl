@@ -72,14 +72,14 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
     wv second = path_difference(R, rx_length, x, &r, &d);
     delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
 #endif
-    wv turns = w_mul(delta, w_load(pulse + P_KAPPA * n, g, lo)), places = w_mul(delta, w_load(pulse + P_SIGMA * n, g, lo));
+    wv wide_cycles = w_mul(delta, w_load(pulse + P_KAPPA * n, g, lo)), wide_position = w_mul(delta, w_load(pulse + P_SIGMA * n, g, lo));
 #if FROM_CENTRE
-    turns = w_add(turns, w_load(pulse + P_TURN * n, g, lo));
-    places = w_add(places, w_load(pulse + P_PLACE * n, g, lo));
+    wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * n, g, lo));
+    wide_position = w_add(wide_position, w_load(pulse + P_POSITION * n, g, lo));
 #endif
     iv unused, base;
-    fv turn = w_split(turns, &unused);
-    fv t = w_split(places, &base) - (fv)(0.5f * (TAPS - 1));
+    fv cycles = w_split(wide_cycles, &unused);
+    fv t = w_split(wide_position, &base) - (fv)(0.5f * (TAPS - 1));
     iv at = base + nearest_int(t);
     fv z = t - nearest(t);
 #if WRAP
@@ -90,7 +90,7 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
     iv safe = clamp(at, (iv)(reach - origin), (iv)(stride - origin + reach - samples - TAPS));
     fv w[TAPS], sine, cosine;
     tap_weights(z, table, w);
-    sincos_turns(turn, &sine, &cosine);
+    sincos_cycles(cycles, &sine, &cosine);
     int sample[VW];
     float re[TAPS][VW], im[TAPS][VW];
     STORE(safe, 0, sample);

@@ -9,6 +9,7 @@
 //           step      high + low: `high` has so few bits that n high is exact, and whole cells are resolved exactly;
 //                     the same sample falls into the same cell whichever tile looks at it
 //           line      (n_rows, 6): rest0, high0, low0, rest1, high1, low1
+//           period    q0 M0, q1 M1: cells by which the copy of the grid that a line crosses is displaced
 //           table     (TAPS/2, 2, TERMS) as interp.clh reads it
 // macros    VW        1: the lanes are the taps of a sample
 //           TAPS, TERMS   of the kernel; TILE cells per side of a tile, M0, M1 >= TILE + 2 TAPS + 4
@@ -55,8 +56,8 @@ inline void periods(float low, float high, float middle, float step, int m, int 
 
 // First tap of sample n on one axis, counted from the row's whole cell, and where it lies between taps.
 inline int first_cell(float n, float rest, float high, float low, float *z) {
-    float whole = n * high, cell = floor(whole), place = (whole - cell) + fma(n, low, rest), more = floor(place);
-    *z = place - more - 0.5f;
+    float whole = n * high, cell = floor(whole), position = (whole - cell) + fma(n, low, rest), more = floor(position);
+    *z = position - more - 0.5f;
     return (int)cell + (int)more - TAPS / 2 + 1;
 }
 
@@ -79,14 +80,14 @@ __kernel void spread(__global const float *restrict samples, int n_rows, int n_s
         periods(low0, high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
         for (int q0 = from0; q0 <= to0; q0++) {
             int begin = -middle, end = n_samples - 1 - middle;
-            float turn0 = (float)q0 * m0;
-            clip(low0 + turn0, high0 + turn0, t0, d0, &begin, &end);
+            float period0 = (float)q0 * m0;
+            clip(low0 + period0, high0 + period0, t0, d0, &begin, &end);
             if (begin > end) continue;
             periods(low1, high1, t1, d1, m1, begin, end, &from1, &to1);
             for (int q1 = from1; q1 <= to1; q1++) {
                 int start = begin, stop = end;
-                float turn1 = (float)q1 * m1;
-                clip(low1 + turn1, high1 + turn1, t1, d1, &start, &stop);
+                float period1 = (float)q1 * m1;
+                clip(low1 + period1, high1 + period1, t1, d1, &start, &stop);
                 int shift0 = cell[2 * p] - q0 * m0 - base0 + TAPS - 1;
                 int shift1 = cell[2 * p + 1] - q1 * m1 - base1 + TAPS - 1;
                 for (int n = start; n <= stop; n++) {

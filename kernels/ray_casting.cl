@@ -10,7 +10,9 @@
 //           eye       the antenna, in units of the scene; shrink  a power of two that makes eye - p about one
 //           leaf      (n/8, 3, 3, 8): corners of eight facets, by corner and axis
 //           node      (., 2, 3, 8): lower and upper sides of the boxes of eight children; level l starts at base[l]
-//           side      1: the facet turned away from the eye is dark; 0: both sides are seen
+//           side      1: the facet turned away from the eye is dark; 0: both sides are seen;  slack  rad, by which a
+//                     facet must be turned away from the eye at least to count as turned away
+//           d, z      eye - p times `shrink`, and the axis of its largest component; A, B, C are sheared along it
 // macros    none
 // reference: sarcl/reference/shadow.py:hidden
 
@@ -85,7 +87,7 @@ inline int blocked(__global const float *leaf, __global const float *node, __con
     return 0;
 }
 
-// Facets turned away start with every sample hidden, the others with none.
+// Facets turned away start with every sample hidden, the others with none (fresh 1) or as they are (fresh 0).
 __kernel void face(__global const float *restrict facet, __global const int *restrict index,
                    __global const uchar *restrict side, float ex, float ey, float ez, float slack, int fresh,
                    __global ulong *restrict hidden) {
@@ -112,13 +114,13 @@ __kernel void hidden(__global const float *restrict facet, __global const int *r
     out[i] = bits;
 }
 
-// What a ray caster on the host found, a byte a sample.
+// Adds the samples that a ray caster on the host found hidden, one byte per sample.
 __kernel void join(__global const uchar *restrict found, int samples, __global ulong *restrict hidden) {
     size_t i = get_global_id(0);
     for (int s = 0; s < samples; s++) hidden[i] |= (ulong)found[i * samples + s] << s;
 }
 
-// How many of the samples are not hidden.
+// Number of samples of each facet that are not hidden.
 __kernel void seen(__global const ulong *restrict hidden, int samples, __global uchar *restrict out) {
     size_t i = get_global_id(0);
     int dark = 0;

@@ -244,7 +244,7 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             size_t at_nearest = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
             offset x = load_offset(offsets, at, n_offsets);
             about_centre(&x, tile, k, n_tiles);
-            place where = locate(c, pulse, p, n, x);
+            phase_position where = locate(c, pulse, p, n, x);
             fv inside = 1;
             if (state == CROSSING) inside = keep_inside(c, &where);
             float is_inside[VW];
@@ -261,7 +261,7 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             if (!(any_mark & BRIGHT)) continue;
 
             fv sine, cosine, w[TAPS];
-            sincos_turns(where.turn, &sine, &cosine);
+            sincos_cycles(where.cycles, &sine, &cosine);
             sine *= inside;
             cosine *= inside;
             iv j;
@@ -275,7 +275,7 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                     a.re = fma(weight_of_node, LOAD(0, from_node), a.re);
                     a.im = fma(weight_of_node, LOAD(1, from_node), a.im);
                 }
-                // times exp(-j 2 pi turn)
+                // times exp(-j 2 pi cycles)
                 add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),
                          fma(a.im, cosine, -a.re * sine));
             }

@@ -64,7 +64,7 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
             size_t at_vector = (size_t)k * (TILE / VW) + i;
             offset x = load_offset(offsets, at_vector, n_offsets);
             about_centre(&x, tile, k, n_tiles);
-            place at = locate(c, pulse, p, n, x);
+            phase_position at = locate(c, pulse, p, n, x);
             fv re = LOAD(at_vector, scatterers), im = LOAD(at_vector, scatterers + n_offsets);
             if (state == CROSSING) {
                 fv inside = keep_inside(c, &at);
@@ -75,8 +75,8 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
                 for (int l = 0; l < VW; l++) count += is_inside[l] != 0 && i * VW + l < n_points;
             }
             fv sine, cosine;
-            sincos_turns(at.turn, &sine, &cosine);
-            // times exp(-j 2 pi turn)
+            sincos_cycles(at.cycles, &sine, &cosine);
+            // times exp(-j 2 pi cycles)
             fv echo_re = fma(re, cosine, im * sine), echo_im = fma(im, cosine, -re * sine);
             iv j;
             fv w[TAPS];

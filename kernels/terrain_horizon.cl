@@ -10,8 +10,11 @@
 //           line      (lines, 2): b and the slope (b - across_eye)/(ref - along_eye)
 //           column    grid line across the range lines; a gap lies between two of them, where a range line crosses at
 //                     most one grid line of the other kind, and diagonals from south-west to north-east
+//           slope     change of `across` per unit `along`;  climb, rise  change of height, of `across`
+//           per_across  grid lines per unit across: the first guess of an interval
 //           table     H (lines, columns)
 //           sector    4 x 8 numbers and 4 x 8 integers: outwards along +x, -x, +y, -y; see sarcl/visibility/_terrain_horizon.py
+//           place     (samples,) barycentric coordinates;  index  facets to test;  hidden  bit s of entry i: sample s of facet i
 // macros    none
 // reference: sarcl/reference/shadow.py:overshadowed
 
@@ -19,8 +22,8 @@
 
 #define NONE -1e30f
 
-// position of v among increasing values, 0 ... n - 2; `guess` is near it
-inline int place_of(__global const float *value, int n, float v, float guess) {
+// number of the interval of increasing values that v lies in, 0 ... n - 2; `guess` is near it
+inline int interval_of(__global const float *value, int n, float v, float guess) {
     int i = clamp((int)guess, 0, n - 2);
     while (i > 0 && value[i] > v) i--;
     while (i < n - 2 && value[i + 1] <= v) i++;
@@ -33,7 +36,7 @@ inline float ratio(float a, float b) {
     return q + fma(-q, b, a) / b;
 }
 
-// one sector's grid: see `turned` in behind
+// the grid of one sector, along its range lines and across; `transposed` in behind exchanges x and y
 typedef struct {
     __global const float *z, *along, *across;
     int n_along, n_across;
@@ -57,7 +60,7 @@ inline int met(Edge e) { return e.share >= 0 && e.share <= e.whole && e.whole > 
 
 // column i, `at` across
 inline Edge column_edge(Grid g, int i, float at) {
-    int r = place_of(g.across, g.n_across, at, (at - g.across[0]) * g.per_across);
+    int r = interval_of(g.across, g.n_across, at, (at - g.across[0]) * g.per_across);
     __global const float *z = g.z + (size_t)r * g.n_along + i;
     return edge_of(z[0], z[g.n_along], at - g.across[r], g.across[r + 1] - g.across[r]);
 }
@@ -84,8 +87,8 @@ __kernel void sweep(__global const float *restrict z, __global const float *rest
         int i = first + c * step, gap = step > 0 ? i - 1 : i;
         if (gap >= 0 && gap < n_along - 1) {
             float wide = along[gap + 1] - along[gap], rise = slope * wide, from = line[j].x + slope * (along[gap] - ref);
-            int ra = place_of(across, n_across, from, (from - across[0]) * per_across);
-            int rb = place_of(across, n_across, from + rise, (from + rise - across[0]) * per_across);
+            int ra = interval_of(across, n_across, from, (from - across[0]) * per_across);
+            int rb = interval_of(across, n_across, from + rise, (from + rise - across[0]) * per_across);
             for (int k = 0; k < (ra == rb ? 1 : 3); k++) {
                 Edge e = gap_edge(g, gap, from, rise, ra, rb, k);
                 float u = ratio(e.share, e.whole), at = along[gap] + u * wide;
@@ -106,8 +109,8 @@ inline int gap_above(Grid g, int i, float x, float y, float z, float slope, floa
     if (i < 0 || i > g.n_along - 2) return 0;
     float a = g.along[i], wide = g.along[i + 1] - a, from = y + slope * (a - x), rise = slope * wide;
     float here = z + climb * (a - x), more = climb * wide, back = (a - x) * step, past = (a - g.eye) * step;
-    int ra = place_of(g.across, g.n_across, from, (from - g.across[0]) * g.per_across);
-    int rb = place_of(g.across, g.n_across, from + rise, (from + rise - g.across[0]) * g.per_across);
+    int ra = interval_of(g.across, g.n_across, from, (from - g.across[0]) * g.per_across);
+    int rb = interval_of(g.across, g.n_across, from + rise, (from + rise - g.across[0]) * g.per_across);
     for (int k = 0; k < (ra == rb ? 1 : 3); k++) {
         Edge e = gap_edge(g, i, from, rise, ra, rb, k);
         float way = wide * step * e.share;
@@ -121,19 +124,19 @@ inline int gap_above(Grid g, int i, float x, float y, float z, float slope, floa
 inline int behind(float3 p, float3 eye, __global const float *grid_x, __global const float *grid_y,
                   __global const float *z_rows, __global const float *z_columns, int nx, int ny, float per_x, float per_y,
                   __global const float *number, __global const int *whole, __global const float *table) {
-    int turned = fabs(p.y - eye.y) * per_y > fabs(p.x - eye.x) * per_x;
-    float x = turned ? p.y : p.x, y = turned ? p.x : p.y, ex = turned ? eye.y : eye.x, ey = turned ? eye.x : eye.y;
-    int s = 2 * turned + (x < ex);
+    int transposed = fabs(p.y - eye.y) * per_y > fabs(p.x - eye.x) * per_x;
+    float x = transposed ? p.y : p.x, y = transposed ? p.x : p.y, ex = transposed ? eye.y : eye.x, ey = transposed ? eye.x : eye.y;
+    int s = 2 * transposed + (x < ex);
     whole += 8 * s;
     number += 8 * s;
     int first = whole[0], step = whole[1], columns = whole[2], lines = whole[3];
     if (columns == 0) return 0;
     float ref = number[0];
-    Grid g = {turned ? z_columns : z_rows, turned ? grid_y : grid_x, turned ? grid_x : grid_y, turned ? ny : nx,
-              turned ? nx : ny, turned ? per_x : per_y, ref, ex, eye.z};
+    Grid g = {transposed ? z_columns : z_rows, transposed ? grid_y : grid_x, transposed ? grid_x : grid_y, transposed ? ny : nx,
+              transposed ? nx : ny, transposed ? per_x : per_y, ref, ex, eye.z};
     __global const float *along = g.along;
     // the column next to p on its way to the eye
-    int r = place_of(along, g.n_along, x, (x - along[0]) * (turned ? per_y : per_x)), i;
+    int r = interval_of(along, g.n_along, x, (x - along[0]) * (transposed ? per_y : per_x)), i;
     if (step > 0)
         i = along[r + 1] < x ? r + 1 : along[r] < x ? r : r - 1;
     else

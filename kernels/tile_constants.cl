@@ -65,12 +65,12 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
     iv base, unused;
     wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
 #if LOCAL
-    put(out, N_CONST, C_TURN, (fv)0);
+    put(out, N_CONST, C_CYCLES, (fv)0);
     put(out, N_CONST, C_FRAC, (fv)0);
     base = 0;
 #else
-    put(out, N_CONST, C_TURN, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_TURN * n, g, lo)), &unused));
-    put(out, N_CONST, C_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_PLACE * n, g, lo)), &base));
+    put(out, N_CONST, C_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
+    put(out, N_CONST, C_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
     if (wrap) base = base % wrap;
 #endif
     put(out, N_CONST, C_BASE, AS_FLOAT(base));

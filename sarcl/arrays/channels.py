@@ -150,5 +150,5 @@ def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> No
         warn(
             f"the array's centre frequency jumps by {jump:.4g} Hz from plan to plan, {100 * share:.3g} % of the band: "
             f"a point r m from the reference changes its phase there by {4 * np.pi * jump / SPEED_OF_LIGHT:.3g} r rad, "
-            "and images of it defocus beyond a quarter turn; move the base frequency as well (array.mirrored)"
+            "and images of it defocus beyond a quarter of a cycle; move the base frequency as well (array.mirrored)"
         )

@@ -41,7 +41,7 @@ class ProfileEnergy:
 def estimate(task: FocusingTask) -> ProfileEnergy:
     """Estimate from 256 pixels in 16 rows spread over the data and in the 16 strongest rows, to 1e-11 of an amplitude.
 
-    ProfileEnergy(1, 1) where no row sees any of these pixels.
+    ProfileEnergy(1, 1) where none of these pixels lies in the range window and beam of any row.
     """
     if task not in _known:
         _known[task] = _estimate(task)
@@ -109,7 +109,7 @@ def share(task: FocusingTask) -> float:
 
 
 def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np.ndarray]:
-    """Delays of points, m (m, 3), in fractions of a row's range window, and whether the row sees them."""
+    """Delays of points, m (m, 3), in fractions of a row's range window; whether they lie in it and in the beam."""
     raw = task.raw
     half = half_path(raw.tx[row], raw.rx[row], x)
     delays = 2 * raw.frequency_step[row] / SPEED_OF_LIGHT * (half - raw.reference_range[row])

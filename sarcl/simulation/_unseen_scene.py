@@ -23,7 +23,7 @@ NO_GAIN = 1e-180  # of the peak: the square of a smaller gain is 0 in float64
 HEIGHTS = 10.0  # standard deviations: no random height of a facet is larger
 CELLS = 16  # per axis: boxes that a scene is divided into where the box of all is not conclusive
 PULSES = 256  # per block
-SAMPLES = 64  # scatterers, and pulses, that are looked at first: scenes in the beam cost no more
+SAMPLES = 64  # scatterers, and pulses, that are tested first: more are tested only where none of these is in the beam
 
 OUTSIDE_WINDOW = (
     "every scatterer is outside the range window of {:g} to {:g} m about the reference; widen range_window or move "

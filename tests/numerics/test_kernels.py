@@ -74,7 +74,7 @@ def test_wide_square_root_of_zero_is_zero(device, monkeypatch):
 
 def test_sine_and_cosine_of_turns_err_less_than_4e_7(device, monkeypatch):
     turns = np.linspace(-0.5, 0.5, 20001, dtype=np.float32)[None]
-    body = "fv s, c; sincos_turns(LOAD(i, x), &s, &c); STORE(s, i, out); STORE(c, i, out + n);"
+    body = "fv s, c; sincos_cycles(LOAD(i, x), &s, &c); STORE(s, i, out); STORE(c, i, out + n);"
     sine, cosine = probe(device, monkeypatch, body, turns, 2)
     angle = 2 * np.pi * turns[0].astype(np.float64)
     assert np.abs(sine - np.sin(angle)).max() < 4e-7

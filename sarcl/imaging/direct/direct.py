@@ -24,7 +24,7 @@ from .tile_kernels import CHUNK, kernel_of
 def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    lanes  the devices work on vectors of pixels, so that lines of pixels pay
+    lanes  the devices work on vectors of pixels, so that lines of pixels may be faster
     ToleranceUnreachable names the best tolerance that can be met.
     """
     raw, grid = task.raw, task.grid

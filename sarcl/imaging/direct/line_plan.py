@@ -107,7 +107,7 @@ class LineTiling(PlaneTiling):
 
 
 def possible(grid: ImageGrid, lanes: bool) -> bool:
-    """Whether lines pay: pixels lie on lines, and the devices work on vectors of pixels."""
+    """Whether a plan by lines may be faster: pixels lie on lines, and the devices work on vectors of pixels."""
     return lanes and grid.is_plane
 
 

@@ -9,7 +9,7 @@ For this folder alone:
 
     _memory          blocks within a memory limit
     _subapertures    runs of pulses, decimated level by level
-    _tile_coverage   which rows see which of the largest tiles
+    _tile_coverage   which of the largest tiles lie in the range window and beam of which rows
 """
 
 __all__ = ["factorized", "plan"]

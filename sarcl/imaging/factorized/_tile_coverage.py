@@ -43,8 +43,9 @@ class TileCoverage:
 def coverage_of(a: PulseGeometry, roots: Roots, center: np.ndarray, radius: float, least: float) -> TileCoverage:
     """Coverage by rows of roots of `radius` m about the scene's centre, m (3,).
 
-    A row that sees every point of a root, in its range window and its beam, can be merged. One that sees none adds
-    nothing. One that sees some is added directly. Where fewer than `least` rows can be merged, all are added directly.
+    A row whose range window and beam contain every point of a root can be merged. One whose window or beam contains
+    none adds nothing. The others are added directly. Where fewer than `least` rows can be merged, all are added
+    directly.
     """
     n = len(roots.centers)
     merged = np.ones(n, bool)

@@ -58,7 +58,7 @@ class FactorPlan:
     factors  leaves along a side of a tile, for each level
     first    interpolator of the range profiles of the rows, `length` samples long; between: that between two levels
     leaf     plan from the profiles of a leaf to its pixels
-    edge     direct plan for roots that a row sees only in part
+    edge     direct plan for roots that lie only in part in the range window and beam of a row
     cost     per contribution, relative to one with linear interpolation and ranges in float32
     order    (n_rows,): order of the rows in which those of a smooth run are consecutive
     """
@@ -91,7 +91,7 @@ class FactorPlan:
 def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
-    lanes  the devices work on vectors of pixels, so that lines of pixels pay
+    lanes  the devices work on vectors of pixels, so that lines of pixels may be faster
     ToleranceUnreachable where sub-apertures cannot meet it, with the reason, but without a best tolerance, which takes
     a search.
     """
@@ -262,7 +262,7 @@ class _Case:
         return best
 
     def _edge(self, tiling: Tiling) -> LinePlan | Plan | None:
-        """Direct plan, on the same leaves, for tiles that a pulse sees only in part; None: there is none."""
+        """Direct plan, on the same leaves, for tiles only partly in a range window or beam; None: there is none."""
         raw = self.task.raw
         if self.lines:
             return line_plan.choose(

@@ -83,8 +83,8 @@ class InterpolatedChannels:
         saved = layout.runs * (separate - cost_model.CHANNEL_INTERPOLATED * width)
         return saved / (len(layout.rows.track) * (fixed + cost_model.CHANNEL_SAMPLE * layout.grid.n))
 
-    def pays(self, scatterers: int) -> bool:
-        """Whether this is faster than separate channels."""
+    def is_faster(self, scatterers: int) -> bool:
+        """Whether interpolation takes less time than separate channels, by the cost model."""
         return self.interpolates and len(self.tx) * len(self.rx) <= self._most(scatterers)
 
     def _is_smooth(self, scene: Scene, vertical: np.ndarray, tolerance: float) -> bool:

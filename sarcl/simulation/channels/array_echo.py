@@ -122,8 +122,8 @@ def _interpolated(
     if INTERPOLATED not in request.skips or layout.runs <= len(layout.rows.track) or not shared:
         return None
     channels = InterpolatedChannels(layout, scene, weights, request.vertical, request.tolerance)
-    pays = channels.pays(len(scene.positions) + len(scene.triangles))
-    return channels if pays and channels.tolerance >= LEAST_TOLERANCE else None
+    faster = channels.is_faster(len(scene.positions) + len(scene.triangles))
+    return channels if faster and channels.tolerance >= LEAST_TOLERANCE else None
 
 
 def _filled(method: SeparateChannels | InterpolatedChannels, prepared: SceneEchoes, output: EchoOutput) -> Added:
