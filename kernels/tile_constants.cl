@@ -1,18 +1,20 @@
-// Constants that the points of a tile share for a pulse: directions and distances of the antennas, phase and position of the
-// tile's reference point.
+// Records of tiles and pulses: what the points of a tile, or the lines of pixels of a square tile, share for a pulse.
 //
 // A program of its own, so that it is compiled for the few macros that it depends on: not for every interpolation kernel and
 // every length of a profile.
 //
-// source    geometry.clh
-// symbols   delta, kappa, sigma, u, R0   as in geometry.clh
+// source    geometry.clh, line_geometry.clh
+// symbols   delta, kappa, sigma, u, R0   as in geometry.clh;  beta   as in line_geometry.clh
 // macros    VW, FP64, BISTATIC, BEAM as in the headers;  RANGE  1: records hold low parts too; 0: they need none
 //           LOCAL  1: every tile has profiles of its own, about its reference point (factorised); 0: pulses' own
 // reference: sarcl/reference/geometry.py:half_path
 
+#define ORDER 0
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
+#include "range_phase.clh"
+#include "line_geometry.clh"
 
 inline void put_direction(__global float *records, int first, int low, point d, wv r) {
     fv R0 = w_float(r);
@@ -97,4 +99,107 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
     for (int i = 0; i < 4; i++) put(out, N_CONST, C_BX + i, w_float(w_load(pulse + (P_BX + i) * n, g, lo)));
 #endif
     put(out, N_CONST, C_STATE, AS_FLOAT(state));
+}
+
+// A column's step (0) or a row's (1), m.
+inline point load_step(__global const float *axes, int which) {
+    point step;
+    step.x = w_load1(axes, 3 * which, 6);
+    step.y = w_load1(axes, 3 * which + 1, 6);
+    step.z = w_load1(axes, 3 * which + 2, 6);
+    return step;
+}
+
+// Projections of the direction to an antenna on the steps of columns and rows, in wide numbers.
+inline void project(__global float *out, int first, point d, wv r, __global const float *axes, wv *along_x, wv *along_y) {
+    fv R0 = w_float(r);
+    wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
+    *along_x = w_mul(w_dot(d, load_step(axes, 0)), inverse);
+    *along_y = w_mul(w_dot(d, load_step(axes, 1)), inverse);
+    put(out, N_LINE, first, w_float(*along_x));
+    put(out, N_LINE, first + 1, w_float(*along_y));
+    put(out, N_LINE, first + 2, R0 > 0 ? w_float(inverse) : (fv)0);
+    put(out, N_LINE, first + 3, R0);
+}
+
+// Writes cycles less whole ones, in two parts: a multiple of 2^-14, whose products with integers up to 2^10 are exact, and the rest.
+inline void put_cycles(__global float *out, int component, wv cycles) {
+    iv whole;
+    fv part = w_split(cycles, &whole), high = nearest(part * 16384.0f) * (1.0f / 16384.0f);
+    wv lost = w_sub(w_sub(cycles, w_make(TO_FLOAT_INT(whole), (fv)0)), w_make(part, (fv)0));  // by rounding to float
+    put(out, N_LINE, component, high);
+    put(out, N_LINE, component + 1, (part - high) + w_float(lost));
+}
+
+// Constants that the lines of a tile share, for VW pulses per work-item: as tile_constants, with one radius, m, for all tiles.
+//   axes    (2, 6)    a column's and a row's step, m, hi and lo parts
+//   wrap    M > 0: profiles repeat every M samples; 0: they do not
+//   fine    samples of a line per pixel: 1, 2, 4 or 8
+__kernel void line_constants(__global const float *restrict pulse, __global const float *restrict tile,
+                             float radius, int n, int n_tiles, int first, int skip, int wrap, int fine,
+                             __global const float *restrict axes, __global float *restrict out) {
+    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
+    point x = load_point(tile, k, n_tiles);
+    out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;
+
+    point d;
+    wv r, along_x, along_y;
+    wv delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &r, &d);
+    project(out, L_UX, d, r, axes, &along_x, &along_y);
+#if BEAM
+    point to_tx = d;
+    wv tx_r = r;
+#endif
+#if BISTATIC
+    wv one_half = w_make((fv)0.5f, (fv)0), second_x, second_y;
+    wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &r, &d);
+    project(out, L_VX, d, r, axes, &second_x, &second_y);
+    delta = w_mul(w_add(delta, second), one_half);
+    along_x = w_mul(w_add(along_x, second_x), one_half);
+    along_y = w_mul(w_add(along_y, second_y), one_half);
+#endif
+    wv zero = w_make((fv)0, (fv)0);
+    along_x = w_sub(zero, along_x);
+    along_y = w_sub(zero, along_y);
+
+    iv base, unused;
+    wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
+#if LOCAL
+    put(out, N_LINE, L_CYCLES, (fv)0);
+    put(out, N_LINE, L_FRAC, (fv)0);
+    base = 0;
+#else
+    put(out, N_LINE, L_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
+    put(out, N_LINE, L_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
+    if (wrap) base = base % wrap;
+#endif
+    put(out, N_LINE, L_BASE, AS_FLOAT(base));
+    put(out, N_LINE, L_KAPPA, w_float(kappa));
+    put(out, N_LINE, L_SIGMA, w_float(sigma));
+    put(out, N_LINE, L_STEP_X, w_float(w_mul(along_x, sigma)));
+    put(out, N_LINE, L_STEP_Y, w_float(w_mul(along_y, sigma)));
+    wv cycles_x = w_mul(along_x, kappa), cycles_y = w_mul(along_y, kappa), part = w_make((fv)(1.0f / fine), (fv)0);
+    put_cycles(out, L_CYCLES_X, cycles_x);
+    put_cycles(out, L_CYCLES_Y, cycles_y);
+    put_cycles(out, L_FINE_X, w_mul(cycles_x, part));
+    put_cycles(out, L_FINE_Y, w_mul(cycles_y, part));
+
+#if LOCAL
+    iv state = INSIDE;
+#else
+    wv near = w_sub(w_load(pulse + P_NEAR * n, g, lo), delta), far = w_sub(w_load(pulse + P_FAR * n, g, lo), delta);
+    put(out, N_LINE, L_NEAR, w_float(w_mul(near, sigma)));
+    put(out, N_LINE, L_FAR, w_float(w_mul(far, sigma)));
+    iv state = window_state(near, far, radius, skip);
+#endif
+#if BEAM
+    wv beam_edge;
+    state = beam_state(pulse, g, n, to_tx, tx_r, radius, skip, state, &beam_edge);
+    point beam = load_antenna(pulse, P_BX, g, n, 0);
+    put(out, N_LINE, L_EDGE, w_float(beam_edge));
+    put(out, N_LINE, L_BX, w_float(w_dot(beam, load_step(axes, 0))));
+    put(out, N_LINE, L_BY, w_float(w_dot(beam, load_step(axes, 1))));
+    put(out, N_LINE, L_COS, w_float(w_load(pulse + P_COS * n, g, lo)));
+#endif
+    put(out, N_LINE, L_STATE, AS_FLOAT(state));
 }

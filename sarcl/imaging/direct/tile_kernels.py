@@ -81,7 +81,8 @@ class LineKernel:
         self.lanes = device.info.vector_width
         macros, geometry = plan.macros(bistatic, wrap, local), {"BISTATIC": int(bistatic), "BEAM": int(beam)}
         macros |= geometry
-        self.constants = device.kernel("line_constants.cl", "line_constants", **geometry, LOCAL=int(local))
+        # the program of TileConstants, with the same macros
+        self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=int(local), RANGE=0)
         self.wrap_and_fine = plan.length if wrap else 0, plan.fine
         self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **macros)
         self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
