@@ -10,6 +10,7 @@ For other folders:
     morton        Morton order: neighbours in space become neighbours in memory
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb
+    rows          some rows spread over all, and groups of rows by keys
     stage_timer   seconds per stage of a computation
     text          bytes, durations, tolerances and spelling suggestions as text for messages
     threads       how many processors computations of this process use
@@ -30,6 +31,7 @@ __all__ = [
     "morton",
     "progress",
     "report",
+    "rows",
     "stage_timer",
     "text",
     "threads",

@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import spread_over
 from ..model.image_grid import ImageGrid
 
 if TYPE_CHECKING:
@@ -46,7 +47,7 @@ def default_grid(
     shape    the extent that the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
     normal, x_axis   as in `ImageGrid.plane`
     """
-    part = raw if raw.n_rows <= ROWS else raw[np.linspace(0, raw.n_rows - 1, ROWS).astype(int)]
+    part = raw if raw.n_rows <= ROWS else raw[spread_over(raw.n_rows, ROWS)]
     why = []
     if center is None:
         center, words = _center(part)

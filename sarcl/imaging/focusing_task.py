@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import groups
 from ..base.validation import array, converted, finite, number
 from ..base.vectors import unit
 from ..model.image_grid import ImageGrid
@@ -129,11 +130,8 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
 
     rows = np.ones(raw.n_rows)
     if window is not None:
-        keys = [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
         when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
-        group = np.zeros(raw.n_rows, np.int64)
-        for key in keys:
-            group = group * (len(np.unique(key)) + 1) + np.unique(key, return_inverse=True)[1]
+        group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
         for g in np.unique(group):
             members = np.flatnonzero(group == g)
             rows[members[np.argsort(when[members])]] = window_weights(window, len(members))

@@ -11,6 +11,7 @@ from weakref import WeakKeyDictionary
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import spread_over
 from ..numerics import range_profiles
 from ..numerics.interpolation import deconvolved
 from ..numerics.pulse_geometry import half_path
@@ -53,7 +54,7 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
     count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
-    usual = np.unique(np.linspace(0, raw.n_rows - 1, count).astype(int))
+    usual = spread_over(raw.n_rows, count)
     best = np.setdiff1d(np.argsort(bright)[-count:], usual)
     _, x = grid.sample(PIXELS, seed=1)
     # weights: the strongest rows count once, the others represent all rows that are not read
@@ -104,7 +105,7 @@ def row_norms(task: FocusingTask) -> np.ndarray:
 def share(task: FocusingTask) -> float:
     """Share of (row, pixel) pairs in the row's range window and beam, estimated from 64 rows and 256 pixels."""
     _, x = task.grid.sample(PIXELS, seed=1)
-    rows = np.unique(np.linspace(0, task.raw.n_rows - 1, 64).astype(int))
+    rows = spread_over(task.raw.n_rows, 64)
     return float(np.mean([_delays(task, x, int(row))[1].mean() for row in rows]))
 
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import groups
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics import range_profiles
@@ -30,11 +31,7 @@ def in_pulses(raw: PhaseHistory) -> np.ndarray:
     pulse = pulse.ravel()
     if raw.time is None:
         pulse = np.argsort(np.argsort(first))[pulse]
-    channel = np.zeros(raw.n_rows, np.int64)
-    for name in (raw.tx_channel, raw.rx_channel, raw.polarization):
-        if name is not None:
-            channel = channel * raw.n_rows + np.unique(name, return_inverse=True)[1].ravel()
-            channel = np.unique(channel, return_inverse=True)[1].ravel()
+    channel = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
     rows = np.full((pulse.max() + 1, channel.max() + 1), -1)
     for row in range(raw.n_rows):
         at = pulse[row], channel[row]

@@ -9,6 +9,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..base.rows import spread_over
 from ..numerics.polynomials import chebyshev
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
@@ -49,7 +50,7 @@ def _errors(
     transform = 2 / FREQUENCIES * np.cos(np.outer(np.arange(FREQUENCIES), np.arccos(chebyshev(0, 2, FREQUENCIES))))
     out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
     seen = False
-    for pulse in np.unique(np.linspace(0, len(antennas.tx) - 1, n_pulses).astype(int)):
+    for pulse in spread_over(len(antennas.tx), n_pulses):
         ends = antennas.tx[pulse], antennas.rx[pulse]
         made = part.amplitudes(*ends, band, polarizations, vertical)
         for power, errors in out.items():

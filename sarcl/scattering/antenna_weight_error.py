@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.errors import NothingSeen
+from ..base.rows import spread_over
 from ..base.vectors import unit
 from ..model.waveform import Waveform
 from ..numerics.polynomials import chebyshev
@@ -58,7 +59,7 @@ def _sampled(
     total = bent = seen = floor = blurred = 0.0
     left = np.zeros(MOST_NODES + 1)
     band = chebyshev(waveform.center, waveform.bandwidth, 2 * MOST_NODES + 1)
-    for pulse in np.unique(np.linspace(0, len(beam.geometry) - 1, n_pulses).astype(int)):
+    for pulse in spread_over(len(beam.geometry), n_pulses):
         power = np.empty(len(places))
         power[n_facets:] = point_power[some] * point_share
         if n_facets:

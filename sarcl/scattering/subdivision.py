@@ -9,6 +9,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
+from ..base.rows import spread_over
 from ..base.validation import number
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
@@ -105,7 +106,7 @@ def subdivision_gain(scene: Scene, max_edge: float, antennas: PulseGeometry, fre
     whole = Scene.facets(scene.triangles[some])
     cut = whole.split(max(max_edge, float(np.maximum.reduce(edges(whole.triangles)).max()) / 64))
     power = [0.0, 0.0]
-    for row in np.unique(np.linspace(0, len(antennas.tx) - 1, 3).astype(int)):
+    for row in spread_over(len(antennas.tx), 3):
         for i, part in enumerate((whole, cut)):
             centers = centroids(part.triangles)
             q = np.zeros_like(centers)

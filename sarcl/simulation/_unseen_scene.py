@@ -12,6 +12,7 @@ import numpy as np
 
 from ..base.boxes import box, corners
 from ..base.errors import NothingSeen
+from ..base.rows import spread_over
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weight_error import out_of_beam
@@ -44,8 +45,8 @@ def refuse_unseen(
         return
     bounds = _Bounds(weights, waveform, antennas, gated, margin + HEIGHTS * float(scene.roughness.max(initial=0.0)))
     places = np.concatenate([scene.positions, centroids(scene.triangles)])
-    few = places[np.linspace(0, len(places) - 1, min(SAMPLES, len(places))).astype(int)]
-    pulses = np.linspace(0, len(antennas) - 1, min(SAMPLES, len(antennas))).astype(int)
+    few = places[spread_over(len(places), SAMPLES)]
+    pulses = spread_over(len(antennas), SAMPLES)
     whole = box(np.concatenate([scene.positions, scene.triangles.reshape(-1, 3)]))
     if not len(few) or np.logical_and(*bounds.may_see(few[:, None], pulses)).any():
         return

@@ -14,6 +14,7 @@ import numpy as np
 from ...arrays.map_aperture import MapKind, map_aperture
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
+from ...base.rows import spread_over
 from ...base.vectors import unit
 from ...model.phase_history import PhaseHistory
 from ...opencl.device import DeviceChoice
@@ -230,7 +231,7 @@ def _support(found: np.ndarray) -> dict[str, Any]:
 
 def spatial_frequencies(raw: PhaseHistory, most: int = 40) -> np.ndarray:
     """K = f/c (u_T + u_R) at the origin, of up to `most` samples per row, cycles/m (n, 2): along x and y."""
-    some = np.unique(np.linspace(0, raw.n_samples - 1, most).astype(int))
+    some = spread_over(raw.n_samples, most)
     f = raw.frequency[:, None] + raw.frequency_step[:, None] * some
     look = unit(raw.tx) + unit(raw.rx)
     return np.asarray((f[:, :, None] / SPEED_OF_LIGHT * look[:, None, :2]).reshape(-1, 2))
@@ -240,7 +241,7 @@ def collected(case: Case, most: int = 101) -> dict[str, Any]:
     """Spread across, cycles/m, and spatial frequencies of the channels, each from its own phase centre, of up to `most`
     pulses."""
     array, track = case.channels(), case.track()
-    pulses = np.unique(np.linspace(0, case.n_pulses - 1, most).astype(int))
+    pulses = spread_over(case.n_pulses, most)
     turn = np.eye(3)[None] if track.attitude is None else track.attitude[pulses]
     tx = track.positions[pulses, None] + np.einsum("pij,nj->pni", turn, array.positions)
     f = case.center + np.stack([array.offsets_at(int(p)) for p in pulses])

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
+from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
@@ -164,7 +165,7 @@ def unmodelled_shift(rest: np.ndarray) -> float:
 def sampled_groups(n_rows: int, group: int, most: int = 24) -> np.ndarray:
     """First rows of up to `most` groups spread over all rows."""
     starts = np.arange(0, max(n_rows - group, 0) + 1, group)
-    return starts[np.unique(np.linspace(0, len(starts) - 1, min(most, len(starts))).astype(int))]
+    return starts[spread_over(len(starts), most)]
 
 
 def choose(

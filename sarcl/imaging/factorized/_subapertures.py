@@ -9,6 +9,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.rows import groups, spread_over
 from ...model.phase_history import PhaseHistory
 from ...numerics import interpolation
 from ...numerics.pulse_geometry import PulseGeometry
@@ -21,12 +22,8 @@ def runs_of(raw: PhaseHistory) -> tuple[np.ndarray, list[tuple[int, int]]]:
 
     A run is smooth: its rows share channel and frequency, and follow one another without a gap in the track.
     """
-    keys: list[np.ndarray] = [raw.frequency, raw.frequency_step]
-    keys += [k for k in (raw.tx_channel, raw.rx_channel, raw.polarization) if k is not None]
-    group = np.zeros(raw.n_rows, np.int64)
-    for key in keys:
-        unique, index = np.unique(key, return_inverse=True)
-        group = group * len(unique) + index
+    channel = raw.tx_channel, raw.rx_channel, raw.polarization
+    group = groups(raw.n_rows, raw.frequency, raw.frequency_step, *channel)
     time = np.arange(raw.n_rows) if raw.time is None else raw.time
     order = np.lexsort((np.arange(raw.n_rows), time, group))
     step = np.abs(np.diff(raw.tx[order], axis=0)).sum(axis=1) + np.abs(np.diff(raw.rx[order], axis=0)).sum(axis=1)
@@ -111,7 +108,7 @@ def rate(track: PulseGeometry, points: np.ndarray, axes: np.ndarray | None) -> f
     for begin, end in track.runs:
         if end - begin < 2:
             continue
-        rows = begin + np.unique(np.linspace(0, end - begin - 2, min(512, end - begin - 1)).astype(int))
+        rows = begin + spread_over(end - begin - 1, 512)
         change = np.zeros((len(points), len(rows), 3))
         for antenna in track.ends:
             directions = []
@@ -142,8 +139,8 @@ def filter_error(
         angle = 2 * np.pi * np.arange(8) / 8
         directions = np.cos(angle)[:, None] * axes[0] + np.sin(angle)[:, None] * axes[1]
     blocks = made.blocks
-    spread = np.unique(np.linspace(0, len(blocks) - 1, min(32, len(blocks))).astype(int))
-    within = np.unique(np.linspace(0, made.ratio - 1, min(64, made.ratio)).astype(int))
+    spread = spread_over(len(blocks), 32)
+    within = spread_over(made.ratio, 64)
     usual = (blocks[spread, :1] + np.minimum(within, blocks[spread, 1:2] - 1)).ravel()
     pulses = np.unique(np.concatenate([usual, _roughest(track, made, centers[len(centers) // 2])]))
     block = blocks[np.searchsorted(blocks[:, 0], pulses, side="right") - 1]

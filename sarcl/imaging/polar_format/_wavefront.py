@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 
@@ -74,7 +75,7 @@ class Curvature:
 
 def curvature(raw: PhaseHistory, waves: Waves, grid: ImageGrid) -> Curvature:
     """Error of plane waves on a plane: at its border, from some rows, at the lowest, middle and highest frequency."""
-    rows = np.unique(np.linspace(0, raw.n_rows - 1, MOST_ROWS).astype(int))
+    rows = spread_over(raw.n_rows, MOST_ROWS)
     neglected = _NeglectedPhase(raw, waves, grid, rows)
     last = np.array(grid.shape) - 1
     i, j = (np.array(at) / 2 for at in ([0, 0, 0, 1, 1, 2, 2, 2], [0, 1, 2, 0, 2, 0, 1, 2]))

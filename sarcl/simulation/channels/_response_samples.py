@@ -12,6 +12,7 @@ import numpy as np
 
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.rows import spread_over
 from ...model.antenna_pattern import pattern_gain
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
@@ -74,7 +75,7 @@ class ResponseSamples:
             here = slice(start, min(start + BLOCK, n))
             change[here] = np.ptp(self._cycles(to_scene(box, here), self.outer), axis=1).max(axis=-1)
         most = np.argsort(change)[-PULSES // 4 :]
-        return np.unique(np.concatenate([np.linspace(0, n - 1, PULSES).astype(int), most]))
+        return np.unique(np.concatenate([spread_over(n, PULSES), most]))
 
     def _cycles(self, ends: np.ndarray, off: np.ndarray) -> np.ndarray:
         """Phases, cycles (n, m, k), of paths from antennas, m (n, m, 3), to points off the centre, m (k, 3)."""
