@@ -13,6 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..base import constants, validation
+from ..base.vectors import unit
 from ..model.phase_history import PhaseHistory
 from ..model.pointing import turned, velocities
 from ..model.trajectory import Trajectory
@@ -224,7 +225,7 @@ def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) 
         if not (level > 1e-6 * np.linalg.norm(along, axis=1, keepdims=True)).all():
             bad = int(np.argmin(level))
             raise ValueError(f"the track stands still or goes straight up at pulse {bad}; use frame='scene'")
-        along, left = along / np.linalg.norm(along, axis=1, keepdims=True), left / level
+        along, left = unit(along), left / level
         axes = np.stack([along, left, np.cross(along, left)], axis=-1)
         turning = np.gradient(axes, track.times, axis=0) if len(track) > 1 else np.zeros_like(axes)
         rate = np.einsum("nij,nj->ni", axes, rate) + np.einsum("nij,nj->ni", turning, offset)

@@ -7,6 +7,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 
 if TYPE_CHECKING:
     from .antenna import Antenna
@@ -75,7 +76,7 @@ def factor_reach(antenna: Antenna, axis: int, level: float, frequency: float) ->
 
 def pattern_gain(antenna: Antenna, directions: np.ndarray, frequency: float) -> np.ndarray:
     """Complex amplitude gain (...) at directions in antenna axes (..., 3), of any length."""
-    x, y, z = np.moveaxis(directions / np.linalg.norm(directions, axis=-1, keepdims=True), -1, 0)
+    x, y, z = np.moveaxis(unit(directions), -1, 0)
     shape = {"isotropic": _isotropic, "aperture": _aperture, "gaussian": _gaussian, "table": _table}[antenna.kind]
     return np.asarray(antenna.amplitude * shape(antenna, x, y, z, frequency), np.complex128)
 

@@ -107,3 +107,8 @@ def system(n: int, step: float, *, mirrored: bool = True, spacing: float | None 
     return Case(
         f"N {n}, {step / 1e6:g} MHz", n=n, frequency_step=step, mirrored=mirrored, spacing=spacing, n_pulses=pulses
     )
+
+
+def decibels(amplitude: np.ndarray, floor: float = -40.0) -> np.ndarray:
+    """20 log10 of amplitudes, and `floor` dB for smaller ones."""
+    return np.maximum(20 * np.log10(np.maximum(amplitude, 1e-9)), floor)

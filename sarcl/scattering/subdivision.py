@@ -11,6 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
 from ..base.rows import spread_over
 from ..base.validation import number
+from ..base.vectors import unit
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.material import COHERENT
@@ -111,8 +112,7 @@ def subdivision_gain(scene: Scene, max_edge: float, antennas: PulseGeometry, fre
             centers = centroids(part.triangles)
             q = np.zeros_like(centers)
             for ends in (antennas.tx, antennas.rx):
-                away = ends[row] - centers
-                q += away / np.linalg.norm(away, axis=1, keepdims=True)
+                q += unit(ends[row] - centers)
             for f in frequencies:
                 integral = triangle_integral(part.triangles, 2 * np.pi * f / SPEED_OF_LIGHT * q)
                 power[i] += float((np.abs(integral) ** 2).sum())

@@ -6,7 +6,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
-from ..lab import Lab, system
+from ..lab import Lab, decibels, system
 from ..paper import Section
 from ._reference import DIAMOND, PRINTED
 
@@ -158,10 +158,10 @@ def nulls(lab: Lab) -> Section:
                 rule="within 3 mm",
             )  # fmt: skip
         at, values = lab.cut(mapped, half=1.0, n=401)
-        curves.append((name, at, _db(values)))
+        curves.append((name, at, decibels(values)))
     plain = system(45, 20e6, mirrored=False)
     at, values = lab.cut(lab.mapped(plain, "corrected"), half=1.0, n=401)
-    curves.insert(0, ("not mapped", at, _db(values)))
+    curves.insert(0, ("not mapped", at, decibels(values)))
     out.say("Cross-range cuts through the centre point. Equation 5.36 assumes that the mapped aperture has no gap.")
     out.draw(html.plot(curves, "cross-range, m", "dB", "The centre point (figures 5.6 to 5.8)."))
     return out
@@ -169,7 +169,3 @@ def nulls(lab: Lab) -> Section:
 
 def _step(places: np.ndarray) -> float:
     return float(np.abs(np.diff(places[:, 1])).max())
-
-
-def _db(values: np.ndarray) -> np.ndarray:
-    return np.maximum(20 * np.log10(np.maximum(values, 1e-9)), -40.0)

@@ -9,7 +9,7 @@ import numpy as np
 from ...arrays.array_factor import diverse_factor
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
-from ..lab import Lab, system
+from ..lab import Lab, decibels, system
 from ..paper import Section
 from ._aperture import THIN
 from ._pattern import F0, SHAPE, SPACING, STEPS, TIME, directions
@@ -80,7 +80,7 @@ def _poles(out: Section) -> None:
     )  # fmt: skip
     for what, level in (("corrected", right), ("as printed, limited to 1", np.minimum(printed, 1.0))):
         out.draw(html.picture(
-            np.maximum(20 * np.log10(np.maximum(level, 1e-6)), -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg",
+            decibels(level, -80), (-85.1, 84.9), (-85.1, 84.9), "azimuth, deg",
             "elevation, deg", f"Equation 4.1 {what}, t' = -250 us.", floor_db=-40,
         ))  # fmt: skip
 

@@ -9,7 +9,7 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab
+from ..lab import Lab, decibels
 from ..paper import Section
 from ._pattern import directions
 from ._pulse import F0, FAR, HALF_WAVE, STEP, N
@@ -107,7 +107,8 @@ def snapshots(lab: Lab) -> Section:
         gate = np.abs(retarded) <= 0.5 / STEP
         exact = np.abs(beam(array, F0, times=t, positions=place, device=lab.device)) * gate
         out.draw(html.picture(
-            _db(exact / N), *edges, "cross-range, m", "range, m", f"Exact field, {ns} ns after the pulse left.",
+            decibels(exact / N, -60), *edges, "cross-range, m", "range, m",
+            f"Exact field, {ns} ns after the pulse left.",
             floor_db=-15,
         ))  # fmt: skip
         if ns == 2:
@@ -116,7 +117,7 @@ def snapshots(lab: Lab) -> Section:
             ))  # fmt: skip
             late = out.parts.pop()
             out.draw(late, html.picture(
-                _db(level * gate / N), *edges, "cross-range, m", "range, m",
+                decibels(level * gate / N, -60), *edges, "cross-range, m", "range, m",
                 "Closed form, 2 ns: what figure 4.9 shows.", floor_db=-15,
             ))  # fmt: skip
             _orders(out, level * gate, distance, azimuth)
@@ -136,7 +137,3 @@ def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.n
         "distances from the middle of the pulse along range; the late part is at the shorter range", places,
         rule="over 5 cm early, within 5 cm, over 5 cm late",
     )  # fmt: skip
-
-
-def _db(level: np.ndarray) -> np.ndarray:
-    return np.maximum(20 * np.log10(np.maximum(level, 1e-9)), -60)

@@ -9,7 +9,7 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab
+from ..lab import Lab, decibels
 from ..paper import Section
 
 F0, SHAPE = 10e9, (9, 9)  # tables 3.1 to 3.3
@@ -66,7 +66,7 @@ def patterns(lab: Lab) -> Section:
             rule="below 0.01 of the peak",
         )  # fmt: skip
         figures.append(html.plot(
-            [("1 km", ANGLES, _db(near)), ("100 km", ANGLES, _db(far))], f"{plane}, deg", "dB",
+            [("1 km", ANGLES, decibels(near, -60)), ("100 km", ANGLES, decibels(far, -60))], f"{plane}, deg", "dB",
             f"One carrier, cut along {plane} at two ranges (figure {figure}).",
         ))  # fmt: skip
     start, _ = look(diverse, 0.0)
@@ -118,7 +118,7 @@ def _over_range(out: Section, figures: list[html.Block], array: AntennaArray, la
             rule="sign of the angle",
         )  # fmt: skip
         figures.append(html.picture(
-            _db(power.T), (0.0, 302.0), (-85.5, 85.5), "range, km", f"{name}, deg",
+            decibels(power.T, -60), (0.0, 302.0), (-85.5, 85.5), "range, km", f"{name}, deg",
             f"Diverse carriers at t = 0 over range (figure {figure}).", floor_db=-40,
         ))  # fmt: skip
 
@@ -186,11 +186,7 @@ def errors(lab: Lab) -> Section:
 
 def _sky(power: np.ndarray, caption: str) -> html.Block:
     edge = (-85.5, 85.5)
-    return html.picture(_db(power), edge, edge, "azimuth, deg", "elevation, deg", caption, floor_db=-30)
-
-
-def _db(level: np.ndarray) -> np.ndarray:
-    return np.maximum(20 * np.log10(np.maximum(level, 1e-9)), -60)
+    return html.picture(decibels(power, -60), edge, edge, "azimuth, deg", "elevation, deg", caption, floor_db=-30)
 
 
 def _deg(at: tuple[float, float]) -> str:

@@ -10,7 +10,7 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab
+from ..lab import Lab, decibels
 from ..paper import Section
 
 F0, N, STEP = 10e9, 9, 1e9  # table 4.1, scenario B
@@ -72,9 +72,10 @@ def waveform(lab: Lab) -> Section:
         html.plot([("1 GHz", 1e9 * t, made[:, 0].real)], "t', ns", "field", "The wave, real part (figure 4.2)."),
         html.plot([("1 GHz", 1e9 * t, level), ("1 kHz", 1e9 * t, flat[:, 0])], "t', ns", "modulus",
                   "Its modulus (figure 4.3), and with steps of 1 kHz (figure 4.1)."),
-        html.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, _db(c[shown])) for i, c in enumerate(channels)],
+        html.plot([(f"{(F0 + i * STEP) / 1e9:g} GHz", f[shown] / 1e9, decibels(c[shown]))
+                   for i, c in enumerate(channels)],
                   "frequency, GHz", "dB", "Spectra of the channels (figure 4.4)."),
-        html.plot([("sum", f[shown] / 1e9, _db(whole[shown] / whole.max()))], "frequency, GHz", "dB",
+        html.plot([("sum", f[shown] / 1e9, decibels(whole[shown] / whole.max()))], "frequency, GHz", "dB",
                   "Spectrum of the pulse (figure 4.5)."),
     )  # fmt: skip
     out.keep(modulus={"ns": 1e9 * t[::20], "modulus": level[::20]})
@@ -134,7 +135,7 @@ def ambiguities(lab: Lab) -> Section:
     )
     for name, a, figure in (("LFM", chirp, "4.6"), ("FDA", tones, "4.7")):
         out.draw(html.picture(
-            20 * np.log10(np.maximum(a.magnitude.T, 1e-4)), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
+            decibels(a.magnitude.T, -80), (1e9 * a.delays[0], 1e9 * a.delays[-1]),
             (a.dopplers[0] / 1e9, a.dopplers[-1] / 1e9), "delay, ns", "Doppler, GHz",
             f"{name}: modulus of the ambiguity function (figure {figure}).", floor_db=-30,
         ))  # fmt: skip
@@ -149,7 +150,3 @@ def _ridge(a: Ambiguity, slope: float, length: float, kind: object = np.max) -> 
     delay, nu = a.delays[:, None], a.dopplers
     on = (np.abs(nu - slope * delay) < STEP / 4) & (np.abs(np.abs(delay) / length - 0.325) < 0.125)
     return float(kind(a.magnitude[on]))  # type: ignore[operator]
-
-
-def _db(level: np.ndarray) -> np.ndarray:
-    return np.maximum(20 * np.log10(np.maximum(level, 1e-9)), -40)

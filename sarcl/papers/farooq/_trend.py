@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 
 from ...figures import html
-from ..lab import Lab, system
+from ..lab import Lab, decibels, system
 from ..paper import Section
 from ._reference import PRINTED
 
@@ -28,7 +28,7 @@ def trends(lab: Lab) -> Section:
         found[step] = point["null"], point["pslr_db"]
         if step in DRAWN:
             at, values = lab.cut(mapped, half=1.0, n=401)
-            curves.append((f"N {n}, {step / 1e6:g} MHz", at, np.maximum(20 * np.log10(np.maximum(values, 1e-9)), -40)))
+            curves.append((f"N {n}, {step / 1e6:g} MHz", at, decibels(values)))
     out.number("PSLR at 100 MHz", "figure 5.11", -13.0, found[100e6][1], 0.2, "dB", ".1f")
     if 1e6 in found:
         ratio = {step: null / PRINTED for step, (null, _) in found.items()}

@@ -12,7 +12,7 @@ from ...imaging.backproject import backproject
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
-from ..lab import Lab
+from ..lab import Lab, decibels
 from ..paper import Section
 from .range_zones import RangeZones, collect, isolation, of_zone
 
@@ -38,7 +38,7 @@ def section(lab: Lab) -> Section:
             ["", *(f"image of zone {q}" for q in range(ZONES))],
             [[f"point of zone {p}", *(f"{round(v, 1) + 0.0:.1f}" for v in row)] for p, row in enumerate(levels)],
         ))  # fmt: skip
-        curves = [(f"zone {q}", at, np.maximum(20 * np.log10(np.maximum(c, 1e-9)), FLOOR)) for q, c in enumerate(cuts)]
+        curves = [(f"zone {q}", at, decibels(c, FLOOR)) for q, c in enumerate(cuts)]
         out.draw(html.plot(
             curves, "behind the zone's centre, m", "dB", f"{title}: images of the four zones, from one record. Hamming."
         ))  # fmt: skip
