@@ -14,6 +14,7 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
+from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import Tiling
 from . import line_plan
@@ -35,7 +36,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
             tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
         )
     if lined is not None and lined.cost < 0.9:  # no other plan costs less
-        return lined, line_plan.LineTiling(grid, lined.side)
+        return lined, LineTiling(grid, lined.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
         tolerance,
@@ -49,7 +50,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
         least_tolerance=0.0,
     )
     if lined is not None and lined.cost < plan.cost:
-        return lined, line_plan.LineTiling(grid, lined.side)
+        return lined, LineTiling(grid, lined.side)
     return plan, tilings[plan.per_tile]
 
 

@@ -15,8 +15,7 @@ from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
-from ...numerics.tiles import Tiles
-from ..tiling.plane import PlaneTiling, outline
+from ..tiling.plane import outline
 
 LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
 SIDES = (64, 32, 16)  # pixels along a side of a tile
@@ -89,22 +88,6 @@ class LinePlan:
             "SLOPE": int(self.slope),
             "LOCAL": int(local),
         }
-
-
-class LineTiling(PlaneTiling):
-    """Square tiles of a plane about one of their pixels, (side/2, side/2), so that offsets are whole pixels."""
-
-    def __init__(self, grid: ImageGrid, side: int) -> None:
-        super().__init__(grid, side)
-        self._cut(side, side)
-        self.radius = side / 2 * self.pixel
-
-    def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
-        half = self.side // 2
-        columns = np.arange(self.across) * self.side + half
-        references = self.grid.at(np.full(self.across, index * self.side + half), columns) - self.center
-        radius = np.full(self.across, self.radius)
-        return Tiles(self.per_tile, references, radius, np.zeros((6, 0), np.float32), shared=True), None
 
 
 def possible(grid: ImageGrid, lanes: bool) -> bool:

@@ -15,9 +15,10 @@ from ...numerics.plan import Plan
 from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
+from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import line_plan
-from .line_plan import LinePlan, LineTiling, steps
+from .line_plan import LinePlan, steps
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel

@@ -17,9 +17,10 @@ from ...numerics.plan import Plan, cheapest
 from ...numerics.pulse_geometry import PulseGeometry
 from ...opencl import fft
 from ..direct import line_plan
-from ..direct.line_plan import LinePlan, LineTiling
+from ..direct.line_plan import LinePlan
 from ..direct.tile_kernels import CHUNK
 from ..focusing_task import FocusingTask
+from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import Tiling
 from ._subapertures import Decimation, chains, decimated, filter_error, rate, runs_of

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    lines        the tiling of planes for lines of pixels
     of_grid      tiling_of(): the tiling of a grid
     plane        the tiling of planes
     tiling       what every tiling offers; parts and sections of it
@@ -12,4 +13,4 @@ For this folder alone:
     _points      the tiling of listed points
 """
 
-__all__ = ["of_grid", "plane", "tiling", "tree"]
+__all__ = ["lines", "of_grid", "plane", "tiling", "tree"]
