@@ -7,8 +7,14 @@ u_t, u_r are unit vectors FROM the facet TO the transmitter and the receiver: a 
 its path, so its phase -2 pi f tau grows. n is the unit normal that points out of the surface. Single scattering.
 S_rt and matrices [r, t]: r received, t sent; 0 is H, 1 is V.
 
-source   Franceschetti et al. 1992 (SARAS), eqs (1)-(10) and appendix, corrected where physics says otherwise: see
-         `saras_matrix`; Tsang, Kong and Shin 1985 (tangent-plane approximation)
+source   Franceschetti et al. 1992 (SARAS), eqs (1)-(10) and appendix; Tsang, Kong and Shin 1985 (tangent-plane
+         approximation)
+
+Where SARAS's print contradicts the physics, the equations are corrected:
+- (A.7): R_q = (eps cos - root)/(eps cos + root). The print's sign would give a conducting facet S_HV != 0.
+- (A.8): cos = -n.k, n of unit length and outward; the print has +n.k, and gradients for n.
+- (A.15) is S_VV, printed S_VH.
+- S_HV has the sign of v = x x k, as (A.9), (A.10) imply; (A.12) prints k x x.
 """
 
 from __future__ import annotations
@@ -156,26 +162,6 @@ def scattering_parts(
 
 def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
     return np.asarray(np.einsum("...i,...i->...", a, b))
-
-
-def saras_matrix(normal: np.ndarray, look: float, permittivity: complex) -> np.ndarray:
-    """SARAS (A.13)-(A.15), complex128 (2, 2), corrected: the special case k perpendicular to x, H along x.
-
-    normal  unit (a, b, c) in the axes (x, r, s);  look  Delta theta, rad: k = (0, cos, -sin), not along the normal
-
-    Physics decides where the print differs, and `scattering_matrix` agrees with what is here:
-    - (A.7): R_q = (eps cos - root)/(eps cos + root). The print's sign would give a conducting facet S_HV != 0.
-    - (A.8): cos = -n.k, n of unit length and outward; the print has +n.k, and gradients for n.
-    - (A.15) is S_VV, printed S_VH.
-    - S_HV has the sign of v = x x k, as (A.9), (A.10) imply; (A.12) prints k x x.
-    """
-    a, b, c = normal
-    cosine = c * math.sin(look) - b * math.cos(look)
-    along = b * math.sin(look) + c * math.cos(look)
-    p, q = fresnel(np.array(cosine), np.array(permittivity))
-    hv = a * along * (p + q)
-    matrix = np.array([[a * a * q - along**2 * p, hv], [hv, along**2 * q - a * a * p]])
-    return np.asarray(2 * cosine / (a * a + along * along) * matrix)
 
 
 @functools.cache
