@@ -37,7 +37,7 @@ def oracle(raw, scene, rows=None, n=5):
 
 @pytest.mark.parametrize(
     "distance, elevation, tolerance",
-    thinned([(1e3, 20), (1e5, 40), (1e3, 70), (1e5, 20), (1e3, 40), (1e5, 70)], [1e-1, 1e-2, 1e-3, 1e-4], every=3),
+    thinned([(1e3, 20), (1e5, 40), (1e3, 70), (1e5, 20), (1e3, 40), (1e5, 70)], [1e-1, 1e-2, 1e-3, 1e-4], every=6),
 )
 def test_a_five_metre_plate_tilted_by_20_degrees(distance, elevation, tolerance):
     # at 20 deg the plate is seen along its normal, at 70 deg its edges' echoes are 1/2000 of that
@@ -75,7 +75,7 @@ def test_every_polarisation_of_tilted_facets(device, material, bistatic):
         assert np.linalg.norm(wanted[1]) > 0.01 * np.linalg.norm(wanted[0])
 
 
-@pytest.mark.parametrize("name", ["VV", "VH", *(pytest.param(name, marks=pytest.mark.slow) for name in ("HH", "HV"))])
+@pytest.mark.parametrize("name", ["VH", *(pytest.param(name, marks=pytest.mark.slow) for name in ("VV", "HH", "HV"))])
 def test_rows_are_pulse_by_pulse_and_polarisations_do_not_depend_on_one_another(name):
     random = np.random.default_rng(4)
     scene = sarcl.Scene.facets(random.uniform(-3, 3, (30, 3, 3)) * [1, 1, 0.3], material=WET, two_sided=True)
