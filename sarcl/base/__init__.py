@@ -17,7 +17,7 @@ For other folders:
     tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
-    vectors       unit vectors
+    vectors       unit vectors, scalar products
     version       the version of the package
     wgs84         longitude, latitude and height to Earth-centred coordinates and local axes
 """

@@ -13,6 +13,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.types import LazyRows
 from ..base.validation import array, count, direction, instance, number
 from ..model.image_grid import ImageGrid
+from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 
@@ -71,7 +72,7 @@ def add_noise(
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
 
 
-class Noisy:
+class Noisy(RowsOnDemand):
     """Rows of a source plus noise of deviation (n_rows,) times shape (n_samples,), computed for the rows of a slice."""
 
     def __init__(self, source: np.ndarray | LazyRows, deviation: np.ndarray, shape: np.ndarray, seed: int) -> None:
@@ -83,9 +84,6 @@ class Noisy:
         clean = np.asarray(self.source[rows])
         noise = complex_gaussian(index, self.shape[1], self.seed) * (self.deviation[index, None] * self.profile)
         return (clean + noise).astype(self.dtype.newbyteorder("="))
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
 
 
 def complex_gaussian(rows: np.ndarray, n_samples: int, seed: int) -> np.ndarray:

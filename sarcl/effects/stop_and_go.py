@@ -3,12 +3,12 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, replace
-from typing import Any
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import constants, validation
+from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
@@ -115,7 +115,7 @@ def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> 
     return replace(raw, samples=_Chirped(raw, slope, -1.0 if undo else 1.0))
 
 
-class _Chirped:
+class _Chirped(RowsOnDemand):
     """Rows times the phase of motion during the pulse, computed for the rows of a slice."""
 
     def __init__(self, raw: PhaseHistory, slope: np.ndarray, sign: float) -> None:
@@ -131,9 +131,6 @@ class _Chirped:
         phase = np.pi * moved * (2 * (f - self.center) + moved) / self.rate
         block = np.asarray(self.source[rows])
         return (block * np.exp(-1j * self.sign * phase)).astype(self.dtype.newbyteorder("="))
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
 
 
 class _Path:

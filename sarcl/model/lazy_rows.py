@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from abc import ABC, abstractmethod
 from typing import Any
 
 import numpy as np
@@ -30,7 +31,20 @@ def stack(sources: list[Any]) -> Any:
     return sealed(np.concatenate(sources)) if all(map(in_memory, sources)) else Stacked(sources)
 
 
-class Picked:
+class RowsOnDemand(ABC):
+    """Rows that are read or computed when they are sliced; NumPy takes all of them as an array."""
+
+    shape: tuple[int, ...]
+    dtype: np.dtype[Any]
+
+    @abstractmethod
+    def __getitem__(self, rows: slice) -> np.ndarray: ...
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        return np.asarray(self[:], dtype)
+
+
+class Picked(RowsOnDemand):
     """Selected rows of a lazy source; a slice reads its rows, one read per run of consecutive rows."""
 
     def __init__(self, source: Any, index: np.ndarray) -> None:
@@ -45,11 +59,8 @@ class Picked:
         runs = np.split(index, np.flatnonzero(np.diff(index) != 1) + 1)
         return np.concatenate([np.asarray(self.source[int(r[0]) : int(r[-1]) + 1]) for r in runs])
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
 
-
-class Stacked:
+class Stacked(RowsOnDemand):
     """Rows of several sources one after another; a slice reads only the sources of its rows."""
 
     def __init__(self, sources: list[Any]) -> None:
@@ -67,11 +78,8 @@ class Stacked:
                 out[a - start : b - start] = source[a - first : b - first]
         return out
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
 
-
-class Scaled:
+class Scaled(RowsOnDemand):
     """Rows of a source times a factor per row (n,); a slice reads and multiplies its rows."""
 
     def __init__(self, source: Any, factor: np.ndarray) -> None:
@@ -81,11 +89,8 @@ class Scaled:
     def __getitem__(self, rows: slice) -> np.ndarray:
         return np.asarray(self.source[rows]) * self.factor[rows, None]
 
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)
 
-
-class Columns:
+class Columns(RowsOnDemand):
     """Columns first ... last - 1 of a source; a slice reads its rows."""
 
     def __init__(self, source: Any, first: int, last: int) -> None:
@@ -95,6 +100,3 @@ class Columns:
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         return np.asarray(self.source[rows])[:, self.columns]
-
-    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
-        return np.asarray(self[:], dtype)

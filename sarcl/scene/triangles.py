@@ -7,18 +7,19 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
+from ..base.vectors import dot
 
 
 def edges(triangles: np.ndarray) -> np.ndarray:
     """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
     d = (triangles[:, (i + 1) % 3] - triangles[:, i] for i in range(3))
-    return np.stack([np.sqrt(np.einsum("ij,ij->i", e, e)) for e in d])
+    return np.stack([np.sqrt(dot(e, e)) for e in d])
 
 
 def areas(triangles: np.ndarray) -> np.ndarray:
     """Area of each triangle (k, 3, 3), m^2 (k,)."""
     n = _cross(triangles)
-    return np.sqrt(np.einsum("ij,ij->i", n, n)) / 2
+    return np.sqrt(dot(n, n)) / 2
 
 
 def centroids(triangles: np.ndarray) -> np.ndarray:
@@ -29,7 +30,7 @@ def centroids(triangles: np.ndarray) -> np.ndarray:
 def normals(triangles: np.ndarray) -> np.ndarray:
     """Outward unit normal of each triangle (k, 3, 3): (k, 3)."""
     n = _cross(triangles)
-    return n / np.sqrt(np.einsum("ij,ij->i", n, n))[:, None]
+    return n / np.sqrt(dot(n, n))[:, None]
 
 
 def solid(triangles: np.ndarray) -> np.ndarray:

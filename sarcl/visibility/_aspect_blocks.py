@@ -7,6 +7,7 @@ from collections.abc import Callable, Iterator
 import numpy as np
 
 from ..base.boxes import box
+from ..base.vectors import dot
 from ..scene.triangles import areas, edges, normals
 
 STRIDE = 16  # blocks from one viewpoint to the next, before refinement
@@ -34,7 +35,7 @@ def projected_width(triangles: np.ndarray, viewpoint: np.ndarray) -> float:
     """
     ahead = viewpoint - triangles[:, 0]
     ahead /= np.maximum(np.linalg.norm(ahead, axis=1, keepdims=True), 1e-300)
-    facing = np.abs(np.einsum("ij,ij->i", normals(triangles), ahead))
+    facing = np.abs(dot(normals(triangles), ahead))
     ratio = areas(triangles) * facing / np.maximum.reduce(edges(triangles))
     usual = ratio[facing > 0.1]
     return float(np.median(usual if len(usual) else ratio))

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.vectors import dot
 from ..opencl.device import Device
 from ._ray_casting import DeviceFacets, Frame
 
@@ -38,7 +39,7 @@ class EmbreeOccluders:
         found = np.empty((n, samples), np.uint8)
         for first in range(0, n, CHUNK):
             part = row[first : first + CHUNK]
-            side = np.sign(np.einsum("ij,ij->i", part[:, 9:], eye - part[:, :3]))[:, None] * part[:, 9:]
+            side = np.sign(dot(part[:, 9:], eye - part[:, :3]))[:, None] * part[:, 9:]
             for s, (u, v) in enumerate(uv):
                 start = part[:, :3] + u * part[:, 3:6] + v * part[:, 6:9] + side
                 ahead = eye - start

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.rows import groups, spread_over
+from ...base.vectors import dot
 from ...model.phase_history import PhaseHistory
 from ...numerics import interpolation
 from ...numerics.pulse_geometry import PulseGeometry
@@ -162,13 +163,13 @@ def _roughest(track: PulseGeometry, made: Decimation, center: np.ndarray, most: 
     for antenna, ends in zip(track.ends, made.kept.ends, strict=True):
         pulses, kept = _directions(antenna, center), _directions(ends, center)
         apart = pulses - (1 - way) * kept[before] - way * kept[before + 1]
-        off = np.maximum(off, np.einsum("ij,ij->i", apart, apart))
+        off = np.maximum(off, dot(apart, apart))
     return np.argpartition(off, max(len(off) - most, 0))[-most:]
 
 
 def _directions(ends: np.ndarray, center: np.ndarray) -> np.ndarray:
     d = ends - center
-    return d / np.maximum(np.sqrt(np.einsum("ij,ij->i", d, d)), 1e-9)[:, None]
+    return d / np.maximum(np.sqrt(dot(d, d)), 1e-9)[:, None]
 
 
 def _phases(

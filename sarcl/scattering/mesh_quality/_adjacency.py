@@ -7,6 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import boxes
+from ...base.vectors import dot
 from ...scene.triangles import areas, solid
 
 SAME_PLACE = 1e-8  # of a mesh's size: corners closer than this are the same
@@ -39,7 +40,7 @@ def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
     """Adjacency of triangles, m (k, 3, 3). Edges of one facet alone, or of more than two, join none."""
     corner, places = _welded(triangles)
     normal = np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
-    twice = np.sqrt(np.einsum("ij,ij->i", normal, normal))
+    twice = np.sqrt(dot(normal, normal))
     normal /= np.where(twice > 0, twice, 1)[:, None]
     start, end = corner.ravel(), np.roll(corner, -1, axis=1).ravel()
     key = np.minimum(start, end) * np.int64(places) + np.maximum(start, end)
@@ -49,7 +50,7 @@ def adjacency_of(triangles: np.ndarray) -> MeshAdjacency:
     first = first[np.diff(first, append=len(key)) == 2]
     one, other = order[first], order[first + 1]
     against = start[one] == start[other]
-    tilt = np.einsum("ij,ij->i", np.take(normal, one // 3, axis=0), np.take(normal, other // 3, axis=0))
+    tilt = dot(np.take(normal, one // 3, axis=0), np.take(normal, other // 3, axis=0))
     tilt[against] *= -1
     return MeshAdjacency(corner, places, one, other, against, tilt, normal, twice)
 
@@ -93,8 +94,8 @@ def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np
     middle = np.stack([np.bincount(its, p, n) for p in points.T], axis=1) / np.maximum(count, 1)[:, None]
     across = triangles[stands, 1] - triangles[stands, 0]
     away = points - middle[its]
-    turned = np.einsum("ij,ij->i", away, np.cross(normal, across[its]))
-    order = np.lexsort((np.arctan2(turned, np.einsum("ij,ij->i", away, across[its])), its))
+    turned = dot(away, np.cross(normal, across[its]))
+    order = np.lexsort((np.arctan2(turned, dot(away, across[its])), its))
     points, its = points[order], its[order]
     first = np.cumsum(count) - count
     fan = np.flatnonzero((its[1:-1] == its[2:]) & (its[:-2] == its[2:])) + 1 if len(its) > 2 else np.zeros(0, np.int64)

@@ -24,6 +24,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.vectors import dot
 from ._adjacency import MeshAdjacency, components
 
 CREASE = np.cos(np.radians(35))  # largest tilt between neighbours of one surface: eleven facets make a full circle
@@ -111,14 +112,10 @@ def _corner_normals(
     weight = (j.twice[:, None] / np.maximum(square * np.roll(square, 1, axis=1), 1e-300)).ravel()
     weight /= weight.max(initial=0.0) or 1.0
     out = np.stack([np.bincount(fan, weight * np.repeat(n, 3)) for n in normal.T], axis=1)
-    out = out / np.maximum(np.sqrt(_dot(out, out)), 1e-300)[:, None]
+    out = out / np.maximum(np.sqrt(dot(out, out)), 1e-300)[:, None]
     return np.take(out, fan, axis=0).reshape(-1, 3, 3)
 
 
 def _next(edge: np.ndarray) -> np.ndarray:
     """The edge that begins where an edge ends, in the same facet."""
     return np.where(edge % 3 == 2, edge - 2, edge + 1)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("ij,ij->i", a, b))

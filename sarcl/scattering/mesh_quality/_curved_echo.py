@@ -18,6 +18,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.vectors import dot
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.material import Material
 from ...scene.scene import Scene
@@ -56,17 +57,17 @@ def sums(scene: Scene, b: SurfaceCurvature, antennas: PulseGeometry, row: int, f
     path, look, cosines = np.full(len(centers), -float(antennas.reference_range[row])), np.zeros_like(centers), []
     for end in ends:
         away = end - centers
-        distance = np.sqrt(_dot(away, away))
+        distance = np.sqrt(dot(away, away))
         path += distance / len(ends)
         away /= np.maximum(distance, 1e-300)[:, None]
         look += away / len(ends)
-        cosines.append(_dot(b.normal, away))
-    half = np.sqrt(_dot(look, look))  # |q|/2k
+        cosines.append(dot(b.normal, away))
+    half = np.sqrt(dot(look, look))  # |q|/2k
     seen = (path >= antennas.near[row]) & (path <= antennas.far[row]) & (b.area > 0) & (half > 1e-6)
     if antennas.beam is not None:
         seen &= antennas.beam_depth(centers, row) >= 0
     # a bound on |grad h|: where facets hardly face away some of the curve still faces the antennas
-    longest = np.sqrt(np.maximum.reduce([_dot(e, e) for e in np.moveaxis(b.edge, 1, 0)]))
+    longest = np.sqrt(np.maximum.reduce([dot(e, e) for e in np.moveaxis(b.edge, 1, 0)]))
     lean = 4 * np.abs(b.height).sum(axis=1) * longest / np.maximum(b.area, 1e-300)
     wave, blame, cost, parts = 2 * np.pi * frequency / SPEED_OF_LIGHT, np.zeros(len(centers)), 4 * len(centers), []
     for side in (1, -1):
@@ -109,7 +110,7 @@ def _facets(
     across = np.cross(u, normal) * (b.turn[some] / (2 * area))[:, None]
     slope = np.einsum("kij,kj->ki", np.roll(edge, -1, axis=1), across)
     phase = np.einsum("kij,kj->ki", edge, u) * q[:, None]
-    return _Facets(phase, side * b.height[some], slope, side * _dot(normal, u), facing, area, q)
+    return _Facets(phase, side * b.height[some], slope, side * dot(normal, u), facing, area, q)
 
 
 def _integrals(f: _Facets) -> tuple[np.ndarray, np.ndarray, np.ndarray, int]:
@@ -211,7 +212,3 @@ def _rule(n: int) -> tuple[np.ndarray, np.ndarray]:
     s, t = (a.ravel() for a in np.meshgrid(x, x, indexing="ij"))
     places = np.stack([1 - s, s * (1 - t), s * t], axis=1)
     return places.astype(np.float32), (2 * s * np.outer(w, w).ravel()).astype(np.float32)
-
-
-def _dot(a: np.ndarray, b: np.ndarray) -> np.ndarray:
-    return np.asarray(np.einsum("ij,ij->i", a, b))
