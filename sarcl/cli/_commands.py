@@ -223,13 +223,13 @@ def papers(args: argparse.Namespace, job: Job) -> int:
     for path in (output, numbers):
         job.expect(path)
     plots.require("the page of sarcl papers")
-    lab, sections = shelf.open_lab(args.device, args.quick), []
+    lab, sections = shelf.open_lab(paper, args.device, args.quick), []
     for section in paper.run(lab):
         sections.append(section)
         job.progress("papers", len(sections), len(paper.sections))
         # Both files are written after every section, so that a later failure does not lose them.
-        _write(numbers, json.dumps(paper.document(sections, lab), allow_nan=False))
-        _write(output, paper.html(sections, lab, args.command_line))
+        _write(numbers, json.dumps(paper.document(sections, args.quick), allow_nan=False))
+        _write(output, paper.html(sections, args.quick, args.command_line))
         fine = sum(row.holds for row in section.rows)
         tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
         job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")

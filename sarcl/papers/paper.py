@@ -10,7 +10,6 @@ from typing import Any
 import numpy as np
 
 from ..figures.html import Block, heading, listed, page, table, terms, words
-from .lab import Lab
 
 
 @dataclass(frozen=True)
@@ -81,39 +80,43 @@ class Section:
         return out | {"rows": [{name: row[name] for name in row if name != "rule"} for row in rows]}
 
 
-Make = Callable[[Lab], Section]
-
-
 @dataclass(frozen=True)
 class Paper:
-    """A paper: its name on the command line, title, a paragraph about it, functions that make its sections, terms."""
+    """A paper: its name on the command line, title, a paragraph about it, sections, terms.
+
+    lab       makes what the sections share, from an OpenCL device and whether the run is a quick one
+    sections  functions of it, one for each section
+    quick     what a quick run leaves out, a sentence
+    """
 
     name: str
     title: str
     about: str
-    sections: tuple[Make, ...]
+    lab: Callable[[Any, bool], Any]
+    sections: tuple[Callable[[Any], Section], ...]
+    quick: str
     terms: tuple[tuple[str, str], ...] = ()
 
-    def run(self, lab: Lab) -> Iterator[Section]:
-        """Its sections, one after the other, timed."""
+    def run(self, lab: Any) -> Iterator[Section]:
+        """Its sections, one after the other, timed; lab: as `self.lab` makes it."""
         for make in self.sections:
             start = time.monotonic()
             section = make(lab)
             section.seconds = round(time.monotonic() - start, 2)
             yield section
 
-    def document(self, sections: Sequence[Section], lab: Lab) -> dict[str, Any]:
+    def document(self, sections: Sequence[Section], quick: bool) -> dict[str, Any]:
         """The numbers of the sections there are."""
         return {
             "paper": self.name,
             "title": self.title,
-            "quick": lab.quick,
+            "quick": quick,
             "finished": len(sections) == len(self.sections),
             "seconds": round(sum(s.seconds for s in sections), 2),
             "sections": [s.document() for s in sections],
         }
 
-    def html(self, sections: Sequence[Section], lab: Lab, command: str = "") -> str:
+    def html(self, sections: Sequence[Section], quick: bool, command: str = "") -> str:
         """The page of the finished sections: conclusion, terms, sections with figures, then the table of all rows.
 
         command  the line that made the page, printed on it
@@ -124,8 +127,8 @@ class Paper:
         missing = len(self.sections) - len(sections)
         if missing:
             blocks.append(words(f"Not finished: {missing} sections follow.", True))
-        if lab.quick:
-            blocks.append(words("A quick run: arrays of more than 100 elements were left out.", True))
+        if quick:
+            blocks.append(words(f"A quick run: {self.quick}", True))
         blocks += [
             heading("Conclusion"),
             words(

@@ -198,7 +198,8 @@ def test_what_is_measured_is_kept_when_a_later_section_fails(tmp_path, monkeypat
         raise RuntimeError("no more")
 
     first = Section("one", "First <&>", parts=[html.words("words")])
-    monkeypatch.setattr(papers, "find", lambda name: Paper(name, "Title", "about", (lambda lab: first, fails)))
+    paper = Paper("farooq", "Title", "about", lambda device, quick: None, (lambda lab: first, fails), "")
+    monkeypatch.setattr(papers, "find", lambda name: paper)
     assert parser.main(["papers", "farooq", "-o", str(tmp_path / "half.html")]) == parser.FAILED
     kept = json.loads((tmp_path / "half.json").read_text())
     assert [s["key"] for s in kept["sections"]] == ["one"] and not kept["finished"]

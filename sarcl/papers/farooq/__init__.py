@@ -7,12 +7,13 @@ For other folders:
 
     range_zones   range zones separated by carriers that continue from pulse to pulse (sarcl's own experiment)
 
-For this folder alone, one section or a group of sections of the page each:
+For this folder alone, a section or a group of sections of the page each, and what they share:
 
     _aperture     5.2, 5.3: apparent apertures, without and with the switch of carriers at mid-aperture
     _errata       errors in the printed equations and figures
     _field        4.4: delay of the pulse's peak against direction
     _focus        5.1: backprojection of frequency-diverse echoes, unmodified and corrected
+    _lab          echoes and images that several sections share
     _off_centre   points off the centre, two points, spatial frequencies (sarcl's own check)
     _pattern      chapter 3: patterns of planar arrays
     _pulse        chapter 4: the pulse, its spectrum and its ambiguity function
@@ -25,7 +26,7 @@ from __future__ import annotations
 
 from .. import PAPERS
 from ..paper import Paper
-from . import _aperture, _errata, _field, _focus, _off_centre, _pattern, _pulse, _reference, _trend, _zones
+from . import _aperture, _errata, _field, _focus, _lab, _off_centre, _pattern, _pulse, _reference, _trend, _zones
 
 __all__ = ["PAPER", "range_zones"]
 
@@ -56,6 +57,8 @@ PAPER = Paper(
     name="farooq",
     title="Frequency-diverse arrays: Farooq 2009, published and measured",
     about=ABOUT,
+    lab=_lab.Lab,
+    quick="arrays of more than 100 elements were left out.",
     sections=(
         _reference.section,
         _pattern.patterns,

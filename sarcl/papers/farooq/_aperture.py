@@ -6,8 +6,8 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
-from ..lab import Lab, decibels, system
 from ..paper import Section
+from ._lab import Lab, decibels, system
 from ._reference import DIAMOND, PRINTED
 
 # N, step, and as printed: length, m, growth, %, the nulls expected, m, figure

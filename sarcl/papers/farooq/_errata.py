@@ -9,9 +9,9 @@ import numpy as np
 from ...arrays.array_factor import diverse_factor
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
-from ..lab import Lab, decibels, system
 from ..paper import Section
 from ._aperture import THIN
+from ._lab import Lab, decibels, system
 from ._pattern import F0, SHAPE, SPACING, STEPS, TIME, directions
 
 SIZES = (0.12, 12.0)  # m, section 5.4, of 9 and 900 elements

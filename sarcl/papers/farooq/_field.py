@@ -9,8 +9,8 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab, decibels
 from ..paper import Section
+from ._lab import Lab, decibels
 from ._pattern import directions
 from ._pulse import F0, FAR, HALF_WAVE, STEP, N
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...arrays import array_factor as closed
 from ...figures import html
-from ..lab import Lab, system
 from ..paper import Section
+from ._lab import Lab, system
 from ._reference import DIAMOND, PRINTED
 
 SYSTEMS = ((45, 20e6), (225, 4e6), (450, 2e6))

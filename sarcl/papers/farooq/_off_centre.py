@@ -8,8 +8,8 @@ from typing import Any
 import numpy as np
 
 from ...experiments.fda import experiment, page
-from ..lab import Lab, system
 from ..paper import Section
+from ._lab import Lab, system
 
 PLACES = (0.0, 2.0, 2.25)  # m across
 SEPARATIONS = (0.125, 0.2, 0.25, 0.3)  # m

@@ -9,8 +9,8 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab, decibels
 from ..paper import Section
+from ._lab import Lab, decibels
 
 F0, SHAPE = 10e9, (9, 9)  # tables 3.1 to 3.3
 HALF_WAVE = SPEED_OF_LIGHT / F0 / 2

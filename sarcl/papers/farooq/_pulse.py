@@ -10,8 +10,8 @@ from ...arrays.beam import beam
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...model.antenna_array import AntennaArray
-from ..lab import Lab, decibels
 from ..paper import Section
+from ._lab import Lab, decibels
 
 F0, N, STEP = 10e9, 9, 1e9  # table 4.1, scenario B
 HALF_WAVE = SPEED_OF_LIGHT / F0 / 2

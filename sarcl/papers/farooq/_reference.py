@@ -8,8 +8,8 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...experiments.fda.case import Case
 from ...figures import html
 from ...model.waveform import Waveform
-from ..lab import Lab
 from ..paper import Section
+from ._lab import Lab
 
 F0, BAND, LENGTH, DISTANCE = 10e9, 900e6, 450.0, 5e3  # table 2.1
 PRINTED = 0.167  # m, theoretical resolution both ways, table 2.1

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from ...figures import html
-from ..lab import Lab, decibels, system
 from ..paper import Section
+from ._lab import Lab, decibels, system
 from ._reference import PRINTED
 
 BAND = 900e6  # Hz

@@ -12,8 +12,8 @@ from ...imaging.backproject import backproject
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
-from ..lab import Lab, decibels
 from ..paper import Section
+from ._lab import Lab, decibels
 from .range_zones import RangeZones, collect, isolation, of_zone
 
 ZONES = 4

@@ -1,4 +1,4 @@
-"""Shared by the sections of a paper on arrays: the systems, their echoes (made once), images and cuts."""
+"""Shared by the sections: the systems, their echoes (computed once), images and cuts."""
 
 from __future__ import annotations
 
@@ -7,16 +7,16 @@ from typing import Any
 
 import numpy as np
 
-from ..arrays.map_aperture import MapKind, map_aperture
-from ..experiments.fda.case import Case
-from ..experiments.fda.experiment import response
-from ..figures import html
-from ..imaging.backproject import backproject
-from ..model.image_grid import ImageGrid
-from ..model.phase_history import PhaseHistory
-from ..model.waveform import Waveform
-from ..scene.scene import Scene
-from ..simulation.echo import echo
+from ...arrays.map_aperture import MapKind, map_aperture
+from ...experiments.fda.case import Case
+from ...experiments.fda.experiment import response
+from ...figures import html
+from ...imaging.backproject import backproject
+from ...model.image_grid import ImageGrid
+from ...model.phase_history import PhaseHistory
+from ...model.waveform import Waveform
+from ...scene.scene import Scene
+from ...simulation.echo import echo
 
 CENTER = ((0.0, 0.0, 0.0),)
 HALF, STEP = (2.64, 4.0), 0.04  # m: half the sides of a picture along range and cross-range; side of a pixel
@@ -93,7 +93,7 @@ class Lab:
 
 def _window(step: float) -> tuple[float, float]:
     """Just inside the unambiguous range of carriers `step` Hz apart, m."""
-    from ..base.constants import SPEED_OF_LIGHT
+    from ...base.constants import SPEED_OF_LIGHT
 
     half = 0.49 * SPEED_OF_LIGHT / (2 * step)
     return -half, half
