@@ -10,6 +10,8 @@ from collections.abc import Collection, Sequence
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from ..base.version import __version__
 from . import plots
 
@@ -65,11 +67,15 @@ def plot(
 
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
-    floor_db: float = -40.0, box: tuple[float, float] | None = None,
+    floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
 ) -> Block:  # fmt: skip
-    """A figure of decibels in grey; see `plots.picture`."""
-    data = plots.picture(db, x, y, x_name, y_name, floor_db=floor_db, box=box)
-    scale = f"White: the largest value; black: {-floor_db:g} dB below."
+    """A figure of decibels in grey; see `plots.picture`. percentile  of the values at which the scale has white."""
+    db = np.asarray(db, np.float64)
+    data = plots.picture(
+        np.minimum(db, np.percentile(db, percentile)), x, y, x_name, y_name, floor_db=floor_db, box=box
+    )
+    white = "the largest value" if percentile == 100 else f"the percentile {percentile:g} of the values"
+    scale = f"White: {white}; black: {-floor_db:g} dB below."
     return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}")
 
 

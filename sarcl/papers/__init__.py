@@ -4,27 +4,28 @@
 
 For other folders:
 
-    lab      echoes and images that several sections share
-    paper    a paper: sections, rows of published and measured values, the page
-    farooq/  Farooq 2009, frequency-diverse arrays
+    far_radar  a far radar for scenes of papers that give no geometry; statistics of speckle
+    paper      a paper: sections, rows of published and measured values, the page
+    farooq/    Farooq 2009, frequency-diverse arrays
+    saras/     Franceschetti et al. 1992, raw signals of facet scenes
 """
 
 from __future__ import annotations
 
 from importlib import import_module
-from typing import TYPE_CHECKING
+from typing import TYPE_CHECKING, Any
 
 from ..base import text
 
-__all__ = ["PAPERS", "farooq", "find", "lab", "listing", "open_lab", "paper"]
+__all__ = ["PAPERS", "far_radar", "farooq", "find", "listing", "open_lab", "paper", "saras"]
 
 if TYPE_CHECKING:
     from ..opencl.device import DeviceChoice
-    from .lab import Lab
     from .paper import Paper
 
 PAPERS = {
     "farooq": "J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, AFIT 2009",
+    "saras": "G. Franceschetti et al., SARAS: A Synthetic Aperture Radar Raw Signal Simulator, IEEE TGRS 30(1), 1992",
 }
 
 
@@ -41,9 +42,8 @@ def listing() -> str:
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
 
 
-def open_lab(device: DeviceChoice | None = None, quick: bool = False) -> Lab:
-    """The `Lab` of a run, with its OpenCL device opened; quick: leave out arrays of more than 100 elements."""
+def open_lab(paper: Paper, device: DeviceChoice | None = None, quick: bool = False) -> Any:
+    """What the sections of a paper share, with its OpenCL device opened; quick: less of it (`Paper.quick`)."""
     from ..opencl.choose_device import open_device
-    from .lab import Lab
 
-    return Lab(open_device(device), quick)
+    return paper.lab(open_device(device), quick)

@@ -2,58 +2,21 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import astuple
 
 import numpy as np
-from scipy import signal, stats
+from scipy import signal
 
-import sarcl
-from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.numerics.windows import weights
+from sarcl.papers import far_radar
+from sarcl.papers.far_radar import FarRadar, ground
 from sarcl.scattering import physical_optics
 
+__all__ = ["Radar", "expected", "ground", "inside_box", "inside_frustum", "looks", "misfit", "speckle"]
 
-@dataclass(frozen=True)
-class Radar:
-    """Far away at -x, `look` rad off the vertical, turning by `turn` rad about z: range runs along x, azimuth along y.
 
-    bandwidth, center  Hz
-    """
-
-    look: float
-    bandwidth: float
-    turn: float
-    n_pulses: int
-    center: float = 9.6e9
-
-    @property
-    def null(self):
-        """How far the first null of a point lies on the ground, m: (along y, along x), a grid's spacing."""
-        side = 2 * np.sin(self.look)
-        return SPEED_OF_LIGHT / self.center / (self.turn * side), SPEED_OF_LIGHT / (self.bandwidth * side)
-
-    @property
-    def up(self):
-        """Unit vector from the scene to the radar."""
-        return np.array([-np.sin(self.look), 0, np.cos(self.look)])
-
-    def echo(self, scene, **options):
-        n = self.n_pulses
-        azimuth = np.pi + self.turn * ((np.arange(n) + 0.5) / n - 0.5)
-        around = np.stack([np.cos(azimuth), np.sin(azimuth)], axis=1) * np.sin(self.look)
-        places = 1e6 * np.column_stack([around, np.full(n, np.cos(self.look))])
-        wave = sarcl.Waveform.chirp(center=self.center, bandwidth=self.bandwidth, duration=1e-6)
-        options = {"tolerance": 1e-2, "check": False, **options}
-        return sarcl.echo(scene, wave, sarcl.Trajectory(np.arange(n) / 100.0, places), **options)
-
-    def grid(self, shape, pixels=1, **options):
-        """So many pixels a null, about the origin."""
-        return sarcl.ImageGrid.plane(shape=shape, spacing=[n / pixels for n in self.null], **options)
-
-    def focus(self, raw, grid, **options):
-        """Pixels whose |.|^2 is the cross section of a point, m^2."""
-        image = sarcl.backproject(raw, grid, **{"tolerance": 1e-2, "check": False, **options})
-        return np.asarray(image.data) / image.gain
+class Radar(FarRadar):
+    """The far radar of the papers' pages, with the power that facets send back."""
 
     def powers(self, scene, pair=(0, 0)):
         """Mean RCS of facets whose roughness has a diagram, m^2 (k,): pi |S|^2 D A/Omega, docs/theory/facets.md."""
@@ -65,19 +28,9 @@ class Radar:
         return np.pi * np.abs(s) ** 2 * lobes[scene.material, np.arange(len(delta))] * area
 
 
-def ground(y, x, cells=(1, 1), **options):
-    """Flat ground from y[0] to y[1] and x[0] to x[1], m, of so many cells."""
-    axes = [np.linspace(*ends, n + 1) for ends, n in zip((y, x), cells, strict=True)]
-    return sarcl.Scene.from_heights(*axes[::-1], np.zeros([len(a) for a in axes]), **options)
-
-
 def speckle(pixels):
-    """p values of Rayleigh amplitudes and of uniform phases (Kolmogorov-Smirnov), and std/mean of the intensity."""
-    power = np.abs(pixels.ravel()) ** 2
-    amplitude = np.sqrt(power / power.mean())
-    rayleigh = stats.kstest(amplitude, "rayleigh", args=(0, np.sqrt(0.5))).pvalue
-    uniform = stats.kstest(np.angle(pixels.ravel()), "uniform", args=(-np.pi, 2 * np.pi)).pvalue
-    return rayleigh, uniform, power.std() / power.mean()
+    """p values of Rayleigh amplitudes and of uniform phases, and std/mean of the intensity."""
+    return astuple(far_radar.speckle(pixels))
 
 
 def inside_box(x, y, z, size):

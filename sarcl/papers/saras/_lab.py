@@ -1,0 +1,71 @@
+"""What several sections share: the radar, ground of the paper's material, and images."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...figures import html
+from ...model.image_grid import ImageGrid
+from ...scene.material import Material
+from ...scene.scene import Scene
+from ..far_radar import FarRadar
+
+# Figures 5, 9, 10 and 13 to 16
+ROUGH, SMOOTH = (Material(eps_r=4.0, conductivity=1e-3, diagram=diagram) for diagram in ("cos2", "smooth"))
+FLAT = FarRadar(look=np.radians(35), bandwidth=300e6, turn=0.05, n_pulses=52)
+
+
+class Lab:
+    """Echoes and images on one device.
+
+    device  an OpenCL device;  quick  smaller fields and fewer looks
+    """
+
+    def __init__(self, device: Any = None, quick: bool = False) -> None:
+        self.device, self.quick = device, quick
+
+    def image(self, radar: FarRadar, scene: Scene, grid: ImageGrid, *, seed: int = 1, window: Any = None) -> np.ndarray:
+        """Pixels of one look at a scene, |.|^2 in m^2."""
+        return radar.focus(radar.echo(scene, seed=seed, device=self.device), grid, window=window, device=self.device)
+
+    def looks(
+        self, radar: FarRadar, scene: Scene, grid: ImageGrid, n: int, polarization: tuple[str, ...] = ("HH",)
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Power of the first look, and mean power over n looks with other random numbers, under Hamming's window.
+
+        Both m^2 (n polarisations, rows, columns).
+        """
+        first, total = np.zeros(0), np.zeros((len(polarization), *grid.shape))
+        for seed in range(n):
+            raw = radar.echo(scene, seed=seed, polarization=polarization, device=self.device)
+            power = [
+                np.abs(radar.focus(raw.select(polarization=p), grid, window="hamming", device=self.device)) ** 2
+                for p in polarization
+            ]
+            first = np.stack(power) if seed == 0 else first
+            total += np.stack(power) / n
+        return first, total
+
+
+def picture(power: np.ndarray, grid: ImageGrid, caption: str, floor_db: float = -30.0) -> html.Block:
+    """Powers (rows, columns) on a grid about the origin as a figure, white at the percentile 99.5."""
+    assert grid.spacing is not None
+    half = [n * s / 2 for n, s in zip(grid.shape, grid.spacing, strict=True)]
+    db = 10 * np.log10(np.maximum(power, 1e-12 * power.max()))
+    return html.picture(
+        db, (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m", caption, floor_db=floor_db,
+        percentile=99.5,
+    )  # fmt: skip
+
+
+def histogram(values: np.ndarray, top: float, bins: int = 24) -> tuple[np.ndarray, np.ndarray]:
+    """Middles of bins from 0 to `top`, and the density of the values in them."""
+    density, edges = np.histogram(values, bins, (0, top))
+    return (edges[:-1] + edges[1:]) / 2, density / len(values) / np.diff(edges)
+
+
+def rayleigh(amplitude: np.ndarray) -> np.ndarray:
+    """Density of Rayleigh's distribution with mean square 1."""
+    return np.asarray(2 * amplitude * np.exp(-(amplitude**2)))

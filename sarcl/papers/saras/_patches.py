@@ -1,0 +1,120 @@
+"""SARAS, figure 12: 22 patches of different materials, with and without small-scale and large-scale statistics."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...figures import html
+from ...scattering.physical_optics import fresnel
+from ...scene.material import Diagram, Material
+from ..far_radar import ground, speckle
+from ..paper import Section
+from ._lab import FLAT, ROUGH, SMOOTH, Lab, histogram, picture, rayleigh
+
+ROWS = ((0, 5), (5, 6), (11, 5), (16, 6))  # first patch and number of patches of each row, from below
+FIELD = {True: (72, 108), False: (256, 384)}  # resolution cells along azimuth and range
+MARGIN = 3  # cells: those so near to another patch are left out
+
+
+@dataclass(frozen=True)
+class Case:
+    """facets  per cell along azimuth and range;  sigma  of the heights, in wavelengths;  rayleigh  as printed"""
+
+    facets: tuple[int, int]
+    material: Material
+    sigma: float
+    words: str
+    rayleigh: bool
+
+
+CASES = {
+    "a": Case((4, 4), ROUGH, 1.0, "rough facets on a rough profile", True),
+    "b": Case((4, 4), ROUGH, 0.0, "rough facets", True),
+    "c": Case((16, 4), SMOOTH, 1.0, "smooth facets on a rough profile", False),
+    "d": Case((4, 4), SMOOTH, 0.0, "no statistics", False),
+}
+
+
+def section(lab: Lab) -> Section:
+    """Figure 12 a to d, each with the grey levels of the lower left patch."""
+    out = Section("patches", "22 patches of different materials (figure 12)")
+    field = FIELD[lab.quick]
+    number, electric = patches(field)
+    radar = replace(FLAT, n_pulses=round(1.3 * field[0]))
+    inner = [interior(number, i) for i in range(22)]
+    reflected = np.array(
+        [abs(fresnel(np.ones(()), m.permittivity(radar.center))[0]) ** 2 for m in _table("cos2", electric)]
+    )
+    curves, mean = [], {}
+    for name, case in CASES.items():
+        fine = np.repeat(np.repeat(number, case.facets[0], axis=0), case.facets[1], axis=1)
+        y, x = ((-m * n / 2, m * n / 2) for m, n in zip(field, radar.null, strict=True))
+        scene = ground(
+            y, x, fine.shape, material=fine, materials=_table(case.material.diagram, electric),
+            point_roughness=case.sigma * SPEED_OF_LIGHT / radar.center,
+        )  # fmt: skip
+        # pixels are the middles of cells
+        grid = radar.grid(field, center=(radar.null[1] / 2, radar.null[0] / 2, 0))
+        raw = radar.echo(scene, seed=1, device=lab.device)
+        pixels = radar.focus(raw, grid, device=lab.device)
+        clean = np.abs(radar.focus(raw, grid, window="hamming", device=lab.device)) ** 2
+        mean[name] = np.array([clean[cells].mean() for cells in inner])
+        found = speckle(pixels[inner[0]])
+        speckled = found.rayleigh > 0.01 and abs(found.contrast - 1) < 0.3
+        out.states(
+            f"case {name}, {case.words}: grey levels", "figure 12", "Rayleigh" if case.rayleigh else "not Rayleigh",
+            f"p = {found.rayleigh:.2g} that they are Rayleigh's, contrast {found.contrast:.2f}",
+            speckled == case.rayleigh, value=[found.rayleigh, found.contrast],
+            rule="Rayleigh: p above 0.01 (Kolmogorov and Smirnov) and a contrast of 0.7 to 1.3",
+        )  # fmt: skip
+        amplitude = np.abs(pixels[inner[0]])
+        curves.append((f"case {name}", *histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)))
+        out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}.", -25.0))
+    at = curves[0][1]
+    out.draw(html.plot(
+        [*curves, ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
+        "Grey levels of the lower left patch in the four cases (figure 12).",
+    ))  # fmt: skip
+    _brightness(out, mean, reflected)
+    out.keep(mean=mean, reflected=reflected)
+    return out
+
+
+def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray) -> None:
+    """Whether patches are as bright as their reflectivity says, and how bright a mirror is."""
+    bright = reflected > 1e-3
+    ratio = 10 * np.log10(mean["b"][bright] / reflected[bright])
+    out.states(
+        "case b: brightness of the patches and Fresnel's |R|^2", "figure 12, equation A.7", "follows the material",
+        f"rms {np.std(ratio):.2f} dB about a constant, over {np.ptp(10 * np.log10(reflected[bright])):.0f} dB",
+        np.std(ratio) < 1.0, value=float(np.std(ratio)), rule="rms below 1 dB",
+    )  # fmt: skip
+    level = float(10 * np.log10(np.median(mean["d"][bright] / mean["b"][bright])))
+    out.states(
+        "case d: smooth facets without statistics", "figure 12 d", "no grey-level distribution",
+        f"{level:.0f} dB of case b: a mirror, of which edges alone are seen", level < -40, value=level,
+        rule="below -40 dB of case b",
+    )  # fmt: skip
+
+
+def patches(field: tuple[int, int]) -> tuple[np.ndarray, list[tuple[float, float]]]:
+    """The number of each cell's patch, from the lower left one, and (eps_r, S/m) of each: the printed ranges, mixed so
+    that neighbours differ."""
+    rows = [first + np.arange(field[1]) * n // field[1] for first, n in ROWS]
+    i = np.arange(22)
+    electric = np.linspace(1, 40, 22)[(5 * i + 11) % 22], np.geomspace(1e-4, 1, 22)[(7 * i + 11) % 22]
+    return np.repeat(rows, field[0] // 4, axis=0), list(zip(*(e.tolist() for e in electric), strict=True))
+
+
+def interior(number: np.ndarray, i: int) -> np.ndarray:
+    """Cells of patch i that lie more than MARGIN cells from its border."""
+    mask = np.pad(number == i, MARGIN)
+    shifts = [(s, a) for s in (-MARGIN, MARGIN) for a in (0, 1)]
+    return np.all([np.roll(mask, *shift) for shift in shifts], axis=0)[MARGIN:-MARGIN, MARGIN:-MARGIN]
+
+
+def _table(diagram: Diagram, electric: list[tuple[float, float]]) -> list[Material]:
+    return [Material(eps_r=e, conductivity=s, diagram=diagram) for e, s in electric]

@@ -1,0 +1,111 @@
+"""SARAS, section III: speckle of homogeneous ground (figures 5 to 7, table I)."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+from scipy.optimize import brentq
+
+from ...figures import html
+from ...model.image_grid import ImageGrid
+from ...model.phase_history import PhaseHistory
+from ...scene.scene import Scene
+from ..far_radar import FarRadar, ground, speckle
+from ..paper import Section
+from ._lab import FLAT, ROUGH, Lab, histogram, picture, rayleigh
+
+# Table I: rows along range, columns along azimuth, lags of 0 to 4 pixels
+TABLE = (
+    (1.00, 0.51, 0.15, 0.11, 0.12),
+    (0.70, 0.35, 0.11, 0.06, 0.08),
+    (0.14, 0.05, 0.01, 0.00, 0.02),
+    (0.21, 0.11, 0.04, 0.03, 0.02),
+    (0.10, 0.04, 0.02, 0.01, 0.01),
+)
+CELLS = {True: 96, False: 400}  # resolution cells a side; the paper's images have 512 pixels of some 0.5 cells
+FACETS = 4  # per cell and direction
+FINE = 8  # pixels per cell of figure 7
+
+
+def section(lab: Lab) -> Section:
+    """Figures 5 to 7 and table I."""
+    out = Section("speckle", "Speckle of homogeneous ground (figures 5 to 7, table I)")
+    n = CELLS[lab.quick]
+    radar = replace(FLAT, n_pulses=round(1.1 * n))
+    y, x = ((-n * null / 2, n * null / 2) for null in radar.null)
+    raw = radar.echo(ground(y, x, (FACETS * n, FACETS * n), material=ROUGH), seed=1, device=lab.device)
+    cells = radar.focus(raw, radar.grid((n, n)), device=lab.device)[2:-2, 2:-2]
+    found = speckle(cells)
+    out.states(
+        "amplitudes of the image", "figure 6", "Rayleigh", f"p = {found.rayleigh:.2f} that they are",
+        found.rayleigh > 0.01, value=found.rayleigh, rule="p above 0.01 in the test of Kolmogorov and Smirnov",
+    )  # fmt: skip
+    out.states(
+        "phases of the image", "section III", "uniform", f"p = {found.uniform:.2f} that they are", found.uniform > 0.01,
+        value=found.uniform, rule="p above 0.01 in the test of Kolmogorov and Smirnov",
+    )  # fmt: skip
+    out.number("standard deviation of the intensity over its mean", "figure 6", 1.0, found.contrast, 6 / n, form=".3f",
+               why="" if abs(found.contrast - 1) <= 6 / n else "more than three standard errors off")  # fmt: skip
+    amplitude = np.abs(cells.ravel()) / np.sqrt((np.abs(cells) ** 2).mean())
+    at, density = histogram(amplitude, 3.0)
+    shown = radar.grid((n, n))
+    out.draw(
+        picture(np.abs(radar.focus(raw, shown, device=lab.device)) ** 2, shown, "Flat homogeneous ground (figure 5)."),
+        html.plot(
+            [("image", at, density), ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
+            "Grey levels of the image (figure 6).", dots=["image"],
+        ),
+    )  # fmt: skip
+    _correlations(out, lab, radar, raw, n)
+    return out
+
+
+def _correlations(out: Section, lab: Lab, radar: FarRadar, raw: PhaseHistory, n: int) -> None:
+    """Table I and figure 7."""
+    # The lags of one pixel give its size: the response of a flat spectrum is sinc(distance/null)
+    size = [brentq(lambda s, v=value: np.sinc(s) - v, 0.1, 0.99) for value in (TABLE[0][1], TABLE[1][0])]
+    shape = [int((n - 8) / s) for s in size]
+    pixels = radar.focus(raw, radar.grid(shape, (1 / size[0], 1 / size[1])), device=lab.device)
+    table = np.array([[_correlation(pixels, azimuth, along) for azimuth in range(5)] for along in range(5)])
+    within = 0.05
+    for name, printed, found in (("azimuth", TABLE[0], table[0]), ("range", [row[0] for row in TABLE], table[:, 0])):
+        for lag in range(1, 5):
+            out.number(f"autocorrelation, {lag} pixels in {name}", "table I", printed[lag], float(found[lag]), within,
+                       form=".2f")  # fmt: skip
+    rest = float(np.abs(table - TABLE)[1:, 1:].max())
+    out.number("largest difference of the other lags", "table I", 0.0, rest, 0.06, form=".2f")
+    out.say(
+        "The paper does not give the size of a pixel. It follows from the two lags of one pixel: the response of a "
+        f"flat spectrum is sinc(distance/null), and 0.51 and 0.70 are those at {size[0]:.2f} nulls in azimuth and "
+        f"{size[1]:.2f} in range. All other lags are then compared; they depend on the noise of one image, about "
+        f"{1 / np.sqrt(np.prod(shape) * np.prod(size)):.3f} here."
+    )
+    rows = [[str(i), *(f"{a:.2f} / {b:.2f}" for a, b in zip(TABLE[i], table[i], strict=True))] for i in range(5)]
+    out.parts.append(html.table(
+        ["range lag", *(f"azimuth lag {i}" for i in range(5))], rows, "Table I: printed / measured autocorrelation."
+    ))  # fmt: skip
+    grid = radar.grid((n - 8, FINE * (n - 8)), (1, FINE))
+    fine = radar.focus(raw, grid, device=lab.device)
+    lags = np.arange(4 * FINE + 1)
+    curve = np.array([_correlation(fine, 0, int(i)) for i in lags])
+    point = radar.echo(Scene.points([[0.0, 0.0, 0.0]]), range_window=(-20.0, 20.0), device=lab.device)
+    places = np.column_stack([lags / FINE * radar.null[1], np.zeros((len(lags), 2))])
+    response = np.abs(radar.focus(point, ImageGrid.points(places), device=lab.device))
+    off = float(np.abs(curve - response).max())
+    out.states(
+        "autocorrelation along range and the response of a point", "figure 7", "coincident",
+        f"differ by up to {off:.3f}", off < 0.05, value=off, rule="at most 0.05 of the peak over the whole curve",
+    )  # fmt: skip
+    out.draw(html.plot(
+        [("autocorrelation of the image", lags / FINE, curve), ("response of a point", lags / FINE, response)],
+        "distance in range, nulls", "modulus", "Range section of the image's autocorrelation (figure 7).",
+    ))  # fmt: skip
+    out.keep(table=table, pixel_in_nulls=size, curve=curve, response=response)
+
+
+def _correlation(pixels: np.ndarray, azimuth: int, along: int) -> float:
+    """Modulus of the autocorrelation of an image (azimuth, range) at lags in pixels."""
+    rows, columns = pixels.shape
+    product = pixels[azimuth:, along:] * pixels[: rows - azimuth, : columns - along].conj()
+    return float(np.abs(product.mean()) / (np.abs(pixels) ** 2).mean())
