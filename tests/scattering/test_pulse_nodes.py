@@ -56,7 +56,7 @@ def test_each_its_own():
 @pytest.mark.parametrize("material, tolerance", thinned([ROUGH, BOTH, "metal"], [1e-2, 1e-3]))
 def test_shared_amplitudes_keep_the_tolerance(device, always, material, tolerance):
     """Against the exact sum of every pulse's own amplitudes, in HH and HV, gains and shadows among them."""
-    scene = hills(10, material, edge=0.2)
+    scene = hills(6, material, edge=0.2)
     tx = pointing.spotlight(track(), (0, 0, 0))
     options = {"polarization": ["HH", "HV"], "antenna": Antenna.gaussian(width=0.002), "device": device}
     raw = sarcl.echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
