@@ -5,9 +5,11 @@
 For other folders:
 
     far_radar  a far radar for scenes of papers that give no geometry; statistics of speckle
+    lab        looks at scenes, pictures and histograms, for papers whose figures are images
     paper      a paper: sections, rows of published and measured values, the page
     farooq/    Farooq 2009, frequency-diverse arrays
     saras/     Franceschetti et al. 1992, raw signals of facet scenes
+    wan/       Wan, Yue, Yang 2004, spaceborne raw data of facet scenes
 """
 
 from __future__ import annotations
@@ -17,7 +19,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..base import text
 
-__all__ = ["PAPERS", "far_radar", "farooq", "find", "listing", "open_lab", "paper", "saras"]
+__all__ = ["PAPERS", "far_radar", "farooq", "find", "lab", "listing", "open_lab", "paper", "saras", "wan"]
 
 if TYPE_CHECKING:
     from ..opencl.device import DeviceChoice
@@ -26,6 +28,7 @@ if TYPE_CHECKING:
 PAPERS = {
     "farooq": "J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, AFIT 2009",
     "saras": "G. Franceschetti et al., SARAS: A Synthetic Aperture Radar Raw Signal Simulator, IEEE TGRS 30(1), 1992",
+    "wan": "Wan F., Yue H., Yang R., Distributed Target's Raw Data Simulation of Spaceborne SAR, JEIT 26(8), 2004",
 }
 
 

@@ -10,8 +10,8 @@ import pytest
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
 from sarcl.papers import far_radar
+from sarcl.papers.lab import Lab
 from sarcl.papers.saras import _errata, _patches, _speckle
-from sarcl.papers.saras._lab import Lab
 
 ERRATA = {
     "HV over HH of tilted facets of a perfect conductor": [1, 0, 0],

@@ -7,7 +7,7 @@ those of the paper.
 For this folder alone, a section or a group of sections of the page each, and what they share:
 
     _errata    errors in the printed equations
-    _lab       the radar, the ground, looks and pictures
+    _ground    material of the ground, radar for flat ground
     _patches   figure 12: patches of different materials and statistics
     _relief    figures 10 and 13 to 17: layover, shadow, polarisation
     _speckle   figures 5 to 7 and table I: speckle of homogeneous ground
@@ -16,8 +16,9 @@ For this folder alone, a section or a group of sections of the page each, and wh
 from __future__ import annotations
 
 from .. import PAPERS
+from ..lab import Lab
 from ..paper import Paper
-from . import _errata, _lab, _patches, _relief, _speckle
+from . import _errata, _patches, _relief, _speckle
 
 __all__ = ["PAPER"]
 
@@ -45,7 +46,7 @@ PAPER = Paper(
     name="saras",
     title="SARAS: Franceschetti et al. 1992, published and measured",
     about=ABOUT,
-    lab=_lab.Lab,
+    lab=Lab,
     sections=(
         _speckle.section,
         _patches.section,

@@ -6,8 +6,8 @@ import numpy as np
 
 from ...figures import html
 from ...scattering.physical_optics import scattering_matrix
+from ..lab import Lab
 from ..paper import Section
-from ._lab import Lab
 
 LOOK = np.radians(35)
 A2, B2, EPS, XI = 150.0, 200.0, 0.05, 60.0  # normalised quantities of equations 28 and 29

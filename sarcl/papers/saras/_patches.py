@@ -11,8 +11,9 @@ from ...figures import html
 from ...scattering.physical_optics import fresnel
 from ...scene.material import Diagram, Material
 from ..far_radar import ground, speckle
+from ..lab import Lab, histogram, picture, rayleigh
 from ..paper import Section
-from ._lab import FLAT, ROUGH, SMOOTH, Lab, histogram, picture, rayleigh
+from ._ground import FLAT, ROUGH, SMOOTH
 
 ROWS = ((0, 5), (5, 6), (11, 5), (16, 6))  # first patch and number of patches of each row, from below
 FIELD = {True: (72, 108), False: (256, 384)}  # resolution cells along azimuth and range

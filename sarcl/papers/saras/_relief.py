@@ -10,8 +10,9 @@ from ...scattering.physical_optics import fresnel
 from ...scene import shapes
 from ...scene.scene import Scene
 from ..far_radar import FarRadar, ground
+from ..lab import Lab, picture
 from ..paper import Section
-from ._lab import ROUGH, Lab, picture
+from ._ground import ROUGH
 
 # What matters is how many resolution cells a shape covers
 RADAR = FarRadar(look=np.radians(50), bandwidth=100e6, turn=0.014, n_pulses=64)

@@ -12,8 +12,9 @@ from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...scene.scene import Scene
 from ..far_radar import FarRadar, ground, speckle
+from ..lab import Lab, histogram, picture, rayleigh
 from ..paper import Section
-from ._lab import FLAT, ROUGH, Lab, histogram, picture, rayleigh
+from ._ground import FLAT, ROUGH
 
 # Table I: rows along range, columns along azimuth, lags of 0 to 4 pixels
 TABLE = (

@@ -1,4 +1,4 @@
-"""What several sections share: the radar, ground of the paper's material, and images."""
+"""Shared by papers whose figures are images: looks at scenes with a far radar, pictures, histograms."""
 
 from __future__ import annotations
 
@@ -6,15 +6,10 @@ from typing import Any
 
 import numpy as np
 
-from ...figures import html
-from ...model.image_grid import ImageGrid
-from ...scene.material import Material
-from ...scene.scene import Scene
-from ..far_radar import FarRadar
-
-# Figures 5, 9, 10 and 13 to 16
-ROUGH, SMOOTH = (Material(eps_r=4.0, conductivity=1e-3, diagram=diagram) for diagram in ("cos2", "smooth"))
-FLAT = FarRadar(look=np.radians(35), bandwidth=300e6, turn=0.05, n_pulses=52)
+from ..figures import html
+from ..model.image_grid import ImageGrid
+from ..scene.scene import Scene
+from .far_radar import FarRadar
 
 
 class Lab:
@@ -25,10 +20,6 @@ class Lab:
 
     def __init__(self, device: Any = None, quick: bool = False) -> None:
         self.device, self.quick = device, quick
-
-    def image(self, radar: FarRadar, scene: Scene, grid: ImageGrid, *, seed: int = 1, window: Any = None) -> np.ndarray:
-        """Pixels of one look at a scene, |.|^2 in m^2."""
-        return radar.focus(radar.echo(scene, seed=seed, device=self.device), grid, window=window, device=self.device)
 
     def looks(
         self, radar: FarRadar, scene: Scene, grid: ImageGrid, n: int, polarization: tuple[str, ...] = ("HH",)

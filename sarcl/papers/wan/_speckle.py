@@ -1,0 +1,64 @@
+"""Wan et al. 2004, section 6.1: amplitudes and phases of rough ground (figure 3)."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...figures import html
+from ...scene.material import Material
+from ..far_radar import ground, speckle
+from ..lab import Lab, histogram, rayleigh
+from ..paper import Section
+from ._radar import l_band
+
+ROUGHNESS, EPS = 0.15, 3.0  # m (no unit is printed), section 6.1
+SIDES = (0.5, 0.75)  # m, of the squares of two facets: 226 and 100 facets per resolution cell
+CELLS = {True: 40, False: 96}
+
+
+def section(lab: Lab) -> Section:
+    """Figure 3."""
+    out = Section("speckle", "Amplitudes and phases of rough ground (figure 3)")
+    n = CELLS[lab.quick]
+    radar = l_band(round(1.3 * n))
+    ends = [(-n * null / 2, n * null / 2) for null in radar.null]
+    curves, phases, found = [], [], []
+    for side in SIDES:
+        cells = [round(n * null / side) for null in radar.null]
+        scene = ground(ends[0], ends[1], cells, material=Material(eps_r=EPS), point_roughness=ROUGHNESS)
+        raw = radar.echo(scene, shadows=False, seed=1, device=lab.device)
+        pixels = radar.focus(raw, radar.grid((n, n)), device=lab.device)[2:-2, 2:-2].ravel()
+        found.append(speckle(pixels))
+        facets = round(2 * np.prod(cells) / n**2)
+        curves.append(
+            (f"{facets} facets per cell", *histogram(np.abs(pixels / np.sqrt((np.abs(pixels) ** 2).mean())), 3.0))
+        )
+        at, density = histogram(np.angle(pixels) + np.pi, 2 * np.pi, 16)
+        phases.append((f"{facets} facets per cell", at - np.pi, density))
+    many, few = found
+    rule = "p above 0.01 in the test of Kolmogorov and Smirnov"
+    out.states(
+        "amplitudes", "figure 3 a", "Rayleigh", f"p = {many.rayleigh:.2f} that they are", many.rayleigh > 0.01,
+        value=many.rayleigh, rule=rule,
+    )  # fmt: skip
+    out.states(
+        "phases", "figure 3 b", "uniform", f"p = {many.uniform:.2f} that they are", many.uniform > 0.01,
+        value=many.uniform, rule=rule,
+    )  # fmt: skip
+    at = curves[0][1]
+    out.draw(
+        html.plot(
+            [*curves, ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
+            "Amplitudes of the image's resolution cells (figure 3 a).",
+        ),
+        html.plot(
+            [*phases, ("uniform", phases[0][1], np.full(16, 1 / (2 * np.pi)))], "phase, rad", "density",
+            "Phases of the image's resolution cells (figure 3 b).",
+        ),
+    )  # fmt: skip
+    out.say(
+        f"Few of the smooth facets face the radar, so that many facets per cell are needed: with {curves[1][0]} the "
+        f"contrast is {few.contrast:.2f} instead of 1, and amplitudes are not Rayleigh's (p = {few.rayleigh:.1g}), "
+        "while phases are uniform."
+    )
+    return out
