@@ -15,6 +15,7 @@ from .base.errors import ToleranceMissed as ToleranceMissed
 from .base.errors import ToleranceUnreachable as ToleranceUnreachable
 from .base.report import Report as Report
 from .base.version import __version__ as __version__
+from .earth.elevation import ElevationModel as ElevationModel
 from .effects import motion as motion
 from .effects import noise as noise
 from .effects import stop_and_go as stop_and_go
@@ -31,6 +32,7 @@ from .model.antenna import Antenna as Antenna
 from .model.antenna_array import AntennaArray as AntennaArray
 from .model.image import Image as Image
 from .model.image_grid import ImageGrid as ImageGrid
+from .model.orbit import Orbit as Orbit
 from .model.phase_history import PhaseHistory as PhaseHistory
 from .model.phase_history import concatenate as concatenate
 from .model.radar import Radar as Radar

@@ -19,7 +19,7 @@ For other folders:
     validation    checks of user input: name, got, wanted, remedy
     vectors       unit vectors, scalar products
     version       the version of the package
-    wgs84         longitude, latitude and height to Earth-centred coordinates and local axes
+    wgs84         longitude, latitude and height to Earth-centred coordinates and back; local axes
 """
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""WGS84: longitude, latitude and height to Earth-centred coordinates and to local axes."""
+"""WGS84: longitude, latitude and height to Earth-centred coordinates and back, and to local axes."""
 
 from __future__ import annotations
 
@@ -49,3 +49,41 @@ def vertical_at(position: np.ndarray) -> np.ndarray | None:
         return None
     normal = position / axes**2
     return np.asarray(normal / np.linalg.norm(normal))
+
+
+def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64], NDArray[np.float64]]:
+    """Longitude, latitude, degrees, and height above the ellipsoid, m, each (...), of positions, m (..., 3).
+
+    The inverse of `ecef`, in closed form, at any distance from the centre: heights to 1e-9 m near the Earth, angles to
+    the rounding of degrees (2e-9 m on the ground). Below 43 km from the centre several points of
+    the ellipsoid have their normal through a position: the nearest is taken, and the northern one of two that are
+    equally near. The longitude on the axis is 0.
+    Source: C. F. F. Karney, Geodesics on an ellipsoid of revolution, arXiv:1102.1215, appendix B.
+    """
+    x, y, z = np.moveaxis(np.asarray(positions, np.float64), -1, 0)
+    e2, e4, rest = ECCENTRICITY_SQUARED, ECCENTRICITY_SQUARED**2, 1 - ECCENTRICITY_SQUARED
+    across = np.hypot(x, y)
+    p, q = (across / SEMI_MAJOR) ** 2, rest * (z / SEMI_MAJOR) ** 2
+    r = (p + q - e4) / 6
+    s = e4 * p * q / 4
+    disc = s * (2 * r**3 + s)
+    cubed = s + r**3
+    t = np.cbrt(cubed + np.copysign(np.sqrt(np.maximum(disc, 0)), cubed))
+    angle = np.arctan2(np.sqrt(np.maximum(-disc, 0)), -cubed)
+    with np.errstate(invalid="ignore", divide="ignore"):  # both branches are computed, the valid one is taken
+        u = r + np.where(disc >= 0, t + np.where(t != 0, r**2 / t, 0), 2 * r * np.cos(angle / 3))
+        v = np.sqrt(u**2 + e4 * q)
+        uv = np.where(u < 0, e4 * q / (v - u), u + v)
+        w = np.maximum(e2 * (uv - q) / (2 * v), 0)
+        k = uv / (np.sqrt(uv + w**2) + w)
+        sine, cosine = z / k, across / (k + e2)
+    inside = (e4 * q == 0) & (r <= 0)  # the disc of radius a e^2 in the equatorial plane
+    sine = np.where(inside, np.copysign(np.sqrt(np.maximum(e4 - p, 0) / rest), z), sine)
+    cosine = np.where(inside, np.sqrt(p), cosine)
+    latitude = np.degrees(np.arctan2(sine, cosine))
+    # a difference of lengths: in extended precision, where the machine has it
+    long = [np.asarray(v, np.longdouble) for v in (x, y, z, sine, cosine)]
+    length = np.sqrt(long[3] ** 2 + long[4] ** 2)
+    sine, cosine = long[3] / length, long[4] / length
+    height = np.sqrt(long[0] ** 2 + long[1] ** 2) * cosine + long[2] * sine - SEMI_MAJOR * np.sqrt(1 - e2 * sine**2)
+    return np.degrees(np.arctan2(y, x)), latitude, height.astype(np.float64)

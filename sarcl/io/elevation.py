@@ -60,6 +60,13 @@ def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
             raise ValueError("center is the origin of a local frame; leave it out with frame='ecef'")
         points = wgs84.ecef(tile.longitude, tile.latitude, tile.height)
         return points, wgs84.up(tile.longitude, tile.latitude)
+    origin, axes = local_frame(tile, center)
+    points = (wgs84.ecef(tile.longitude, tile.latitude, tile.height) - origin) @ axes.T
+    return points, wgs84.up(tile.longitude, tile.latitude) @ axes.T
+
+
+def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
+    """Origin, m (3,), and axes east, north, up (3, 3) of the local frame of Scene.from_dem, in Earth-centred axes."""
     middle = [(a.min() + a.max()) / 2 for a in (tile.longitude, tile.latitude)]
     if center is None:
         center = middle
@@ -73,9 +80,7 @@ def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
             f"center ({longitude:g}, {latitude:g}) is more than 1000 km from the heights, which are about "
             f"({middle[0]:.4f}, {middle[1]:.4f}); give (longitude, latitude) in degrees"
         )
-    axes = wgs84.local_axes(longitude, latitude)
-    points = (wgs84.ecef(tile.longitude, tile.latitude, tile.height) - origin) @ axes.T
-    return points, wgs84.up(tile.longitude, tile.latitude) @ axes.T
+    return origin, wgs84.local_axes(longitude, latitude)
 
 
 @contextmanager

@@ -8,6 +8,7 @@ For other folders:
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels
     lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
+    orbit             Orbit: where a satellite is, Earth-fixed, and what it sees
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
     radar             Radar: the radar equation as named factors
@@ -27,6 +28,7 @@ __all__ = [
     "image",
     "image_grid",
     "lazy_rows",
+    "orbit",
     "phase_history",
     "pointing",
     "radar",

@@ -6,12 +6,16 @@ import functools
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
+
+if TYPE_CHECKING:
+    from ..base.types import PathLike
+    from ..earth.elevation import ElevationModel, Geoid
 
 FARTHEST = 1e150  # m: squares of coordinates stay finite
 MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
@@ -19,7 +23,7 @@ MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 @dataclass(frozen=True, eq=False)
 class ImageGrid:
-    """Pixel positions: a plane (`ImageGrid.plane`) or any points (`ImageGrid.points`).
+    """Pixel positions: a plane (`ImageGrid.plane`), points of terrain (`on_terrain`) or any points (`points`).
 
     shape    of the image
     center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
@@ -107,6 +111,36 @@ class ImageGrid:
                 raise ValueError(f"valid is {mask.dtype} of shape {mask.shape}, wanted bool of shape {shape[:-1]}")
             listed[~mask] = np.nan
         return cls(shape=shape[:-1], listed=_cells(listed))
+
+    @classmethod
+    def on_terrain(
+        cls,
+        dem: PathLike | ElevationModel,
+        spacing: float | Sequence[float] | np.ndarray,
+        *,
+        bounds: Sequence[float] | np.ndarray | None = None,
+        center: Sequence[float] | np.ndarray | None = None,
+        frame: Literal["local", "ecef"] = "local",
+        heights: str | None = None,
+        geoid: Geoid = None,
+        nodata: float | None = None,
+    ) -> ImageGrid:
+        """Points on an elevation model, at even steps north (row) and east (column), m, seen from above.
+
+        dem     a file, read as by `Scene.from_dem` with bounds, heights, geoid and nodata; or a `sarcl.ElevationModel`
+        center, frame   as in `Scene.from_dem`: with the same values the grid lies on the scene's terrain
+
+        Between the points of the model heights are bilinear. Cells without data are empty. ValueError, ImportError and
+        FileNotFoundError as from `Scene.from_dem`.
+        """
+        from ..earth.elevation import ElevationModel
+
+        steps = tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(pair("spacing", spacing)))
+        if not isinstance(dem, ElevationModel):
+            dem = ElevationModel.read(dem, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+        elif any(option is not None for option in (bounds, heights, geoid, nodata)):
+            raise ValueError("bounds, heights, geoid and nodata are for files; an ElevationModel has been read already")
+        return cls.points(dem.grid_positions((steps[0], steps[1]), frame, center))
 
     @property
     def is_plane(self) -> bool:

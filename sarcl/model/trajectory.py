@@ -15,10 +15,14 @@ from ..base import validation
 class Trajectory:
     """Positions of an antenna's phase centre, one per pulse.
 
-    times       s (n,), increasing
-    positions   m (n, 3)
-    velocities  m/s (n, 3) or None
-    attitude    rotation from body to scene axes (n, 3, 3) or None
+    times          s (n,), increasing
+    positions      m (n, 3)
+    velocities     m/s (n, 3) or None
+    attitude       rotation from body to scene axes (n, 3, 3) or None
+    accelerations  m/s^2 (n, 3) or None
+    stop_and_go    whether the antenna rests while a pulse is on its way (default). False, as Orbit.trajectory makes it:
+                   positions are Earth-fixed, and `echo` takes the receiver's when the echo arrives; it needs velocities
+                   and accelerations
 
     Raises ValueError when shapes disagree, a value is not finite, or times do not increase.
     """
@@ -27,6 +31,8 @@ class Trajectory:
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64] | None = None
     attitude: NDArray[np.float64] | None = None
+    accelerations: NDArray[np.float64] | None = None
+    stop_and_go: bool = True
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -36,6 +42,8 @@ class Trajectory:
             positions: ArrayLike,
             velocities: ArrayLike | None = None,
             attitude: ArrayLike | None = None,
+            accelerations: ArrayLike | None = None,
+            stop_and_go: bool = True,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -56,6 +64,14 @@ class Trajectory:
         if self.attitude is not None:
             a = validation.array("trajectory attitude", self.attitude, np.float64, (n, 3, 3))
             object.__setattr__(self, "attitude", a)
+        if self.accelerations is not None:
+            a = validation.array("trajectory accelerations", self.accelerations, np.float64, (n, 3))
+            object.__setattr__(self, "accelerations", a)
+        if not self.stop_and_go and (self.velocities is None or self.accelerations is None):
+            raise ValueError(
+                "stop_and_go is False, but the trajectory has no velocities or no accelerations, which say where the "
+                "antenna is when an echo arrives; give both, or take Orbit.trajectory"
+            )
 
     def __len__(self) -> int:
         return len(self.times)
@@ -63,7 +79,7 @@ class Trajectory:
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:
         """The track at the pulses of a slice, or at increasing pulse numbers."""
         whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
-        some: dict[str, Any] = {name: None if value is None else value[pulses] for name, value in whole.items()}
+        some: dict[str, Any] = {n: value[pulses] for n, value in whole.items() if isinstance(value, np.ndarray)}
         return replace(self, **some)
 
     @classmethod

@@ -101,7 +101,8 @@ def echo(
 
     scene         points (|amplitude|^2 = RCS, m^2) and facets: physical optics with the materials' Fresnel
                   coefficients, the exact phase of the wave over every facet, single scattering (docs/theory/facets.md)
-    track         transmitter; receiver  a track of as many pulses, default the transmitter's
+    track         transmitter; receiver  a track of as many pulses, default the transmitter's; its positions count as
+                  they are given
     polarization  "HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": one row per
                   pulse for each, pulse by pulse. Points keep the polarisation: they have no echo in HV and VH
     vertical      (3,), direction: H is perpendicular to it, V in a plane with it; default z, or in Earth-centred
@@ -134,9 +135,13 @@ def echo(
     check         recompute 256 random samples exactly, fewer above 20 000 facets; None: where that costs less than 2 %
     progress      called as progress(stage, done, total)
 
-    Stop and go. Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the
-    best that can, before the work starts. ToleranceMissed, a ValueError that holds the finished echoes: the check
-    measured more than the tolerance. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
+    Antennas rest while a pulse is on its way (stop and go), except on tracks of `Orbit.trajectory`: there the receiver
+    is where it is when the echo of the reference point arrives, on the rotating Earth. report.plan says which, and how
+    much stop and go leaves out (docs/guide/orbits.md).
+
+    Returns a PhaseHistory. ToleranceUnreachable, a ValueError: a tolerance that cannot be met, with the best that can,
+    before the work starts. ToleranceMissed, a ValueError that holds the finished echoes: the check measured more than
+    the tolerance. ValueError, MemoryError, sarcl.NoDeviceError say what else does not fit.
     Source: the echo equation of sarcl/__init__.py.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
@@ -149,9 +154,10 @@ def echo(
         opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
         _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed, progress,
     )  # fmt: skip
+    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
+    track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
     rx = echo_sampling.receiver_positions(track, receiver)
     tx = track.positions
-    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     reference_range = echo_sampling.half_path(tx, rx, point)
     original_scene, scene = scene, scene.realized(seed)  # before the window: it moves the corners of rough terrain
     weights = antenna_weights.weights_of(antenna, radar, track, receiver, waveform, scene.center)
@@ -160,7 +166,7 @@ def echo(
         if not is_single(array):
             return array_echo(
                 array, scene, original_scene, waveform, track, receiver, point, range_window, weights, request,
-                channels=channels, receive=receive, compressed=compressed, check=check, out=out,
+                motion=motion, channels=channels, receive=receive, compressed=compressed, check=check, out=out,
             )  # fmt: skip
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, compressed)
@@ -207,7 +213,7 @@ def echo(
             array=array,
             compressed=compressed,
             report=Report(
-                plan=channel.plan,
+                plan=channel.plan | motion,
                 tolerance=request.tolerance,
                 predicted_error=channel.predicted_error,
                 measured_error=measured,

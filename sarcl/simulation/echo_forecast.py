@@ -59,9 +59,10 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     given: dict[str, Any] = {
         k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")
     }
-    real, rx = scene.realized(options.get("seed", 0)), echo_sampling.receiver_positions(track, receiver)
-    asked = options.get("reference")
+    real, asked = scene.realized(options.get("seed", 0)), options.get("reference")
     point = scene.center if asked is None else validation.array("reference", asked, np.float64, (3,))
+    track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
+    rx = echo_sampling.receiver_positions(track, receiver)
     reference_range = echo_sampling.half_path(track.positions, rx, point)
     near, far = echo_sampling.window(real, waveform, track.positions, rx, reference_range, options.get("range_window"))
     given |= {"reference": point, "range_window": (near, far)}  # of the whole track
@@ -104,5 +105,5 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     n_samples = raw.n_samples if n_samples is None else n_samples
     return EchoForecast(
         rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), longer + slope * (len(track) - more),
-        raw.report.contributions_done / more * len(track), dict(raw.report.plan), raw.report.predicted_error,
+        raw.report.contributions_done / more * len(track), dict(raw.report.plan) | motion, raw.report.predicted_error,
     )  # fmt: skip

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -9,11 +10,14 @@ import numpy as np
 from ..base.boxes import corners
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import finite, instance
+from ..earth.light_time import antennas_in_flight
+from ..earth.rotation import RATE, rotated
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import half_path
 from ..scene.scene import Scene
 
+SOME_PULSES = 33  # at which the error of the receiver's positions over the scene is computed
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
@@ -25,6 +29,50 @@ def receiver_positions(track: Trajectory, receiver: Trajectory | None) -> np.nda
     if len(receiver) != len(track):
         raise ValueError(f"receiver has {len(receiver)} positions but track has {len(track)}; give one per pulse")
     return receiver.positions
+
+
+def in_flight(
+    track: Trajectory, receiver: Trajectory | None, scene: Scene, point: np.ndarray
+) -> tuple[Trajectory, Trajectory | None, dict[str, object]]:
+    """Tracks of the antennas while pulses travel to the reference point, m (3,), and back; and entries of the report.
+
+    A track that is not stop-and-go, without a receiver of its own, becomes two (earth/light_time.py): the transmitter's
+    and, at the echo's arrival, the receiver's, both in the frame of the Earth when the pulse meets the point. All
+    others stay as they are. The entries are
+
+        receiver             "at the echo's arrival", "stop and go", or "a track of its own"
+        stop_and_go_error_m  largest half path, m, that stop and go leaves out (or would) for the reference point
+        arrival_error_m      the same that positions at arrival leave out, over the box of the scene
+    """
+    if receiver is not None:
+        return track, receiver, {"receiver": "a track of its own"}
+    still = half_path(track.positions, track.positions, point)
+    if track.stop_and_go:
+        said: dict[str, object] = {"receiver": "stop and go"}
+        if track.velocities is not None:
+            after = track.positions + 2 * still[:, None] / SPEED_OF_LIGHT * track.velocities
+            said["stop_and_go_error_m"] = _rounded(half_path(track.positions, after, point) - still)
+        return track, None, said
+    assert track.velocities is not None and track.accelerations is not None
+    p, v, a = track.positions, track.velocities, track.accelerations
+    tx, rx, down, up = antennas_in_flight(p, v, a, point)
+    sends = replace(track, positions=tx, velocities=rotated(-RATE * down, track.velocities), stop_and_go=True)
+    later = track.velocities + (down + up)[:, None] * track.accelerations
+    hears = replace(track, positions=rx, velocities=rotated(RATE * up, later), stop_and_go=True)
+    some = np.linspace(0, len(track) - 1, min(SOME_PULSES, len(track))).round().astype(np.intp)
+    box = corners(scene.bounds)
+    _, _, down_there, up_there = antennas_in_flight(p[some, None], v[some, None], a[some, None], box)
+    off = SPEED_OF_LIGHT * (down_there + up_there) / 2 - half_path(tx[some, None], rx[some, None], box)
+    return sends, hears, {
+        "receiver": "at the echo's arrival",
+        "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
+        "arrival_error_m": _rounded(off),
+    }  # fmt: skip
+
+
+def _rounded(errors: np.ndarray) -> float:
+    """The largest modulus, to three digits."""
+    return float(f"{np.abs(errors).max():.3g}")
 
 
 def window(

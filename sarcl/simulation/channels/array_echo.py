@@ -33,10 +33,11 @@ EQUAL, INTERPOLATED = "equal channels", "interpolated channels"  # reasons to le
 def array_echo(
     array: AntennaArray, scene: Scene, original_scene: Scene, waveform: Waveform, track: Trajectory,
     receiver: Trajectory | None, point: np.ndarray, range_window: Any, weights: AntennaWeights, request: EchoRequest, *,
-    channels: str, receive: str, compressed: bool, check: bool | None, out: Any,
+    motion: dict[str, object], channels: str, receive: str, compressed: bool, check: bool | None, out: Any,
 ) -> PhaseHistory:  # fmt: skip
     """The phase history that `sarcl.echo` returns with an array; arguments as there.
 
+    motion  what the report says of antennas while pulses are on their way
     scene  with its random heights;  original_scene  without them;  point  the reference point, m (3,)
 
     Source: Farooq 2009, equations 4.28 to 4.32, with exact distances to every element.
@@ -77,6 +78,7 @@ def array_echo(
             added.plan
             | {"channels": channels, "carriers": len(sent), "receivers": rows.n_receivers}
             | method.describe()
+            | motion
         )
         raw = output.finish(
             **rows.fields(waveform.center, grid, track, receiver or track),

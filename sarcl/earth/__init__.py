@@ -1,0 +1,24 @@
+"""The Earth under a radar: its rotation, orbits about it, terrain heights, and positions of what a radar sees.
+
+For other folders:
+
+    elevation      ElevationModel: heights above the ellipsoid by longitude and latitude
+    kepler         Kepler orbits about the rotating Earth
+    light_time     positions of antennas while a pulse is on its way to the rotating Earth and back
+    rotation       the Earth's rotation: sidereal time, inertial positions to Earth-fixed ones
+    state_vectors  interpolation of state vectors, to an order chosen from the states
+    two_line       orbits of two-line elements, by SGP4
+    viewing        incidence, look and squint angles, ground range, Doppler frequencies
+    zero_doppler   time and range of closest approach to positions, and positions from time and range
+"""
+
+__all__ = [
+    "elevation",
+    "kepler",
+    "light_time",
+    "rotation",
+    "state_vectors",
+    "two_line",
+    "viewing",
+    "zero_doppler",
+]

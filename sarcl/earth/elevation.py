@@ -1,0 +1,166 @@
+"""ElevationModel: heights of terrain above the ellipsoid, at any longitude and latitude in it."""
+
+from __future__ import annotations
+
+import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base import validation, wgs84
+from ..io import elevation
+
+if TYPE_CHECKING:
+    from ..base.types import PathLike
+
+Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
+
+
+@dataclass(frozen=True, eq=False)
+class ElevationModel:
+    """Heights of terrain above the WGS84 ellipsoid, at the points of a grid; between these, bilinear interpolation.
+
+    longitude  degrees (n_columns,), or (n_rows, n_columns);  latitude  degrees (n_rows,), or (n_rows, n_columns)
+    height     m (n_rows, n_columns), above the ellipsoid (not above a geoid), NaN without data
+
+    A grid may cross the antimeridian: its longitudes then go on beyond 180 degrees. Raises ValueError for shapes that
+    disagree, longitudes that jump by 180 degrees, and heights that are infinite or all NaN. `read` takes files.
+    """
+
+    longitude: NDArray[np.float64]
+    latitude: NDArray[np.float64]
+    height: NDArray[np.float64]
+
+    if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
+
+        def __init__(self, longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> None: ...
+
+    def __post_init__(self) -> None:
+        height = validation.converted("height", self.height, np.float64)
+        if height.ndim != 2 or min(height.shape) < 2:
+            raise ValueError(f"height has shape {height.shape}; wanted (n_rows, n_columns), two of each at least")
+        if np.isinf(height).any() or np.isnan(height).all():
+            raise ValueError(
+                "height is infinite somewhere, or NaN everywhere; give metres, and NaN where data is missing"
+            )
+        for name, axis in (("longitude", 1), ("latitude", 0)):
+            given = np.asarray(getattr(self, name))
+            shape = (height.shape[axis],) if given.ndim == 1 else height.shape
+            values = validation.array(name, given, np.float64, shape)
+            if given.ndim == 1:
+                values = np.broadcast_to(values if axis else values[:, None], height.shape)
+            object.__setattr__(self, name, values)
+        if np.abs(self.latitude).max() > 90:
+            raise ValueError(f"latitude reaches {np.abs(self.latitude).max():g}; give degrees from -90 to 90")
+        if max(np.abs(np.diff(self.longitude, axis=a)).max() for a in (0, 1)) >= 180:
+            raise ValueError(
+                "longitude jumps by 180 degrees or more between neighbours; across the antimeridian let it go on "
+                "beyond 180 (179, 180, 181)"
+            )
+        object.__setattr__(self, "height", validation.sealed(height))
+
+    @classmethod
+    def read(
+        cls,
+        path: PathLike,
+        *,
+        bounds: Sequence[float] | np.ndarray | None = None,
+        heights: str | None = None,
+        geoid: Geoid = None,
+        nodata: float | None = None,
+    ) -> ElevationModel:
+        """The elevation model of a file that rasterio reads; arguments and errors as in `Scene.from_dem`."""
+        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+        return cls(tile.longitude, tile.latitude, tile.height)
+
+    @property
+    def lowest(self) -> float:
+        """Least height, m."""
+        return float(np.nanmin(self.height))
+
+    @property
+    def highest(self) -> float:
+        """Greatest height, m."""
+        return float(np.nanmax(self.height))
+
+    @property
+    def spacing(self) -> float:
+        """Least distance between neighbouring points along the middle row and column, m."""
+        i, j = (n // 2 for n in self.height.shape)
+        lines = [wgs84.ecef(self.longitude[at], self.latitude[at], 0.0) for at in (np.s_[i, :], np.s_[:, j])]
+        return float(min(np.linalg.norm(np.diff(line, axis=0), axis=1).min() for line in lines))
+
+    def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
+        """Heights above the ellipsoid, m (...), at degrees (...); NaN outside the grid and in cells without data."""
+        shape = np.broadcast_shapes(np.shape(longitude), np.shape(latitude))
+        lon = np.broadcast_to(np.asarray(longitude, np.float64), shape).ravel()
+        lat = np.broadcast_to(np.asarray(latitude, np.float64), shape).ravel()
+        i0, j0 = (n // 2 for n in self.height.shape)
+        middle = self.longitude[i0, j0]
+        wanted = np.stack([middle + (lon - middle + 180) % 360 - 180, lat])
+        known = np.stack([self.longitude, self.latitude])
+        ends = [known[:, -1, j0] - known[:, 0, j0], known[:, i0, -1] - known[:, i0, 0]]
+        affine = np.linalg.inv(np.stack([e / (n - 1) for e, n in zip(ends, self.height.shape, strict=True)], axis=1))
+        at = np.array([[i0], [j0]]) + affine @ (wanted - known[:, i0, j0, None])
+        for _ in range(20):  # grids that are even in a map projection are nearly affine in degrees
+            step = affine @ (wanted - _bilinear(known, at))
+            at = at + step
+            if np.abs(step).max(initial=0.0) < 1e-9:
+                break
+        size = np.array(self.height.shape)[:, None] - 1
+        inside = ((at >= -1e-6) & (at <= size + 1e-6)).all(axis=0)
+        return np.where(inside, _bilinear(self.height[None], np.clip(at, 0, size))[0], np.nan).reshape(shape)
+
+    def grid_positions(
+        self, spacing: tuple[float, float], frame: str, center: Sequence[float] | np.ndarray | None
+    ) -> NDArray[np.float64]:
+        """Positions on the terrain, m (n_rows, n_columns, 3), at even steps north (row) and east (column), m.
+
+        They cover the box of the model in the local frame at `center`, and are NaN where it has no heights. frame and
+        center as in `Scene.from_dem`. MemoryError for too many.
+        """
+        validation.choice("frame", frame, ("local", "ecef"))
+        tile = elevation.Tile(self.longitude, self.latitude, self.height)
+        origin, axes = elevation.local_frame(tile, center)
+        known = (wgs84.ecef(self.longitude, self.latitude, np.nan_to_num(self.height)) - origin) @ axes.T
+        low, high = (f(known.reshape(-1, 3), axis=0) for f in (np.min, np.max))
+        steps = [int(np.floor((high[a] - low[a]) / d * (1 + 1e-9))) + 1 for a, d in ((1, spacing[0]), (0, spacing[1]))]
+        if math.prod(steps) > elevation.MOST_POINTS:
+            raise MemoryError(
+                f"a grid of {steps[0]} x {steps[1]} points is more than {elevation.MOST_POINTS:,}; give a larger "
+                "spacing, or bounds=(west, south, east, north) of the part that the radar sees"
+            )
+        y = (low[1] + high[1]) / 2 + (np.arange(steps[0]) - (steps[0] - 1) / 2) * spacing[0]
+        x = (low[0] + high[0]) / 2 + (np.arange(steps[1]) - (steps[1] - 1) / 2) * spacing[1]
+        out = np.empty((*steps, 3))
+        for row, north in enumerate(y):
+            local = np.stack([x, np.full_like(x, north), np.full_like(x, known[..., 2].mean())], axis=-1)
+            for _ in range(10):  # the vertical of the frame is nearly the ellipsoid's normal: a step is nearly exact
+                lon, lat, height = wgs84.geodetic(local @ axes + origin)
+                step = self.heights_at(lon, lat) - height
+                local[:, 2] += step
+                if not (np.abs(step) > 1e-6).any():
+                    break
+            local[np.isnan(local[:, 2])] = np.nan
+            out[row] = local
+        return out @ axes + origin if frame == "ecef" else out
+
+
+def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Grids of values (k, n_rows, n_columns) at fractional (row, column) (2, n), extrapolated outside: (k, n)."""
+    size = np.array(values.shape[1:])[:, None]
+    low = np.clip(np.floor(at).astype(np.int64), 0, size - 2)
+    (i, j), (u, v) = low, at - low
+    out = np.zeros((len(values), at.shape[1]))
+    for weight, corner in (
+        ((1 - u) * (1 - v), values[:, i, j]),
+        ((1 - u) * v, values[:, i, j + 1]),
+        (u * (1 - v), values[:, i + 1, j]),
+        (u * v, values[:, i + 1, j + 1]),
+    ):
+        out += np.where(weight == 0, 0.0, weight * corner)
+    return out

@@ -1,0 +1,179 @@
+"""Interpolation of state vectors: the order is chosen from the states, by leaving each of them out in turn."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rotation import spin
+
+LEAST_STATES = 4
+# Numbers of states per interpolation, cheapest first: Hermite uses velocities too, Lagrange positions alone.
+HERMITE, LAGRANGE = (2, 3, 4, 5, 6, 7, 8), (4, 6, 8, 10, 12, 14)
+FINE = 1e-7  # m: an error so small needs no higher order
+WORST = 1.0  # m: states that do not fit their neighbours better are refused
+VELOCITY_MISFIT = 1.0  # m/s: the same of velocities
+GAP = 2.1  # of the usual spacing: leaving out a state measures the error over twice the spacing, and no more
+BLOCK = 32_768  # times that are interpolated at once
+
+
+@dataclass(frozen=True, eq=False)
+class StateVectors:
+    """States and how they are interpolated.
+
+    times, positions, velocities   s (n,), m and m/s (n, 3), Earth-fixed
+    n_nodes      states that one interpolation uses
+    hermite      whether it uses their velocities too: its degree is then 2 n_nodes - 1, else n_nodes - 1
+    left_out     largest distance, m, between a state and its interpolation from the others: the error over twice
+                 the spacing, which no error between the states exceeds
+    """
+
+    times: NDArray[np.float64]
+    positions: NDArray[np.float64]
+    velocities: NDArray[np.float64]
+    n_nodes: int
+    hermite: bool
+    left_out: float
+
+    @classmethod
+    def fitted(
+        cls, times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]
+    ) -> StateVectors:
+        """The states with the interpolation that predicts each of them best from the others.
+
+        ValueError for too few states, times that do not increase, gaps, velocities that are not the derivative of
+        the positions, and states that do not fit the others.
+        """
+        _check_times(times)
+        _check_velocities(times, positions, velocities)
+        tried = []
+        for hermite, counts in ((True, HERMITE), (False, LAGRANGE)):
+            for n in counts:
+                if n < len(times):
+                    misfit = _left_out(times, positions, velocities, n, hermite)
+                    tried.append((float(misfit.max()), n, hermite, int(misfit.argmax()) + 1))
+        least = min(t[0] for t in tried)
+        error, n, hermite, worst = next(t for t in tried if t[0] <= max(1.5 * least, FINE))
+        if error > WORST:
+            raise ValueError(
+                f"positions[{worst}] (at {times[worst]:g} s) is {error:.3g} m away from the curve through the other "
+                "states; correct or remove a wrong state, or give states at a closer spacing"
+            )
+        return cls(times, positions, velocities, n, hermite, error)
+
+    def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions, m, and velocities, m/s (n, 3), at times, s (n,), within those of the states."""
+        positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
+        before = np.searchsorted(self.times, times, side="right") - 1
+        first = np.clip(before - (self.n_nodes - 1) // 2, 0, len(self.times) - self.n_nodes)
+        for start in range(0, len(times), BLOCK):
+            part = slice(start, start + BLOCK)
+            nodes = first[part, None] + np.arange(self.n_nodes)
+            positions[part], velocities[part] = interpolate(
+                self.times[nodes], self.positions[nodes], self.velocities[nodes] if self.hermite else None, times[part]
+            )
+        return positions, velocities
+
+    def describe(self) -> str:
+        """How positions are computed, and the error that was measured."""
+        step = np.median(np.diff(self.times))
+        kind, used = ("Hermite", " and velocities") if self.hermite else ("Lagrange", "")
+        degree = 2 * self.n_nodes - 1 if self.hermite else self.n_nodes - 1
+        return (
+            f"{len(self.times)} state vectors every {step:g} s, {kind} interpolation of degree {degree} through "
+            f"positions{used} of {self.n_nodes} states; states left out are met to {self.left_out:.1e} m"
+        )
+
+
+def interpolate(
+    nodes: NDArray[np.float64],
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64] | None,
+    times: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions, m, and their derivatives, m/s (n, 3), at times, s (n,), each from nodes of its own.
+
+    nodes, positions, velocities   s (n, m), m and m/s (n, m, 3); without velocities: Lagrange, else Hermite
+    Source: Hermite's formula sum_i l_i^2 ((1 - 2 l_i'(t_i)(t - t_i)) x_i + (t - t_i) v_i), l_i Lagrange's polynomials.
+    """
+    offset = times[:, None] - nodes
+    value, slope, own = np.ones_like(nodes), np.zeros_like(nodes), np.zeros_like(nodes)
+    for shift in range(1, nodes.shape[1]):
+        gap = nodes - np.roll(nodes, -shift, axis=1)
+        factor = np.roll(offset, -shift, axis=1) / gap
+        slope = slope * factor + value / gap
+        value = value * factor
+        own += 1 / gap
+    middle = positions[:, nodes.shape[1] // 2, None]  # what is summed are differences, which round less
+    away = positions - middle
+    if velocities is None:
+        return middle[:, 0] + _sum(value, away), _sum(slope, away)
+    tilt, square, steep = 1 - 2 * own * offset, value**2, 2 * value * slope
+    out = middle[:, 0] + _sum(square * tilt, away) + _sum(square * offset, velocities)
+    rate = _sum(steep * tilt - 2 * own * square, away) + _sum(steep * offset + square, velocities)
+    return out, rate
+
+
+def _sum(weights: NDArray[np.float64], values: NDArray[np.float64]) -> NDArray[np.float64]:
+    return np.asarray(np.einsum("nm,nmk->nk", weights, values))
+
+
+def _left_out(
+    times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64], n: int, hermite: bool
+) -> NDArray[np.float64]:
+    """Distances, m, of all states but the first and the last from their interpolation by n neighbours."""
+    k = np.arange(1, len(times) - 1)
+    nodes = np.clip(k - n // 2, 0, len(times) - n - 1)[:, None] + np.arange(n)
+    nodes += nodes >= k[:, None]
+    made, _ = interpolate(times[nodes], positions[nodes], velocities[nodes] if hermite else None, times[k])
+    return np.asarray(np.linalg.norm(made - positions[k], axis=1))
+
+
+def _check_times(times: NDArray[np.float64]) -> None:
+    if len(times) < LEAST_STATES:
+        raise ValueError(f"times has {len(times)} states; an orbit needs at least {LEAST_STATES}: give more states")
+    steps = np.diff(times)
+    if not (steps > 0).all():
+        at = int(np.argmax(steps <= 0)) + 1
+        what = "repeats" if times[at] == times[at - 1] else "is before"
+        raise ValueError(
+            f"times[{at}] = {times[at]:.9g} s {what} times[{at - 1}] = {times[at - 1]:.9g} s; times must increase: "
+            "sort the states by time, and keep one of each"
+        )
+    usual = float(np.median(steps))
+    if steps.max() > GAP * usual:
+        at = int(np.argmax(steps))
+        raise ValueError(
+            f"the states have a gap of {steps[at]:g} s from times[{at}] = {times[at]:.9g} s on, where they are usually "
+            f"{usual:g} s apart; give the missing states, or make one orbit before the gap and one after it"
+        )
+
+
+def _check_velocities(
+    times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]
+) -> None:
+    derived = [_slopes(times, positions, n) for n in (min(len(times), 8), min(len(times), 8) - 1)]
+    doubt = np.linalg.norm(derived[0] - derived[1], axis=1)  # about the error of the derivative at this spacing
+    off = np.linalg.norm(velocities - derived[0], axis=1)
+    if (off > VELOCITY_MISFIT + 10 * doubt).any():
+        at = int(np.argmax(off - 10 * doubt))
+        inertial = np.linalg.norm(velocities[at] - derived[0][at] - spin(positions[at]))
+        why = (
+            "these are velocities in an inertial frame: subtract the cross product of the Earth's rotation and the "
+            "position"
+            if inertial < 0.05 * off[at]
+            else "check units (m, m/s, s) and the order of the states"
+        )
+        raise ValueError(
+            f"velocities[{at}] differs by {off[at]:.4g} m/s from the derivative of the positions; wanted Earth-fixed "
+            f"velocities: {why}"
+        )
+
+
+def _slopes(times: NDArray[np.float64], positions: NDArray[np.float64], n: int) -> NDArray[np.float64]:
+    """Derivatives of the positions at the states, m/s, by Lagrange interpolation through n of them."""
+    k = np.arange(len(times))
+    nodes = np.clip(k - n // 2, 0, len(times) - n)[:, None] + np.arange(n)
+    return interpolate(times[nodes], positions[nodes], None, times)[1]

@@ -1,0 +1,92 @@
+"""Orbits of two-line elements, by SGP4: pip install sarcl[orbits]."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .rotation import SIDEREAL_RATE, rotated, sidereal_time
+from .state_vectors import interpolate
+
+STEP, NODES = 10.0, 12  # s, and number of positions of SGP4 per interpolation: below the rounding of float64
+
+
+@dataclass(frozen=True, eq=False)
+class TwoLineElements:
+    """Two-line elements; times are in seconds since their epoch.
+
+    satellite  sgp4.api.Satrec;  epoch  UTC;  greenwich  mean sidereal time at the epoch, rad
+
+    Velocities are the derivative of the positions. Those that SGP4 itself gives differ from it by metres per second,
+    because they leave out rates of small terms: zero-Doppler times would not be times of closest approach.
+    """
+
+    satellite: Any
+    epoch: np.datetime64
+    greenwich: float
+
+    @classmethod
+    def parsed(cls, line1: str, line2: str) -> TwoLineElements:
+        """The elements of two lines. ValueError names the line and what is wrong with it."""
+        for number, line in ((1, line1), (2, line2)):
+            _check(number, line)
+        if line1[2:7] != line2[2:7]:
+            raise ValueError(f"line1 is of satellite {line1[2:7]} and line2 of {line2[2:7]}; give lines of one")
+        try:
+            from sgp4.api import WGS72, Satrec
+        except ImportError as exc:
+            raise ImportError("two-line elements need the package sgp4: pip install sarcl[orbits]") from exc
+        satellite = Satrec.twoline2rv(line1, line2, WGS72)
+        year, day = int(line1[18:20]), line1[20:32].strip()
+        whole, _, part = day.partition(".")
+        epoch = np.datetime64(f"{year + (1900 if year >= 57 else 2000)}-01-01", "ns")
+        nanoseconds = (int(whole) - 1) * 86_400 * 10**9 + int(part.ljust(8, "0")[:8]) * 864_000
+        epoch = epoch + np.timedelta64(nanoseconds, "ns")
+        return cls(satellite, epoch, sidereal_time(epoch))
+
+    def teme(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions, m, and velocities, m/s (n, 3), as SGP4 gives them: true equator, mean equinox of date (TEME)."""
+        positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
+        for i, t in enumerate(times.tolist()):
+            failed, positions[i], velocities[i] = self.satellite.sgp4_tsince(t / 60)
+            if failed:
+                from sgp4.api import SGP4_ERRORS
+
+                raise ValueError(
+                    f"the two-line elements give no position at {t:g} s from their epoch {self.epoch}: "
+                    f"{SGP4_ERRORS[failed]}; use elements of a date that is closer"
+                )
+        return positions * 1e3, velocities * 1e3
+
+    def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Earth-fixed positions, m, and velocities, m/s (n, 3), at times, s (n,)."""
+        steps = np.floor(times / STEP).astype(np.int64)[:, None] + np.arange(1 - NODES // 2, NODES // 2 + 1)
+        some, back = np.unique(steps, return_inverse=True)
+        back = back.reshape(steps.shape)
+        known, _ = self.teme(some * STEP)
+        fixed = rotated(-(self.greenwich + SIDEREAL_RATE * (some * STEP)), known)
+        return interpolate(np.asarray(steps * STEP), fixed[back], None, times)
+
+    def describe(self) -> str:
+        """How positions are computed."""
+        return (
+            f"SGP4 of the two-line elements of {self.epoch} (TEME), rotated by Greenwich mean sidereal time; "
+            f"interpolated between positions {STEP:g} s apart"
+        )
+
+
+def _check(number: int, line: Any) -> None:
+    """ValueError unless `line` is line 1 or 2 of two-line elements, with the right check sum."""
+    name = f"line{number}"
+    if not isinstance(line, str) or len(line) < 69 or line[:2] != f"{number} ":
+        raise ValueError(
+            f"{name} is {line!r:.90}; wanted the 69 characters of line {number}, which begins with '{number} '"
+        )
+    total = sum(int(c) if c.isdigit() else c == "-" for c in line[:68]) % 10
+    if str(total) != line[68]:
+        raise ValueError(
+            f"{name} has check sum {line[68]!r}, but its characters add up to {total}; copy the damaged line again"
+        )

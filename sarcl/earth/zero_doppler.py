@@ -1,0 +1,264 @@
+"""Zero-Doppler geometry: when an antenna is closest to a position, and which position lies at a time and range.
+
+At the zero-Doppler time the Earth-fixed velocity is perpendicular to the path to the position: V.(x - P) = 0.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+
+import numpy as np
+from numpy.typing import NDArray
+
+from ..base import wgs84
+from .elevation import ElevationModel
+from .viewing import hidden, normal
+
+States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.float64]]]
+
+COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
+PAIRS = 4_000_000  # of positions and coarse times that are examined at once
+EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end
+LEAST_SPEED = 1.0  # m/s over the ground: below it there is no zero-Doppler plane
+WALK = 4_000_000  # points of terrain that are examined at once
+
+
+def locate(
+    states: States, span: tuple[float, float], positions: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Zero-Doppler times, s (n,), within span, and slant ranges, m (n,), of positions, m (n, 3).
+
+    Of several passes over a position the one that comes closest counts. ValueError names the first position that no
+    pass sees: because there is no zero-Doppler time in span, or because it is behind the horizon then.
+    """
+    start, stop = span
+    coarse = np.linspace(start, stop, int(np.ceil((stop - start) / COARSE)) + 8)
+    antennas, velocities = states(coarse)
+    times, ranges = np.full(len(positions), np.nan), np.full(len(positions), np.inf)
+    seen_once = np.zeros(len(positions), bool)
+    for first in range(0, len(positions), max(1, PAIRS // len(coarse))):
+        block = slice(first, first + max(1, PAIRS // len(coarse)))
+        x = positions[block]
+        ahead = x @ velocities.T - (antennas * velocities).sum(axis=1)
+        early = EARLY * (velocities**2).sum(axis=1)
+        row, k = np.nonzero((ahead[:, :-1] >= -early[:-1]) & (ahead[:, 1:] <= early[1:]))
+        t = _crossings(states, x[row], coarse[k], coarse[k + 1], ahead[row, k], ahead[row, k + 1])
+        there, _ = states(t)
+        distance = np.linalg.norm(x[row] - there, axis=1)
+        seen_once[block][row] = True
+        good = ~hidden(there, x[row])
+        row, t, distance = row[good], t[good], distance[good]
+        order = np.argsort(-distance, kind="stable")  # the nearest is written last
+        times[first + row[order]], ranges[first + row[order]] = t[order], distance[order]
+    if not np.isfinite(ranges).all():
+        at = int(np.argmin(np.isfinite(ranges)))
+        lon, lat, _ = wgs84.geodetic(positions[at])
+        why = (
+            "it is behind the horizon at every zero-Doppler time"
+            if seen_once[at]
+            else "it has no zero-Doppler time (closest approach)"
+        )
+        raise ValueError(
+            f"positions[{at}] (longitude {lon:.4f}, latitude {lat:.4f}) is never seen: {why} from {start:.9g} to "
+            f"{stop:.9g} s; give an orbit over a longer span, or a scene that the satellite passes"
+        )
+    return times, ranges
+
+
+def _crossings(
+    states: States,
+    x: NDArray[np.float64],
+    low: NDArray[np.float64],
+    high: NDArray[np.float64],
+    at_low: NDArray[np.float64],
+    at_high: NDArray[np.float64],
+) -> NDArray[np.float64]:
+    """Times between low and high, s (n,), at which V.(x - P) is 0, from its values at both: Newton's iteration."""
+    low, high = low.copy(), high.copy()
+    least, most = low.copy(), high.copy()
+    _, v_low = states(low)
+    _, v_high = states(high)
+    acceleration = (v_high - v_low) / (high - low)[:, None]
+    t = np.clip(low + at_low / (at_low - at_high) * (high - low), low, high)
+    for _ in range(60):
+        antenna, velocity = states(t)
+        path = x - antenna
+        ahead = (path * velocity).sum(axis=1)
+        low, high = np.where(ahead >= 0, t, low), np.where(ahead <= 0, t, high)
+        slope = (path * acceleration).sum(axis=1) - (velocity**2).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved = t - ahead / slope
+        moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
+        step = np.abs(moved - t)
+        t = moved
+        if (step <= 4 * np.spacing(np.abs(t))).all():
+            break
+    return np.asarray(np.clip(t, least, most))
+
+
+def geolocate(
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    ranges: NDArray[np.float64],
+    heights: NDArray[np.float64] | ElevationModel,
+    sign: float,
+) -> NDArray[np.float64]:
+    """Positions, m (n, 3), at slant ranges, m (n,), in the zero-Doppler planes of antennas, m and m/s (n, 3).
+
+    heights  above the ellipsoid, m (n,), or an elevation model;  sign  1 right of the velocity seen from above, -1 left
+
+    The position turns about the antenna in its zero-Doppler plane, by an angle from straight down, until it lies at
+    the height. Where terrain meets that arc several times (layover), the point closest to the point below the antenna
+    counts. ValueError names the first range that meets no ground, or meets it behind the horizon.
+    """
+    speed = np.linalg.norm(velocities, axis=1)
+    if (speed < LEAST_SPEED).any():
+        at = int(np.argmin(speed))
+        raise ValueError(
+            f"the satellite moves over the ground with {speed[at]:.3g} m/s at point {at}: without a velocity there is "
+            "no zero-Doppler plane; give an orbit that is not geostationary"
+        )
+    along = velocities / speed[:, None]
+    up = positions - (positions * along).sum(axis=1)[:, None] * along
+    up /= np.linalg.norm(up, axis=1)[:, None]
+    arc = _Arc(positions, -up, sign * np.cross(along, up), ranges)
+    model = heights if isinstance(heights, ElevationModel) else None
+    levels = np.full(len(ranges), model.lowest) if model is not None else np.asarray(heights)
+    angle = _angle_at(arc, levels)
+    if model is not None:
+        angle = _angle_on(arc, model, angle, _angle_at(arc, np.full(len(ranges), model.highest)))
+    found = arc.at(angle)
+    behind = hidden(positions, found)
+    if behind.any():
+        at = int(np.argmax(behind))
+        raise ValueError(
+            f"slant range[{at}] = {ranges[at]:.9g} m meets the ground behind the horizon; give a shorter range"
+        )
+    return found
+
+
+class _Arc:
+    """Circles of positions at a range from antennas, in zero-Doppler planes; angles from straight down, rad (n,)."""
+
+    def __init__(self, centers: np.ndarray, down: np.ndarray, across: np.ndarray, ranges: np.ndarray) -> None:
+        self.centers, self.down, self.across, self.ranges = centers, down, across, ranges
+
+    def at(self, angle: np.ndarray) -> np.ndarray:
+        """Positions, m (n, 3)."""
+        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        return np.asarray(self.centers + self.ranges[:, None] * (c * self.down + s * self.across))
+
+    def slope(self, angle: np.ndarray) -> np.ndarray:
+        """Derivatives of the positions with the angle, m (n, 3)."""
+        c, s = np.cos(angle)[:, None], np.sin(angle)[:, None]
+        return np.asarray(self.ranges[:, None] * (c * self.across - s * self.down))
+
+    def part(self, rows: np.ndarray) -> _Arc:
+        """The circles of some antennas."""
+        return _Arc(self.centers[rows], self.down[rows], self.across[rows], self.ranges[rows])
+
+
+def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
+    """Angles, rad (n,), at which positions have heights above the ellipsoid, m (n,).
+
+    The height grows with the angle, from below the antenna to above it: Newton's iteration within bounds.
+    """
+    low, high = np.zeros(len(heights)), np.full(len(heights), np.pi)
+    top = wgs84.geodetic(arc.centers)[2]
+    if (heights >= top).any():
+        at = int(np.argmax(heights >= top))
+        raise ValueError(f"heights[{at}] = {heights[at]:.9g} m is above the satellite ({top[at]:.9g} m); give metres")
+    short = wgs84.geodetic(arc.at(low))[2] >= heights
+    if short.any():
+        at = int(np.argmax(short))
+        raise ValueError(
+            f"slant range[{at}] = {arc.ranges[at]:.9g} m does not reach the ground, which is "
+            f"{top[at] - heights[at]:.9g} m below the satellite; give a longer range (one way, in m), or lower heights"
+        )
+    distance = np.linalg.norm(arc.centers, axis=1)
+    drop = np.abs((arc.centers * arc.down).sum(axis=1))
+    ground = distance - top + heights
+    angle = np.arccos(
+        np.clip((distance**2 + arc.ranges**2 - ground**2) / (2 * drop * arc.ranges), -1, 1)
+    )  # on a sphere
+    for _ in range(100):
+        x = arc.at(angle)
+        longitude, latitude, height = wgs84.geodetic(x)
+        excess = height - heights
+        low, high = np.where(excess <= 0, angle, low), np.where(excess >= 0, angle, high)
+        slope = (wgs84.up(longitude, latitude) * arc.slope(angle)).sum(axis=1)
+        with np.errstate(divide="ignore", invalid="ignore"):
+            moved = angle - excess / slope
+        moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
+        step = np.abs(moved - angle)
+        angle = moved
+        if (step <= 4e-16).all() or (np.abs(excess) <= 2e-9).all():
+            break
+    return np.asarray(angle)
+
+
+def _angle_on(arc: _Arc, model: ElevationModel, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+    """The smallest angles, rad (n,), at which positions lie on terrain, between those of its lowest and highest level.
+
+    The arc is walked in steps of half the model's spacing, then bisected where it first comes up through the terrain.
+    """
+    length = np.linalg.norm(arc.at(high) - arc.at(low), axis=1)
+    margin = model.spacing / arc.ranges
+    low, high = np.maximum(low - margin, 0), high + margin
+    steps = int(np.ceil(2 * length.max(initial=0.0) / model.spacing)) + 5
+    first, last = np.full(len(low), np.nan), np.full(len(low), np.nan)
+    for start in range(0, len(low), max(1, WALK // steps)):
+        rows = np.arange(start, min(start + max(1, WALK // steps), len(low)))
+        some = arc.part(rows)
+        walk = np.linspace(low[rows], high[rows], steps)
+        before = _clearance(some, model, walk[0])
+        for angles, last_angles in zip(walk[1:], walk[:-1], strict=True):
+            now = _clearance(some, model, angles)
+            up = (before <= 0) & (now > 0) & np.isnan(first[rows])
+            first[rows[up]], last[rows[up]] = last_angles[up], angles[up]
+            before = now
+    if np.isnan(first).any():
+        at = int(np.argmax(np.isnan(first)))
+        lon, lat, _ = wgs84.geodetic(arc.at(low)[at])
+        raise ValueError(
+            f"slant range[{at}] = {arc.ranges[at]:.9g} m meets no terrain of the elevation model: near longitude "
+            f"{lon:.4f}, latitude {lat:.4f} it ends or has no data; give a model that covers the swath, or a number"
+        )
+    for _ in range(60):
+        middle = (first + last) / 2
+        above = _clearance(arc, model, middle) > 0
+        first, last = np.where(above, first, middle), np.where(above, middle, last)
+        if (last - first <= 4e-16).all():
+            break
+    return np.asarray(last)
+
+
+def _clearance(arc: _Arc, model: ElevationModel, angle: np.ndarray) -> np.ndarray:
+    """Heights above the terrain, m (n,); NaN where the model has none."""
+    longitude, latitude, height = wgs84.geodetic(arc.at(angle))
+    return np.asarray(height - model.heights_at(longitude, latitude))
+
+
+def beam_edge(position: NDArray[np.float64], directions: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+    """Positions, m (n, 3), where rays from one position, m (3,), along unit vectors (n, 3) meet a height, m.
+
+    ValueError where a ray passes over the horizon.
+    """
+    axes = wgs84.SEMI_MAJOR * np.array([1, 1, 1 - wgs84.FLATTENING]) + height
+    start, ray = position / axes, directions / axes
+    a, b, c = (ray**2).sum(axis=1), ray @ start, float(start @ start) - 1
+    disc = b**2 - a * c
+    if (disc < 0).any() or c <= 0 or (b >= 0).any():
+        at = int(np.argmax((disc < 0) | (b >= 0)))
+        raise ValueError(
+            f"the beam's edge passes over the horizon (direction {at} of {len(directions)} around it); give a smaller "
+            "look angle or a narrower beam"
+        )
+    along = c / (-b + np.sqrt(disc))
+    for _ in range(20):  # surfaces of constant height are nearly, but not exactly, ellipsoids
+        points = position + along[:, None] * directions
+        step = (wgs84.geodetic(points)[2] - height) / (normal(points) * directions).sum(axis=1)
+        along = along - step
+        if np.abs(step).max() < 1e-8:
+            break
+    return np.asarray(position + along[:, None] * directions)

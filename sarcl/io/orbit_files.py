@@ -1,0 +1,99 @@
+"""State vectors of orbit files in XML: Sentinel-1 orbits (EOF) and annotations, and orbits as ISCE3 writes them."""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+from xml.etree import ElementTree
+
+import numpy as np
+
+_SPACE = re.compile(r"\{[^}]*\}")
+
+
+@dataclass(frozen=True)
+class _Layout:
+    """Where state vectors stand in a file: the tag of one, and in it the paths of time, position and velocity.
+
+    frame  the tag, in the state or in the head of the file, of the frame's name, where the file gives one
+    """
+
+    name: str
+    state: str
+    time: str
+    position: tuple[str, str, str]
+    velocity: tuple[str, str, str]
+    frame: str
+
+
+# By the tag of the root
+LAYOUTS = {
+    "Earth_Explorer_File": _Layout(
+        "an Earth Explorer orbit file (EOF)", "OSV", "UTC", ("X", "Y", "Z"), ("VX", "VY", "VZ"), "Ref_Frame"
+    ),
+    "product": _Layout(
+        "a Sentinel-1 annotation", "orbit", "time", ("position/x", "position/y", "position/z"),
+        ("velocity/x", "velocity/y", "velocity/z"), "frame",
+    ),
+    "orbitEphemeris": _Layout(
+        "an orbit of ISCE3", "orbitStateVector", "utc", ("x", "y", "z"), ("vx", "vy", "vz"), "frame"
+    ),
+}  # fmt: skip
+
+
+def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]:
+    """Epoch (UTC of the first state), seconds since then (n,), positions, m, and velocities, m/s (n, 3), Earth-fixed.
+
+    FileNotFoundError where there is no file; ValueError where it is not XML, of an unknown layout, has no state vectors
+    or states in another frame.
+    """
+    if not path.exists():
+        raise FileNotFoundError(f"orbit file {str(path)!r} does not exist; check the name and the folder")
+    name = f"orbit file {path.name!r}"
+    try:
+        root = ElementTree.fromstring(path.read_bytes())
+    except ElementTree.ParseError as exc:
+        raise ValueError(f"{name} cannot be read as XML ({exc}): it is damaged, or no orbit file") from None
+    for element in root.iter():
+        element.tag = _SPACE.sub("", element.tag) if isinstance(element.tag, str) else ""
+    layout = LAYOUTS.get(root.tag)
+    if layout is None:
+        known = ", ".join(f"{one.name} (<{tag}>)" for tag, one in LAYOUTS.items())
+        raise ValueError(f"{name} begins with <{root.tag}>; orbits are read from {known}")
+    states = list(root.iter(layout.state))
+    if not states:
+        raise ValueError(f"{name} is {layout.name} without state vectors (<{layout.state}>); give one that has them")
+    frames = [f for state in states for f in state.iter(layout.frame)] or [*root.iter(layout.frame)]
+    for frame in frames:
+        if (frame.text or "").strip().upper().replace(" ", "_") != "EARTH_FIXED":
+            raise ValueError(f"{name} has states in the frame {frame.text!r}; give Earth-fixed ones")
+    dates = np.array([_date(name, layout, state) for state in states])
+    seconds = (dates - dates[0]) / np.timedelta64(1, "ns") * 1e-9
+    positions, velocities = (
+        np.array([[_number(name, state, tag) for tag in tags] for state in states])
+        for tags in (layout.position, layout.velocity)
+    )
+    return dates[0], seconds, positions, velocities
+
+
+def _text(name: str, state: Any, tag: str) -> str:
+    text = state.findtext(tag)
+    if text is None:
+        raise ValueError(f"{name} has a state vector without <{tag}>: it is damaged")
+    return str(text).strip()
+
+
+def _date(name: str, layout: _Layout, state: Any) -> np.datetime64:
+    text = _text(name, state, layout.time).removeprefix("UTC=").removesuffix("Z")
+    if not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?", text):
+        raise ValueError(f"{name} has the time {text!r}; wanted UTC such as 2021-12-23T05:10:21.029300")
+    return np.datetime64(text, "ns")
+
+
+def _number(name: str, state: Any, tag: str) -> float:
+    text = _text(name, state, tag)
+    if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text):
+        raise ValueError(f"{name} has <{tag}> {text!r}; wanted a number")
+    return float(text)

@@ -1,0 +1,324 @@
+"""Orbit: where a satellite is, Earth-fixed, and what it sees."""
+
+from __future__ import annotations
+
+import datetime
+import re
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import TYPE_CHECKING, Literal
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base import validation, wgs84
+from ..earth import rotation, viewing, zero_doppler
+from ..earth.elevation import ElevationModel
+from ..earth.kepler import KeplerElements
+from ..earth.state_vectors import StateVectors
+from ..earth.two_line import TwoLineElements
+from ..io import orbit_files
+from . import pointing
+from .trajectory import Trajectory
+
+if TYPE_CHECKING:
+    from ..base.types import PathLike
+
+Date = str | datetime.datetime | np.datetime64
+Attitude = Literal["zero-doppler", "yaw", "orbital"]
+ATTITUDES = ("zero-doppler", "yaw", "orbital")
+LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
+ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
+DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
+
+
+@dataclass(frozen=True, eq=False)
+class Orbit:
+    """Positions of a satellite in Earth-fixed WGS84 coordinates (ECEF): make it with states, kepler, tle or read.
+
+    path   how positions are computed: state vectors, Kepler elements or two-line elements
+    span   (first, last) time, s: other times are refused
+    epoch  UTC of time 0, or None where it is unknown
+
+    Times are seconds since the epoch, where a day has 86 400 s.
+    """
+
+    path: StateVectors | KeplerElements | TwoLineElements
+    span: tuple[float, float]
+    epoch: np.datetime64 | None = None
+
+    @classmethod
+    def states(cls, times: ArrayLike, positions: ArrayLike, velocities: ArrayLike, epoch: Date | None = None) -> Orbit:
+        """The orbit through state vectors: s (n,), m (n, 3), m/s (n, 3), Earth-fixed, at least 4.
+
+        Positions in between are interpolated: by Hermite polynomials through positions and velocities, or Lagrange
+        polynomials through positions, whichever predicts states that are left out best. `describe` says which, and the
+        error. ValueError for NaN, times that do not increase, gaps (twice the usual spacing and more), velocities that
+        are not the derivative of the positions (inertial ones), and states more than 1 m off their neighbours' curve.
+        """
+        p = validation.array("positions", positions, np.float64, ("n_states", 3))
+        t = validation.array("times", times, np.float64, (len(p),))
+        v = validation.array("velocities", velocities, np.float64, (len(p), 3))
+        return cls(StateVectors.fitted(t, p, v), (float(t[0]), float(t[-1])), None if epoch is None else _date(epoch))
+
+    @classmethod
+    def kepler(
+        cls,
+        semi_major_axis: float,
+        eccentricity: float,
+        inclination: float,
+        node: float = 0.0,
+        argument_of_perigee: float = 0.0,
+        mean_anomaly: float = 0.0,
+        *,
+        epoch: Date | None = None,
+        j2: bool = False,
+        span: Sequence[float] | None = None,
+    ) -> Orbit:
+        """An elliptic orbit about the rotating Earth: semi-major axis in m, angles in rad, elements at time 0.
+
+        node   of the ascending node. With an epoch (UTC): right ascension, from the mean equinox of date; Greenwich
+               mean sidereal time leads to the Earth-fixed frame. Without one: its longitude from Greenwich at time 0
+        j2     with the secular drift of node, perigee and anomaly that the Earth's oblateness causes
+        span   (first, last) time, s, default half a revolution before and after time 0
+
+        ValueError for an eccentricity outside [0, 1), and a perigee below the Earth's surface.
+        """
+        a = validation.number("semi_major_axis", semi_major_axis, above=0)
+        e = validation.number("eccentricity", eccentricity, least=0)
+        if e >= 1:
+            raise ValueError(f"eccentricity is {e:g}; an ellipse has less than 1")
+        if a * (1 - e) < wgs84.SEMI_MAJOR * (1 - wgs84.FLATTENING):
+            raise ValueError(
+                f"the perigee is {a * (1 - e):.7g} m from the Earth's centre, below its surface; give a larger "
+                "semi_major_axis (m, from the centre), or a smaller eccentricity"
+            )
+        names = ("inclination", "node", "argument_of_perigee", "mean_anomaly")
+        given = (inclination, node, argument_of_perigee, mean_anomaly)
+        angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
+        if not 0 <= angles[0] <= np.pi:
+            raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
+        date = None if epoch is None else _date(epoch)
+        greenwich = 0.0 if date is None else rotation.sidereal_time(date)
+        path = KeplerElements(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, bool(j2))
+        half = np.pi / path.mean_motion
+        return cls(path, (-half, half) if span is None else _span(span), date)
+
+    @classmethod
+    def tle(cls, line1: str, line2: str, *, span: Sequence[float] | None = None) -> Orbit:
+        """The orbit of two-line elements, by SGP4 (WGS72 constants): pip install sarcl[orbits].
+
+        SGP4's frame (TEME) is rotated by Greenwich mean sidereal time. The elements themselves are good to about 1 km
+        at their epoch. span: (first, last) s from that epoch, default a day before and after.
+        ValueError for damaged lines; ImportError where sgp4 is missing.
+        """
+        path = TwoLineElements.parsed(line1, line2)
+        seconds = LINES_DAYS * rotation.DAY
+        return cls(path, (-seconds, seconds) if span is None else _span(span), path.epoch)
+
+    @classmethod
+    def read(cls, path: PathLike) -> Orbit:
+        """The orbit of a file of state vectors; its epoch is the first state's time (UTC).
+
+        Sentinel-1 orbit files (EOF: POEORB, RESORB), Sentinel-1 annotations (their state vectors) and orbits in the XML
+        of ISCE3 are known. FileNotFoundError, and ValueError for other files and for states that `states` refuses.
+        """
+        path = Path(path)
+        epoch, times, positions, velocities = orbit_files.load(path)
+        return cls.states(times, positions, velocities, epoch)
+
+    def describe(self) -> str:
+        """How positions are computed, with the order of the interpolation and its measured error, and from when on."""
+        start, stop = self.span
+        since = "an unknown epoch" if self.epoch is None else f"{self.epoch} UTC"
+        return f"{self.path.describe()}; from {start:.9g} to {stop:.9g} s after {since}"
+
+    def __repr__(self) -> str:
+        return f"Orbit({self.describe()})"
+
+    def seconds(self, dates: Date | Sequence[Date] | NDArray[np.datetime64]) -> NDArray[np.float64]:
+        """Seconds since the epoch (...) of dates, UTC (...): strings, datetimes or numpy's datetime64."""
+        if self.epoch is None:
+            raise ValueError("the orbit has no epoch, so dates have no time in it; give Orbit.states(..., epoch=...)")
+        if isinstance(dates, (str, datetime.datetime)):
+            dates = _date(dates)
+        elif not isinstance(dates, (np.datetime64, np.ndarray)):
+            dates = np.array([_date(d) for d in dates])
+        return np.asarray((np.asarray(dates).astype("datetime64[ns]") - self.epoch) / np.timedelta64(1, "ns") * 1e-9)
+
+    def positions(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Positions, m (..., 3), at times, s (...). ValueError for times outside the span."""
+        return self._states(t)[0]
+
+    def velocities(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Velocities over the rotating Earth, m/s (..., 3), at times, s (...): the derivative of the positions."""
+        return self._states(t)[1]
+
+    def accelerations(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Derivatives of the velocities, m/s^2 (..., 3), at times, s (...), by differences over a second."""
+        t = self._times(t)
+        before, after = (np.clip(t + d, *self.span) for d in (-DIFFERENCE, DIFFERENCE))
+        return np.asarray((self.velocities(after) - self.velocities(before)) / (after - before)[..., None])
+
+    def trajectory(
+        self,
+        *,
+        start: float,
+        prf: float,
+        n_pulses: int,
+        attitude: Attitude | None = None,
+        look: float | None = None,
+        side: Literal["right", "left"] = "right",
+    ) -> Trajectory:
+        """The track of n_pulses pulses from time `start`, s, at `prf`, Hz, with velocities and accelerations.
+
+        attitude  of the antenna, whose boresight looks `look` rad from straight down (against the ellipsoid's normal):
+                  "zero-doppler": across the Earth-fixed velocity; "yaw": across its horizontal part (yaw steering: what
+                  is left is the Doppler frequency of the vertical velocity); "orbital": across the velocity in space,
+                  so that the Earth's rotation shifts the Doppler centroid. None: not aimed
+        side      "right" or "left" of the velocity, seen from above
+
+        The track is not stop-and-go: `echo` takes the receiver's positions when echoes arrive.
+        """
+        start = validation.number("start", start)
+        prf = validation.number("prf", prf, above=0)
+        t = start + np.arange(validation.count("n_pulses", n_pulses)) / prf
+        p, v = self._states(t)
+        track = Trajectory(t, p, v, accelerations=self.accelerations(t), stop_and_go=False)
+        if attitude is None:
+            if look is not None:
+                raise ValueError("look aims the antenna, which needs attitude='zero-doppler', 'yaw' or 'orbital'")
+            return track
+        validation.choice("attitude", attitude, ATTITUDES)
+        if look is None:
+            raise ValueError(f"attitude={attitude!r} needs look=, rad from straight down to the boresight")
+        up = viewing.normal(p)
+        if attitude == "yaw":
+            v = v - (v * up).sum(axis=1, keepdims=True) * up
+        elif attitude == "orbital":
+            v = v + rotation.spin(p)
+        aimed = pointing.stripmap(replace(track, velocities=v), look, side=side, up=up)
+        return replace(track, attitude=aimed.attitude)
+
+    def locate(
+        self, positions: ArrayLike, *, span: Sequence[float] | None = None
+    ) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Zero-Doppler times, s (...), and slant ranges, m (...), of Earth-fixed positions, m (..., 3).
+
+        span  (first, last) time to search, s, default the orbit's. Of several passes the closest counts.
+        ValueError names the first position that the satellite never sees.
+        """
+        x = validation.converted("positions", positions, np.float64)
+        if x.shape[-1:] != (3,):
+            raise ValueError(f"positions has shape {x.shape}, wanted (..., 3): Earth-fixed, m")
+        validation.finite("positions", x)
+        within = self.span if span is None else _span(span)
+        self._times(np.array(within))
+        t, r = zero_doppler.locate(self._at, within, x.reshape(-1, 3))
+        return t.reshape(x.shape[:-1]), r.reshape(x.shape[:-1])
+
+    def geolocate(
+        self,
+        t: ArrayLike,
+        r: ArrayLike,
+        heights: ArrayLike | ElevationModel = 0.0,
+        side: Literal["right", "left"] = "right",
+    ) -> NDArray[np.float64]:
+        """Earth-fixed positions, m (..., 3), at zero-Doppler times, s (...), and slant ranges, m (...).
+
+        heights  above the ellipsoid, m: a number, an array (...), or a `sarcl.ElevationModel`; where terrain has
+                 several positions of one range (layover), the one closest to the point below the satellite is taken
+        side     "right" or "left" of the velocity, seen from above
+
+        ValueError names the first range that does not reach the ground, meets it behind the horizon, or meets no height
+        of the model.
+        """
+        sign = {"right": 1.0, "left": -1.0}[validation.choice("side", side, ("right", "left"))]
+        times = self._times(t)
+        ranges = validation.converted("r", r, np.float64)
+        validation.finite("r", ranges)
+        if (ranges <= 0).any():
+            raise ValueError(f"r reaches {ranges.min():g} m; slant ranges are positive, one way, in m")
+        model = heights if isinstance(heights, ElevationModel) else None
+        levels = np.zeros(()) if model is not None else validation.converted("heights", heights, np.float64)
+        validation.finite("heights", levels)
+        times, ranges, levels = np.broadcast_arrays(times, ranges, levels)
+        p, v = self._at(times.ravel())
+        found = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
+        return found.reshape(*times.shape, 3)
+
+    def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
+        """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
+        x = validation.converted("positions", positions, np.float64)
+        validation.finite("positions", x)
+        p, v = self._states(t)
+        return viewing.view(*np.broadcast_arrays(p, v, self.accelerations(t), x))
+
+    def footprint(
+        self,
+        t: float,
+        *,
+        look: float,
+        width: tuple[float, float],
+        side: Literal["right", "left"] = "right",
+        attitude: Attitude = "zero-doppler",
+        height: float = 0.0,
+        n: int = 64,
+    ) -> NDArray[np.float64]:
+        """Edge of a beam on the ground at a time, s: n positions around it, Earth-fixed, m (n, 3), at a height, m.
+
+        look, side, attitude  of the boresight, as in `trajectory`;  width  (azimuth, elevation) full angles between the
+        edges, rad, of an elliptic beam. ValueError where the edge passes over the horizon.
+        """
+        track = self.trajectory(start=t, prf=1.0, n_pulses=1, attitude=attitude, look=look, side=side)
+        assert track.attitude is not None
+        around = 2 * np.pi * np.arange(validation.count("n", n, 3)) / n
+        widths = [validation.number(f"width[{i}]", w, above=0) for i, w in enumerate(width)]
+        a, e = widths[0] / 2 * np.cos(around), widths[1] / 2 * np.sin(around)
+        off = np.hypot(a, e)
+        body = np.stack([np.cos(off), np.sin(off) * a / off, np.sin(off) * e / off], axis=1)
+        height = validation.number("height", height)
+        return zero_doppler.beam_edge(track.positions[0], body @ track.attitude[0].T, height)
+
+    def _times(self, t: ArrayLike) -> NDArray[np.float64]:
+        """Times, s (...), all within the span."""
+        times = validation.converted("t", t, np.float64)
+        validation.finite("t", times)
+        start, stop = self.span
+        outside = (times < start - ROUNDING) | (times > stop + ROUNDING)
+        if outside.any():
+            at = np.unravel_index(int(np.argmax(outside)), times.shape)
+            where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+            raise ValueError(
+                f"t{where} = {times[at]:.9g} s is outside the orbit, which reaches from {start:.9g} to {stop:.9g} s "
+                f"after {'its epoch' if self.epoch is None else self.epoch}; give times within it"
+            )
+        return np.asarray(np.clip(times, start, stop))
+
+    def _states(self, t: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        times = self._times(t)
+        p, v = self._at(times.ravel())
+        return p.reshape(*times.shape, 3), v.reshape(*times.shape, 3)
+
+    def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+        """Positions and velocities (n, 3) at times (n,) within the span."""
+        return self.path.at(times)
+
+
+def _date(value: Date) -> np.datetime64:
+    """A date in UTC, to the nanosecond."""
+    if isinstance(value, datetime.datetime) and value.tzinfo is not None:
+        value = value.astimezone(datetime.UTC).replace(tzinfo=None)
+    if isinstance(value, str):
+        value = value.removesuffix("Z")
+        if not re.fullmatch(r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d{1,9})?)?)?", value):
+            raise ValueError(f"date {value!r} is not in UTC as wanted, such as '2021-12-23T05:10:21.029300'")
+    return np.datetime64(value).astype("datetime64[ns]")
+
+
+def _span(value: Sequence[float]) -> tuple[float, float]:
+    pair = validation.array("span", value, np.float64, (2,))
+    if not pair[0] < pair[1]:
+        raise ValueError(f"span is ({pair[0]:g}, {pair[1]:g}); the first time must be before the last")
+    return float(pair[0]), float(pair[1])
