@@ -36,9 +36,9 @@ def in_flight(
 ) -> tuple[Trajectory, Trajectory | None, dict[str, object]]:
     """Tracks of the antennas while pulses travel to the reference point, m (3,), and back; and entries of the report.
 
-    A track that is not stop-and-go, without a receiver of its own, becomes two (earth/light_time.py): the transmitter's
-    and, at the echo's arrival, the receiver's, both in the frame of the Earth when the pulse meets the point. All
-    others stay as they are. The entries are
+    A track that is not stop-and-go, without a receiver of its own, becomes two: the transmitter's and, at the echo's
+    arrival, the receiver's, both in the frame of the Earth when the pulse meets the point (sarcl/earth/light_time.py).
+    All others stay as they are. The entries are
 
         receiver             "at the echo's arrival", "stop and go", or "a track of its own"
         stop_and_go_error_m  largest half path, m, that stop and go leaves out (or would) for the reference point
