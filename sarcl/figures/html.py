@@ -68,11 +68,19 @@ def plot(
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
     floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
+    lines: Sequence[tuple[str, Any, Any]] = (),
 ) -> Block:  # fmt: skip
     """A figure of decibels in grey; see `plots.picture`. percentile  of the values at which the scale has white."""
     db = np.asarray(db, np.float64)
     data = plots.picture(
-        np.minimum(db, np.percentile(db, percentile)), x, y, x_name, y_name, floor_db=floor_db, box=box
+        np.minimum(db, np.percentile(db, percentile)),
+        x,
+        y,
+        x_name,
+        y_name,
+        floor_db=floor_db,
+        box=box,
+        lines=lines,
     )
     white = "the largest value" if percentile == 100 else f"the percentile {percentile:g} of the values"
     scale = f"White: {white}; black: {-floor_db:g} dB below."

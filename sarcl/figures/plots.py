@@ -115,11 +115,12 @@ def decades(axis: Any) -> None:
 
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
-    box: tuple[float, float] | None = None,
+    box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (),
 ) -> bytes:  # fmt: skip
     """PNG of decibels (rows, columns) in grey, row 0 at the bottom: white is the largest value, black floor_db below.
 
     x, y  edges of the frame;  box: half widths along x and y of a dashed rectangle about the origin
+    lines (name, x (n,), y (n,)) drawn over it, with a legend
     """
     from matplotlib.patches import Rectangle
 
@@ -136,4 +137,8 @@ def picture(
     if box is not None:
         corner = -box[0], -box[1]
         axes.add_patch(Rectangle(corner, 2 * box[0], 2 * box[1], fill=False, edgecolor="#2ecc71", linestyle="--"))
+    for i, (name, along, up) in enumerate(lines):
+        axes.plot(along, up, label=name, **(style(i) | {"marker": ""}))
+    if lines:
+        axes.legend(loc="lower left", fontsize=9)
     return png(made, 256)

@@ -87,6 +87,7 @@ class Paper:
     lab       makes what the sections share, from an OpenCL device and whether the run is a quick one
     sections  functions of it, one for each section
     quick     what a quick run leaves out, a sentence
+    main      items of the rows that a reader should see first
     """
 
     name: str
@@ -96,6 +97,7 @@ class Paper:
     sections: tuple[Callable[[Any], Section], ...]
     quick: str
     terms: tuple[tuple[str, str], ...] = ()
+    main: tuple[str, ...] = ()
 
     def run(self, lab: Any) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""
@@ -129,15 +131,17 @@ class Paper:
             blocks.append(words(f"Not finished: {missing} sections follow.", True))
         if quick:
             blocks.append(words(f"A quick run: {self.quick}", True))
+        first = [row for item in self.main for row in rows if row.item == item]
+        if first:
+            blocks += [heading("Main results"), listed([f"{_verdict(row)}: {_in_words(row)}" for row in first])]
         blocks += [
             heading("Conclusion"),
             words(
                 f"{len(rows) - len(different)} of {len(rows)} published values and statements agree with what was "
                 f"measured in this run. {len(different)} differ:"
             ),
-            listed([f"{row.item} ({row.source}): published {row.published}; measured {row.measured}. "
-                    f"{row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") for row in different]),
-        ]  # fmt: skip
+            listed([_in_words(row) for row in different]),
+        ]
         if self.terms:
             blocks += [heading("Terms"), terms(self.terms)]
         for section in sections:
@@ -157,8 +161,18 @@ class Paper:
         return page(self.title, blocks, command)
 
 
+def _verdict(row: Row) -> str:
+    return "ok" if row.holds else "differs"
+
+
+def _in_words(row: Row) -> str:
+    """A row as a paragraph."""
+    text = f"{row.item} ({row.source}): published {row.published}; measured {row.measured}."
+    return f"{text} {row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") if row.why else text
+
+
 def _cells(row: Row) -> list[str]:
-    verdict = ("ok" if row.holds else "differs") + (f": {row.why}" if row.why else "")
+    verdict = _verdict(row) + (f": {row.why}" if row.why else "")
     return [row.item, f"{row.published} ({row.source})", row.measured, row.rule, verdict]
 
 

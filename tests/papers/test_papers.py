@@ -154,7 +154,7 @@ def test_the_page_has_its_conclusion_on_top_and_its_table_at_the_end(quick):
     text, document = quick
     made = Page(text)
     sections = list(made.sections)
-    assert sections[:2] == ["Conclusion", "Terms"] and sections[-1] == "Published and measured"
+    assert sections[:3] == ["Main results", "Conclusion", "Terms"] and sections[-1] == "Published and measured"
     assert [s["title"] for s in document["sections"]] == sections[2:-1]
     assert all(made.sections[title] > 0 for title in sections[2:-1])
     head, conclusion = (
@@ -178,6 +178,10 @@ def test_every_verdict_stands_beside_its_criterion(quick):
         assert verdict.startswith("ok" if found[item]["holds"] else "differs: ") and measured == found[item]["measured"]
     assert next(row[3] for row in rows if row[0] == "LFM: first null in range") == "within 0.002 m"
     assert not any("rule" in row for row in found.values())
+
+
+def test_main_results_are_rows_of_their_papers(quick):
+    assert set(papers.find("farooq").main) <= set(rows_of(quick[1]))
 
 
 def test_rows_are_judged_by_their_numbers():

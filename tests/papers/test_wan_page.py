@@ -7,6 +7,7 @@ import json
 import numpy as np
 import pytest
 
+from sarcl import papers
 from sarcl.cli import parser
 from sarcl.opencl.choose_device import open_device
 from sarcl.papers.lab import Lab
@@ -36,5 +37,6 @@ def test_the_command_writes_a_page_with_the_known_differences(tmp_path):
     assert document["finished"] and {item for item, row in rows.items() if not row["holds"]} == DIFFERENT
     slope = next(s["numbers"]["slope"] for s in document["sections"] if s["key"] == "patches")
     assert slope == pytest.approx(1, abs=0.1)  # of the brightness over |R(0)|^2, dB per dB
+    assert set(papers.find("wan").main) <= set(rows)
     text = (tmp_path / "wan.html").read_text()
     assert text.index("Conclusion") < text.index("<figure") and "sarcl papers wan --quick" in text

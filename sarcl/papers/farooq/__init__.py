@@ -78,4 +78,11 @@ PAPER = Paper(
         _errata.section,
     ),
     terms=TERMS,
+    main=(
+        "LFM: first null in cross-range",
+        "largest error of the power pattern, 30 MHz",
+        "N 45, +-20 MHz: apparent length",
+        "N 45, +-20 MHz: nulls",
+        "N 45, 20 MHz: two points told apart",
+    ),
 )

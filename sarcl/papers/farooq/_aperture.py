@@ -17,6 +17,7 @@ SWITCHED = (
     (450, 2e6, 574.0, 33, 0.125, "figure 5.8"),
 )
 OTHER_SPACING = 0.015  # m, half a wave of f0
+ZOOM = 8.0  # of the pictures of the centre point
 THIN = 5  # every fifth position is plotted
 
 
@@ -57,9 +58,10 @@ def steady(lab: Lab) -> Section:
         curves.append((name, actual.tx[::THIN, 1], y[::THIN]))
         if n == 45:
             curves.insert(0, ("actual", actual.tx[::THIN, 1], actual.tx[::THIN, 1]))
-            out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
-        elif step > 0:
-            out.draw(lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."))
+        out.draw(
+            lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped (figure {figure})."),
+            lab.picture(mapped, f"{name}: the centre point in a box of 0.167 m (figure {figure}).", ZOOM, PRINTED),
+        )
     out.draw(
         html.plot(
             curves, "actual position, m", "position backprojected from, m", "Positions along the track.", dots=True
@@ -106,7 +108,7 @@ def switched(lab: Lab) -> Section:
         curves.append((name, raw.tx[::THIN, 1], found["published"].tx[::THIN, 1]))
         out.draw(
             lab.picture(lab.mapped(case, "apparent", DIAMOND), f"{name}, mapped ({figure})."),
-            lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", 8.0, PRINTED),
+            lab.picture(found["published"], f"{name}: the centre point in a box of 0.167 m ({figure}).", ZOOM, PRINTED),
         )
     head = ["length, m", "printed", "d 14.36 mm", "d 15 mm", "offset halved"]
     out.parts.append(html.table(head, table))

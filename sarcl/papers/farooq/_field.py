@@ -121,7 +121,34 @@ def snapshots(lab: Lab) -> Section:
                 "Closed form, 2 ns: what figure 4.9 shows.", floor_db=-15,
             ))  # fmt: skip
             _orders(out, level * gate, distance, azimuth)
+            _normals(out, decibels(level * gate / N, -60), edges)
     return out
+
+
+def _normals(out: Section, level: np.ndarray, edges: tuple[tuple[float, float], tuple[float, float]]) -> None:
+    """Normals of the surfaces of uniform phase and of uniform amplitude at an azimuth of 30 deg, 2 ns (figure 4.13)."""
+    step, angle, width = 1e-3, np.radians(30), HALF_WAVE * F0 / STEP  # m: the peak is delayed by width sin(azimuth)/c
+
+    def peak(azimuth: float) -> np.ndarray:
+        r = 2e-9 * SPEED_OF_LIGHT - width * np.sin(azimuth)
+        return r * np.array([np.cos(azimuth), np.sin(azimuth)])
+
+    at, along = peak(angle), (peak(angle + step) - peak(angle - step)) / (2 * step)
+    radial = at / np.linalg.norm(at)
+    across = np.array([along[1], -along[0]]) / np.linalg.norm(along)
+    apart = float(np.degrees(np.arccos(np.clip(radial @ across, -1, 1))))
+    out.states(
+        "directions of uniform phase and of uniform amplitude at 30 deg, 2 ns", "figure 4.13", "they differ",
+        f"by {apart:.0f} deg", apart > 5, value=apart, rule="by more than 5 deg",
+    )  # fmt: skip
+    rays = [
+        (name, [at[1], at[1] + 0.4 * d[1]], [at[0], at[0] + 0.4 * d[0]])
+        for name, d in (("normal of uniform phase", radial), ("normal of uniform amplitude", across))
+    ]
+    out.draw(html.picture(
+        level, *edges, "cross-range, m", "range, m", "Closed form, 2 ns, with two normals at 30 deg (figure 4.13).",
+        floor_db=-15, lines=rays,
+    ))  # fmt: skip
 
 
 def _orders(out: Section, level: np.ndarray, distance: np.ndarray, azimuth: np.ndarray) -> None:

@@ -166,13 +166,14 @@ def errors(lab: Lab) -> Section:
                 "equation 3.60 itself gives 3.5 pi/4 at 45 deg; equation 3.40 allows pi/4", at20,
                 rule="below 0.1 of the peak power at 20 deg",
             )  # fmt: skip
-            out.draw(*(
-                html.picture(
-                    np.maximum(10 * np.log10(np.maximum(p, 1e-9)), -60).T, (0.0, 1e9 / step), (-90.0, 90.0), "t', ns",
-                    "azimuth, deg", f"{what} power pattern, 150 MHz (figure {figure}).", floor_db=-20,
-                )
-                for what, p, figure in (("Exact", exact, "3.12"), ("Closed-form", made, "3.13"))
-            ))  # fmt: skip
+        figures = ("3.10", "3.11") if name == "A" else ("3.12", "3.13")
+        out.draw(*(
+            html.picture(
+                np.maximum(10 * np.log10(np.maximum(p, 1e-9)), -60).T, (0.0, 1e9 / step), (-90.0, 90.0), "t', ns",
+                "azimuth, deg", f"{what} power pattern, {step / 1e6:g} MHz (figure {figure}).", floor_db=-20,
+            )
+            for what, p, figure in zip(("Exact", "Closed-form"), (exact, made), figures, strict=True)
+        ))  # fmt: skip
         out.keep(**{f"error, {step / 1e6:g} MHz": {"deg": degrees[::4], "error": apart[::4]}})
     bound = closed.quadratic_phase(shape=SHAPE, spacing=(0.015, 0.015), frequency_step=(30e6, 0), cosines=(1, 0))
     out.number("quadratic phase of scenario A", "equation 3.59", np.pi / 4, bound, 0.03, "rad")

@@ -57,4 +57,11 @@ PAPER = Paper(
     ),
     quick="fields are smaller and looks fewer than in the paper.",
     terms=TERMS,
+    main=(
+        "autocorrelation at all 25 lags",
+        "autocorrelation along range and the response of a point",
+        "the shadow",
+        "HV where the cone faces the radar",
+        "HV over HH of tilted facets of a perfect conductor",
+    ),
 )

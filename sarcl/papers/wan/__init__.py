@@ -41,4 +41,5 @@ PAPER = Paper(
     sections=(_speckle.section, _patches.section, _errata.section),
     quick="patches are smaller and looks fewer.",
     terms=TERMS,
+    main=("amplitudes", "phases", "coefficient as roughness grows", "coefficient as permittivity grows"),
 )
