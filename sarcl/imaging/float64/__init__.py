@@ -7,7 +7,7 @@ For other folders:
 
 For this folder alone:
 
-    _pulse_records   rows as kernels/backproject_float64.cl reads them
+    _pulse_records   rows as kernels/geometry_float64.clh lays them out
 """
 
 __all__ = ["direct", "plan"]

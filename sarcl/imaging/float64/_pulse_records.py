@@ -1,4 +1,4 @@
-"""Geometry of the rows for kernels/backproject_float64.cl, in float64 and pairs of float64."""
+"""Geometry of the rows as kernels/geometry_float64.clh lays it out, in float64 and pairs of float64."""
 
 from __future__ import annotations
 
@@ -12,7 +12,7 @@ from ...numerics.pulse_geometry import PulseGeometry
 
 def packed(raw: PhaseHistory, antennas: PulseGeometry, length: int, start: int, stop: int, lanes: int) -> np.ndarray:
     """Array per pulse (components, n) of rows start ... stop - 1 for profiles of `length` samples, in the order of
-    kernels/backproject_float64.cl.
+    kernels/geometry_float64.clh.
 
     n is rounded up to whole vectors of `lanes` by repeating the last row. Positions and reference ranges are float64
     as given, so exact; what is derived from frequencies comes in pairs: kappa = 2 fc/c with fc the frequency of

@@ -17,7 +17,7 @@ from ..tiling.tiling import Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
 
-N_CONST = 16  # of kernels/backproject_float64.cl
+N_CONST = 16  # of kernels/geometry_float64.clh
 PIXEL_BYTES = 56  # bytes per pixel: position, sum, and the compensation of the sum
 
 
@@ -32,9 +32,9 @@ class DirectFloat64(DirectEngine):
             raise ValueError(_no_float64(device))
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
-        macros = plan.macros(not task.antennas.is_monostatic, task.wrap, task.antennas.beam is not None)
-        self.constants = device.kernel("backproject_float64.cl", "tile_constants", **macros)
-        self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
+        geometry = {"BISTATIC": int(not task.antennas.is_monostatic), "BEAM": int(task.antennas.beam is not None)}
+        self.constants = device.kernel("tile_constants_float64.cl", "tile_constants", **geometry)
+        self.kernel = device.kernel("backproject_float64.cl", "backproject", **geometry, **plan.macros(task.wrap))
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length, dtype=np.complex128)
@@ -86,7 +86,7 @@ class DirectFloat64(DirectEngine):
         image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
         where = device.upload(positions.reshape(-1, 3).T)
         tile, reach = device.upload(references.T), device.upload(radius)
-        stride = self.profiles.stride
+        stride, wrap = self.profiles.stride, plan.length if self.task.wrap else 0
         clock.lap("prepare")
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
@@ -100,7 +100,7 @@ class DirectFloat64(DirectEngine):
                 count = min(step, n_tiles - at)
                 device.run(
                     self.constants, (n // self.lanes, count), None,
-                    pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, constants,
+                    pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, wrap, constants,
                 )  # fmt: skip
                 items = positions.shape[1] // self.lanes
                 device.run(

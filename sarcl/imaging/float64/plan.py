@@ -61,11 +61,9 @@ class Float64Plan:
             )
         return words
 
-    def macros(self, bistatic: bool, wrap: bool, beam: bool) -> dict[str, int]:
-        """Build-time macros of kernels/backproject_float64.cl."""
+    def macros(self, wrap: bool) -> dict[str, int]:
+        """Build-time macros of kernels/backproject_float64.cl that the plan sets."""
         return {
-            "BISTATIC": int(bistatic),
-            "BEAM": int(beam),
             "WRAP": self.length if wrap else 0,
             "TAPS": self.interpolator.taps,
             "TERMS": self.interpolator.terms,
