@@ -159,7 +159,7 @@ def test_the_page_has_its_conclusion_on_top_and_its_table_at_the_end(quick):
     assert all(made.sections[title] > 0 for title in sections[3:-1])
     head, conclusion = (
         made.words.index("Conclusion"),
-        made.words.index("46 of 59 published values and statements agree"),
+        made.words.index("47 of 60 published values and statements agree"),
     )
     assert head < conclusion < made.words.index("Terms") and "errs" not in made.words
     for item, row in rows_of(document).items():
