@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -99,21 +100,25 @@ class ElevationModel:
         shape = np.broadcast_shapes(np.shape(longitude), np.shape(latitude))
         lon = np.broadcast_to(np.asarray(longitude, np.float64), shape).ravel()
         lat = np.broadcast_to(np.asarray(latitude, np.float64), shape).ravel()
-        i0, j0 = (n // 2 for n in self.height.shape)
-        middle = self.longitude[i0, j0]
-        wanted = np.stack([middle + (lon - middle + 180) % 360 - 180, lat])
-        known = np.stack([self.longitude, self.latitude])
-        ends = [known[:, -1, j0] - known[:, 0, j0], known[:, i0, -1] - known[:, i0, 0]]
-        affine = np.linalg.inv(np.stack([e / (n - 1) for e, n in zip(ends, self.height.shape, strict=True)], axis=1))
-        at = np.array([[i0], [j0]]) + affine @ (wanted - known[:, i0, j0, None])
+        (i0, j0), affine = self._index
+        middle = self.longitude[i0, j0], self.latitude[i0, j0]
+        wanted = np.stack([middle[0] + (lon - middle[0] + 180) % 360 - 180, lat])
+        at = np.array([[i0], [j0]]) + affine @ (wanted - np.reshape(middle, (2, 1)))
         for _ in range(20):  # grids that are even in a map projection are nearly affine in degrees
-            step = affine @ (wanted - _bilinear(known, at))
+            step = affine @ (wanted - np.stack([_bilinear(v, at) for v in (self.longitude, self.latitude)]))
             at = at + step
             if np.abs(step).max(initial=0.0) < 1e-9:
                 break
         size = np.array(self.height.shape)[:, None] - 1
         inside = ((at >= -1e-6) & (at <= size + 1e-6)).all(axis=0)
-        return np.where(inside, _bilinear(self.height[None], np.clip(at, 0, size))[0], np.nan).reshape(shape)
+        return np.where(inside, _bilinear(self.height, np.clip(at, 0, size)), np.nan).reshape(shape)
+
+    @functools.cached_property
+    def _index(self) -> tuple[tuple[int, int], NDArray[np.float64]]:
+        """(row, column) in the middle, and the matrix (2, 2) from degrees about it to rows and columns, nearly."""
+        i, j = (n // 2 for n in self.height.shape)
+        ends = [[v[-1, j] - v[0, j], v[i, -1] - v[i, 0]] for v in (self.longitude, self.latitude)]
+        return (i, j), np.linalg.inv(np.array(ends) / (np.array(self.height.shape) - 1))
 
     def grid_positions(
         self, spacing: tuple[float, float], frame: str, center: Sequence[float] | np.ndarray | None
@@ -151,16 +156,16 @@ class ElevationModel:
 
 
 def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
-    """Grids of values (k, n_rows, n_columns) at fractional (row, column) (2, n), extrapolated outside: (k, n)."""
-    size = np.array(values.shape[1:])[:, None]
+    """A grid of values (n_rows, n_columns) at fractional (row, column) (2, n), extrapolated outside: (n,)."""
+    size = np.array(values.shape)[:, None]
     low = np.clip(np.floor(at).astype(np.int64), 0, size - 2)
     (i, j), (u, v) = low, at - low
-    out = np.zeros((len(values), at.shape[1]))
+    out = np.zeros(at.shape[1])
     for weight, corner in (
-        ((1 - u) * (1 - v), values[:, i, j]),
-        ((1 - u) * v, values[:, i, j + 1]),
-        (u * (1 - v), values[:, i + 1, j]),
-        (u * v, values[:, i + 1, j + 1]),
+        ((1 - u) * (1 - v), values[i, j]),
+        ((1 - u) * v, values[i, j + 1]),
+        (u * (1 - v), values[i + 1, j]),
+        (u * v, values[i + 1, j + 1]),
     ):
         out += np.where(weight == 0, 0.0, weight * corner)
     return out

@@ -37,7 +37,26 @@ def antennas_in_flight(
         down = np.linalg.norm(tx - point, axis=-1) / SPEED_OF_LIGHT
     up = down
     for _ in range(ITERATIONS):
-        after = (down + up)[..., None]
-        rx = rotated(RATE * up, positions + after * (velocities + after / 2 * accelerations))
+        rx, _ = receivers(positions, velocities, accelerations, down, up)
         up = np.linalg.norm(rx - point, axis=-1) / SPEED_OF_LIGHT
     return tx, rx, down, up
+
+
+def receivers(
+    positions: NDArray[np.float64],
+    velocities: NDArray[np.float64],
+    accelerations: NDArray[np.float64],
+    down: NDArray[np.float64],
+    up: NDArray[np.float64],
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions D(w tau_2) R, m, and velocities, m/s (..., 3), of receivers at delays tau_1 and tau_2, s (...)."""
+    after = (down + up)[..., None]
+    later = positions + after * (velocities + after / 2 * accelerations)
+    return rotated(RATE * up, later), rotated(RATE * up, velocities + after * accelerations)
+
+
+def transmitters(
+    positions: NDArray[np.float64], velocities: NDArray[np.float64], down: NDArray[np.float64]
+) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Positions D(-w tau_1) T, m, and velocities, m/s (..., 3), of transmitters at delays tau_1, s (...)."""
+    return rotated(-RATE * down, positions), rotated(-RATE * down, velocities)

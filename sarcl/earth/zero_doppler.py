@@ -18,9 +18,10 @@ States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.f
 
 COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
 PAIRS = 4_000_000  # of positions and coarse times that are examined at once
+DOUBT = 50e3  # m: ranges of passes that are told apart only after their zero-Doppler times are known
+EXACT = 1e-12  # s: below it, times follow the rounding of positions, 1e-9 m
 EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end
 LEAST_SPEED = 1.0  # m/s over the ground: below it there is no zero-Doppler plane
-WALK = 4_000_000  # points of terrain that are examined at once
 
 
 def locate(
@@ -34,28 +35,39 @@ def locate(
     start, stop = span
     coarse = np.linspace(start, stop, int(np.ceil((stop - start) / COARSE)) + 8)
     antennas, velocities = states(coarse)
-    times, ranges = np.full(len(positions), np.nan), np.full(len(positions), np.inf)
-    seen_once = np.zeros(len(positions), bool)
-    for first in range(0, len(positions), max(1, PAIRS // len(coarse))):
-        block = slice(first, first + max(1, PAIRS // len(coarse)))
-        x = positions[block]
+    slack = EARLY * (velocities**2).sum(axis=1)
+    times, ranges = np.full(len(positions), np.nan), np.full(len(positions), np.nan)
+    passed = np.zeros(len(positions), bool)
+    count = max(1, PAIRS // len(coarse))
+    for first in range(0, len(positions), count):
+        x = positions[first : first + count]
         ahead = x @ velocities.T - (antennas * velocities).sum(axis=1)
-        early = EARLY * (velocities**2).sum(axis=1)
-        row, k = np.nonzero((ahead[:, :-1] >= -early[:-1]) & (ahead[:, 1:] <= early[1:]))
-        t = _crossings(states, x[row], coarse[k], coarse[k + 1], ahead[row, k], ahead[row, k + 1])
-        there, _ = states(t)
-        distance = np.linalg.norm(x[row] - there, axis=1)
-        seen_once[block][row] = True
-        good = ~hidden(there, x[row])
-        row, t, distance = row[good], t[good], distance[good]
-        order = np.argsort(-distance, kind="stable")  # the nearest is written last
-        times[first + row[order]], ranges[first + row[order]] = t[order], distance[order]
-    if not np.isfinite(ranges).all():
-        at = int(np.argmin(np.isfinite(ranges)))
+        row, k = np.nonzero((ahead[:, :-1] >= -slack[:-1]) & (ahead[:, 1:] <= slack[1:]))
+        passed[first + row] = True
+        lead = np.clip(ahead[row, k] / np.maximum(ahead[row, k] - ahead[row, k + 1], 1e-300), 0, 1)
+        # about where the antenna is then: good to some kilometres, which separates most passes
+        some = antennas[k] + lead[:, None] * (antennas[k + 1] - antennas[k])
+        guess = np.where(hidden(some, x[row]), np.inf, np.linalg.norm(some - x[row], axis=1))
+        least = np.full(len(x), np.inf)
+        np.minimum.at(least, row, guess)
+        for every in (False, True):
+            open_rows = np.isnan(ranges[first + row])
+            use = np.flatnonzero(open_rows & (every | (guess <= least[row] + DOUBT)))
+            if not len(use):
+                continue
+            i, j = row[use], k[use]
+            t = _crossings(states, x[i], coarse[j], coarse[j + 1], ahead[i, j], ahead[i, j + 1])
+            there, _ = states(t)
+            distance = np.where(hidden(there, x[i]), np.inf, np.linalg.norm(x[i] - there, axis=1))
+            order = np.argsort(-distance, kind="stable")  # the nearest is written last
+            order = order[np.isfinite(distance[order])]
+            times[first + i[order]], ranges[first + i[order]] = t[order], distance[order]
+    if np.isnan(ranges).any():
+        at = int(np.argmax(np.isnan(ranges)))
         lon, lat, _ = wgs84.geodetic(positions[at])
         why = (
             "it is behind the horizon at every zero-Doppler time"
-            if seen_once[at]
+            if passed[at]
             else "it has no zero-Doppler time (closest approach)"
         )
         raise ValueError(
@@ -91,7 +103,7 @@ def _crossings(
         moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
         step = np.abs(moved - t)
         t = moved
-        if (step <= 4 * np.spacing(np.abs(t))).all():
+        if (step <= EXACT + 4 * np.spacing(np.abs(t))).all():
             break
     return np.asarray(np.clip(t, least, most))
 
@@ -207,16 +219,13 @@ def _angle_on(arc: _Arc, model: ElevationModel, low: np.ndarray, high: np.ndarra
     low, high = np.maximum(low - margin, 0), high + margin
     steps = int(np.ceil(2 * length.max(initial=0.0) / model.spacing)) + 5
     first, last = np.full(len(low), np.nan), np.full(len(low), np.nan)
-    for start in range(0, len(low), max(1, WALK // steps)):
-        rows = np.arange(start, min(start + max(1, WALK // steps), len(low)))
-        some = arc.part(rows)
-        walk = np.linspace(low[rows], high[rows], steps)
-        before = _clearance(some, model, walk[0])
-        for angles, last_angles in zip(walk[1:], walk[:-1], strict=True):
-            now = _clearance(some, model, angles)
-            up = (before <= 0) & (now > 0) & np.isnan(first[rows])
-            first[rows[up]], last[rows[up]] = last_angles[up], angles[up]
-            before = now
+    rows, before = np.arange(len(low)), _clearance(arc, model, low)
+    for step in range(1, steps):
+        angles = [low[rows] + n / (steps - 1) * (high - low)[rows] for n in (step - 1, step)]
+        now = _clearance(arc.part(rows), model, angles[1])
+        up = (before <= 0) & (now > 0)
+        first[rows[up]], last[rows[up]] = angles[0][up], angles[1][up]
+        rows, before = rows[~up], now[~up]
     if np.isnan(first).any():
         at = int(np.argmax(np.isnan(first)))
         lon, lat, _ = wgs84.geodetic(arc.at(low)[at])
@@ -239,26 +248,26 @@ def _clearance(arc: _Arc, model: ElevationModel, angle: np.ndarray) -> np.ndarra
     return np.asarray(height - model.heights_at(longitude, latitude))
 
 
-def beam_edge(position: NDArray[np.float64], directions: NDArray[np.float64], height: float) -> NDArray[np.float64]:
-    """Positions, m (n, 3), where rays from one position, m (3,), along unit vectors (n, 3) meet a height, m.
+def ray_ends(positions: NDArray[np.float64], directions: NDArray[np.float64], height: float) -> NDArray[np.float64]:
+    """Positions, m (n, 3), where rays from antennas, m (n, 3), along unit vectors (n, 3) meet a height, m.
 
-    ValueError where a ray passes over the horizon.
+    ValueError names the first ray that passes over the horizon.
     """
     axes = wgs84.SEMI_MAJOR * np.array([1, 1, 1 - wgs84.FLATTENING]) + height
-    start, ray = position / axes, directions / axes
-    a, b, c = (ray**2).sum(axis=1), ray @ start, float(start @ start) - 1
+    start, ray = positions / axes, directions / axes
+    a, b, c = (ray**2).sum(axis=1), (ray * start).sum(axis=1), (start**2).sum(axis=1) - 1
     disc = b**2 - a * c
-    if (disc < 0).any() or c <= 0 or (b >= 0).any():
-        at = int(np.argmax((disc < 0) | (b >= 0)))
+    over = (disc < 0) | (c <= 0) | (b >= 0)
+    if over.any():
         raise ValueError(
-            f"the beam's edge passes over the horizon (direction {at} of {len(directions)} around it); give a smaller "
-            "look angle or a narrower beam"
+            f"the beam passes over the horizon in direction {int(np.argmax(over))} of {len(over)}; give a smaller look "
+            "angle, or a narrower beam"
         )
     along = c / (-b + np.sqrt(disc))
     for _ in range(20):  # surfaces of constant height are nearly, but not exactly, ellipsoids
-        points = position + along[:, None] * directions
+        points = positions + along[:, None] * directions
         step = (wgs84.geodetic(points)[2] - height) / (normal(points) * directions).sum(axis=1)
         along = along - step
         if np.abs(step).max() < 1e-8:
             break
-    return np.asarray(position + along[:, None] * directions)
+    return np.asarray(positions + along[:, None] * directions)

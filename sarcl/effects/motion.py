@@ -14,6 +14,7 @@ from numpy.typing import ArrayLike
 
 from ..base import constants, validation
 from ..base.vectors import unit
+from ..earth.light_time import receivers, transmitters
 from ..model.phase_history import PhaseHistory
 from ..model.pointing import turned, velocities
 from ..model.trajectory import Trajectory
@@ -82,7 +83,8 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
 
     Samples and reference ranges stay as they were recorded. The track has as many pulses as raw has rows, or as many as
     it has times (rows of one time, such as polarisations, share a position). receiver: likewise; default
-    the track where raw has one antenna, raw's own receiver where it has two. ValueError where times do not match.
+    the track where raw has one antenna, raw's own receiver where it has two. A track of `Orbit.trajectory` gives both
+    antennas, at the delays of the reference ranges. ValueError where times do not match.
     """
     validation.instance("raw", raw, PhaseHistory)
     changes: dict[str, Any] = {}
@@ -93,7 +95,13 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
         row = _pulse_of_row(raw, given)
         changes[side] = given.positions[row]
         changes[f"{side}_velocity"] = None if given.velocities is None else given.velocities[row]
-    if receiver is None:
+    if receiver is None and not track.stop_and_go:
+        row, delay = _pulse_of_row(raw, track), raw.reference_range / constants.SPEED_OF_LIGHT
+        assert track.velocities is not None and track.accelerations is not None
+        p, v, a = track.positions[row], track.velocities[row], track.accelerations[row]
+        changes["tx"], changes["tx_velocity"] = transmitters(p, v, delay)
+        changes["rx"], changes["rx_velocity"] = receivers(p, v, a, delay, delay)
+    elif receiver is None:
         changes["rx"] = None if raw.is_monostatic else raw.rx
         changes["rx_velocity"] = changes["tx_velocity"] if raw.is_monostatic else raw.rx_velocity
     return replace(raw, **changes)

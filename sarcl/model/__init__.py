@@ -19,6 +19,8 @@ For other folders:
 For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
+    _dates            dates in UTC to seconds since an epoch
+    _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
 """
 
 __all__ = [

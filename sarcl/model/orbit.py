@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import datetime
-import re
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,15 +17,13 @@ from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
-from . import pointing
+from ._dates import Date, date, seconds
+from ._orbit_attitude import Attitude, axes_of, ellipse
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
-Date = str | datetime.datetime | np.datetime64
-Attitude = Literal["zero-doppler", "yaw", "orbital"]
-ATTITUDES = ("zero-doppler", "yaw", "orbital")
 LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
 DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
@@ -60,7 +56,7 @@ class Orbit:
         p = validation.array("positions", positions, np.float64, ("n_states", 3))
         t = validation.array("times", times, np.float64, (len(p),))
         v = validation.array("velocities", velocities, np.float64, (len(p), 3))
-        return cls(StateVectors.fitted(t, p, v), (float(t[0]), float(t[-1])), None if epoch is None else _date(epoch))
+        return cls(StateVectors.fitted(t, p, v), (float(t[0]), float(t[-1])), None if epoch is None else date(epoch))
 
     @classmethod
     def kepler(
@@ -99,11 +95,11 @@ class Orbit:
         angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
         if not 0 <= angles[0] <= np.pi:
             raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
-        date = None if epoch is None else _date(epoch)
-        greenwich = 0.0 if date is None else rotation.sidereal_time(date)
+        zero = None if epoch is None else date(epoch)
+        greenwich = 0.0 if zero is None else rotation.sidereal_time(zero)
         path = KeplerElements(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, bool(j2))
         half = np.pi / path.mean_motion
-        return cls(path, (-half, half) if span is None else _span(span), date)
+        return cls(path, (-half, half) if span is None else _span(span), zero)
 
     @classmethod
     def tle(cls, line1: str, line2: str, *, span: Sequence[float] | None = None) -> Orbit:
@@ -141,11 +137,7 @@ class Orbit:
         """Seconds since the epoch (...) of dates, UTC (...): strings, datetimes or numpy's datetime64."""
         if self.epoch is None:
             raise ValueError("the orbit has no epoch, so dates have no time in it; give Orbit.states(..., epoch=...)")
-        if isinstance(dates, (str, datetime.datetime)):
-            dates = _date(dates)
-        elif not isinstance(dates, (np.datetime64, np.ndarray)):
-            dates = np.array([_date(d) for d in dates])
-        return np.asarray((np.asarray(dates).astype("datetime64[ns]") - self.epoch) / np.timedelta64(1, "ns") * 1e-9)
+        return seconds(dates, self.epoch)
 
     def positions(self, t: ArrayLike) -> NDArray[np.float64]:
         """Positions, m (..., 3), at times, s (...). ValueError for times outside the span."""
@@ -190,16 +182,9 @@ class Orbit:
             if look is not None:
                 raise ValueError("look aims the antenna, which needs attitude='zero-doppler', 'yaw' or 'orbital'")
             return track
-        validation.choice("attitude", attitude, ATTITUDES)
         if look is None:
             raise ValueError(f"attitude={attitude!r} needs look=, rad from straight down to the boresight")
-        up = viewing.normal(p)
-        if attitude == "yaw":
-            v = v - (v * up).sum(axis=1, keepdims=True) * up
-        elif attitude == "orbital":
-            v = v + rotation.spin(p)
-        aimed = pointing.stripmap(replace(track, velocities=v), look, side=side, up=up)
-        return replace(track, attitude=aimed.attitude)
+        return replace(track, attitude=axes_of(p, v, attitude, look, side))
 
     def locate(
         self, positions: ArrayLike, *, span: Sequence[float] | None = None
@@ -255,6 +240,26 @@ class Orbit:
         p, v = self._states(t)
         return viewing.view(*np.broadcast_arrays(p, v, self.accelerations(t), x))
 
+    def boresight(
+        self,
+        t: ArrayLike,
+        *,
+        look: float,
+        side: Literal["right", "left"] = "right",
+        attitude: Attitude = "zero-doppler",
+        height: float = 0.0,
+    ) -> NDArray[np.float64]:
+        """Positions, Earth-fixed, m (..., 3), that the boresight meets at a height, m, at times, s (...).
+
+        look, side, attitude  as in `trajectory`. The Doppler centroid and rate are those of `view` there.
+        ValueError where the boresight passes over the horizon.
+        """
+        p, v = self._states(t)
+        axes = axes_of(p.reshape(-1, 3), v.reshape(-1, 3), attitude, look, side)
+        return zero_doppler.ray_ends(p.reshape(-1, 3), axes[:, :, 0], validation.number("height", height)).reshape(
+            p.shape
+        )
+
     def footprint(
         self,
         t: float,
@@ -271,15 +276,11 @@ class Orbit:
         look, side, attitude  of the boresight, as in `trajectory`;  width  (azimuth, elevation) full angles between the
         edges, rad, of an elliptic beam. ValueError where the edge passes over the horizon.
         """
-        track = self.trajectory(start=t, prf=1.0, n_pulses=1, attitude=attitude, look=look, side=side)
-        assert track.attitude is not None
-        around = 2 * np.pi * np.arange(validation.count("n", n, 3)) / n
+        p, v = self._states(validation.number("t", t))
+        axes = axes_of(p[None], v[None], attitude, look, side)[0]
         widths = [validation.number(f"width[{i}]", w, above=0) for i, w in enumerate(width)]
-        a, e = widths[0] / 2 * np.cos(around), widths[1] / 2 * np.sin(around)
-        off = np.hypot(a, e)
-        body = np.stack([np.cos(off), np.sin(off) * a / off, np.sin(off) * e / off], axis=1)
-        height = validation.number("height", height)
-        return zero_doppler.beam_edge(track.positions[0], body @ track.attitude[0].T, height)
+        body = ellipse(widths[0], widths[1], validation.count("n", n, 3))
+        return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
 
     def _times(self, t: ArrayLike) -> NDArray[np.float64]:
         """Times, s (...), all within the span."""
@@ -304,17 +305,6 @@ class Orbit:
     def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and velocities (n, 3) at times (n,) within the span."""
         return self.path.at(times)
-
-
-def _date(value: Date) -> np.datetime64:
-    """A date in UTC, to the nanosecond."""
-    if isinstance(value, datetime.datetime) and value.tzinfo is not None:
-        value = value.astimezone(datetime.UTC).replace(tzinfo=None)
-    if isinstance(value, str):
-        value = value.removesuffix("Z")
-        if not re.fullmatch(r"\d{4}-\d\d-\d\d(T\d\d:\d\d(:\d\d(\.\d{1,9})?)?)?", value):
-            raise ValueError(f"date {value!r} is not in UTC as wanted, such as '2021-12-23T05:10:21.029300'")
-    return np.datetime64(value).astype("datetime64[ns]")
 
 
 def _span(value: Sequence[float]) -> tuple[float, float]:

@@ -7,17 +7,19 @@ from typing import Any
 
 import numpy as np
 
+from ..base import wgs84
 from ..base.boxes import corners
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import finite, instance
-from ..earth.light_time import antennas_in_flight
-from ..earth.rotation import RATE, rotated
+from ..earth.light_time import antennas_in_flight, receivers, transmitters
+from ..earth.viewing import hidden
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import half_path
 from ..scene.scene import Scene
 
 SOME_PULSES = 33  # at which the error of the receiver's positions over the scene is computed
+DEEPEST = -12e3  # m: lower than any ground, the bottom of the sea included
 LEAST_SAMPLES = 64  # in the default range window, so that a single point has a profile, too
 
 
@@ -55,10 +57,10 @@ def in_flight(
         return track, None, said
     assert track.velocities is not None and track.accelerations is not None
     p, v, a = track.positions, track.velocities, track.accelerations
+    _check_seen(p, point)
     tx, rx, down, up = antennas_in_flight(p, v, a, point)
-    sends = replace(track, positions=tx, velocities=rotated(-RATE * down, track.velocities), stop_and_go=True)
-    later = track.velocities + (down + up)[:, None] * track.accelerations
-    hears = replace(track, positions=rx, velocities=rotated(RATE * up, later), stop_and_go=True)
+    sends = replace(track, positions=tx, velocities=transmitters(p, v, down)[1], stop_and_go=True)
+    hears = replace(track, positions=rx, velocities=receivers(p, v, a, down, up)[1], stop_and_go=True)
     some = np.linspace(0, len(track) - 1, min(SOME_PULSES, len(track))).round().astype(np.intp)
     box = corners(scene.bounds)
     _, _, down_there, up_there = antennas_in_flight(p[some, None], v[some, None], a[some, None], box)
@@ -68,6 +70,21 @@ def in_flight(
         "stop_and_go_error_m": _rounded(SPEED_OF_LIGHT * (down + up) / 2 - still),
         "arrival_error_m": _rounded(off),
     }  # fmt: skip
+
+
+def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:
+    """Raise ValueError where the reference point, m (3,), of an orbit's echoes is inside the Earth, or never seen."""
+    longitude, latitude, height = wgs84.geodetic(point)
+    if height < DEEPEST:
+        raise ValueError(
+            f"the reference point of the scene is {-height:.4g} m under the ellipsoid, but tracks of Orbit.trajectory "
+            "are in Earth-fixed coordinates; place the scene there (sarcl.wgs84.ecef, Scene.from_dem(frame='ecef'))"
+        )
+    if hidden(antennas, point).all():
+        raise ValueError(
+            f"the scene (longitude {longitude:.4f}, latitude {latitude:.4f}) is behind the horizon at every pulse; "
+            "Orbit.locate tells when the satellite passes it"
+        )
 
 
 def _rounded(errors: np.ndarray) -> float:

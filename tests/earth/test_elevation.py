@@ -37,7 +37,7 @@ def test_a_grid_that_is_even_in_a_map_projection_is_inverted():
     lat = 42 - 1e-3 * (0.94 * i - 0.34 * j) - 2e-8 * i * j
     at = np.random.default_rng(1).uniform(0, 40, (2, 50))
     turned = sarcl.ElevationModel(lon, lat, 100 + 3 * i + 2 * j)
-    there = turned.heights_at(_bilinear(lon[None], at)[0], _bilinear(lat[None], at)[0])
+    there = turned.heights_at(_bilinear(lon, at), _bilinear(lat, at))
     assert np.abs(there - (100 + 3 * at[0] + 2 * at[1])).max() < 1e-6
 
 

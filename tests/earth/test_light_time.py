@@ -107,6 +107,26 @@ def test_a_receiver_that_is_given_wins_and_other_tracks_stop_and_go():
     assert "stop_and_go_error_m" not in plain.report.plan and plain.report.plan["receiver"] == "stop and go"
 
 
+def test_a_processor_s_positions_arrive_too():
+    """motion.with_positions has no reference point, but the delays that the reference ranges are."""
+    x = point_below()
+    track = ORBIT.trajectory(start=0.0, prf=500.0, n_pulses=5)
+    raw = sarcl.echo(sarcl.Scene.points([x], [1.0]), CHIRP, track, polarization=("HH", "VV"), reference=x)
+    again = sarcl.motion.with_positions(raw, track)
+    assert np.abs(again.tx - raw.tx).max() < 1e-6 and np.abs(again.rx - raw.rx).max() < 1e-5
+    path = np.linalg.norm(again.tx - x, axis=1) + np.linalg.norm(again.rx - x, axis=1)
+    assert np.abs(path / 2 - raw.reference_range).max() < 1e-7  # m: tau_1 and tau_2 are not equal
+    assert np.abs(again.rx_velocity - raw.rx_velocity).max() < 1e-6
+
+
+def test_scenes_that_the_track_never_sees_are_refused():
+    track = ORBIT.trajectory(start=0.0, prf=500.0, n_pulses=5)
+    with pytest.raises(ValueError, match=r"m under the ellipsoid, but .*Earth-fixed.*from_dem\(frame='ecef'\)"):
+        sarcl.echo(sarcl.Scene.points([[0, 0, 0]], [1.0]), CHIRP, track)
+    with pytest.raises(ValueError, match=r"behind the horizon at every pulse; Orbit\.locate tells when"):
+        sarcl.echo(sarcl.Scene.points([-point_below()], [1.0]), CHIRP, track)
+
+
 def test_channels_of_an_array_and_forecasts_follow_the_same_rule():
     x = point_below()
     scene = sarcl.Scene.points([x], [1.0])

@@ -192,6 +192,19 @@ def test_a_footprint_is_as_wide_as_the_beam():
         POLAR.footprint(0.0, look=1.1, width=(0.01, 0.2))
 
 
+def test_the_doppler_centroid_is_that_of_the_boresight():
+    t = np.array([-500.0, 700.0])
+    for attitude in ("zero-doppler", "yaw", "orbital"):
+        x = POLAR.boresight(t, look=0.5, attitude=attitude, height=100.0)
+        track = [POLAR.trajectory(start=s, prf=1.0, n_pulses=1, attitude=attitude, look=0.5) for s in t]
+        along = np.array([(k.velocities[0] @ k.attitude[0])[0] for k in track])
+        seen = POLAR.view(t, x)
+        assert seen.doppler(5.4e9) == pytest.approx(2 * 5.4e9 / C * along, abs=1e-5)
+        assert seen.look == pytest.approx(0.5, abs=2e-3)  # the zero-Doppler plane is tilted by the climb
+        assert np.abs(sarcl.wgs84.geodetic(x)[2] - 100).max() < 1e-7
+    assert np.abs(POLAR.view(t, POLAR.boresight(t, look=0.5)).doppler(5.4e9)).max() < 1e-5
+
+
 # refusals
 
 
