@@ -256,3 +256,20 @@ def test_state_vectors_locate_as_the_orbit_they_are_of():
     x = POLAR.geolocate(np.linspace(-90, 90, 50), 9e5)
     found = zero_doppler.locate(path.at, (-100.0, 100.0), x)
     assert np.abs(found[0] - np.linspace(-90, 90, 50)).max() < 1e-9 and np.abs(found[1] - 9e5).max() < 1e-7
+
+
+def test_the_projections_of_sarkit_agree():
+    """A second implementation, of SICD's Volume 3: range and range rate to a surface of constant height."""
+    projection = pytest.importorskip("sarkit.sicd.projection", reason="no sarkit")
+    t, r, h = np.linspace(-900, 900, 7), np.linspace(7.4e5, 1.2e6, 7), np.linspace(-100, 5000, 7)
+    for side, look in (("left", 1), ("right", -1)):
+        x = POLAR.geolocate(t, r, h, side=side)
+        for i in range(7):
+            sets = projection.ProjectionSetsMono(
+                t_COA=t[i], ARP_COA=POLAR.positions(t[i]), VARP_COA=POLAR.velocities(t[i]), R_COA=r[i],
+                Rdot_COA=np.zeros(()),
+            )  # fmt: skip
+            there, _, met = projection.r_rdot_to_constant_hae_surface(
+                look, x[i] + 500, sets, h[i], delta_hae_max=1e-6, nlim=20
+            )
+            assert met and np.linalg.norm(there - x[i]) < 1e-4  # m: its last step is a plane
