@@ -50,6 +50,7 @@ from .scene.scene import Scene as Scene
 from .simulation.echo import echo as echo
 from .simulation.echo_forecast import EchoForecast as EchoForecast
 from .simulation.echo_forecast import plan_echo as plan_echo
+from .simulation.spectral.spectral_echo import spectral_echo as spectral_echo
 from .visibility import illumination as illumination
 
 from . import papers as papers  # isort: skip

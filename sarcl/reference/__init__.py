@@ -18,6 +18,7 @@ For other folders:
     polar_format   the image of plane waves
     quality        a point response by brute force
     shadow         which samples of facets are hidden
+    spectral_echo  spectrum of a reflectivity map, and the steps of its grid
 """
 
 __all__ = [
@@ -33,4 +34,5 @@ __all__ = [
     "polar_format",
     "quality",
     "shadow",
+    "spectral_echo",
 ]

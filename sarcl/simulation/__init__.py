@@ -1,4 +1,4 @@
-"""echo(): from a scene to a phase history.
+"""echo() and spectral_echo(): from a scene to a phase history.
 
 For other folders:
 
@@ -10,6 +10,7 @@ For other folders:
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
     spreading          plan, tiles and sums that points and facets share
     channels/          echoes of the channels of an array
+    spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
 
 For this folder alone:
 
@@ -27,5 +28,6 @@ __all__ = [
     "echo_output",
     "echo_sampling",
     "scene_echoes",
+    "spectral",
     "spreading",
 ]

@@ -152,7 +152,7 @@ def echo(
     opened = open_device(device)
     request = EchoRequest(
         opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
-        _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed, progress,
+        polarization_names(polarization), vertical_direction(vertical, scene.center), max_edge, shadows, seed, progress,
     )  # fmt: skip
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
@@ -228,7 +228,7 @@ def echo(
     return raw
 
 
-def _polarizations(asked: Any) -> tuple[str, ...]:
+def polarization_names(asked: Any) -> tuple[str, ...]:
     """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
     if isinstance(asked, str):
         asked = POLARIZATIONS if asked == "all" else (asked,)
@@ -240,7 +240,7 @@ def _polarizations(asked: Any) -> tuple[str, ...]:
     return names
 
 
-def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
+def vertical_direction(asked: Any, center: np.ndarray) -> np.ndarray:
     """Unit vector (3,): as asked, the ellipsoid's normal at an Earth-centred `center`, m (3,), or z."""
     if asked is not None:
         return direction("vertical", asked)

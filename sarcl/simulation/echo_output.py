@@ -69,6 +69,14 @@ class EchoOutput:
             rows = block.reshape(-1, self.shape[-1])
             self.writer.samples[start * self.a_pulse : start * self.a_pulse + len(rows)] = rows
 
+    def keep_frequencies(self, first: int, block: np.ndarray) -> None:
+        """Store the samples of all pulses at some frequencies, (n_pulses, ..., n), from index `first` on."""
+        at = slice(first, first + block.shape[-1])
+        if self.writer is None:
+            self.whole[..., at] = block
+        else:
+            self.writer.samples[:, at] = block.reshape(-1, block.shape[-1])
+
     def __len__(self) -> int:
         return self.shape[0]
 

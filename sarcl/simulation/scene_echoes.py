@@ -238,13 +238,14 @@ class ChannelEchoes:
 
 def prepare_scene(
     request: EchoRequest, original_scene: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry,
-    weights: AntennaWeights, bands: Iterable[Band], margin: float = 0.0,
+    weights: AntennaWeights, bands: Iterable[Band], margin: float = 0.0, tiled: bool = True,
 ) -> SceneEchoes:  # fmt: skip
     """A scene prepared for its echoes.
 
     original_scene  as it was given;  scene  with its random heights;  waveform  over the band of all channels
     bands           of all samples that will be asked for
     margin          m: elements of an array stand up to this far from the antennas
+    tiled           False: no scatterers are put on the device, for callers that do not spread them into range profiles
     ToleranceUnreachable where these cannot meet the tolerance; NothingSeen where no scatterer is left.
     """
     refuse_unseen(scene, weights, waveform, antennas, request.gated, margin)
@@ -269,7 +270,7 @@ def prepare_scene(
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
-        if facets is not None:
+        if facets is not None and tiled:
             held_facets = TiledFacets(
                 device, facets, facet_plan, antennas, waveform, weights, request.polarizations, vertical
             )
@@ -284,7 +285,7 @@ def prepare_scene(
     if points is not None:
         bounded(points.largest() * weights.peak)
         weights.check_clearance(points.positions)
-        if request.same:
+        if request.same and tiled:
             held_points = tiled_points(device, points, antennas, waveform, weights)
     request.clock.lap("scene")
     prepared = SceneEchoes(

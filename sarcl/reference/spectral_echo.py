@@ -1,0 +1,44 @@
+"""The steps of a spectral echo, term by term: kernels/spectral_echo.cl, and the sum that they compute together."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..numerics.interpolation import Interpolator
+from ..numerics.polynomials import lagrange
+
+
+def map_spectrum(
+    amplitudes: np.ndarray, azimuth: np.ndarray, offset: np.ndarray, u: np.ndarray, kappa: np.ndarray
+) -> np.ndarray:
+    """sum_k b_k exp(-j u x_k - j kappa (r_k - r_c)) at wavenumbers u and kappa (n,): complex128 (n,)."""
+    return np.asarray(np.exp(-1j * (np.outer(u, azimuth) + np.outer(kappa, offset))) @ amplitudes)
+
+
+def spread(
+    amplitudes: np.ndarray, first: np.ndarray, rest: np.ndarray, kernel: Interpolator, shape: tuple[int, int]
+) -> np.ndarray:
+    """Scatterers (n,) over TAPS x TAPS cells from `first` (n, 2) on, on a grid complex128 whose columns repeat."""
+    out = np.zeros(shape, np.complex128)
+    weights = kernel.weights(rest)
+    for i in range(kernel.taps):
+        for j in range(kernel.taps):
+            at = first[:, 0] + i, (first[:, 1] + j) % shape[1]
+            np.add.at(out, at, amplitudes * weights[:, 0, i] * weights[:, 1, j])
+    return out
+
+
+def migrate(
+    grid: np.ndarray, first: np.ndarray, rest: np.ndarray, cycles: np.ndarray, cell: np.ndarray, cell_rest: np.ndarray,
+    tables: np.ndarray, basis: np.ndarray, kernel: Interpolator,
+) -> np.ndarray:  # fmt: skip
+    """y(u, f), complex128 (n_u, n_f), of a grid (n_u, n_range); coordinates (n_u, n_f), basis (n_tables, n_f)."""
+    n_range, rows = grid.shape[1], np.arange(len(grid))[:, None]
+    weights, made = kernel.weights(rest), np.zeros(first.shape, np.complex128)
+    for t in range(kernel.taps):
+        made += weights[..., t] * grid[rows, (first + t) % n_range]
+    made /= kernel.transform((first + rest + (kernel.taps - 1) / 2) / n_range)
+    table = np.einsum("qf,qn->fn", basis, tables)
+    shares = lagrange(np.array([-1.0, 0, 1, 2]), cell_rest.ravel()).reshape(4, *cell.shape)
+    amplitude = sum(shares[i] * table[np.arange(len(table)), np.maximum(cell, 0) + i] for i in range(4))
+    return np.asarray(np.where(cell < 0, 0, amplitude * made * np.exp(2j * np.pi * cycles)))

@@ -1,0 +1,200 @@
+"""Transfer functions along track, transformed numerically: amplitude left when the known phase is taken out.
+
+A scatterer at slant range r that is seen with the amplitude w(s), s the sine of its aspect, sends along the track
+
+    h(x; r, k) = w(s) exp(-j 2 k (R - r)),   R = sqrt(r^2 + x^2),  s = x/R,  k = 2 pi f/c
+
+Its transform over x is H(u; r, k) = sqrt(r/r_c) A exp(-j (kappa - 2 k) r) with kappa = sqrt(4 k^2 - u^2). A depends on
+u/2k and k r alone, and changes slowly: it is transformed by FFT at a few ranges and frequencies, tabulated over u/2k,
+and interpolated between them. Beyond the aspects at which any pulse sees any scatterer, w is continued and falls to 0
+over a few Fresnel zones: there the samples do not depend on it. docs/theory/spectral_echo.md derives it.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.errors import NotApplicable, ToleranceUnreachable
+from ...numerics.polynomials import chebyshev, lagrange
+from ...opencl import fft
+from ._aspect_window import Aspects, DopplerGrid, wavenumber
+from ._straight_track import StraightTrack, tangent
+
+# Ranges and frequencies of the tables, and width of their margins in Fresnel zones, that are tried one after the other.
+TRIED = ((1, 1, 4), (1, 2, 4), (2, 2, 4), (2, 3, 4), (3, 3, 4), (3, 4, 16), (4, 4, 64), (6, 8, 64))
+CELLS = 8  # of a table per Fresnel zone, for a margin of 4
+TESTED = 4  # scatterers whose responses are compared with the formula
+SAFETY = 1.5  # the error is measured at a few ranges and frequencies
+MOST_CELLS = 2**22  # of a table, and lags of a transform: beyond, echo is the better choice
+
+Functions = Callable[[np.ndarray, float], np.ndarray]  # (sines (n,), frequency, Hz) -> complex128 (J, n)
+
+
+@dataclass(frozen=True, eq=False)
+class AzimuthTransfer:
+    """Tables of A over u/2k = start + i step: complex128 (J, ranges, frequencies, n), for J amplitude functions.
+
+    ranges, frequencies  m (Q,), Hz (M,): nodes;  error  relative, of responses made from the tables
+    """
+
+    aspects: Aspects
+    ranges: np.ndarray
+    frequencies: np.ndarray
+    start: float
+    step: float
+    tables: np.ndarray
+    error: float = 0.0
+
+    def range_weights(self, slant_range: np.ndarray) -> np.ndarray:
+        """Shares of the tables of each range in a response at slant ranges (n,), with sqrt(r/r_c): (Q, n)."""
+        middle = self.aspects.middle_range
+        return lagrange(middle / self.ranges, middle / slant_range) * np.sqrt(slant_range / middle)
+
+    def basis(self, frequencies: np.ndarray) -> np.ndarray:
+        """Shares of the tables of each frequency (M, n): A falls with 1/sqrt(f), which is taken out."""
+        return lagrange(self.frequencies, frequencies) * np.sqrt(self.frequencies[:, None] / frequencies)
+
+    @property
+    def limits(self) -> tuple[float, float]:
+        """Values of u/2k between which A is not 0."""
+        return self.start + self.step, self.start + (self.tables.shape[-1] - 3) * self.step
+
+    def positions(self, ratio: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """First of four table cells for values of u/2k, and distance from the second in cells; -1 outside the table."""
+        position = (ratio - self.start) / self.step
+        inside = (position >= 1) & (position < self.tables.shape[-1] - 2)
+        cell = np.floor(np.where(inside, position, 1))
+        return np.where(inside, cell - 1, -1).astype(np.int32), np.where(inside, position - cell, 0)
+
+    def amplitude(self, term: int, node: int, frequency: float, u: np.ndarray) -> np.ndarray:
+        """A of one function, by the table of one range, at wavenumbers u (n,): as the kernel interpolates it."""
+        k = wavenumber(frequency)
+        cell, z = self.positions(u / (2 * k))
+        weights = lagrange(np.array([-1.0, 0, 1, 2]), z)
+        table = self.basis(np.array([frequency]))[:, 0] @ self.tables[term, node]
+        made = sum(weights[i] * table[np.maximum(cell, 0) + i] for i in range(4))
+        return np.asarray(np.where(cell < 0, 0, made))
+
+
+def doppler_grid(transfer: AzimuthTransfer, track: StraightTrack, reach: tuple[float, float]) -> DopplerGrid:
+    """The wavenumbers of a transfer function; reach  lowest and highest end of any scatterer's response, m (2,)."""
+    length = max(reach[1], track.length - reach[0]) + 2 * track.spacing
+    n_lags = fft.good_length(int(np.ceil(length / track.spacing)))
+    period = n_lags * track.spacing
+    ends = np.outer(2 * wavenumber(np.array(transfer.aspects.band)), transfer.limits) * period / (2 * np.pi)
+    first = int(np.ceil(ends.min()))
+    return DopplerGrid(period, n_lags, first, max(1, int(np.floor(ends.max())) - first + 1))
+
+
+def transfer_tables(
+    aspects: Aspects, functions: Functions, n_ranges: int, n_frequencies: int, margin: float
+) -> AzimuthTransfer:
+    """Tables at Chebyshev nodes of ranges and frequencies. `margin`: Fresnel zones by which they exceed the window."""
+    zone = aspects.fresnel
+    step = zone / (CELLS * max(1.0, margin / 4))
+    low, high = aspects.support
+    start = -high - margin * zone
+    n = fft.good_length(int(np.ceil((high - low + 2 * margin * zone) / step)) + 4)
+    inverse = np.sort(
+        chebyshev(0.5 / aspects.nearest + 0.5 / aspects.farthest, 1 / aspects.nearest - 1 / aspects.farthest, n_ranges)
+    )
+    ranges, middle = 1 / inverse, aspects.middle_range
+    frequencies = chebyshev(sum(aspects.band) / 2, aspects.band[1] - aspects.band[0], n_frequencies)
+    tables = None
+    for q, r in enumerate(ranges.tolist()):
+        for m, f in enumerate(frequencies.tolist()):
+            k = float(wavenumber(f))
+            lag_step = np.pi / (k * n * step)
+            first, last = (int(np.floor(r * float(tangent(end)) / lag_step)) for end in (low, high))
+            count = -(-(last - first + 2) // n) * n
+            if max(count, n) > MOST_CELLS:
+                raise NotApplicable(
+                    f"scatterers are seen over {r * (high - low):.3g} m of track, which would need transforms of "
+                    f"{max(count, n)} samples, and spectral_echo takes up to {MOST_CELLS}; use echo"
+                )
+            lag = (first + np.arange(count)) * lag_step
+            distance = np.hypot(r, lag)
+            sine = lag / distance
+            window = aspects.window(sine)
+            inside = np.flatnonzero(window)
+            wave = window[inside] * np.exp(-2j * k * lag[inside] ** 2 / (distance[inside] + r))
+            wave *= np.exp(-2j * k * start * lag[inside])
+            response = np.zeros((1, count), np.complex128)
+            made = functions(sine[inside], f)
+            ratio = start + np.arange(n) * step
+            u = 2 * k * ratio
+            kappa = 2 * k * np.sqrt(np.maximum(1 - ratio**2, 1e-6))
+            known = lag_step * np.sqrt(middle / r) * np.exp(1j * (-(u**2) / (kappa + 2 * k)) * r)
+            # exp(-j u lag) of the first lag; its whole steps are the FFT's
+            known = known * np.exp(-1j * (u - u[0]) * (first * lag_step))
+            if tables is None:
+                tables = np.empty((len(made), n_ranges, n_frequencies, n), np.complex128)
+            for j, psi in enumerate(made):
+                response[0, inside] = psi * wave
+                folded = response.reshape(-1, n).sum(axis=0)[None]
+                tables[j, q, m] = fft.rows(None, folded)[0] * known
+    assert tables is not None
+    return AzimuthTransfer(aspects, ranges, frequencies, start, step, tables)
+
+
+def plan_transfer(
+    aspects: Aspects, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float],
+    tolerance: float, asked: float,
+) -> AzimuthTransfer:  # fmt: skip
+    """The smallest tables whose responses differ from the formula by at most `tolerance`.
+
+    factors  of some scatterers (n, J);  asked  the whole tolerance, for the message
+    """
+    best = np.inf
+    for tried in TRIED:
+        made = transfer_tables(aspects, functions, *tried)
+        error = SAFETY * response_error(made, functions, factors[:TESTED], track, reach)
+        best = min(best, error)
+        if error <= tolerance:
+            return AzimuthTransfer(aspects, made.ranges, made.frequencies, made.start, made.step, made.tables, error)
+    raise ToleranceUnreachable(
+        asked, None, "transform along the track of beams with edges", "use echo",
+        f"by spectral_echo: transfer functions leave {best:.1e} of the responses along the track",
+    )  # fmt: skip
+
+
+def response_error(
+    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float]
+) -> float:
+    """Largest relative error of responses along the track made from tables, over stretches as long as the track."""
+    aspects, grid = made.aspects, doppler_grid(made, track, reach)
+    u, worst = grid.wavenumbers, 0.0
+    low, high = aspects.band
+    for r in {aspects.nearest, aspects.farthest, 0.6 * aspects.nearest + 0.4 * aspects.farthest}:
+        for f in {low, high, 0.4 * low + 0.6 * high}:
+            k = float(wavenumber(f))
+            first = max(aspects.lags[0], r * float(tangent(aspects.low)))
+            last = min(aspects.lags[1], r * float(tangent(aspects.high)))
+            n = min(int((last - first) / track.spacing), grid.n_lags)
+            if n < 1:
+                continue
+            lag = first + np.arange(n) * track.spacing
+            kappa = np.sqrt(np.maximum(4 * k * k - u * u, 1e-6))
+            known = np.exp(1j * (u * u / (kappa + 2 * k) * r + u * first)) / grid.period
+            shares = made.range_weights(np.array([r]))[:, 0]
+            tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
+            terms = np.einsum("q,jqu->ju", shares, np.array(tables))
+            spectra = (factors @ terms) * known
+            response = fft.rows(None, grid.folded(spectra), inverse=True)[:, :n]
+            distance = np.hypot(r, lag)
+            wave = np.exp(-2j * k * lag**2 / (distance + r))
+            exact = (factors @ functions(lag / distance, f)) * wave
+            span = min(n, track.n_pulses)
+            wrong = _largest_sum(np.abs(response - exact) ** 2, span)
+            right = _largest_sum(np.abs(exact) ** 2, span)
+            worst = max(worst, float(np.sqrt(wrong / right)) if right else 0.0)
+    return worst
+
+
+def _largest_sum(power: np.ndarray, n: int) -> float:
+    """Largest sum over n neighbours, added over all rows."""
+    total = np.concatenate([np.zeros((len(power), 1)), np.cumsum(power, axis=1)], axis=1)
+    return float((total[:, n:] - total[:, :-n]).max(axis=1).sum())

@@ -1,0 +1,162 @@
+"""Spectrum of a reflectivity map at the range wavenumbers of every Doppler and radar frequency.
+
+    y(u, f) = exp(-j (kappa - 2 k) r_c) A(u, f) sum_k b_k exp(-j u x_k - j kappa (r_k - r_c))
+    kappa = sqrt(4 k^2 - u^2)
+
+(x_k, r_k) are azimuth and slant range of the scatterers, anywhere; u is evenly spaced, kappa is not. Scatterers are
+spread on a grid (type-1 nonuniform FFT over x), whose transform over r is read between its samples (type 2): Stolt's
+change of variables without an approximation, kernels/spectral_echo.cl. With the centre of the band
+(u_c, kappa_c), kappa = kappa_c + slope (u - u_c) + small: the map is sheared by the slope, so that squinted beams need
+no finer grid in range.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from ...base.text import size_text
+from ...numerics.interpolation import Interpolator
+from ...opencl import fft
+from ...opencl.device import Device
+from ._aspect_window import DopplerGrid, wavenumber
+from ._azimuth_transfer import AzimuthTransfer
+from ._map_plan import MapPlan, RangeWavenumbers
+
+AT_ONCE = 2**17  # pairs of wavenumber and frequency per block: their coordinates stay in a cache
+FLAT = 9  # coefficients of 1/transform of the interpolation kernel
+
+
+class ReflectivityMap:
+    """Scatterers at azimuth and slant range, m (n,), sorted into the tiles of a grid, on a device."""
+
+    def __init__(
+        self, device: Device, plan: MapPlan, numbers: RangeWavenumbers, grid: DopplerGrid, azimuth: np.ndarray,
+        slant_range: np.ndarray,
+    ) -> None:  # fmt: skip
+        self.device, self.plan, self.numbers, self.grid = device, plan, numbers, grid
+        offset = slant_range - numbers.middle_range
+        cycles = (numbers.u_c * azimuth + numbers.kappa_c * offset) / (2 * np.pi)
+        cycles -= np.rint(cycles)
+        row = offset / plan.spacing + plan.origin
+        column = (azimuth + numbers.slope * offset) / grid.period
+        column = (column - np.floor(column)) * plan.n_columns
+        taps, n_tiles = plan.kernel.taps, plan.n_columns // plan.tile
+        first, rest = [], []
+        for position in (row, column):
+            start = position - (taps - 1) / 2
+            whole = np.rint(start)
+            rest.append((start - whole).astype(np.float32))
+            first.append(whole.astype(np.int32))
+        first[1] %= plan.n_columns
+        tile = (first[0] // plan.tile) * n_tiles + first[1] // plan.tile
+        self.order = np.argsort(tile, kind="stable")
+        counts = np.bincount(tile, minlength=(plan.n_rows // plan.tile) * n_tiles)
+        self.start = device.upload(np.concatenate([[0], np.cumsum(counts)]).astype(np.int32))
+        self.first = device.upload(np.stack(first, axis=1)[self.order])
+        self.rest = device.upload(np.stack(rest, axis=1)[self.order])
+        self.wave = np.exp(-2j * np.pi * cycles).astype(np.complex64)
+        macros = {"VW": 1, "TAPS": taps, "TERMS": plan.kernel.terms, "TILE": plan.tile}
+        self.spread = device.kernel("spectral_echo.cl", "spread", **macros, NODES=1)
+        self.macros = macros
+        self.table = device.upload(plan.kernel.table)
+        self.flat = device.upload(_flat(plan.kernel))
+
+    def over_azimuth(self, amplitudes: np.ndarray, wavenumbers: slice, budget: float) -> np.ndarray:
+        """Transform over azimuth of amplitudes (n,), at some of the wavenumbers: complex64 (n_u, n_rows).
+
+        budget  bytes: the grid is made in bands of rows that keep to it
+        """
+        plan, device, grid = self.plan, self.device, self.grid
+        values = device.upload((amplitudes * self.wave).astype(np.complex64)[self.order])
+        n_tiles = plan.n_columns // plan.tile
+        a_band = 8 * plan.tile * plan.n_columns
+        most = min(budget / 2, device.info.max_alloc)
+        if a_band > most:
+            raise MemoryError(
+                f"max_bytes leaves {size_text(most)} for a band of the reflectivity map, which needs "
+                f"{size_text(a_band)}; raise max_bytes"
+            )
+        at_once = max(1, int(most / a_band))
+        index = grid.indices[wavenumbers] - int(np.rint(self.numbers.u_c * grid.period / (2 * np.pi)))
+        flat = (1 / plan.kernel.transform(index / plan.n_columns)).astype(np.float32)
+        row = (np.arange(plan.n_rows) - plan.origin) / plan.n_range
+        flat_rows = (1 / plan.kernel.transform(row)).astype(np.float32)
+        index %= plan.n_columns
+        out = np.empty((len(index), plan.n_rows), np.complex64)
+        for first in range(0, plan.n_rows // plan.tile, at_once):
+            n = min(at_once, plan.n_rows // plan.tile - first)
+            made = device.empty(n * a_band)
+            device.run(
+                self.spread, (n_tiles, n), (1, 1) if device.is_cpu else None,
+                values, self.first, self.rest, self.start, self.table, n_tiles, first, made,
+            )  # fmt: skip
+            rows = device.download(made, np.empty((n * plan.tile, plan.n_columns), np.complex64))
+            wave = fft.rows(device, rows)
+            part = slice(first * plan.tile, (first + n) * plan.tile)
+            wave *= flat_rows[part, None]
+            for start in range(0, len(index), 256):  # transposed a few columns at a time, for the cache
+                some = slice(start, start + 256)
+                out[some, part] = wave[:, index[some]].T
+        out *= flat[:, None]
+        return out
+
+    def add(
+        self, over_azimuth: np.ndarray, wavenumbers: slice, tables: np.ndarray, transfer: AzimuthTransfer,
+        frequencies: np.ndarray, out: np.ndarray,
+    ) -> None:  # fmt: skip
+        """Add y(u, f) at some wavenumbers to out, complex64 (n_u, n_f).
+
+        over_azimuth  of the amplitudes;  tables  complex (M, n): A at the transfer's frequencies, for these amplitudes
+        """
+        device, plan = self.device, self.plan
+        kernel = device.kernel("spectral_echo.cl", "migrate", **self.macros, NODES=len(tables))
+        held = device.upload(np.ascontiguousarray(tables, np.complex64))
+        basis = device.upload(transfer.basis(frequencies).astype(np.float32))
+        for part, coordinates in self.coordinates(transfer, frequencies, wavenumbers):
+            padded = np.zeros((part.stop - part.start, plan.n_range), np.complex64)
+            padded[:, : plan.n_rows - plan.origin] = over_azimuth[part, plan.origin :]
+            padded[:, plan.n_range - plan.origin :] = over_azimuth[part, : plan.origin]
+            spectra = device.upload(fft.rows(device, padded))
+            made = np.empty((len(padded), len(frequencies)), np.complex64)
+            buffer = device.empty(made.nbytes)
+            first, rest, cycles, cell, cell_rest = (device.upload(a) for a in coordinates)
+            device.run(
+                kernel, made.shape[::-1], None,
+                spectra, plan.n_range, first, rest, cycles, cell, cell_rest, held, tables.shape[-1], basis, self.flat,
+                self.table, buffer,
+            )  # fmt: skip
+            out[part] += device.download(buffer, made)
+
+    def coordinates(
+        self, transfer: AzimuthTransfer, frequencies: np.ndarray, wavenumbers: slice
+    ) -> Iterator[tuple[slice, tuple[Any, ...]]]:
+        """Blocks of wavenumbers, and the kernel's coordinates of each: first tap, rest, cycles, cell, its rest."""
+        plan, u, k = self.plan, self.grid.wavenumbers[wavenumbers], wavenumber(frequencies)
+        at_once = max(1, AT_ONCE // len(k))
+        scale = plan.spacing * plan.n_range / (2 * np.pi)
+        for start in range(0, len(u), at_once):
+            part = slice(start, min(start + at_once, len(u)))
+            kappa, cycles = self.numbers.rest(u[part], k)
+            cell, cell_rest = transfer.positions(u[part, None] / (2 * k))
+            kappa *= scale
+            kappa -= (plan.kernel.taps - 1) / 2
+            first = np.rint(kappa)
+            kappa -= first
+            first[cell < 0] = 0
+            yield part, (
+                first.astype(np.int32), kappa.astype(np.float32), cycles.astype(np.float32), cell,
+                cell_rest.astype(np.float32),
+            )  # fmt: skip
+
+
+def _flat(kernel: Interpolator) -> np.ndarray:
+    """Coefficients of 1/transform in rising powers of nu^2, float32 (9,), within the band of the kernel."""
+    nu = np.linspace(0, 0.52 / kernel.oversample, 200)
+    wanted = 1 / kernel.transform(nu)
+    powers = nu[:, None] ** (2 * np.arange(FLAT))
+    scale = np.abs(powers).max(axis=0)
+    found = np.linalg.lstsq(powers / scale / wanted[:, None], np.ones(len(nu)), rcond=None)[0]
+    return np.asarray(found / scale, np.float32)

@@ -1,0 +1,82 @@
+"""Straight, evenly spaced tracks, and the coordinates of scatterers about them: azimuth and slant range."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ...base.errors import NotApplicable
+from ...model.trajectory import Trajectory
+
+LEAST_COSINE = 0.3  # of the squint: nearer to the track's direction the range kernels change too fast along the track
+
+
+@dataclass(frozen=True, eq=False)
+class StraightTrack:
+    """Pulses at start + n spacing along, n = 0 ... n_pulses - 1.
+
+    start      m (3,);  along  unit vector (3,);  spacing  m
+    prf        Hz, mean pulse repetition frequency
+    deviation  m, largest distance of a pulse from its place on this line
+    """
+
+    start: np.ndarray
+    along: np.ndarray
+    spacing: float
+    n_pulses: int
+    prf: float
+    deviation: float
+
+    @property
+    def length(self) -> float:
+        """Distance of the last pulse from the first, m."""
+        return self.spacing * (self.n_pulses - 1)
+
+    def coordinates(self, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Azimuth (n,), m from the first pulse, and slant range at closest approach (n,), m, of points, m (n, 3)."""
+        offset = points - self.start
+        azimuth = offset @ self.along
+        offset -= azimuth[:, None] * self.along
+        return azimuth, np.sqrt((offset**2).sum(axis=1))
+
+    def antennas(self, azimuth: np.ndarray, slant_range: np.ndarray, sine: float | np.ndarray) -> np.ndarray:
+        """Positions on the line, m (n, 3), from which scatterers are seen at `sine`: (antenna - scatterer) . along over
+        their distance."""
+        return self.start + (azimuth + slant_range * tangent(sine))[:, None] * self.along
+
+
+def tangent(sine: float | np.ndarray) -> np.ndarray:
+    """Tangent of an angle within +-90 deg from its sine."""
+    return np.asarray(sine / np.sqrt(1 - np.square(sine)))
+
+
+def straight_track(track: Trajectory, frequency: float, allowed: float) -> StraightTrack:
+    """The line of a track. NotApplicable for a track that is no straight, evenly spaced line.
+
+    frequency  Hz, the highest;  allowed  phase error, rad, that deviations from the line may cause
+    """
+    n = len(track)
+    if n < 2:
+        raise NotApplicable("the track has one pulse; spectral_echo needs a line of them: use echo")
+    step = (track.positions[-1] - track.positions[0]) / (n - 1)
+    spacing = float(np.linalg.norm(step))
+    line = track.positions[0] + np.arange(n)[:, None] * step
+    away = np.linalg.norm(track.positions - line, axis=1)
+    worst = int(np.argmax(away))
+    most = allowed * 299792458.0 / (4 * np.pi * frequency)
+    if spacing == 0 or away[worst] > most:
+        raise NotApplicable(
+            f"the track is not a straight line of evenly spaced pulses: pulse {worst} is {away[worst]:.3g} m from its "
+            f"place on the line from the first to the last, where this tolerance allows {most:.2g} m; use echo, which "
+            "takes any track, or Trajectory.line"
+        )
+    prf = (n - 1) / float(track.times[-1] - track.times[0])
+    if track.attitude is not None:
+        turn = np.abs(track.attitude - track.attitude[0]).max(axis=(1, 2))
+        if turn.max() > 1e-9:
+            raise NotApplicable(
+                f"the antennas turn along the track (attitude of pulse {int(np.argmax(turn))}); spectral_echo needs "
+                "the same attitude at all pulses, such as pointing.stripmap gives: use echo for others"
+            )
+    return StraightTrack(track.positions[0], step / spacing, spacing, n, prf, float(away[worst]))

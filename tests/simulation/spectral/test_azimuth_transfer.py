@@ -1,0 +1,92 @@
+"""Responses along the track against their closed form, and amplitudes that are sums of products."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import scipy.special
+
+import sarcl
+from sarcl.simulation.spectral._aspect_expansion import expand
+from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
+from sarcl.simulation.spectral._azimuth_transfer import response_error, transfer_tables
+from sarcl.simulation.spectral._straight_track import straight_track, tangent
+
+
+def ones(sines, frequency):
+    return np.ones((1, len(sines)), np.complex128)
+
+
+def test_without_an_antenna_the_transform_is_a_hankel_function():
+    # the integral of exp(-j 2 k R) exp(-j u x) over an endless track is -pi r (2 k/kappa) H1^(2)(r kappa)
+    r, f = 500.0, 1e9
+    seen = aspects(-0.1, 0.1, (r, r * 1.0001), (0.98 * f, 1.02 * f), (-50.0, 50.0), 1e-5)
+    made = transfer_tables(seen, ones, 1, 1, 4)
+    k = float(wavenumber(made.frequencies[0]))
+    ratio = made.start + made.step * np.arange(made.tables.shape[-1])
+    inside = np.abs(ratio) < 0.08
+    u = 2 * k * ratio[inside]
+    kappa = np.sqrt(4 * k**2 - u**2)
+    hankel = scipy.special.hankel2e(1, r * kappa)  # times exp(+j r kappa)
+    wanted = -np.pi * r * (2 * k / kappa) * hankel * np.sqrt(seen.middle_range / r)
+    assert np.abs(made.tables[0, 0, 0, inside] / wanted - 1).max() < 2e-4
+
+
+@pytest.mark.parametrize("width", [0.004, 0.02])
+def test_stationary_phase_is_0_38_over_the_time_bandwidth_product_off(width):
+    # a Gaussian beam of full width at half maximum of `width` in sines; stationary phase: A = w(-u/2k) times a constant
+    r, f = 2000.0, 9.6e9
+    seen = aspects(-4 * width, 4 * width, (r, r * 1.0001), (f, 1.0001 * f), (-r, r), 1e-6)
+
+    def gaussian(sines, frequency):
+        return np.exp(-4 * np.log(2) * (sines / width) ** 2)[None].astype(complex)
+
+    made = transfer_tables(seen, gaussian, 1, 1, 4)
+    k = float(wavenumber(made.frequencies[0]))
+    ratio = made.start + made.step * np.arange(made.tables.shape[-1])
+    found = made.tables[0, 0, 0]
+    kappa = 2 * k * np.sqrt(1 - np.minimum(ratio**2, 0.9))
+    stationary = gaussian(-ratio, f)[0] * np.sqrt(2 * np.pi * seen.middle_range * 4 * k**2 / kappa**3)
+    stationary = stationary * np.exp(-0.25j * np.pi)
+    error = np.linalg.norm(stationary - found) / np.linalg.norm(found)
+    time_bandwidth = width * r * 2 * k * width / (2 * np.pi)  # extent along the track times bandwidth along it
+    assert error * time_bandwidth == pytest.approx(0.38, rel=0.1)
+
+
+def test_the_error_of_tables_is_that_of_their_responses():
+    line = straight_track(
+        sarcl.Trajectory.line(start=(0, 0, 0), velocity=(0, 100, 0), prf=250, n_pulses=200), 10e9, 1e-3
+    )
+    errors = []
+    for tolerance in (1e-2, 1e-3, 1e-4):
+        seen = aspects(-0.01, 0.01, (9900.0, 10100.0), (9.5e9, 9.7e9), (-100.0, 100.0), tolerance)
+        low, high = (10100.0 * float(tangent(s)) for s in seen.support)
+        made = transfer_tables(seen, ones, 1, 1, 4)
+        errors.append(response_error(made, ones, np.ones((1, 1)), line, (line.length - 100 + low, 100 + high)))
+        assert errors[-1] < 2 * tolerance
+    assert errors[2] < errors[0] / 10
+
+
+def test_sums_of_products_are_found_with_as_many_terms():
+    random = np.random.default_rng(0)
+    a = random.normal(size=(500, 3)) + 1j * random.normal(size=(500, 3))
+
+    def amplitudes(some, sine, frequency):
+        functions = np.stack([np.ones_like(sine + 0.0), np.asarray(sine) * 30, np.cos(np.asarray(sine) * frequency)])
+        return (a[some] * functions.T)[..., None].sum(axis=1)
+
+    def seen(some, random):
+        return random.uniform(-0.1, 0.1, len(some))
+
+    found = expand(amplitudes, np.ones(500), (-0.1, 0.1), (9.0, 11.0), seen, 1e-6, 1e-6)
+    assert len(found) == 3 and found.error < 1e-9
+    sines, some = np.linspace(-0.1, 0.1, 500), np.arange(500)
+    made = sum(found.factors(some, j)[:, 0] * found.functions(sines, 10.0)[j] for j in range(3))
+    assert np.allclose(made, amplitudes(some, sines, 10.0)[:, 0], atol=1e-9)
+    noise = random.normal(size=(500, 1000, 1)).astype(complex)
+
+    def unlike(some, sine, frequency):
+        return noise[some, np.broadcast_to((np.asarray(sine) * 4999).astype(int), some.shape)]
+
+    with pytest.raises(sarcl.ToleranceUnreachable, match="use echo"):
+        expand(unlike, np.ones(500), (-0.1, 0.1), (9.0, 11.0), seen, 1e-3, 1e-3)
