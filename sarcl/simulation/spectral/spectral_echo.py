@@ -104,6 +104,11 @@ def spectral_echo(
         instance("array", array, AntennaArray)
         if not is_single(array):
             raise NotApplicable("spectral_echo takes no arrays; use echo, which computes their channels")
+    if not track.stop_and_go:
+        raise NotApplicable(
+            "the track is that of an orbit, with the receiver where it is at the echo's arrival; spectral_echo is for "
+            "straight tracks, stop and go: use echo"
+        )
     opened = open_device(device)
     request = EchoRequest(
         opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
@@ -112,6 +117,7 @@ def spectral_echo(
     line = straight_track(track, waveform.center + waveform.bandwidth / 2, STRAIGHT * request.tolerance)
     tx = track.positions
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
+    _, _, motion = echo_sampling.in_flight(track, None, scene, point)
     reference_range = echo_sampling.half_path(tx, tx, point)
     original_scene, scene = scene, scene.realized(seed)
     weights = antenna_weights.weights_of(antenna, radar, track, None, waveform, scene.center)
@@ -165,6 +171,7 @@ def spectral_echo(
                     **largest.describe(),
                     **prepared.mesh_warnings,
                     **prepared.weights.describe(prepared.weight_error),
+                    **motion,
                 },
                 tolerance=request.tolerance,
                 predicted_error=error,

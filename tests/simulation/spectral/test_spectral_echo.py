@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from helpers.devices import opened, variants
@@ -147,6 +149,7 @@ def _bent():
         (_bent(), {}, r"pulse 1\d\d is 0.\d+ m from its place.*use echo"),
         (sarcl.Trajectory.line(prf=20, **LINE), {}, r"20 pulses per second, below the Doppler.*give prf=\d+.*use echo"),
         (TRACK.picked(slice(0, 1)), {}, "one pulse"),
+        (replace(TRACK, accelerations=np.zeros((300, 3)), stop_and_go=False), {}, r"of an orbit.*use echo"),
         (TRACK, {"range_window": (-5, 5)}, r"range_window \(-5, 5\) m cuts the scene.*use echo"),
         (TRACK, {"receiver": TRACK}, "use echo for a receiver"),
         (TRACK, {"array": sarcl.AntennaArray.linear(4, spacing=0.015, frequency_step=1e6)}, "no arrays; use echo"),
