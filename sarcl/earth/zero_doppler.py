@@ -18,7 +18,7 @@ States = Callable[[NDArray[np.float64]], tuple[NDArray[np.float64], NDArray[np.f
 
 COARSE = 60.0  # s: least time between zero-Doppler times of any orbit is half a revolution, 40 minutes
 PAIRS = 4_000_000  # of positions and coarse times that are examined at once
-DOUBT = 50e3  # m: ranges of passes that are told apart only after their zero-Doppler times are known
+DOUBT = 50e3  # m: of passes whose first ranges differ by less, all zero-Doppler times are computed
 EXACT = 1e-12  # s: below it, times follow the rounding of positions, 1e-9 m
 EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end
 LEAST_SPEED = 1.0  # m/s over the ground: below it there is no zero-Doppler plane

@@ -83,7 +83,7 @@ def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:
     if hidden(antennas, point).all():
         raise ValueError(
             f"the scene (longitude {longitude:.4f}, latitude {latitude:.4f}) is behind the horizon at every pulse; "
-            "Orbit.locate tells when the satellite passes it"
+            "Orbit.locate gives the times at which the satellite passes it"
         )
 
 

@@ -118,6 +118,7 @@ def test_bad_grids_on_terrain_are_refused():
 # geolocation on terrain
 
 
+@pytest.fixture(scope="module")
 def passing():
     """An orbit past (12.03, 41.98) at 850 km, and the time and range of positions there."""
     x = sarcl.wgs84.ecef(12.03, 41.98, 0.0)
@@ -137,42 +138,42 @@ def _seen(orbit, x, start):
     return ((orbit.positions(t) - x) @ up).max() > 2e5
 
 
-ORBIT, SIDE = passing()
-
-
-def test_positions_on_terrain_are_located_again_and_lie_at_its_height():
+def test_positions_on_terrain_are_located_again_and_lie_at_its_height(passing):
+    orbit, side = passing
     gentle = model(0.05 * hills(LON, LAT[:, None]) + 200)
     random = np.random.default_rng(2)
     lon, lat = random.uniform(12.01, 12.05, 60), random.uniform(41.97, 41.99, 60)
     x = sarcl.wgs84.ecef(lon, lat, gentle.heights_at(lon, lat))
-    t, r = ORBIT.locate(x)
-    back = ORBIT.geolocate(t, r, gentle, side=SIDE)
+    t, r = orbit.locate(x)
+    back = orbit.geolocate(t, r, gentle, side=side)
     assert np.linalg.norm(back - x, axis=1).max() < 1e-5
     there = sarcl.wgs84.geodetic(back)
     assert np.abs(there[2] - gentle.heights_at(there[0], there[1])).max() < 1e-6
     flat = model(np.full((41, 61), 321.0))
     level = sarcl.wgs84.ecef(lon, lat, 321.0)
-    t, r = ORBIT.locate(level)
-    assert np.abs(ORBIT.geolocate(t, r, flat, side=SIDE) - ORBIT.geolocate(t, r, 321.0, side=SIDE)).max() < 1e-6
+    t, r = orbit.locate(level)
+    assert np.abs(orbit.geolocate(t, r, flat, side=side) - orbit.geolocate(t, r, 321.0, side=side)).max() < 1e-6
 
 
-def test_of_a_layover_the_point_nearest_to_the_track_is_taken():
+def test_of_a_layover_the_point_nearest_to_the_track_is_taken(passing):
     """A mountain whose slope towards the radar is steeper than the look angle: three points lie at one range."""
+    orbit, side = passing
     ridge = 200 + 400 * np.exp(-(((LON - 12.03) / 0.003) ** 2)) + 0 * LAT[:, None]
     steep = model(ridge)
     top = sarcl.wgs84.ecef(12.03, 41.98, 600.0)
-    t, r = ORBIT.locate(top)
-    found = ORBIT.geolocate(t, r, steep, side=SIDE)
-    seen = ORBIT.view(t, np.stack([found, top]))
+    t, r = orbit.locate(top)
+    found = orbit.geolocate(t, r, steep, side=side)
+    seen = orbit.view(t, np.stack([found, top]))
     assert seen.slant_range == pytest.approx(np.array([r, r]), abs=1e-6) and abs(seen.squint[0]) < 1e-9
     assert seen.ground_range[0] < seen.ground_range[1] - 500  # the foot of the mountain, or before it
     lon, lat, height = sarcl.wgs84.geodetic(found)
     assert height == pytest.approx(float(steep.heights_at(lon, lat)), abs=1e-6)
 
 
-def test_ranges_beyond_the_model_name_where_it_ends():
-    t, r = ORBIT.locate(sarcl.wgs84.ecef([12.03, 12.3], 41.98, 300.0))
+def test_ranges_beyond_the_model_name_where_it_ends(passing):
+    orbit, side = passing
+    t, r = orbit.locate(sarcl.wgs84.ecef([12.03, 12.3], 41.98, 300.0))
     with pytest.raises(
         ValueError, match=r"slant range\[1\] = .* meets no terrain of the elevation model: near longitude"
     ):
-        ORBIT.geolocate(t, r, model(np.full((41, 61), 300.0)), side=SIDE)
+        orbit.geolocate(t, r, model(np.full((41, 61), 300.0)), side=side)
