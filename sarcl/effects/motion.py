@@ -143,6 +143,9 @@ def relative(
     if track.velocities is not None:
         seen = np.einsum("nij,nj->ni", back, track.velocities - v - a * t)
         changes["velocities"] = seen - np.cross(w, positions - c)
+        if track.accelerations is not None:
+            inertia = 2 * np.cross(w, changes["velocities"]) + np.cross(w, np.cross(w, positions - c))
+            changes["accelerations"] = np.einsum("nij,nj->ni", back, track.accelerations - a) - inertia
     if track.attitude is not None:
         changes["attitude"] = back @ track.attitude
     return replace(track, **changes)

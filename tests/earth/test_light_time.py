@@ -118,6 +118,18 @@ def test_a_processor_s_positions_arrive_too():
     assert np.abs(again.rx_velocity - raw.rx_velocity).max() < 1e-6
 
 
+def test_the_track_of_a_moving_target_has_its_accelerations():
+    track = ORBIT.trajectory(start=0.0, prf=10.0, n_pulses=21)
+    x = point_below()
+    body = dict(velocity=(30, -20, 5), acceleration=(0.3, 0.1, 0), rotation=(0.01, 0.02, 0.03), center=x, epoch=0.7)
+    moved = sarcl.motion.relative(track, **body)
+    for of, slope in ((moved.positions, moved.velocities), (moved.velocities, moved.accelerations)):
+        derived = (of[2:] - of[:-2]) / 0.2
+        assert np.abs(derived - slope[1:-1]).max() < 1e-4 * np.abs(slope).max()
+    raw = sarcl.echo(sarcl.Scene.points([x], [1.0]), CHIRP, moved, reference=x)
+    assert raw.report.plan["receiver"] == "at the echo's arrival" and raw.report.plan["stop_and_go_error_m"] < 1
+
+
 def test_scenes_that_the_track_never_sees_are_refused():
     track = ORBIT.trajectory(start=0.0, prf=500.0, n_pulses=5)
     with pytest.raises(ValueError, match=r"m under the ellipsoid, but .*Earth-fixed.*from_dem\(frame='ecef'\)"):
