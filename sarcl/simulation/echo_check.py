@@ -26,11 +26,17 @@ def draws_of(scene: SceneEchoes) -> int:
     return int(np.clip(np.sqrt(FACET_SAMPLES / max(n, 1)), FEWEST_DRAWS[n > MANY_FACETS], MOST_DRAWS))
 
 
+def seconds_to_check(scene: SceneEchoes) -> float:
+    """About the seconds that `measure_error` takes, on one core."""
+    points, facets = (0 if part is None else len(part) for part in (scene.points, scene.facets))
+    return MOST_DRAWS**2 * points * PER_POINT + draws_of(scene) ** 2 * facets * PER_FACET
+
+
 def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) -> bool:
     """Whether samples are to be recomputed: as asked, or where that takes less than 2 % of the time."""
-    points, facets = (0 if part is None else len(part) for part in (scene.points, scene.facets))
-    seconds = MOST_DRAWS**2 * points * PER_POINT + draws_of(scene) ** 2 * facets * PER_FACET
-    return check if check is not None else channels * seconds < 0.02 * scene.request.clock.seconds.get("echo", 0.0)
+    if check is not None:
+        return check
+    return channels * seconds_to_check(scene) < 0.02 * scene.request.clock.seconds.get("echo", 0.0)
 
 
 def measure_error(

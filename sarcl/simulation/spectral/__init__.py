@@ -14,6 +14,7 @@ For this folder alone:
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
     _spectral_part          points or facets: plan, and spectra along the track
     _spectral_samples       from spectra along the track to samples
+    _stationary_phase       the transfer function of SARAS, by stationary phase
     _straight_track         straight, evenly spaced tracks; azimuth and slant range of scatterers
 """
 

@@ -14,7 +14,7 @@ source  Goreinov, Tyrtyshnikov, Zamarashkin 1997, A theory of pseudoskeleton app
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -60,70 +60,82 @@ class AspectExpansion:
         return np.asarray(self.inverse @ made[np.arange(m), :, self.polarizations])
 
 
-def expand(
-    amplitudes: Amplitudes, size: np.ndarray, sines: tuple[float, float], band: tuple[float, float],
-    seen: Callable[[np.ndarray, np.random.Generator], np.ndarray], tolerance: float, asked: float,
-) -> AspectExpansion:  # fmt: skip
-    """The shortest expansion whose error is at most `tolerance`.
+class AmplitudeSamples:
+    """Random scatterers, and pairs of scatterer and pulse at which expansions are compared with the amplitudes."""
 
-    size    (n,) of the scatterers, such as areas: large ones are drawn more often
-    sines, band   limits of aspect and of frequency, Hz
-    seen    (scatterers (n,), random) -> sines (n,) at which random pulses of the track see them
-    asked   the whole tolerance, for the message
-    """
-    random = np.random.default_rng(0)
-    chance = 0.5 / len(size) + (0.5 * size / size.sum() if size.any() else np.full(len(size), 0.5 / len(size)))
-    chance /= np.sum(chance)
-    n = min(SCATTERERS, len(size))
-    some = np.sort(random.choice(len(size), n, replace=False, p=chance)) if n < len(size) else np.arange(n)
-    grid_s = np.linspace(*sines, ASPECTS)
-    grid_f = np.unique(np.linspace(*band, FREQUENCIES))
+    def __init__(
+        self, amplitudes: Amplitudes, size: np.ndarray, band: tuple[float, float],
+        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray],
+    ) -> None:  # fmt: skip
+        """size  (n,) of the scatterers, such as areas: large ones are drawn more often;  band  Hz, its limits
+        seen    (scatterers (n,), random) -> sines (n,) at which random pulses of the track see them
+        """
+        self.amplitudes, self.band = amplitudes, band
+        random = np.random.default_rng(0)
+        alike = np.full(len(size), 1 / len(size))
+        chance = 0.5 * (alike + (size / size.sum() if size.any() else alike))
+        chance /= np.sum(chance)
+        n = min(SCATTERERS, len(size))
+        self.some, self.which, self.share = np.arange(n), np.resize(np.arange(n), CHECKED), np.ones(CHECKED)
+        if n < len(size):
+            self.some = np.sort(random.choice(len(size), n, replace=False, p=chance))
+            self.which = random.choice(len(size), CHECKED, p=chance)
+            self.share = 1 / chance[self.which]
+        self.weight = 1 / np.sqrt(chance[self.some])
+        self.at = seen(self.which, random)
+        self.frequencies = random.uniform(*band, 4).tolist()
+        self.exact = np.stack([amplitudes(self.which, self.at, f) for f in self.frequencies])
+
+    def error(self, expansion: AspectExpansion) -> float:
+        """Relative error of an expansion, with a margin."""
+        factors = np.stack([expansion.factors(self.which, j) for j in range(len(expansion))], axis=-1)
+        wrong = right = 0.0
+        for f, exact in zip(self.frequencies, self.exact, strict=True):
+            guess = np.einsum("cpj,jc->cp", factors, expansion.functions(self.at, f))
+            wrong += float((self.share[:, None] * np.abs(guess - exact) ** 2).sum())
+            right += float((self.share[:, None] * np.abs(exact) ** 2).sum())
+        return SAFETY * float(np.sqrt(wrong / right)) if right else 0.0
+
+
+def expand(samples: AmplitudeSamples, sines: tuple[float, float], tolerance: float, asked: float) -> AspectExpansion:
+    """The shortest expansion between two sines whose error is at most `tolerance`; asked  the whole tolerance, for the
+    message."""
+    amplitudes, some = samples.amplitudes, samples.some
+    grid_s, grid_f = np.linspace(*sines, ASPECTS), np.unique(np.linspace(*samples.band, FREQUENCIES))
     columns = [(s, f) for f in grid_f.tolist() for s in grid_s.tolist()]
     made = np.stack([amplitudes(some, s, f) for s, f in columns], axis=-1)  # (n, polarizations, columns)
     n_pol = made.shape[1]
-    matrix = made.reshape(n * n_pol, len(columns)) / np.sqrt(np.repeat(chance[some], n_pol))[:, None]
-    order = _pivots(matrix, RANKS[-1])
-    which, share = some, np.ones(0)
-    if len(size) > n:
-        which = random.choice(len(size), CHECKED, p=chance)
-        share = 1 / chance[which]
-    else:
-        which = np.resize(some, CHECKED)
-        share = np.ones(CHECKED)
-    at = seen(which, random)
-    frequencies = random.uniform(*band, 4)
-    exact = np.stack([amplitudes(which, at, f) for f in frequencies.tolist()])
-    total = float((share[:, None] * np.abs(exact) ** 2).sum())
-    best = np.inf
-    for rank in RANKS:
-        rank = min(rank, len(order))
+    matrix = made.reshape(-1, len(columns)) * np.repeat(samples.weight, n_pol)[:, None]
+    order, best = _pivots(matrix, RANKS[-1]), np.inf
+    for rank in (min(rank, len(order)) for rank in RANKS):
         picked = order[:rank]
         rows = _pivots(matrix[:, picked].conj().T, rank)
-        core = made.reshape(n * n_pol, -1)[np.ix_(rows, picked)]
-        inverse = np.linalg.pinv(core, rcond=1e-10)
+        inverse = np.linalg.pinv(made.reshape(-1, len(columns))[np.ix_(rows, picked)], rcond=1e-10)
         sine_j, frequency_j = (np.array([columns[i][axis] for i in picked]) for axis in (0, 1))
-        # psi_j(s, f) = sum_i inverse[j, i] a_i(s, f)
-        found = AspectExpansion(
-            amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0
-        )  # fmt: skip
-        factors = np.stack([found.factors(which, j) for j in range(rank)], axis=-1)  # (checked, pol, J)
-        wrong = 0.0
-        for i, f in enumerate(frequencies.tolist()):
-            functions = found.functions(at, f)  # (J, checked)
-            guess = np.einsum("cpj,jc->cp", factors, functions)
-            wrong += float((share[:, None] * np.abs(guess - exact[i]) ** 2).sum())
-        error = SAFETY * float(np.sqrt(wrong / total)) if total else 0.0
+        found = AspectExpansion(amplitudes, sine_j, frequency_j, some[rows // n_pol], rows % n_pol, inverse, 0.0)
+        error = samples.error(found)
         best = min(best, error)
         if error <= tolerance:
-            return AspectExpansion(
-                amplitudes, sine_j, frequency_j, found.scatterers, found.polarizations, inverse, error
-            )
+            return replace(found, error=error)
         if rank == len(order):
             break
     raise ToleranceUnreachable(
         asked, None, "amplitudes that change along the track", "use echo, which computes them pulse by pulse",
-        how=f"by spectral_echo: {RANKS[-1]} functions of aspect leave {best:.1e} of these scatterers' amplitudes",
+        how=f"by spectral_echo: {len(order)} functions of aspect leave {best:.1e} of these scatterers' amplitudes",
     )  # fmt: skip
+
+
+def one_function(samples: AmplitudeSamples, sine: float) -> AspectExpansion:
+    """The expansion of SARAS: amplitudes at one sine, and the pattern of the strongest sampled scatterer for all."""
+    frequency = sum(samples.band) / 2
+    made = samples.amplitudes(samples.some, sine, frequency)
+    row, polarization = np.unravel_index(int(np.argmax(np.abs(made))), made.shape)
+    value = made[row, polarization]
+    found = AspectExpansion(
+        samples.amplitudes, np.array([sine]), np.array([frequency]), samples.some[[row]], np.array([polarization]),
+        np.array([[1 / value if value else 0.0]]), 0.0,
+    )  # fmt: skip
+    return replace(found, error=samples.error(found))
 
 
 def _pivots(matrix: np.ndarray, most: int) -> np.ndarray:

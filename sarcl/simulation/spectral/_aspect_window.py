@@ -108,3 +108,32 @@ class DopplerGrid:
 def wavenumber(frequency: float | np.ndarray) -> np.ndarray:
     """k = 2 pi f/c, rad/m."""
     return np.asarray(2 * np.pi * frequency / SPEED_OF_LIGHT)
+
+
+@dataclass(frozen=True, eq=False)
+class KnownPhase:
+    """The phase of responses along the track that is taken out before A is tabulated.
+
+    middle_range  r_c, m
+    paraxial      None: exact. k_0, rad/m: as SARAS approximates it, with parabolas over u; the range's share at the
+                  centre of the band alone (equations 27 and 34, signs of the numerical transform)
+    """
+
+    middle_range: float
+    paraxial: float | None = None
+
+    def ratio(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """The variable of the tables: u/2k, of SARAS u/2k_0."""
+        return np.asarray(u / (2 * (k if self.paraxial is None else self.paraxial + 0 * np.asarray(k))))
+
+    def kappa(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """Wavenumber over slant range, rad/m: sqrt(4 k^2 - u^2), of SARAS 2 k - u^2/4 k_0."""
+        if self.paraxial is None:
+            return np.asarray(np.sqrt(np.maximum(4 * np.square(k) - u**2, 1e-6)))
+        return np.asarray(2 * k - u**2 / (4 * self.paraxial))
+
+    def at_middle(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """Phase at the middle range, rad: -(sqrt(4 k^2 - u^2) - 2 k) r_c, of SARAS u^2 r_c/4 k."""
+        if self.paraxial is None:
+            return np.asarray(u**2 * self.middle_range / (self.kappa(u, k) + 2 * k))
+        return np.asarray(u**2 * self.middle_range / (4 * k))

@@ -13,14 +13,14 @@ over a few Fresnel zones: there the samples do not depend on it. docs/theory/spe
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...numerics.polynomials import chebyshev, lagrange
 from ...opencl import fft
-from ._aspect_window import Aspects, DopplerGrid, wavenumber
+from ._aspect_window import Aspects, DopplerGrid, KnownPhase, wavenumber
 from ._straight_track import StraightTrack, tangent
 
 # Ranges and frequencies of the tables, and width of their margins in Fresnel zones, that are tried one after the other.
@@ -37,10 +37,12 @@ Functions = Callable[[np.ndarray, float], np.ndarray]  # (sines (n,), frequency,
 class AzimuthTransfer:
     """Tables of A over u/2k = start + i step: complex128 (J, ranges, frequencies, n), for J amplitude functions.
 
+    phase                that is taken out of the responses, and the variable of the tables
     ranges, frequencies  m (Q,), Hz (M,): nodes;  error  relative, of responses made from the tables
     """
 
     aspects: Aspects
+    phase: KnownPhase
     ranges: np.ndarray
     frequencies: np.ndarray
     start: float
@@ -71,8 +73,8 @@ class AzimuthTransfer:
 
     def amplitude(self, term: int, node: int, frequency: float, u: np.ndarray) -> np.ndarray:
         """A of one function, by the table of one range, at wavenumbers u (n,): as the kernel interpolates it."""
-        k = wavenumber(frequency)
-        cell, z = self.positions(u / (2 * k))
+        k = float(wavenumber(frequency))
+        cell, z = self.positions(self.phase.ratio(u, k))
         weights = lagrange(np.array([-1.0, 0, 1, 2]), z)
         table = self.basis(np.array([frequency]))[:, 0] @ self.tables[term, node]
         made = sum(weights[i] * table[np.maximum(cell, 0) + i] for i in range(4))
@@ -84,7 +86,8 @@ def doppler_grid(transfer: AzimuthTransfer, track: StraightTrack, reach: tuple[f
     length = max(reach[1], track.length - reach[0]) + 2 * track.spacing
     n_lags = fft.good_length(int(np.ceil(length / track.spacing)))
     period = n_lags * track.spacing
-    ends = np.outer(2 * wavenumber(np.array(transfer.aspects.band)), transfer.limits) * period / (2 * np.pi)
+    k = wavenumber(np.array(transfer.aspects.band))
+    ends = np.outer(1 / transfer.phase.ratio(np.ones(2), k), transfer.limits) * period / (2 * np.pi)
     first = int(np.ceil(ends.min()))
     return DopplerGrid(period, n_lags, first, max(1, int(np.floor(ends.max())) - first + 1))
 
@@ -137,7 +140,7 @@ def transfer_tables(
                 folded = response.reshape(-1, n).sum(axis=0)[None]
                 tables[j, q, m] = fft.rows(None, folded)[0] * known
     assert tables is not None
-    return AzimuthTransfer(aspects, ranges, frequencies, start, step, tables)
+    return AzimuthTransfer(aspects, KnownPhase(middle), ranges, frequencies, start, step, tables)
 
 
 def plan_transfer(
@@ -154,7 +157,7 @@ def plan_transfer(
         error = SAFETY * response_error(made, functions, factors[:TESTED], track, reach)
         best = min(best, error)
         if error <= tolerance:
-            return AzimuthTransfer(aspects, made.ranges, made.frequencies, made.start, made.step, made.tables, error)
+            return replace(made, error=error)
     raise ToleranceUnreachable(
         asked, None, "transform along the track of beams with edges", "use echo",
         f"by spectral_echo: transfer functions leave {best:.1e} of the responses along the track",
@@ -177,8 +180,8 @@ def response_error(
             if n < 1:
                 continue
             lag = first + np.arange(n) * track.spacing
-            kappa = np.sqrt(np.maximum(4 * k * k - u * u, 1e-6))
-            known = np.exp(1j * (u * u / (kappa + 2 * k) * r + u * first)) / grid.period
+            turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - aspects.middle_range)
+            known = np.exp(1j * (turn + u * first)) / grid.period
             shares = made.range_weights(np.array([r]))[:, 0]
             tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
             terms = np.einsum("q,jqu->ju", shares, np.array(tables))

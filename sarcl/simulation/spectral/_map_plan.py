@@ -12,7 +12,7 @@ from ...numerics.error_bounds import FLOAT32
 from ...numerics.interpolation import Interpolator, interpolator
 from ...opencl import fft
 from ...opencl.device import Device
-from ._aspect_window import DopplerGrid, wavenumber
+from ._aspect_window import DopplerGrid, KnownPhase, wavenumber
 from ._azimuth_transfer import AzimuthTransfer
 
 KERNELS = ((6, 1.5), (6, 2.0), (8, 1.5), (8, 2.0), (8, 2.5))  # taps and oversampling that are tried, cheapest first
@@ -24,20 +24,20 @@ SAFE_CELLS = 4.0  # resolution cells over which scatterers that lie evenly may a
 class RangeWavenumbers:
     """kappa(u, f) about the centre of a band, and the shear of the map that takes out its slope over u.
 
-    middle_range  r_c, m;  u_c, kappa_c  rad/m;  slope  d kappa/d u;  spread  (lowest, highest) rest of kappa, rad/m
+    phase  that is known;  u_c, kappa_c  rad/m;  slope  d kappa/d u;  spread  (lowest, highest) rest of kappa, rad/m
     """
 
-    middle_range: float
+    phase: KnownPhase
     u_c: float
     kappa_c: float
     slope: float
     spread: tuple[float, float]
 
     def rest(self, u: np.ndarray, k: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-        """kappa less its value and slope at the centre, rad/m, and cycles of -(kappa - 2 k) r_c: (n_u, n_f) each."""
-        squared = u[:, None] ** 2
-        kappa = np.sqrt(np.maximum(4 * k**2 - squared, 1e-6))
-        cycles = squared * (self.middle_range / (2 * np.pi)) / (kappa + 2 * k)
+        """kappa less its value and slope at the centre, rad/m, and cycles of the phase at the middle range: (n_u, n_f)
+        each."""
+        kappa, cycles = self.phase.kappa(u[:, None], k), self.phase.at_middle(u[:, None], k)
+        cycles /= 2 * np.pi
         cycles -= np.rint(cycles)
         kappa -= (self.kappa_c + self.slope * (u - self.u_c))[:, None]
         return kappa, cycles
@@ -46,19 +46,19 @@ class RangeWavenumbers:
 def range_wavenumbers(transfer: AzimuthTransfer, grid: DopplerGrid) -> RangeWavenumbers:
     """kappa over all wavenumbers of a grid and frequencies of the band at which the transfer function is not 0."""
     u, k = grid.wavenumbers, wavenumber(np.linspace(*transfer.aspects.band, 9))
-    low, high = transfer.limits
-    u_c, k_c = float(2 * k[4] * (low + high) / 2), float(k[4])
+    phase, (low, high) = transfer.phase, transfer.limits
+    k_c = float(k[4])
+    u_c = float((low + high) / 2 / phase.ratio(np.ones(1), k_c)[0])
     u_c = float(u[np.argmin(np.abs(u - u_c))])
-    kappa_c = float(np.sqrt(4 * k_c**2 - u_c**2))
-    found = RangeWavenumbers(transfer.aspects.middle_range, u_c, kappa_c, -u_c / kappa_c, (0.0, 0.0))
+    kappa_c = float(phase.kappa(np.array([u_c]), k_c)[0])
+    slope = -u_c / (kappa_c if phase.paraxial is None else 2 * phase.paraxial)
+    found = RangeWavenumbers(phase, u_c, kappa_c, slope, (0.0, 0.0))
     rest = found.rest(u, k)[0]
-    ratio = u[:, None] / (2 * k)
+    ratio = phase.ratio(u[:, None], k)
     inside = (ratio >= low) & (ratio <= high)
     spread = (float(rest[inside].min()), float(rest[inside].max())) if inside.any() else (0.0, 0.0)
     middle = sum(spread) / 2
-    return RangeWavenumbers(
-        found.middle_range, u_c, kappa_c + middle, found.slope, (spread[0] - middle, spread[1] - middle)
-    )
+    return RangeWavenumbers(phase, u_c, kappa_c + middle, slope, (spread[0] - middle, spread[1] - middle))
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,8 +93,8 @@ def plan_map(
     for taps, oversample in KERNELS:
         kernel = interpolator(taps, oversample)
         spacing = 2 * np.pi / (oversample * band)
-        origin = int(np.ceil((numbers.middle_range - ranges[0]) / spacing)) + taps
-        rows = origin + int(np.ceil((ranges[1] - numbers.middle_range) / spacing)) + taps
+        origin = int(np.ceil((numbers.phase.middle_range - ranges[0]) / spacing)) + taps
+        rows = origin + int(np.ceil((ranges[1] - numbers.phase.middle_range) / spacing)) + taps
         rows = -(-rows // tile) * tile
         columns = tile * fft.good_length(int(np.ceil(max(oversample * grid.count, 4 * taps) / tile)))
         n_range = 2 * fft.good_length(int(np.ceil(oversample * max(origin, rows - origin))))

@@ -37,7 +37,7 @@ class ReflectivityMap:
         slant_range: np.ndarray,
     ) -> None:  # fmt: skip
         self.device, self.plan, self.numbers, self.grid = device, plan, numbers, grid
-        offset = slant_range - numbers.middle_range
+        offset = slant_range - numbers.phase.middle_range
         cycles = (numbers.u_c * azimuth + numbers.kappa_c * offset) / (2 * np.pi)
         cycles -= np.rint(cycles)
         row = offset / plan.spacing + plan.origin
@@ -140,7 +140,7 @@ class ReflectivityMap:
         for start in range(0, len(u), at_once):
             part = slice(start, min(start + at_once, len(u)))
             kappa, cycles = self.numbers.rest(u[part], k)
-            cell, cell_rest = transfer.positions(u[part, None] / (2 * k))
+            cell, cell_rest = transfer.positions(transfer.phase.ratio(u[part, None], k))
             kappa *= scale
             kappa -= (plan.kernel.taps - 1) / 2
             first = np.rint(kappa)

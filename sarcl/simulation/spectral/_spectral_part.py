@@ -3,26 +3,30 @@
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import NotApplicable
+from ...base.errors import NotApplicable, ToleranceUnreachable
+from ...base.tolerances import rounded_up
 from ...opencl.device import Device
-from ._aspect_expansion import AspectExpansion, expand
+from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_function
 from ._aspect_window import DopplerGrid, aspects
-from ._azimuth_transfer import AzimuthTransfer, doppler_grid, plan_transfer
+from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
+from ._azimuth_transfer import AzimuthTransfer, doppler_grid, plan_transfer, response_error
 from ._map_plan import MapPlan, RangeWavenumbers, plan_map, range_wavenumbers, tile_of
 from ._map_spectrum import ReflectivityMap
 from ._scatterer_amplitudes import ScattererAmplitudes
+from ._stationary_phase import stationary_tables
 from ._straight_track import StraightTrack, tangent
 
 # Shares of the tolerance: of amplitudes over aspect, transfer functions, what lies outside the beam, the grids.
 EXPANSION, TRANSFER, OUTSIDE, GRID = 0.35, 0.25, 0.15, 0.2
 STEEPEST = 0.95  # largest sine of the aspect: nearer to the track's direction the geometry degenerates
 PROFILE, DRAWN = 2048, 48  # aspects and scatterers from which the beam's extent is found
+MANY = 64  # scatterers, the strongest of which try the responses along the track
 HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
 MOST_DOPPLER = 64  # pulse repetition frequencies over which responses may spread in Doppler
 
@@ -51,7 +55,7 @@ class SpectralPart:
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
         return {
-            "method": "spectral, exact",
+            "method": "spectral, " + ("exact" if self.transfer.phase.paraxial is None else "saras"),
             "functions of aspect": len(self.expansion),
             "ranges": len(self.transfer.ranges),
             "frequencies": len(self.transfer.frequencies),
@@ -95,12 +99,13 @@ class SpectralPart:
 
 def plan_part(
     amplitudes: ScattererAmplitudes, track: StraightTrack, band: tuple[float, float], has_beam: bool,
-    is_random: bool, tolerance: float, asked: float, device: Device,
+    is_random: bool, variant: str, tolerance: float, asked: float, device: Device,
 ) -> SpectralPart:  # fmt: skip
     """The plan for points or facets whose error is at most `tolerance`.
 
-    band       Hz, lowest and highest sample;  has_beam  antennas limit the aspects at which scatterers are seen
-    is_random  the scatterers have random phases;  asked  the whole tolerance, for messages
+    variant    "exact" or "saras";  band  Hz, its limits
+    has_beam   antennas limit the aspects at which scatterers are seen;  is_random  scatterers have random phases
+    asked      the whole tolerance, for messages
     """
     low, high, outside, main = _aspects_seen(amplitudes, track, band, has_beam, OUTSIDE * tolerance)
     _check_doppler(track, band[1], main, has_beam)
@@ -111,18 +116,30 @@ def plan_part(
     def seen(some: np.ndarray, random: np.random.Generator) -> np.ndarray:
         return np.clip(amplitudes.sines(random.integers(0, track.n_pulses, len(some)) * track.spacing, some), low, high)
 
-    expansion = expand(amplitudes, amplitudes.size, (low, high), band, seen, EXPANSION * tolerance, asked)
+    samples = AmplitudeSamples(amplitudes, amplitudes.size, band, seen)
+    if variant == "saras":
+        expansion = one_function(samples, float(np.clip(0.0, *main)))
+    else:
+        expansion = expand(samples, (low, high), EXPANSION * tolerance, asked)
     azimuth, ranges = amplitudes.azimuth, amplitudes.slant_range
     lags = -float(azimuth.max()), track.length - float(azimuth.min())
     seen_aspects = aspects(low, high, (nearest, farthest), band, lags, TRANSFER * tolerance / 3)
     ends = [azimuth + ranges * float(tangent(end)) for end in seen_aspects.support]
     some = np.flatnonzero((ends[0] <= track.length) & (ends[1] >= 0))
     reach = float(ends[0][some].min()), float(ends[1][some].max())
-    factors = np.stack([expansion.factors(some[:: max(1, len(some) // 4)][:4], j) for j in range(len(expansion))], -1)
-    strongest = np.abs(factors).sum(axis=(0, 2)).argmax()
-    transfer = plan_transfer(
-        seen_aspects, expansion.functions, factors[:, strongest], track, reach, TRANSFER * tolerance, asked
-    )
+    drawn = some[np.linspace(0, len(some) - 1, min(len(some), MANY)).astype(int)]
+    factors = np.stack([expansion.factors(drawn, j) for j in range(len(expansion))], axis=-1)
+    factors = factors[:, np.abs(factors).sum(axis=(0, 2)).argmax()]
+    factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
+    if variant == "saras":
+        transfer = stationary_tables(seen_aspects, expansion.functions)
+        error = RESPONSE_SAFETY * response_error(transfer, expansion.functions, factors[:1], track, reach)
+        _check_saras(expansion.error, error, outside, (1 - GRID) * tolerance, asked)
+        transfer = replace(transfer, error=error)
+    else:
+        transfer = plan_transfer(
+            seen_aspects, expansion.functions, factors, track, reach, TRANSFER * tolerance, asked
+        )  # fmt: skip
     grid = doppler_grid(transfer, track, reach)
     numbers = range_wavenumbers(transfer, grid)
     per_cell = _per_cell(azimuth[some], ranges[some], grid, numbers)
@@ -130,6 +147,18 @@ def plan_part(
         GRID * tolerance, numbers, grid, (nearest, farthest), 0.0 if is_random else per_cell, tile_of(device), asked
     )
     return SpectralPart(amplitudes, some, expansion, transfer, grid, numbers, made, outside)
+
+
+def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allowed: float, asked: float) -> None:
+    """ToleranceUnreachable where SARAS's approximations exceed their share of the tolerance."""
+    error = of_amplitudes + of_transfer + outside
+    if error > allowed:
+        best = rounded_up(1.05 * asked * error / allowed)
+        raise ToleranceUnreachable(
+            asked, best if best < 1 else None, "SARAS's transfer function", "take variant='exact', or echo",
+            "by variant='saras': stationary phase, parabolas and the grid deformation differ from the responses along "
+            f"the track by {of_transfer:.1e}, amplitudes of one aspect by {of_amplitudes:.1e}",
+        )  # fmt: skip
 
 
 def _aspects_seen(

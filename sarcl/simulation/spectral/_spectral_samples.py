@@ -60,7 +60,9 @@ class SpectralSamples:
         folded = part.grid.folded(np.ascontiguousarray(spectra.T))
         made = fft.rows(self.device, folded, inverse=True)[:, : self.line.n_pulses].T
         # the spectra's phases count from the middle range of the part
-        return np.asarray(made * (self._turns(part.numbers.middle_range, frequencies) / np.float32(part.grid.period)))
+        return np.asarray(
+            made * (self._turns(part.numbers.phase.middle_range, frequencies) / np.float32(part.grid.period))
+        )
 
     def _turns(self, middle_range: float, frequencies: np.ndarray) -> np.ndarray:
         """exp(-j 4 pi f (middle range - first reference range)/c), complex64 (n_f,)."""

@@ -31,17 +31,19 @@ from ...scattering import antenna_weights
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo import Polarization, polarization_names, vertical_direction
-from ..echo_check import measure_error
+from ..echo_check import measure_error, seconds_to_check
 from ..echo_output import EchoOutput
 from ..scene_echoes import EchoRequest, Progress, SceneEchoes, parts_of, prepare_scene
 from ..spreading import Counts
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
 from ._spectral_samples import SpectralSamples
+from ._stationary_phase import chirp_ripple
 from ._straight_track import StraightTrack, straight_track
 
 SKIPS = ("zero reflectivity", "facing away", "range window")
 STRAIGHT = 0.05  # share of the tolerance: phase errors, rad, of a track that is not quite straight
+QUICK_CHECK = 1.0  # s, for the exact sums of the check
 WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range window that was asked for
 
 
@@ -50,7 +52,7 @@ def spectral_echo(
     waveform: Waveform,
     track: Trajectory,
     *,
-    variant: Literal["exact"] = "exact",
+    variant: Literal["exact", "saras"] = "exact",
     receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
@@ -63,11 +65,12 @@ def spectral_echo(
     seed: int = 0,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     compressed: bool = True,
+    ripple: bool = False,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     out: PathLike | None = None,
     tolerance: float = 1e-2,
-    check: bool = True,
+    check: bool | None = None,
     device: DeviceChoice | None = None,
     progress: Progress | None = None,
 ) -> PhaseHistory:
@@ -78,14 +81,19 @@ def spectral_echo(
 
     variant     "exact": no approximation but those that the tolerance bounds. The response of a scatterer along the
                 track is transformed numerically, with the antenna's pattern, squint and range migration
+                "saras": the paper's transfer function and grid deformation, by stationary phase, with amplitudes as
+                seen from broadside: for comparison, it is no faster
     track       a straight line of evenly spaced pulses (Trajectory.line), with one attitude for all pulses where there
                 is an antenna (pointing.stripmap). Its PRF must be at least the Doppler bandwidth: of the scene without
                 an antenna, or of the beam between its half-power directions
     receiver, array   not supported: None
     range_window      must hold every scatterer at every pulse that sees it
+    ripple      multiply by the Fresnel ripples of the spectrum of a rectangular chirp (SARAS's function d), which
+                `echo` leaves out
     max_bytes   memory for blocks of the map and its spectra; smaller blocks take longer
     tolerance   L2 error of the samples, as in `echo`
-    check       recompute samples at 16 random pulses exactly, fewer above 20 000 facets: report.measured_error
+    check       recompute samples at 16 random pulses exactly, fewer above 20 000 facets: report.measured_error; None:
+                where that takes about a second at most
 
     Other arguments: see `echo`. Raises NotApplicable, a ValueError, for tracks, receivers, arrays and windows that it
     cannot take, ToleranceUnreachable, a ValueError, for tolerances: both name `echo`. ToleranceMissed, ValueError,
@@ -94,10 +102,12 @@ def spectral_echo(
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
-    choice("variant", variant, ("exact",))
+    choice("variant", variant, ("exact", "saras"))
     seed = count("seed", seed, 0)
     if not isinstance(shadows, (bool, np.bool_)):
         choice("shadows", shadows, ("embree",))
+    if ripple and waveform.kind != "chirp":
+        raise ValueError(f"ripple is that of a rectangular chirp's spectrum, and the waveform is a {waveform.kind}")
     if receiver is not None:
         raise NotApplicable("spectral_echo is for one antenna that transmits and receives; use echo for a receiver")
     if array is not None:
@@ -133,8 +143,10 @@ def spectral_echo(
         request.report("scene", 0, 3)
         prepared = prepare_scene(request, original_scene, scene, waveform, antennas, weights, (), tiled=False)
         spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * prepared.weights.factor(frequencies)
+        if ripple:
+            spectrum = spectrum * chirp_ripple(waveform, frequencies)
         band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-        parts, error = _parts(prepared, scene, line, band)
+        parts, error = _parts(prepared, scene, line, band, variant)
         if range_window is not None and request.gated:
             for part in parts:
                 _check_window(part, line, reference_range, (near, far))
@@ -142,7 +154,7 @@ def spectral_echo(
         samples = SpectralSamples(opened, request, parts, line, reference_range, frequencies, spectrum)
         samples.compute(output)
         measured = None
-        if check:
+        if check if check is not None else seconds_to_check(prepared) <= QUICK_CHECK:
             measured = measure_error(prepared, antennas, frequencies, spectrum, output)
             request.clock.lap("check")
         seen = sum(len(part.some) for part in parts)
@@ -188,7 +200,7 @@ def spectral_echo(
 
 
 def _parts(
-    prepared: SceneEchoes, scene: Scene, line: StraightTrack, band: tuple[float, float]
+    prepared: SceneEchoes, scene: Scene, line: StraightTrack, band: tuple[float, float], variant: str
 ) -> tuple[list[SpectralPart], float]:
     """Plans for the points and the facets of a scene, and the predicted error of their sum."""
     request, out, errors = prepared.request, [], []
@@ -203,8 +215,8 @@ def _parts(
             random = not prepared.facets.is_mirror
         amplitudes = ScattererAmplitudes(part, prepared.weights, line, request.polarizations, request.vertical)
         made = plan_part(
-            amplitudes, line, band, prepared.weights.pair is not None, random, share / gain - fixed - straight,
-            request.tolerance, request.device,
+            amplitudes, line, band, prepared.weights.pair is not None, random, variant,
+            share / gain - fixed - straight, request.tolerance, request.device,
         )  # fmt: skip
         out.append(made)
         errors.append(gain * (made.predicted_error + fixed + straight))

@@ -7,7 +7,7 @@ import pytest
 import scipy.special
 
 import sarcl
-from sarcl.simulation.spectral._aspect_expansion import expand
+from sarcl.simulation.spectral._aspect_expansion import AmplitudeSamples, expand
 from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import response_error, transfer_tables
 from sarcl.simulation.spectral._straight_track import straight_track, tangent
@@ -78,7 +78,8 @@ def test_sums_of_products_are_found_with_as_many_terms():
     def seen(some, random):
         return random.uniform(-0.1, 0.1, len(some))
 
-    found = expand(amplitudes, np.ones(500), (-0.1, 0.1), (9.0, 11.0), seen, 1e-6, 1e-6)
+    samples = AmplitudeSamples(amplitudes, np.ones(500), (9.0, 11.0), seen)
+    found = expand(samples, (-0.1, 0.1), 1e-6, 1e-6)
     assert len(found) == 3 and found.error < 1e-9
     sines, some = np.linspace(-0.1, 0.1, 500), np.arange(500)
     made = sum(found.factors(some, j)[:, 0] * found.functions(sines, 10.0)[j] for j in range(3))
@@ -89,4 +90,4 @@ def test_sums_of_products_are_found_with_as_many_terms():
         return noise[some, np.broadcast_to((np.asarray(sine) * 4999).astype(int), some.shape)]
 
     with pytest.raises(sarcl.ToleranceUnreachable, match="use echo"):
-        expand(unlike, np.ones(500), (-0.1, 0.1), (9.0, 11.0), seen, 1e-3, 1e-3)
+        expand(AmplitudeSamples(unlike, np.ones(500), (9.0, 11.0), seen), (-0.1, 0.1), 1e-3, 1e-3)

@@ -40,7 +40,7 @@ def test_the_spectrum_is_the_sum_over_the_scatterers(task):
     whole = slice(0, held.grid.count)
     out = np.zeros((held.grid.count, 7), np.complex64)
     held.add(held.over_azimuth(b, whole, 1e9), whole, transfer.tables[0, 0], transfer, f, out)
-    middle, u = held.numbers.middle_range, held.grid.wavenumbers
+    middle, u = held.numbers.phase.middle_range, held.grid.wavenumbers
     for i, k in enumerate(wavenumber(f).tolist()):
         kappa = np.sqrt(4 * k**2 - u**2)
         wanted = twin.map_spectrum(b, azimuth, slant_range - middle, u, kappa)
