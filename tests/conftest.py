@@ -3,22 +3,41 @@
 from __future__ import annotations
 
 import os
+from collections import defaultdict
 from pathlib import Path
 
 import pytest
-from helpers.devices import opened, variants
+from helpers.devices import ALONE, TWINS, opened, variants
 
 
 def pytest_collection_modifyitems(config, items):
-    """Leave out repeated tests on twins of devices: these run every value of every parameter with quick partners."""
-    left_out = [item for item in items if item.get_closest_marker("repeated") and _on_a_twin(item)]
+    """Leave out tests on twins of devices.
+
+    Repeated tests run on no twin: twins run every value of every parameter with its quick partners. Of the twins that
+    only the slow tests have, each runs every other combination of a test's values, so that the two share them; a single
+    combination runs on both.
+    """
+    left_out, combinations = set(), defaultdict(list)
+    for item in items:
+        twin = _twin(item)
+        if twin and item.get_closest_marker("repeated"):
+            left_out.add(item)
+        elif twin in ALONE:
+            combinations[item.parent.nodeid, item.originalname, twin].append(item)
+    for (*_, twin), found in combinations.items():
+        if len(found) > 1:
+            left_out.update(found[1 - ALONE.index(twin) :: 2])
     if left_out:
-        config.hook.pytest_deselected(items=left_out)
-        items[:] = [item for item in items if item not in set(left_out)]
+        config.hook.pytest_deselected(items=list(left_out))
+        items[:] = [item for item in items if item not in left_out]
 
 
-def _on_a_twin(item):
-    return any(name in ("device", "double") and value and value[1] for name, value in item.callspec.params.items())
+def _twin(item):
+    """The name of the twin in TWINS that a test of the fixtures `device` and `double` runs on, if any."""
+    params = item.callspec.params if hasattr(item, "callspec") else {}
+    if not any(name in ("device", "double") and value and value[1] for name, value in params.items()):
+        return None
+    return next(name for name in TWINS if f"-{name}" in item.callspec.id)
 
 
 @pytest.fixture(params=variants())

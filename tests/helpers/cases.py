@@ -59,14 +59,17 @@ def image_error(image, raw, *, most=None, among=None, exact=exact_image, **model
     return float(np.linalg.norm(np.asarray(image.data).ravel()[at] - wanted) / (scale or 1.0))
 
 
-def thinned(first, second, every=2):
-    """Every pair of two lists as parameters, its tuples flattened; the quick ones lie `every` apart along both lists.
+def thinned(first, second, every=2, slow=None):
+    """Pairs of two lists as parameters, their tuples flattened; the quick ones lie `every` apart along both lists.
 
     Each value has quick partners, so each formula and kernel that one of them chooses is run, on each device and its
-    twins. The other pairs are REPEATED.
+    twins. The other pairs are REPEATED: all of them, or those that lie as far from a quick one as `slow` lists.
     """
-    pairs = [(i + j, (*_tuple(a), *_tuple(b))) for i, a in enumerate(first) for j, b in enumerate(second)]
-    return [pytest.param(*values, marks=REPEATED if at % every else []) for at, values in pairs]
+    slow = range(1, every) if slow is None else slow
+    pairs = [((i + j) % every, *_tuple(a), *_tuple(b)) for i, a in enumerate(first) for j, b in enumerate(second)]
+    return [
+        pytest.param(*values, marks=REPEATED if away else []) for away, *values in pairs if away == 0 or away in slow
+    ]
 
 
 def _tuple(value):

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import functools
+
 import pytest
 
 from sarcl.opencl.choose_device import REMEDY, open_device
@@ -14,9 +16,10 @@ TWINS = {
     "no-fp64": ("without_fp64",),
     "one-lane": ("one_lane",),
 }
+ALONE = ("no-fp64", "one-lane")  # the twins that run with -m slow only
 
 
-def variants(names=TWINS, slow=("no-fp64", "one-lane"), fp64=False):
+def variants(names=TWINS, slow=ALONE, fp64=False):
     """Parameters of a fixture that hands each to `opened`: every working device, and its twins of these names.
 
     slow  twins that run with `-m slow` only;  fp64  keep what has float64 only
@@ -35,8 +38,9 @@ def variants(names=TWINS, slow=("no-fp64", "one-lane"), fp64=False):
     return found or [pytest.param(None, id="none")]
 
 
+@functools.cache
 def opened(param):
-    """The open device of a parameter."""
+    """The open device of a parameter. Tests share it, so that each kernel is built once per process."""
     if param is None:
         pytest.fail(f"no OpenCL device works. {REMEDY}")
     index, methods = param

@@ -7,7 +7,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import noise_history, thinned
+from helpers.cases import REPEATED, noise_history, thinned
 
 import sarcl
 from sarcl.base.stage_timer import Clock
@@ -89,7 +89,7 @@ def test_a_spotlight_is_aimed_at_the_grids_centre(device):
 
 @pytest.mark.parametrize(
     "lanes, bistatic, tolerance",
-    thinned([(True, False), (False, False), (False, True), (True, True)], [1e-1, 1e-3, 1e-5]),
+    thinned([(True, False), (False, False), (False, True), (True, True)], [1e-1, 1e-3, 1e-5], every=3, slow=(1,)),
 )
 def test_both_kernels_see_the_same_beam_and_window(lanes, tolerance, bistatic):
     raw = noise_history(n_rows=33, n_samples=32, bistatic=bistatic)  # a swath of +-4 m
@@ -181,7 +181,7 @@ def looked_at(chosen, task):
     return engine._coverage(next(chosen.tiling.sections(parts, chosen.plan.factors)).roots)
 
 
-@pytest.mark.parametrize("listed", [False, pytest.param(True, marks=pytest.mark.slow)], ids=["plane", "points"])
+@pytest.mark.parametrize("listed", [False, pytest.param(True, marks=REPEATED)], ids=["plane", "points"])
 def test_sub_apertures_merge_rows_that_see_a_tile_whole_and_add_the_others_directly(device, listed):
     # a beam 130 m wide passes over the scene: every tile sees some pulses whole, some in part, some not at all
     raw, beam = strip_history(n=900, n_samples=256, length=260.0), (spread(10e3, 130.0), BROADSIDE)

@@ -19,7 +19,7 @@ WAYS = [
 ]  # fmt: skip
 
 
-@pytest.mark.parametrize("options, tolerance", thinned(WAYS, [1e-2, 1e-4, 1e-6], every=3))
+@pytest.mark.parametrize("options, tolerance", thinned(WAYS, [1e-2, 1e-4, 1e-6], every=3, slow=(1,)))
 def test_every_way_to_send_and_receive(options, tolerance, device):
     array, track = line(5, spacing=0.4), passing(6)
     receivers = 5 if options.get("receive") == "all" else 1

@@ -45,6 +45,7 @@ def echo_error(raw, positions, amplitudes):
         [(False, 50.0), (True, 10e3), (False, 800e3), (True, 50.0), (False, 10e3), (True, 800e3)],
         [1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6],
         every=6,
+        slow=(1, 2),  # with the quick ones: every distance, and every kind of track, with every tolerance
     ),
 )
 def test_error_is_below_prediction_and_prediction_below_tolerance(device, distance, tolerance, bistatic):
