@@ -73,7 +73,8 @@ def hold_at_a_thousand_and(n, method, device):
     [
         ("direct", 200_000),
         ("factorized", 50_000),
-        *(pytest.param(method, 1_000_000, marks=SLOW) for method in ("direct", "factorized")),
+        pytest.param("direct", 1_000_000, marks=SLOW),
+        pytest.param("factorized", 250_000, marks=SLOW),
     ],
 )
 def test_the_error_does_not_grow_with_the_number_of_pulses(method, n):
@@ -81,8 +82,8 @@ def test_the_error_does_not_grow_with_the_number_of_pulses(method, n):
 
 
 @SLOW
-def test_a_million_pulses_on_every_device(device):
-    hold_at_a_thousand_and(1_000_000, "direct", device)
+def test_the_error_does_not_grow_with_the_number_of_pulses_on_any_device(device):
+    hold_at_a_thousand_and(200_000, "direct", device)
 
 
 def test_a_point_120_db_below_its_neighbour_is_seen_at_1e_7():
