@@ -21,7 +21,9 @@ PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(9, 11), spacing=(0.9, 0.7
 
 @pytest.mark.parametrize(
     "distance, tolerance, bistatic",
-    thinned([1.0, 30.0, 10e3, 800e3, 36e6], [(1e-7, False), (1e-9, True), (1e-9, False), (1e-8, True)], every=4),
+    thinned(
+        [1.0, 30.0, 10e3, 800e3, 36e6], [(1e-7, False), (1e-9, True), (1e-9, False), (1e-8, True)], every=4, slow=(2,)
+    ),
 )
 def test_error_is_below_prediction_and_prediction_below_tolerance(double, distance, tolerance, bistatic):
     raw = noise_history(n_rows=7, distance=distance, bistatic=bistatic)
@@ -232,12 +234,12 @@ def random_case(seed):
 def test_random_cases_keep_the_contract():
     device, seen = open_device(), 0
     assert device.info.fp64
-    for seed in range(200):
+    for seed in range(60):
         raw, grid, tolerance, wrap = random_case(seed)
         data, plan, _ = focus(raw, grid, tolerance, device, wrap=wrap)
-        picked = np.random.default_rng(0).permutation(grid.size)[:40]
+        picked = np.random.default_rng(0).permutation(grid.size)[:20]
         wanted, spread = decimal_image(raw, grid.positions.reshape(-1, 3)[picked], wrap)
         wrong, scale = np.linalg.norm(data.ravel()[picked] - wanted), max(np.linalg.norm(wanted), spread)
         assert wrong <= plan.predicted_error * scale and plan.predicted_error <= tolerance, f"seed {seed}"
         seen += scale > 0
-    assert seen > 100
+    assert seen > 30

@@ -246,7 +246,7 @@ def test_what_only_moves_the_image_is_left_alone(points):
     assert at == pytest.approx((0, -1.5, 0), abs=0.1 * CELL) or at == pytest.approx((0, 1.5, 0), abs=0.1 * CELL)
 
 
-@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 5))])
+@pytest.mark.parametrize("seed", [0, *(pytest.param(k, marks=pytest.mark.slow) for k in range(1, 3))])
 def test_noise_comes_back_as_it_was_and_the_estimate_says_so(points, seed):
     random = np.random.default_rng(seed)
     shape = points.samples.shape
@@ -361,7 +361,7 @@ def test_gotcha_with_ten_radians_comes_back(gotcha):
 @pytest.mark.slow
 @pytest.mark.parametrize(
     "modes, seed, scale",
-    [(3, 0, "rms"), (8, 1, "rms"), (20, 2, "rms"), (3, 2, "peak"), (8, 0, "peak"), (20, 1, "peak")],
+    [(3, 0, "rms"), (8, 1, "peak"), (20, 2, "rms")],
 )
 def test_gotcha_with_any_ten_radians_comes_back(gotcha, modes, seed, scale):
     scene = sarcl.ImageGrid.plane(shape=(500, 500), spacing=0.2)
@@ -377,9 +377,9 @@ def test_gotcha_as_it_is_does_not_suffer(gotcha):
 
 @pytest.mark.slow
 def test_an_aperture_of_46_degrees_is_grown_from_its_core():
-    n, side, extent = 700, 16.0, np.radians(46)
+    n, side, extent = 450, 10.0, np.radians(46)
     truth = echoes(*scatterers(40, side=side, seed=6), arc(n, extent=extent), bandwidth=600e6, n_samples=160)
-    grid = sarcl.ImageGrid.plane(shape=(800, 800), spacing=side / 800)
+    grid = sarcl.ImageGrid.plane(shape=(500, 500), spacing=side / 500)
     better, errors = sarcl.autofocus(disturbed(truth, smooth(n, 1, rms=10)), grid)
     assert errors.found
     assert_as_sharp(better, truth, grid=grid)
