@@ -26,6 +26,7 @@ from .imaging.compress import compress as compress
 from .imaging.forecast import Forecast as Forecast
 from .imaging.forecast import plan as plan
 from .imaging.polar_format.polar_format import polar_format as polar_format
+from .imaging.range_doppler.range_doppler import range_doppler as range_doppler
 from .model import pointing as pointing
 from .model import radar as radar
 from .model.antenna import Antenna as Antenna

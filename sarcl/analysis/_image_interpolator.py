@@ -125,8 +125,7 @@ def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[floa
         frequency = np.abs(np.fft.fftfreq(len(density)))
         bands.append(float(frequency[density > FALL * density.max()].max()))
         if bands[-1] > BAND:
-            assert image.grid.spacing is not None
-            spacing = image.grid.spacing[axis]
+            spacing = image.grid.spacing_at(row, column)[axis]
             raise ValueError(
                 f"the grid is coarser than the resolution: at a {name} spacing of {spacing:g} m the response "
                 f"fills +-{bands[-1]:.2f} of +-0.5 cycles per pixel, more than +-{BAND}; focus again with a "

@@ -68,7 +68,7 @@ class PointResponse:
 
 
 def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
-    """Position, resolution and side lobes of one point of a complex image on a plane.
+    """Position, resolution and side lobes of one point of a complex image on a plane, or by `range_doppler`.
 
     image  with frequency (Hz) and tx, rx (m; rx None is tx); only the data that are needed are read
     near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it
@@ -87,8 +87,7 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
     row, column = brightest(image) if near is None else peak_near(image, near)
     axes = _axes(image, row, column)
     interpolated = ImageInterpolator.about(image, row, column)
-    assert image.grid.spacing is not None
-    step = min(image.grid.spacing) / 4
+    step = min(image.grid.spacing_at(row, column)) / 4
     position = _ascend(interpolated, image.grid.at(row, column), axes, step)
 
     def cut(axis: np.ndarray, name: str) -> _Cut:
@@ -120,7 +119,7 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
 def _check(image: Image) -> None:
     if not image.is_complex:
         raise ValueError("the image is detected (multilooked), without phase; measure the complex image")
-    if not image.grid.is_plane:
+    if not image.grid.is_plane and image.grid.times is None:
         raise ValueError("the grid lists its points; cuts need rows and columns: focus on an ImageGrid.plane")
     wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
     for name, what in wanted.items():
@@ -130,7 +129,7 @@ def _check(image: Image) -> None:
 
 def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     """Unit vectors of range and cross-range on the plane, at a pixel."""
-    normal = image.grid.normal
+    normal = image.grid.normal_at(row, column)
     point = image.grid.at(row, column)
     gradient = -np.sum([validation.direction("antenna less point", end - point) for end in antennas(image)], axis=0)
     along = gradient - (gradient @ normal) * normal

@@ -1,4 +1,4 @@
-"""backproject(), polar_format(): from a phase history to an image.
+"""backproject(), polar_format(), range_doppler(): from a phase history to an image.
 
 For other folders:
 
@@ -15,6 +15,7 @@ For other folders:
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
     polar_format/    polar_format(): plane wavefronts and one two-dimensional FFT
+    range_doppler/   range_doppler(): FFTs along the track and in range, for near-straight tracks
     run/             the work in blocks: devices, checkpoints, output files
     tiling/          a grid in tiles, the tiles in bands: one class for each kind of grid
 """
@@ -33,6 +34,7 @@ __all__ = [
     "forecast",
     "polar_format",
     "profile_energy",
+    "range_doppler",
     "run",
     "tiling",
 ]

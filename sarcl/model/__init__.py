@@ -20,6 +20,7 @@ For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
     _dates            dates in UTC to seconds since an epoch
+    _listed_surface   positions between the points of a listed grid, and indices of positions
     _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
 """
 

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
+from . import _listed_surface
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
@@ -29,6 +30,8 @@ class ImageGrid:
     center, spacing, x_axis, y_axis   of a plane: pixel [i, j] lies at
              center + (i - shape[0]//2) spacing[0] y_axis + (j - shape[1]//2) spacing[1] x_axis
     listed   positions of any points, m shape + (3,), or None; NaN in all three where a cell is empty
+    times, ranges   zero-Doppler times of the rows, s, and slant ranges of the columns, m, where `range_doppler` listed
+             the points; else None
     """
 
     shape: tuple[int, ...]
@@ -37,11 +40,13 @@ class ImageGrid:
     x_axis: NDArray[np.float64] | None = None
     y_axis: NDArray[np.float64] | None = None
     listed: NDArray[np.float64] | None = None
+    times: NDArray[np.float64] | None = None
+    ranges: NDArray[np.float64] | None = None
 
     def __post_init__(self) -> None:
         if (self.listed is None) == (self.spacing is None):
             raise ValueError("a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points")
-        for name in ("center", "x_axis", "y_axis", "listed"):
+        for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges"):
             value = getattr(self, name)
             if value is not None and value.flags.writeable:
                 made = (
@@ -142,6 +147,22 @@ class ImageGrid:
             raise ValueError("bounds, heights, geoid and nodata are for files; an ElevationModel has been read already")
         return cls.points(dem.grid_positions((steps[0], steps[1]), frame, center))
 
+    @classmethod
+    def zero_doppler(cls, times: ArrayLike, ranges: ArrayLike, positions: ArrayLike) -> ImageGrid:
+        """Positions, m (rows, columns, 3), by zero-Doppler time, s (rows,), and slant range, m (columns,).
+
+        Both axes must be evenly spaced: ValueError where they are not, or do not fit the positions.
+        """
+        made = cls.points(positions)
+        axes = []
+        for name, value, n in (("times", times, made.shape[0]), ("ranges", ranges, made.shape[-1])):
+            axis = validation.array(name, value, np.float64, (n,))
+            steps = np.diff(axis)
+            if not (steps > 0).all() or (n > 2 and np.ptp(steps) > 1e-6 * steps.mean()):
+                raise ValueError(f"{name} must increase in even steps; give one per row (times) or column (ranges)")
+            axes.append(axis)
+        return replace(made, times=axes[0], ranges=axes[1])
+
     @property
     def is_plane(self) -> bool:
         """Whether the grid was made by `plane`."""
@@ -198,6 +219,23 @@ class ImageGrid:
         """Positions, m (..., 3), of the pixels at whole indices into an image."""
         return self.at(*index) if self.listed is None else self.listed[index]
 
+    def normal_at(self, row: int, column: int) -> NDArray[np.float64]:
+        """Unit normal (3,) at a pixel of a plane, or of a grid that `zero_doppler` made."""
+        if self.is_plane:
+            return self.normal
+        i, j = np.clip([row, column], 0.5, np.array(self.shape) - 1.5)
+        here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
+        across = np.cross(here[2] - here[3], here[0] - here[1])
+        return np.asarray(across / np.linalg.norm(across))
+
+    def spacing_at(self, row: int, column: int) -> tuple[float, float]:
+        """Distance to the next row and column, m, at a pixel of a plane, or of a grid that `zero_doppler` made."""
+        if self.spacing is not None:
+            return self.spacing
+        i, j = np.clip([row, column], 0.5, np.array(self.shape) - 1.5)
+        here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
+        return float(np.linalg.norm(here[0] - here[1])), float(np.linalg.norm(here[2] - here[3]))
+
     @property
     def normal(self) -> NDArray[np.float64]:
         """Unit normal of a plane (3,)."""
@@ -222,7 +260,9 @@ class ImageGrid:
         return np.stack([p.min(axis=0), p.max(axis=0)])
 
     def at(self, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
-        """Position, m (..., 3), of (fractional) pixel indices of a plane."""
+        """Position, m (..., 3), of (fractional) pixel indices of a plane, or of a grid that `zero_doppler` made."""
+        if self.times is not None and self.listed is not None:
+            return _listed_surface.at(self.listed, np.asarray(row), np.asarray(column))
         self._need_plane("at")
         assert self.center is not None and self.spacing is not None
         assert self.y_axis is not None and self.x_axis is not None
@@ -231,7 +271,9 @@ class ImageGrid:
         return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
 
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
-        """Fractional (row, column) of positions, m (..., 3), projected on a plane: (..., 2)."""
+        """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on a plane or a `zero_doppler` grid."""
+        if self.times is not None and self.listed is not None:
+            return _listed_surface.index(self.listed, np.asarray(position))
         self._need_plane("index")
         assert (
             self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None

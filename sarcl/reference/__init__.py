@@ -17,6 +17,7 @@ For other folders:
     merge          profiles about a tile's centre, and their decimation
     polar_format   the image of plane waves
     quality        a point response by brute force
+    range_doppler  reading of a profile along the range migration
     shadow         which samples of facets are hidden
     spectral_echo  spectrum of a reflectivity map, and the steps of its grid
 """
@@ -33,6 +34,7 @@ __all__ = [
     "merge",
     "polar_format",
     "quality",
+    "range_doppler",
     "shadow",
     "spectral_echo",
 ]

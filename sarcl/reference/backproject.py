@@ -17,12 +17,13 @@ def backproject(
     wrap: bool = False,
     beam: tuple[float, np.ndarray] | None = None,
     edge: float = 0.0,
+    share: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """I(x) = sum_p v_p(x) sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3).
 
     v_p(x) is 1 in the range window and in the beam: (full angle, rad, and directions, (3,) or (n_rows, 3), from tx).
     Points nearer than `edge` to the edge of a window (relative to half of it) or beam (rad) come out NaN: rounding
-    may put them on either side.
+    may put them on either side. share (n, n_rows): weights of rows in each point, such as those of a tapered beam.
 
     Returns I complex128 (n,) and the norm it would have if contributions had random phases.
     """
@@ -52,7 +53,7 @@ def backproject(
         step = (raw.frequency_step[p] * delay) % 1
         high, low = (np.exp(2j * np.pi * (step.astype(np.float64)[:, None] * n)) for n in digits)
         sums = np.einsum("pa,ab,pb->p", high, np.pad(samples, (0, padding)).reshape(-1, width), low)
-        profile = np.exp(2j * np.pi * first.astype(np.float64)) * sums * seen
+        profile = np.exp(2j * np.pi * first.astype(np.float64)) * sums * seen * (1 if share is None else share[:, p])
         image += profile
         power += abs(profile) ** 2
     image[~clear] = np.nan

@@ -1,0 +1,18 @@
+"""Range-Doppler: images of near-straight tracks by FFTs along the track and in range.
+
+For other folders:
+
+    range_doppler   range_doppler(): the image, and its error against backprojection
+
+For this folder alone:
+
+    _doppler        Doppler band that an image needs, Doppler centroid
+    _extent         rows and columns of the image, the range window and the pulse rate they need
+    _focus          the work: azimuth FFT, secondary range compression, migration, azimuth compression
+    _ground         positions at zero-Doppler times and slant ranges, at a height or on an elevation model
+    _plan           rows, columns, Doppler bins, range blocks and the predicted error
+    _track          an evenly sampled smooth track
+    _velocity       ranges from a track to points as hyperbolas: effective velocity at several slant ranges
+"""
+
+__all__ = ["range_doppler"]

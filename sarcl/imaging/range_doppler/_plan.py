@@ -1,0 +1,176 @@
+"""Rows, columns, Doppler bins and range blocks of a range-Doppler image, and its predicted error."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import ToleranceUnreachable
+from ...base.tolerances import rounded_up
+from ...model.phase_history import PhaseHistory
+from ...numerics.interpolation import Interpolator, choose_interpolator
+from ...opencl import fft
+from ._doppler import STEEPEST, Band, delay
+from ._extent import Extent
+from ._track import Track
+from ._velocity import Hyperbolas
+
+SEGMENT = 64  # columns along which positions and phases of a Doppler bin are linear
+ROUNDING = 4e-6  # relative error of complex64 FFTs and float32 phases
+INTERPOLATION, COMPRESSION = 0.4, 0.5  # shares of the tolerance that the other errors leave
+# Root mean squares over a band of a phase that grows with the square of the frequency from its middle, and of the
+# square of that phase, relative to those at its ends: 1/sqrt(5), 1/3, and some room for the phase's cubic part.
+QUADRATIC, QUARTIC = 0.5, 0.4
+
+
+@dataclass(frozen=True, eq=False)
+class FocusPlan:
+    """How an image is made.
+
+    times, ranges   zero-Doppler times of the rows, s, and slant ranges of the columns, m; times lie step/finer apart
+    band            Doppler band, as sines of squint angles
+    fit             effective velocity by slant range
+    length          rows of the azimuth FFT;  bins  numbers of the Doppler bins, in steps of 1/(length step) Hz
+    blocks          first and last column + 1 of range blocks. A single block has one secondary range compression,
+                    that of its middle; with several, each is interpolated between those of its ends
+    interpolator, profile_length   of range profiles;  center  their delay 0, m
+    errors          predicted relative errors by cause
+    """
+
+    times: np.ndarray
+    ranges: np.ndarray
+    finer: int
+    band: Band
+    fit: Hyperbolas
+    length: int
+    bins: np.ndarray
+    blocks: tuple[tuple[int, int], ...]
+    interpolator: Interpolator
+    profile_length: int
+    center: float
+    errors: dict[str, float]
+
+    @property
+    def predicted_error(self) -> float:
+        """Sum of the errors by cause."""
+        return float(sum(self.errors.values()))
+
+    def describe(self) -> dict[str, Any]:
+        """The plan in words and numbers, for a report."""
+        return {
+            "method": "range-Doppler",
+            "Doppler bins": f"{len(self.bins)} of an FFT of {self.length}",
+            "range blocks": len(self.blocks),
+            "taps": self.interpolator.taps,
+            "profiles": self.profile_length,
+        }
+
+
+def band_frequencies(raw: PhaseHistory) -> np.ndarray:
+    """Frequencies of the samples, Hz (n_samples,)."""
+    return np.asarray(raw.frequency[0] + np.arange(raw.n_samples) * raw.frequency_step[0])
+
+
+def curved(frequencies: np.ndarray, center: float, bend: np.ndarray) -> np.ndarray:
+    """sqrt(f^2 - b^2) less its value and slope at the centre frequency, Hz, without cancellation; arrays broadcast.
+
+    With g = f - fc and a^2 = fc^2 - b^2 it is -(g b/a)^2 / (sqrt(f^2 - b^2) + a + g fc/a).
+    """
+    a = np.sqrt(center**2 - bend**2)
+    g = frequencies - center
+    return np.asarray(-((g * bend / a) ** 2) / (np.sqrt(frequencies**2 - bend**2) + a + g * center / a))
+
+
+def make_plan(
+    raw: PhaseHistory, track: Track, extent: Extent, fit: Hyperbolas, model_error: float, tolerance: float
+) -> FocusPlan:  # fmt: skip
+    """The plan for a tolerance; ToleranceUnreachable names the best there is.
+
+    model_error  root mean square phase error of the hyperbolas, rad
+    """
+    times, ranges = extent.times, extent.ranges
+    band, fixed = extent.band, model_error + ROUNDING
+    errors = {"hyperbolic ranges": model_error, "rounding": ROUNDING, "ends of the Doppler band": band.error}
+    spare = tolerance - fixed - band.error
+    if spare <= 0.2 * tolerance:
+        best = rounded_up(2 * fixed)
+        limit = "rounding of complex64" if model_error < ROUNDING else "the track's ranges, which are no hyperbolas"
+        raise ToleranceUnreachable(
+            tolerance, best if best < 1 else None, limit, "use backproject, which takes any track"
+        )
+    frequencies = band_frequencies(raw)
+    center = float(frequencies[raw.n_samples // 2])
+    steepest = max(abs(s) for s in extent.band.ends)
+    if steepest > STEEPEST:
+        raise ValueError(
+            f"points are seen up to {np.degrees(np.arcsin(min(1.0, steepest))):.3g} degrees from broadside, too near "
+            "to the direction of flight for range_doppler; use backproject"
+        )
+    interpolator, profile_length, _ = choose_interpolator(INTERPOLATION * spare, raw.n_samples, float(len(ranges)))
+    errors["interpolation in range"] = interpolator.error
+    speeds = fit.at(ranges)[0]
+    slow, fast = float(speeds.min()), float(speeds.max())
+    blocks, error = _blocks(frequencies, center, fit, band, ranges, COMPRESSION * spare, tolerance)
+    errors["secondary range compression"] = error
+    low, high = band.ends
+    reach = [delay(low, ranges[-1 if low < 0 else 0], slow if low < 0 else fast),
+             delay(high, ranges[-1 if high > 0 else 0], slow if high > 0 else fast)]  # fmt: skip
+    first, last = times[0] - track.stop, times[-1] - track.start
+    span = max(reach[1] - first, last - reach[0])
+    length = fft.good_length(int(np.ceil(span / track.step)) + 16)
+    doppler = [2 * v * s * f / SPEED_OF_LIGHT for v in (slow, fast) for s in (low, high) for f in frequencies[[0, -1]]]
+    scale = length * track.step
+    bins = np.arange(int(np.floor(min(doppler) * scale)), int(np.ceil(max(doppler) * scale)) + 1)
+    return FocusPlan(
+        times, ranges, extent.finer, band, fit, length, bins, blocks, interpolator, profile_length,
+        float(ranges.mean()), errors,
+    )  # fmt: skip
+
+
+def _blocks(
+    frequencies: np.ndarray,
+    center: float,
+    fit: Hyperbolas,
+    band: Band,
+    ranges: np.ndarray,
+    allowed: float,
+    tolerance: float,
+) -> tuple[tuple[tuple[int, int], ...], float]:
+    """The fewest range blocks whose secondary range compression has an error of at most `allowed`, and that error.
+
+    One filter has the error psi, the phase at the ends of the band by which the ranges at both ends of the swath differ
+    from its middle; linear interpolation between the filters of a block's ends has psi^2/8, psi their difference.
+    """
+    n = len(ranges)
+    one = QUADRATIC * max(_lacking(frequencies, center, fit, band, ranges[[n // 2, i]]) for i in (0, -1))
+    if one <= allowed:
+        return ((0, n),), one
+    error = np.inf
+    for count in sorted({int(2 ** (i / 2)) for i in range(2, 17)}):
+        edges = np.linspace(0, n, min(count, n) + 1).astype(int)
+        blocks = tuple((int(a), int(b)) for a, b in pairwise(edges))
+        error = QUARTIC / 8 * max(
+            _lacking(frequencies, center, fit, band, ranges[[a, min(b, n - 1)]]) ** 2 for a, b in blocks
+        )  # fmt: skip
+        if error <= allowed:
+            return blocks, error
+    raise ToleranceUnreachable(
+        tolerance, None,
+        "secondary range compression of so wide a swath at this squint",
+        "give ranges=(near, far) of a part of it, or use backproject",
+    )  # fmt: skip
+
+
+def _lacking(frequencies: np.ndarray, center: float, fit: Hyperbolas, band: Band, ranges: np.ndarray) -> float:
+    """Largest difference, rad, between the secondary range compressions of two ranges (2,) at the ends of the bands."""
+    speeds = fit.at(ranges)[0]
+    bends = np.array(band.ends)[:, None] * center
+    phases = [
+        4 * np.pi / SPEED_OF_LIGHT * r * curved(frequencies[[0, -1]], center, bends * speeds[0] / v)
+        for r, v in zip(ranges, speeds, strict=True)
+    ]
+    return float(np.abs(phases[1] - phases[0]).max())

@@ -1,0 +1,354 @@
+"""Range-Doppler images: equal to backprojection within the tolerance; points as theory says; refusals."""
+
+from __future__ import annotations
+
+import warnings
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.cases import image_error, noise_on
+
+import sarcl
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.imaging.range_doppler._focus import _Bins
+from sarcl.imaging.range_doppler._plan import curved
+from sarcl.numerics.interpolation import interpolator
+from sarcl.numerics.range_profiles import correction, from_samples
+from sarcl.reference.range_doppler import straighten
+
+SPEED = 100.0
+
+
+def flown(n=200, aperture=90.0, squint=0.0, distance=4e3, climb=0.0):
+    """Positions, m (n, 3), and times, s, of a straight flight past the origin, which is on its right."""
+    along = aperture * (np.arange(n) / (n - 1) - 0.5)
+    y = along + 0.7 * distance * np.tan(squint)
+    tx = np.stack([np.full(n, -0.7 * distance), y, 0.714 * distance + climb * along], axis=1)
+    return tx, np.linspace(0, aperture * np.hypot(1, climb) / SPEED, n)
+
+
+def noise(n_samples=80, seed=0, bandwidth=150e6, **track):
+    tx, time = flown(**track)
+    return noise_on(tx, n_samples=n_samples, bandwidth=bandwidth, seed=seed, time=time)
+
+
+def points(places, n_samples=200, bandwidth=300e6, reference=None, **track):
+    """Echoes of unit points from a formula, not from `sarcl.echo`."""
+    tx, time = flown(**track)
+    frequency = 9.6e9 - bandwidth / 2 + np.arange(n_samples) * bandwidth / n_samples
+    reference = np.linalg.norm(tx, axis=1) if reference is None else np.full(len(tx), reference)
+    samples = np.zeros((len(tx), n_samples), complex)
+    for place in places:
+        path = 2 * (np.linalg.norm(tx - place, axis=1) - reference)
+        samples += np.exp(-2j * np.pi * np.outer(path, frequency) / SPEED_OF_LIGHT)
+    return sarcl.PhaseHistory(
+        samples, frequency=frequency[0], frequency_step=bandwidth / n_samples, tx=tx, reference_range=reference,
+        time=time,
+    )  # fmt: skip
+
+
+def hold(raw, tolerance, **options):
+    image = sarcl.range_doppler(raw, tolerance=tolerance, check=False, **options)
+    error = image_error(image, raw, most=100)
+    print(f"{error:.1e} of {image.report.predicted_error:.1e}")
+    assert error <= image.report.predicted_error <= tolerance
+    return image
+
+
+TRACKS = {
+    "broadside": {},
+    "forward": {"squint": -0.5, "n": 300},
+    "backward": {"squint": 0.3, "n": 300},
+    "climbing": {"climb": 0.1},
+    "short": {"aperture": 12.0, "n": 40},
+    "far": {"distance": 60e3, "aperture": 300.0},
+}
+
+
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3, 1e-4])
+@pytest.mark.parametrize("track", TRACKS)
+def test_the_image_is_that_of_backproject(track, tolerance):
+    hold(noise(**TRACKS[track]), tolerance)
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-4])
+def test_the_image_is_that_of_backproject_on_every_device(device, tolerance):
+    hold(noise(squint=0.3), tolerance, device=device)
+
+
+def test_any_reference_range_will_do():
+    raw = noise()
+    hold(replace(raw, reference_range=np.full(raw.n_rows, 4e3)), 1e-3)
+    hold(replace(raw, reference_range=raw.reference_range + np.linspace(-3, 3, raw.n_rows)), 1e-3)
+
+
+def test_weights_and_windows_are_those_of_backproject():
+    raw = noise(n=120, aperture=40.0)
+    raw = replace(raw, weight=np.linspace(0.5, 1, 120))
+    options = {"window": ("taylor", 35, 5), "weights": np.arange(120) % 4 / 3.0}
+    image = sarcl.range_doppler(raw, tolerance=1e-3, check=True, **options)
+    assert image.report.measured_error <= image.report.predicted_error
+    exact = sarcl.backproject(raw, image.grid, tolerance=1e-4, **options)
+    assert np.linalg.norm(image.data - exact.data) <= 1e-3 * np.linalg.norm(exact.data)
+    assert image.gain == pytest.approx(exact.gain, rel=1e-12)
+    assert image.frequency == pytest.approx(exact.frequency, rel=1e-12)
+
+
+@pytest.mark.parametrize("squint", [0.0, 0.4])
+def test_a_point_is_where_and_as_sharp_as_theory_says(squint):
+    place = np.array([4.0, -6.0, 0.0])
+    raw = points([place], squint=squint, n=400)
+    image = sarcl.range_doppler(raw, tolerance=1e-3)
+    grid = sarcl.ImageGrid.plane(center=place, shape=(121, 121), spacing=0.2)
+    seen, oracle = (sarcl.measure(im, near=place) for im in (image, sarcl.backproject(raw, grid, tolerance=1e-4)))
+    tx = raw.tx - place
+    level = np.median(np.linalg.norm(tx[:, :2], axis=1) / np.linalg.norm(tx, axis=1))
+    along = np.unwrap(np.arctan2(tx[:, 1], tx[:, 0]))
+    theory = (
+        0.886 * SPEED_OF_LIGHT / (2 * 300e6) / level,
+        0.886 * SPEED_OF_LIGHT / 9.6e9 / (2 * np.ptp(along) * 400 / 399) / level,
+    )
+    print(seen.position - place, seen.irw, theory, seen.pslr)
+    assert np.linalg.norm(seen.position - place) <= 0.01 * min(theory)
+    assert np.linalg.norm(seen.position - oracle.position) <= 1e-3 * min(theory)
+    assert seen.irw == pytest.approx(oracle.irw, rel=1e-3)
+    assert seen.pslr == pytest.approx(oracle.pslr, abs=0.02)
+    if not squint:  # there the spectrum is a rectangle along range and cross-range
+        assert seen.irw == pytest.approx(theory, rel=0.01)
+        assert seen.pslr == pytest.approx((-13.26, -13.26), abs=0.1)
+    # gain and phase: a unit point has the value image.gain at its position
+    index, axes = image.grid.index(place), (image.grid.times, image.grid.ranges)
+    times, ranges = (np.interp(i, np.arange(len(a)), a) for i, a in zip(index, axes, strict=True))
+    part = sarcl.range_doppler(raw, tolerance=1e-3, times=(times, times + 0.1), ranges=(ranges, ranges + 2))
+    assert np.linalg.norm(part.grid.listed[0, 0] - place) < 1e-6
+    assert part.data[0, 0] == pytest.approx(part.gain, rel=2e-3)
+
+
+def test_the_grid_knows_its_positions():
+    raw = noise(squint=0.2, climb=0.1)
+    image = sarcl.range_doppler(raw, heights=7.0)
+    grid = image.grid
+    assert grid.positions.shape == (*image.data.shape, 3) and (grid.times.size, grid.ranges.size) == image.data.shape
+    velocity = (raw.tx[-1] - raw.tx[0]) / raw.time[-1]
+    antenna = raw.tx[0] + grid.times[:, None] * velocity
+    away = grid.positions - antenna[:, None]
+    assert np.abs(away @ velocity).max() <= 1e-6 * SPEED  # zero Doppler
+    assert np.linalg.norm(away, axis=2) == pytest.approx(np.broadcast_to(grid.ranges, image.data.shape), abs=1e-8)
+    assert grid.positions[..., 2] == pytest.approx(np.full(image.data.shape, 7.0), abs=1e-8)
+    assert (grid.positions[..., 0] > raw.tx[0, 0]).all()  # the side where the origin is
+    other = sarcl.range_doppler(raw, heights=7.0, side="left")
+    assert (other.grid.positions[..., 0] < raw.tx[0, 0]).all()
+    assert np.linalg.norm(other.data - image.data) <= 1e-5 * np.linalg.norm(image.data)
+    here = np.array([[3.25, 8.5], [40.0, 20.0]])
+    assert grid.index(grid.at(*here.T)) == pytest.approx(here, abs=1e-6)
+
+
+def test_times_ranges_and_spacing_are_as_asked():
+    raw = noise()
+    middle = float(np.sqrt(0.7**2 + 0.714**2)) * 4e3
+    image = hold(raw, 1e-3, times=(0.35, 0.55), ranges=(middle - 8, middle + 6), spacing=(1e-3, 0.5))
+    assert image.grid.ranges[[0, -1]] == pytest.approx([middle - 8, middle + 6])
+    assert image.grid.times[0] == pytest.approx(0.35) and image.grid.times[-1] <= 0.55 + 1e-9
+    interval = raw.time[1] - raw.time[0]
+    steps = interval / np.diff(image.grid.times)
+    assert steps == pytest.approx(np.full(len(steps), np.ceil(interval / 1e-3)))
+
+
+def test_an_image_is_saved_and_read(tmp_path):
+    image = sarcl.range_doppler(noise(n=60, aperture=20.0))
+    image.save(tmp_path / "image.h5")
+    image.save(tmp_path / "image.png")
+    again = sarcl.read(tmp_path / "image.h5")
+    assert (np.asarray(again.data) == image.data).all()
+    assert (again.grid.times == image.grid.times).all() and (again.grid.ranges == image.grid.ranges).all()
+    assert (again.grid.positions == image.grid.positions).all()
+
+
+def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
+    raw = points([(0, 0, 0), (5, 60, 0)], aperture=400.0, n=500, reference=4e3)
+    with pytest.raises(ValueError, match=r"PRF|pulse rate.*124\.\d+ Hz, is below the Doppler bandwidth.*beam="):
+        sarcl.range_doppler(raw)
+    image = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, check=True, ranges=(3985, 4025))
+    assert image.report.measured_error <= image.report.predicted_error
+    for place in ((0, 0, 0), (5, 60, 0)):
+        row = int(np.argmin(np.abs(raw.tx[:, 1] - place[1])))  # each point has its own aperture, and carrier
+        seen = sarcl.measure(replace(image, tx=raw.tx[row], rx=None), near=place)
+        assert np.linalg.norm(seen.position - place) <= 0.05
+        assert abs(seen.peak) == pytest.approx(image.gain, rel=0.03)
+    rows = 0.015 * 4e3 / 400 * 500  # within the beam; each taper has half its width of rows
+    assert 200 * rows < image.gain < 200 * 2 * rows
+    assert "Hz of a pixel, PRF 124.7" in image.report.plan["Doppler band"]
+
+
+@pytest.mark.parametrize("squint", [0.0, 0.3])
+def test_the_centroid_is_estimated_from_the_data(squint):
+    raw = points([(x, y, 0) for x in (-6, 0, 5) for y in (-4, 3)], squint=squint, n=300)
+    wanted = -2 * 9.6e9 / SPEED_OF_LIGHT * SPEED * np.sin(np.arctan(0.7 * np.tan(squint)))
+    for doppler in ("geometry", "data"):
+        plan = sarcl.range_doppler(raw, doppler=doppler, check=False).report.plan
+        assert float(plan["Doppler centroid"].split()[0]) == pytest.approx(wanted, abs=10)
+    # a constant reference tells nothing; the data do
+    fixed = points([(0, 0, 0)], squint=0.02, n=300, reference=4e3)
+    wanted = -2 * 9.6e9 / SPEED_OF_LIGHT * SPEED * np.sin(np.arctan(0.7 * np.tan(0.02)))
+    found = {d: sarcl.range_doppler(fixed, doppler=d).report.plan["Doppler centroid"] for d in ("geometry", "data")}
+    assert float(found["geometry"].split()[0]) == 0
+    assert float(found["data"].split()[0]) == pytest.approx(wanted, abs=3)
+
+
+def test_profiles_are_read_as_the_twin_says(device):
+    raw = noise(n=40, aperture=10.0, n_samples=50)
+    random = np.random.default_rng(2)
+    for taps in (2, 4, 6, 8):
+        kernel = interpolator(taps, 2.0)
+        bins = _Bins.__new__(_Bins)
+        plan = type("Plan", (), {"profile_length": 100})
+        bins.device, bins.plan, bins.pad = device, plan, 200
+        bins.kernel = device.kernel("range_doppler.cl", "straighten", TAPS=taps, TERMS=kernel.terms, SEGMENT=64)
+        bins.table = device.upload(kernel.table)
+        profiles = from_samples(device, raw.samples[:5], correction(kernel, 50, 100).astype(np.float32), 100, 200)
+        cell = random.integers(-50, 50, (5, 2)).astype(np.int32)
+        line = random.uniform(-0.5, 0.5, (5, 2, 4)).astype(np.float32)
+        bins._lines = lambda doppler, ranges, made=(cell, line): made
+        made = bins._straightened(profiles, np.zeros(5), np.zeros(100))
+        column = np.arange(64)
+        for q in range(5):
+            wanted = np.concatenate(
+                [
+                    straighten(profiles[q], 250 + cell[q, k] + a + b * column, c + d * column, kernel)
+                    for k, (a, b, c, d) in enumerate(line[q].astype(np.float64))
+                ]
+            )[:100]
+            assert np.linalg.norm(made[q] - wanted) <= 1e-5 * np.linalg.norm(wanted)
+
+
+def test_the_curved_part_of_the_root_does_not_cancel():
+    frequency, bend = 9.6e9 + np.linspace(-1e8, 1e8, 5), np.array([[1e6], [4e9]])
+    wide, b = frequency.astype(np.longdouble), bend.astype(np.longdouble)
+    center = np.longdouble(9.6e9)
+    a = np.sqrt(center**2 - b**2)
+    wanted = np.sqrt(wide**2 - b**2) - a - (wide - center) * center / a
+    assert curved(frequency, 9.6e9, bend) == pytest.approx(wanted.astype(float), rel=1e-6, abs=1e-9)
+
+
+def test_bytes_do_not_change_the_image_and_too_few_are_refused():
+    raw = noise(n=100, n_samples=20000, aperture=30.0)
+    cut = {"ranges": (3990.0, 4010.0), "times": (0.1, 0.2)}
+    whole = sarcl.range_doppler(raw, check=False, **cut)
+    less = sarcl.range_doppler(raw, check=False, max_bytes=1.2e6, **cut)
+    assert np.linalg.norm(whole.data - less.data) <= 1e-6 * np.linalg.norm(whole.data)
+    with pytest.raises(MemoryError, match="raise max_bytes"):
+        sarcl.range_doppler(noise(n=20, n_samples=200000, aperture=6.0), max_bytes=1e6, **cut)
+
+
+def test_progress_of_range_doppler_is_reported_up_to_its_end():
+    said = []
+    sarcl.range_doppler(noise(n=60, aperture=20.0), progress=lambda *a: said.append(a), check=False)
+    stages, done, totals = zip(*said, strict=True)
+    assert set(stages) == {"range Doppler"} and set(totals) == {1000}
+    assert list(done) == sorted(done) and done[-1] == 1000
+
+
+def test_an_image_wider_than_the_pulse_rate_allows_is_warned_of():
+    raw = points([(0, 0, 0)], aperture=90.0, n=140)
+    with pytest.warns(sarcl.SarclWarning, match=r"more than the pulse rate.*again .* m along the track"):
+        sarcl.range_doppler(raw, times=(-0.3, 1.2), check=False)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        sarcl.range_doppler(raw, check=False)
+
+
+AROUND = np.array([-1.0, 1.0])
+ORBIT = sarcl.Orbit.kepler(7.171e6, 0.001, 1.72, span=(-60, 60))
+
+
+def seen_from_orbit(n=160, prf=1000.0, width=0.0):
+    """Echoes of a point 200 m above the ellipsoid, and it: C band, 850 km."""
+    track = ORBIT.trajectory(start=0.0, prf=prf, n_pulses=n)
+    place = ORBIT.geolocate(n / prf / 2, 1e6, heights=200.0, side="right")
+    chirp = sarcl.Waveform.chirp(center=5.4e9, bandwidth=60e6, duration=10e-6)
+    scene = sarcl.Scene.points([place])
+    return sarcl.echo(scene, chirp, track, range_window=(-width, width), tolerance=1e-4, check=False), place
+
+
+def test_an_orbit_is_focused_with_its_effective_velocity():
+    raw, place = seen_from_orbit(n=300, width=300.0)
+    assert not raw.is_monostatic  # the receiver moves on while the pulse is on its way
+    image = sarcl.range_doppler(raw, side="right", heights=200.0, tolerance=5e-3)
+    seen = sarcl.measure(image, near=place)
+    speed = np.linalg.norm(ORBIT.velocities(0.15))
+    hertz = 2 * 5.4e9 / SPEED_OF_LIGHT * speed
+    print(image.report.plan["effective velocity"], speed, seen)
+    assert 0.93 * speed < float(image.report.plan["effective velocity"].split()[0]) < 0.97 * speed
+    assert np.linalg.norm(seen.position - place) <= 0.02
+    assert seen.pslr == pytest.approx((-13.26, -13.26), abs=0.1)
+    assert abs(seen.peak) == pytest.approx(image.gain, rel=2e-3) and abs(np.angle(seen.peak)) < 0.02
+    rate = ORBIT.view(0.15, place).doppler_rate(5.4e9)
+    assert float(image.report.plan["Doppler rate"].split()[0]) == pytest.approx(rate, rel=2e-3), hertz
+
+
+@pytest.mark.parametrize("tolerance", [3e-2, 3e-3])
+def test_noise_seen_from_an_orbit_is_focused_as_by_backproject(tolerance):
+    raw, place = seen_from_orbit(width=150.0)
+    random = np.random.default_rng(1)
+    samples = random.standard_normal((2, *raw.samples.shape)).astype(np.float32)
+    noisy = replace(raw, samples=samples[0] + 1j * samples[1])
+    longitude, latitude, _ = sarcl.wgs84.geodetic(place)
+    level = sarcl.ElevationModel(longitude + AROUND, latitude + AROUND, [[200.0, 200], [200, 200]])
+    flat = hold(noisy, tolerance, side="right", heights=200.0)
+    assert sarcl.wgs84.geodetic(flat.grid.positions)[2] == pytest.approx(np.full(flat.data.shape, 200.0), abs=1e-6)
+    on_terrain = sarcl.range_doppler(noisy, tolerance=tolerance, side="right", heights=level, check=False)
+    assert np.abs(on_terrain.grid.positions - flat.grid.positions).max() < 1e-6
+    assert np.linalg.norm(on_terrain.data - flat.data) <= 1e-4 * np.linalg.norm(flat.data)
+
+
+def bent(size):
+    tx, time = flown()
+    return noise_on(tx + np.sin(np.linspace(0, 40, len(tx)))[:, None] * [0, 0, size], time=time)
+
+
+def uneven(raw):
+    return replace(raw, time=raw.time + 0.1 * (raw.time[1] - raw.time[0]) * (np.arange(raw.n_rows) % 2))
+
+
+RAW = noise(n=64, aperture=30.0)
+TERRAIN = sarcl.ElevationModel([8.0, 9.0], [47.0, 48.0], [[0.0, 0.0], [0.0, 0.0]])
+REFUSED = {
+    "not compressed": (lambda: replace(RAW, compressed=False), {}, "call sarcl.compress"),
+    "no times": (lambda: replace(RAW, time=None), {}, "raw.time is None"),
+    "few rows": (lambda: RAW[:5], {}, "raw has 5 rows"),
+    "channels": (lambda: replace(RAW, time=np.repeat(RAW.time[::2], 2)), {}, "take one channel with raw.select"),
+    "uneven": (lambda: uneven(RAW), {}, "not evenly spaced in time.*use backproject"),
+    "hovering": (lambda: replace(RAW, tx=np.tile(RAW.tx[:1], (64, 1)), rx=None), {}, "antenna rests"),
+    "own frequencies": (lambda: replace(RAW, frequency=RAW.frequency + np.arange(64)), {}, "raw.frequency differs"),
+    "one sample": (lambda: noise(n_samples=1), {}, "without bandwidth there is no range"),
+    "Earth-fixed": (lambda: replace(RAW, tx=RAW.tx + 7e6, rx=None), {}, "side is None"),
+    "terrain": (lambda: RAW, {"heights": TERRAIN}, "longitude and latitude, but the track is in local coordinates"),
+    "no side": (lambda: replace(RAW, reference_range=RAW.reference_range + 500), {}, "side is None"),
+    "side": (lambda: RAW, {"side": "up"}, "side is 'up'"),
+    "doppler": (lambda: RAW, {"doppler": "guess"}, "doppler is 'guess'"),
+    "near end": (lambda: RAW, {"doppler": 6399.0}, "near to the direction of flight"),
+    "times": (lambda: RAW, {"times": (1, 0)}, "times is"),
+    "other ranges": (lambda: RAW, {"ranges": (3980.0, 4300.0)}, r"range window.*is too small for slant ranges"),
+    "underground": (lambda: RAW, {"ranges": (2000.0, 4000.0)}, "the ground is 28.* m from the track"),
+    "beam elsewhere": (lambda: RAW, {"beam": 0.001, "times": (3, 3.1)}, "no row sees the times"),
+    "silent": (lambda: replace(RAW, samples=0 * RAW.samples), {"doppler": "data"}, "have no Doppler centroid"),
+    "migration": (
+        lambda: points([(0, 0, 0)], n_samples=8, reference=4e3, aperture=700.0, n=9000), {"side": "right"}, "migration"
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", REFUSED)
+def test_what_it_cannot_do_is_refused_with_a_remedy(name):
+    raw, options, match = REFUSED[name]
+    with pytest.raises(ValueError, match=match):
+        sarcl.range_doppler(raw(), check=False, **options)
+
+
+def test_a_track_is_as_straight_as_the_tolerance_needs():
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"ranges, which are no hyperbolas.*backproject"):
+        sarcl.range_doppler(bent(2e-3))
+    hold(bent(1e-6), 1e-2)
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"rounding of complex64"):
+        sarcl.range_doppler(RAW, tolerance=1e-6)
