@@ -146,14 +146,11 @@ def echo(
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
-    seed = count("seed", seed, 0)
-    if not isinstance(shadows, (bool, np.bool_)):
-        choice("shadows", shadows, ("embree",))
-    opened = open_device(device)
-    request = EchoRequest(
-        opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
-        polarization_names(polarization), vertical_direction(vertical, scene.center), max_edge, shadows, seed, progress,
+    request = echo_request(
+        scene, SKIPS, polarization=polarization, vertical=vertical, shadows=shadows, seed=seed, skip=skip,
+        max_edge=max_edge, max_bytes=max_bytes, tolerance=tolerance, device=device, progress=progress,
     )  # fmt: skip
+    opened, seed = request.device, request.seed
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
     rx = echo_sampling.receiver_positions(track, receiver)
@@ -228,7 +225,24 @@ def echo(
     return raw
 
 
-def polarization_names(asked: Any) -> tuple[str, ...]:
+def echo_request(
+    scene: Scene, skips: tuple[str, ...] = SKIPS, *, polarization: Any = "HH", vertical: Any = None,
+    shadows: Any = True, seed: int = 0, skip: Any = True, max_edge: Any = "auto", max_bytes: float | None = None,
+    tolerance: float = 1e-3, device: DeviceChoice | None = None, progress: Progress | None = None,
+) -> EchoRequest:  # fmt: skip
+    """The options of `echo` that all its methods share, checked; skips  the reasons that `skip` may name."""
+    seed = count("seed", seed, 0)
+    if not isinstance(shadows, (bool, np.bool_)):
+        choice("shadows", shadows, ("embree",))
+    opened = open_device(device)
+    return EchoRequest(
+        opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, skips),
+        _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed,
+        progress,
+    )  # fmt: skip
+
+
+def _polarizations(asked: Any) -> tuple[str, ...]:
     """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
     if isinstance(asked, str):
         asked = POLARIZATIONS if asked == "all" else (asked,)
@@ -240,7 +254,7 @@ def polarization_names(asked: Any) -> tuple[str, ...]:
     return names
 
 
-def vertical_direction(asked: Any, center: np.ndarray) -> np.ndarray:
+def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
     """Unit vector (3,): as asked, the ellipsoid's normal at an Earth-centred `center`, m (3,), or z."""
     if asked is not None:
         return direction("vertical", asked)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import logging
 import time
+import warnings
 from dataclasses import dataclass, replace
 from typing import Any, Unpack
 
@@ -18,9 +19,15 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from . import echo_sampling
-from .echo import EchoOptions, echo
+from .echo import EchoOptions, echo, echo_request
 from .echo_output import log as output_log
+from .spectral.spectral_task import spectral_task
 
+# options of echo that make up its request, and those that a task of spectral_echo takes besides
+REQUEST = {
+    "polarization", "vertical", "shadows", "seed", "skip", "max_edge", "max_bytes", "tolerance", "device",
+}  # fmt: skip
+TASK = {"receiver", "array", "reference", "range_window", "antenna", "radar", "compressed"}
 FEW, MORE = 8, 40  # pulses from the middle of the track that are computed and timed
 
 
@@ -32,6 +39,8 @@ class EchoForecast:
     seconds            about, on this device at its present speed
     contributions      about the number of pairs of scatterer, pulse and channel that will be added up
     plan               as in the report;  predicted_error  bound of the relative error
+    spectral_seconds   about the seconds of `spectral_echo` with these arguments, None where it refuses them
+    spectral_refusal   why it does, else empty
     """
 
     n_rows: int
@@ -41,17 +50,22 @@ class EchoForecast:
     contributions: float
     plan: dict[str, object]
     predicted_error: float
+    spectral_seconds: float | None = None
+    spectral_refusal: str = ""
 
     def __str__(self) -> str:
         text = f"{self.n_rows} rows of {self.n_samples} samples: {size_text(self.bytes)}, "
         text += f"about {duration(self.seconds)}, error below {self.predicted_error:.1e}"
+        if self.spectral_seconds is not None:
+            text += f"\nspectral_echo: about {duration(self.spectral_seconds)}"
         return text
 
 
 def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Unpack[EchoOptions]) -> EchoForecast:
     """Forecast of `echo(scene, waveform, track, ...)` with these options, as an EchoForecast.
 
-    Up to 40 pulses from the middle of the track are computed and timed. Raises as `echo` does; `out` is not written.
+    Up to 40 pulses from the middle of the track are computed and timed, and `spectral_echo` is planned where it takes
+    the track. Raises as `echo` does; `out` is not written.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         validation.instance(name, value, kind)
@@ -61,6 +75,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     }
     real, asked = scene.realized(options.get("seed", 0)), options.get("reference")
     point = scene.center if asked is None else validation.array("reference", asked, np.float64, (3,))
+    whole = track
     track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
     rx = echo_sampling.receiver_positions(track, receiver)
     reference_range = echo_sampling.half_path(track.positions, rx, point)
@@ -106,4 +121,21 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     return EchoForecast(
         rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), longer + slope * (len(track) - more),
         raw.report.contributions_done / more * len(track), dict(raw.report.plan) | motion, raw.report.predicted_error,
+        *_spectral(scene, waveform, whole, options),
     )  # fmt: skip
+
+
+def _spectral(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> tuple[float | None, str]:
+    """About the seconds of spectral_echo, or None and why it refuses these arguments."""
+    try:
+        given: dict[str, Any] = dict(options)
+        request = echo_request(scene, **{k: v for k, v in given.items() if k in REQUEST})
+        task = spectral_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
+        with warnings.catch_warnings():
+            warnings.simplefilter(
+                "ignore", errors.SarclWarning
+            )  # those of the mesh came with the pulses that were timed
+            prepared, parts, _ = task.planned("exact")
+    except (errors.NotApplicable, errors.NothingSeen, errors.ToleranceUnreachable) as refused:
+        return None, str(refused)
+    return task.seconds(prepared, parts), ""

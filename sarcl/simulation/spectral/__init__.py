@@ -3,6 +3,7 @@
 For other folders:
 
     spectral_echo           spectral_echo(): the samples of echo, to a stated tolerance
+    spectral_task           one task of spectral_echo: geometry, plans, seconds
 
 For this folder alone:
 
@@ -18,4 +19,4 @@ For this folder alone:
     _straight_track         straight, evenly spaced tracks; azimuth and slant range of scatterers
 """
 
-__all__ = ["spectral_echo"]
+__all__ = ["spectral_echo", "spectral_task"]

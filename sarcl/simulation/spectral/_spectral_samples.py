@@ -8,7 +8,6 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...opencl import fft
-from ...opencl.device import Device
 from ..echo_output import EchoOutput
 from ..scene_echoes import EchoRequest
 from ._spectral_part import SpectralPart
@@ -19,11 +18,11 @@ class SpectralSamples:
     """Samples of all parts, block of frequencies by block."""
 
     def __init__(
-        self, device: Device, request: EchoRequest, parts: Sequence[SpectralPart], line: StraightTrack,
+        self, request: EchoRequest, parts: Sequence[SpectralPart], line: StraightTrack,
         reference_range: np.ndarray, frequencies: np.ndarray, spectrum: np.ndarray,
     ) -> None:  # fmt: skip
         """spectrum  complex (n_f,), by which all samples are multiplied"""
-        self.device, self.request, self.parts, self.line = device, request, parts, line
+        self.device, self.request, self.parts, self.line = request.device, request, parts, line
         self.reference_range, self.frequencies, self.spectrum = reference_range, frequencies, spectrum
 
     def compute(self, output: EchoOutput) -> None:

@@ -8,43 +8,29 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...arrays.channels import is_single
-from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import NotApplicable, ToleranceMissed
+from ...base.errors import ToleranceMissed
 from ...base.report import Report
 from ...base.types import PathLike
-from ...base.validation import array as numbers
-from ...base.validation import choice, count, instance
-from ...base.validation import tolerance as allowed_error
+from ...base.validation import choice, instance
 from ...model.antenna import Antenna
 from ...model.antenna_array import AntennaArray
 from ...model.phase_history import PhaseHistory
 from ...model.radar import Radar
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
-from ...numerics import plan
-from ...numerics.pulse_geometry import PulseGeometry
-from ...opencl.choose_device import open_device
 from ...opencl.device import DeviceChoice
-from ...opencl.memory_budget import budget
-from ...scattering import antenna_weights
 from ...scene.scene import Scene
-from .. import echo_sampling
-from ..echo import Polarization, polarization_names, vertical_direction
+from ..echo import Polarization, echo_request
 from ..echo_check import measure_error, seconds_to_check
 from ..echo_output import EchoOutput
-from ..scene_echoes import EchoRequest, Progress, SceneEchoes, parts_of, prepare_scene
+from ..scene_echoes import Progress
 from ..spreading import Counts
-from ._scatterer_amplitudes import ScattererAmplitudes
-from ._spectral_part import SpectralPart, plan_part
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple
-from ._straight_track import StraightTrack, straight_track
+from .spectral_task import spectral_task
 
 SKIPS = ("zero reflectivity", "facing away", "range window")
-STRAIGHT = 0.05  # share of the tolerance: phase errors, rad, of a track that is not quite straight
 QUICK_CHECK = 1.0  # s, for the exact sums of the check
-WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range window that was asked for
 
 
 def spectral_echo(
@@ -103,75 +89,45 @@ def spectral_echo(
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     choice("variant", variant, ("exact", "saras"))
-    seed = count("seed", seed, 0)
-    if not isinstance(shadows, (bool, np.bool_)):
-        choice("shadows", shadows, ("embree",))
     if ripple and waveform.kind != "chirp":
         raise ValueError(f"ripple is that of a rectangular chirp's spectrum, and the waveform is a {waveform.kind}")
-    if receiver is not None:
-        raise NotApplicable("spectral_echo is for one antenna that transmits and receives; use echo for a receiver")
-    if array is not None:
-        instance("array", array, AntennaArray)
-        if not is_single(array):
-            raise NotApplicable("spectral_echo takes no arrays; use echo, which computes their channels")
-    if not track.stop_and_go:
-        raise NotApplicable(
-            "the track is that of an orbit, with the receiver where it is at the echo's arrival; spectral_echo is for "
-            "straight tracks, stop and go: use echo"
-        )
-    opened = open_device(device)
-    request = EchoRequest(
-        opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, SKIPS),
-        polarization_names(polarization), vertical_direction(vertical, scene.center), max_edge, shadows, seed, progress,
+    request = echo_request(
+        scene, SKIPS, polarization=polarization, vertical=vertical, shadows=shadows, seed=seed, skip=skip,
+        max_edge=max_edge, max_bytes=max_bytes, tolerance=tolerance, device=device, progress=progress,
     )  # fmt: skip
-    line = straight_track(track, waveform.center + waveform.bandwidth / 2, STRAIGHT * request.tolerance)
-    tx = track.positions
-    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
-    _, _, motion = echo_sampling.in_flight(track, None, scene, point)
-    reference_range = echo_sampling.half_path(tx, tx, point)
-    original_scene, scene = scene, scene.realized(seed)
-    weights = antenna_weights.weights_of(antenna, radar, track, None, waveform, scene.center)
-    near, far = echo_sampling.window(scene, waveform, tx, tx, reference_range, range_window)
-    frequency, step, n_samples = echo_sampling.sampling(waveform, near, far, compressed)
-    antennas = PulseGeometry.sampled(
-        tx, tx, reference_range, first=frequency, step=step, n_samples=n_samples, near=near, far=far
-    )
-    n_polarizations = len(request.polarizations)
-    with EchoOutput((len(tx), n_polarizations, n_samples), out, request.budget, (near, far)) as output:
-        frequencies = frequency + step * np.arange(n_samples)
+    task = spectral_task(
+        scene, waveform, track, request, receiver=receiver, array=array, reference=reference,
+        range_window=range_window, antenna=antenna, radar=radar, compressed=compressed,
+    )  # fmt: skip
+    n_pulses, n_polarizations, frequencies = len(track), len(request.polarizations), task.frequencies
+    with EchoOutput((n_pulses, n_polarizations, len(frequencies)), out, request.budget, task.window) as output:
+        prepared, parts, error = task.planned(variant)
         pulse = waveform.pulse_spectrum(frequencies)
-        request.report("scene", 0, 3)
-        prepared = prepare_scene(request, original_scene, scene, waveform, antennas, weights, (), tiled=False)
         spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * prepared.weights.factor(frequencies)
         if ripple:
             spectrum = spectrum * chirp_ripple(waveform, frequencies)
-        band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-        parts, error = _parts(prepared, scene, line, band, variant)
-        if range_window is not None and request.gated:
-            for part in parts:
-                _check_window(part, line, reference_range, (near, far))
-        request.clock.lap("plan")
-        samples = SpectralSamples(opened, request, parts, line, reference_range, frequencies, spectrum)
+        reference_range = task.antennas.reference_range
+        samples = SpectralSamples(request, parts, task.line, reference_range, frequencies, spectrum)
         samples.compute(output)
         measured = None
         if check if check is not None else seconds_to_check(prepared) <= QUICK_CHECK:
-            measured = measure_error(prepared, antennas, frequencies, spectrum, output)
+            measured = measure_error(prepared, task.antennas, frequencies, spectrum, output)
             request.clock.lap("check")
         seen = sum(len(part.some) for part in parts)
-        counts = Counts(len(prepared) * len(tx), 0, 0, (len(prepared) - seen) * len(tx))
+        counts = Counts(len(prepared) * n_pulses, 0, 0, (len(prepared) - seen) * n_pulses)
 
         def every(values: Any) -> Any:
             return values if n_polarizations == 1 or values is None else np.repeat(values, n_polarizations, axis=0)
 
         largest = max(parts, key=lambda part: part.predicted_error)
         raw = output.finish(
-            frequency=frequency,
-            frequency_step=step,
-            tx=every(tx),
+            frequency=frequencies[0],
+            frequency_step=task.step,
+            tx=every(track.positions),
             rx=None,
             reference_range=every(reference_range),
             time=every(track.times),
-            polarization=np.tile(request.polarizations, len(tx)),
+            polarization=np.tile(request.polarizations, n_pulses),
             tx_velocity=every(track.velocities),
             rx_velocity=every(track.velocities),
             waveform=waveform,
@@ -183,61 +139,17 @@ def spectral_echo(
                     **largest.describe(),
                     **prepared.mesh_warnings,
                     **prepared.weights.describe(prepared.weight_error),
-                    **motion,
+                    **task.motion,
                 },
                 tolerance=request.tolerance,
                 predicted_error=error,
                 measured_error=measured,
                 **prepared.counted(counts),
                 seconds=request.clock.seconds,
-                device=opened.info.name,
-                seed=seed,
+                device=request.device.info.name,
+                seed=request.seed,
             ),
         )
     if measured is not None and measured > request.tolerance:
         raise ToleranceMissed(request.tolerance, measured, raw=raw)
     return raw
-
-
-def _parts(
-    prepared: SceneEchoes, scene: Scene, line: StraightTrack, band: tuple[float, float], variant: str
-) -> tuple[list[SpectralPart], float]:
-    """Plans for the points and the facets of a scene, and the predicted error of their sum."""
-    request, out, errors = prepared.request, [], []
-    share = request.tolerance / parts_of(scene)
-    straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * line.deviation
-    for part in (prepared.points if request.same else None, prepared.facets):
-        if part is None:
-            continue
-        gain, fixed, random = 1.0, 0.0, False
-        if part is prepared.facets and prepared.subdivision is not None:
-            gain, fixed = prepared.subdivision.gain, prepared.subdivision.plan.predicted_error
-            random = not prepared.facets.is_mirror
-        amplitudes = ScattererAmplitudes(part, prepared.weights, line, request.polarizations, request.vertical)
-        made = plan_part(
-            amplitudes, line, band, prepared.weights.pair is not None, random, variant,
-            share / gain - fixed - straight, request.tolerance, request.device,
-        )  # fmt: skip
-        out.append(made)
-        errors.append(gain * (made.predicted_error + fixed + straight))
-    return out, float(np.sqrt(np.sum(np.square(errors))))
-
-
-def _check_window(
-    part: SpectralPart, line: StraightTrack, reference_range: np.ndarray, window: tuple[float, float]
-) -> None:
-    """NotApplicable where a scatterer lies outside the range window at a pulse that sees it."""
-    azimuth, slant_range = part.amplitudes.azimuth[part.some], part.amplitudes.slant_range[part.some]
-    low, high = part.transfer.aspects.low, part.transfer.aspects.high
-    for p in np.unique(np.linspace(0, line.n_pulses - 1, WINDOW_PULSES).astype(int)).tolist():
-        lag = p * line.spacing - azimuth
-        distance = np.hypot(lag, slant_range)
-        seen = (lag >= low * distance) & (lag <= high * distance)
-        away = distance[seen] - reference_range[p]
-        outside = (away < window[0]) | (away > window[1])
-        if outside.any():
-            raise NotApplicable(
-                f"range_window ({window[0]:g}, {window[1]:g}) m cuts the scene: at pulse {p} scatterers lie at "
-                f"{away.min():.4g} to {away.max():.4g} m about the reference. Widen it, leave it out, or use echo, "
-                "which leaves out scatterers row by row"
-            )

@@ -178,3 +178,14 @@ def test_a_beam_with_hard_edges_is_refused_where_it_cannot_be_met(device):
     table = sarcl.Antenna.table(np.linspace(-0.004, 0.004, 9), np.linspace(-0.1, 0.1, 5), np.ones((9, 5)))
     with pytest.raises(sarcl.ToleranceUnreachable, match=r"cannot be met by spectral_echo.*use echo"):
         sarcl.spectral_echo(points(), CHIRP, aimed, antenna=table, tolerance=1e-3, device=device)
+
+
+def test_the_forecast_of_echo_says_what_this_would_take(device):
+    options = {"tolerance": 1e-3, "device": device, "skip": {"range window", "out of beam"}}
+    forecast = sarcl.plan_echo(points(), CHIRP, TRACK, **options)
+    assert 0 < forecast.spectral_seconds < 60 and forecast.spectral_refusal == ""
+    assert str(forecast).splitlines()[1].startswith("spectral_echo: about ")
+    circle = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100)
+    refused = sarcl.plan_echo(points(ground=0), CHIRP, circle, **options)
+    assert refused.spectral_seconds is None and "not a straight line" in refused.spectral_refusal
+    assert "spectral" not in str(refused)
