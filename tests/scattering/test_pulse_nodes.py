@@ -56,7 +56,7 @@ def test_each_its_own():
 @pytest.mark.parametrize("material, tolerance", thinned([ROUGH, BOTH, "metal"], [1e-2, 1e-3]))
 def test_shared_amplitudes_keep_the_tolerance(device, always, material, tolerance):
     """Against the exact sum of every pulse's own amplitudes, in HH and HV, gains and shadows among them."""
-    scene = hills(6, material, edge=0.2)
+    scene = hills(4, material, edge=0.2)
     tx = pointing.spotlight(track(), (0, 0, 0))
     options = {"polarization": ["HH", "HV"], "antenna": Antenna.gaussian(width=0.002), "device": device}
     raw = sarcl.echo(scene, CHIRP, tx, tolerance=tolerance, check=True, **options)
@@ -66,7 +66,7 @@ def test_shared_amplitudes_keep_the_tolerance(device, always, material, toleranc
 
 def test_shared_or_not_the_same_echoes_and_counts(device, monkeypatch):
     """A receiver of its own, a window that cuts, facets that turn away on the way, blocks that end anywhere."""
-    scene = hills(14, BOTH, edge=0.4) + sarcl.Scene.facets(
+    scene = hills(8, BOTH, edge=0.4) + sarcl.Scene.facets(
         [[[-2.0, 0, 0], [2, 0, 0], [0, 0.02, 3]], [[0, 2, 0.0], [1, 2, 0], [1, 2.0, 2]]], material=ROUGH
     )
     tx = sarcl.Trajectory.line(start=(-300, -6e3, 4e3), velocity=(600, 300, 0), prf=150.0, n_pulses=150)

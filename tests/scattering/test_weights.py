@@ -2,7 +2,7 @@
 
 import numpy as np
 import pytest
-from helpers.cases import thinned
+from helpers.cases import REPEATED, thinned
 
 import sarcl
 from sarcl import pointing
@@ -113,7 +113,7 @@ def test_facets_keep_the_tolerance(device, kind, waveform):
     assert found <= raw.report.predicted_error <= 1e-2
 
 
-@pytest.mark.parametrize("kind", [pytest.param("aperture", marks=pytest.mark.slow), "pair"])
+@pytest.mark.parametrize("kind", [pytest.param("aperture", marks=REPEATED), "pair"])
 def test_two_places_have_two_gains(device, kind):
     scene, tx = points() + facets(), track()
     rx = pointing.spotlight(sarcl.Trajectory(tx.times, tx.positions + np.array((900.0, -500, 400))), (30, 0, 0))
@@ -156,7 +156,7 @@ def test_scanning_draws_the_pattern(device):
 def test_left_out_of_the_beam_changes_nothing(device):
     """A strip much longer than the beam: most pairs are skipped, and the samples are those of all of them."""
     random = np.random.default_rng(5)
-    scene = sarcl.Scene.points(random.uniform(-1, 1, (20000, 3)) * (2000, 200, 2)) + facets(300, 600.0, edge=0.5)
+    scene = sarcl.Scene.points(random.uniform(-1, 1, (6000, 3)) * (2000, 200, 2)) + facets(300, 600.0, edge=0.5)
     made = sarcl.Trajectory.line(start=(-1500, -4000, 3000), velocity=(100, 0, 0), prf=2, n_pulses=60)
     tx, antenna = pointing.stripmap(made, np.arctan2(4, 3), side="left"), Antenna.gaussian(width=(0.02, 0.2))
     options = {"antenna": antenna, "tolerance": 1e-2, "shadows": False, "range_window": (-700, 1200), "device": device}
