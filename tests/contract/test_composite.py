@@ -45,7 +45,7 @@ def track(n=48):
 
 @pytest.mark.parametrize(
     "half, shadows",
-    [(12, True), *(pytest.param(*values, marks=pytest.mark.slow) for values in ((12, False), (30, True)))],
+    [(12, True), *(pytest.param(*values, marks=pytest.mark.slow) for values in ((12, False), (20, True)))],
 )
 @pytest.mark.filterwarnings("ignore:mesh too coarse")  # the capsule
 def test_culling_changes_a_whole_scene_by_less_than_the_tolerance(half, shadows):

@@ -44,7 +44,7 @@ def hold_all(seeds, share, **limits):
 # plans are not needlessly accurate: half of the errors exceed a thirtieth of the tolerance. The median of 40 tasks is
 # uncertain by a quarter, that of 24 by a third, so that a third less is accepted of it
 @pytest.mark.parametrize(
-    "seeds, least", [(range(24), 1 / 45), pytest.param(range(24, 100), 1 / 30, marks=SLOW)], ids=str
+    "seeds, least", [(range(24), 1 / 45), pytest.param(range(24, 74), 1 / 30, marks=SLOW)], ids=str
 )
 def test_random_tasks(seeds, least):
     assert np.median(hold_all(seeds, 0.975, terms=6e5)) >= least

@@ -6,7 +6,7 @@ from dataclasses import replace
 
 import numpy as np
 import pytest
-from helpers.cases import noise_history
+from helpers.cases import REPEATED, noise_history
 from helpers.precise_cases import decimal_image, error, focus, task_of
 
 import sarcl
@@ -142,7 +142,7 @@ def coherent(n_rows, grid):
     return raw, n_rows * decimal_image(raw[:1], grid.positions.reshape(-1, 3))[0]
 
 
-@pytest.mark.parametrize("n_rows", [1_000, pytest.param(1_000_000, marks=pytest.mark.slow)])
+@pytest.mark.parametrize("n_rows", [1_000, pytest.param(1_000_000, marks=REPEATED)])
 def test_error_does_not_grow_with_the_number_of_pulses(double, n_rows):
     grid = sarcl.ImageGrid.plane(shape=(4, 4), spacing=0.5)
     raw, wanted = coherent(n_rows, grid)

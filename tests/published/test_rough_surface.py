@@ -77,8 +77,8 @@ def test_a_conducting_surface_reaches_the_geometric_optics_limit():
 @pytest.mark.slow
 @pytest.mark.parametrize("correlation, across, cells", [(5, 20, 8), (10, 15, 12)])
 def test_it_stays_there_on_average_and_with_longer_correlation(correlation, across, cells):
-    # 64 surfaces: a standard error of 0.07 to 0.11 dB
-    assert np.abs(decibel(sigma0(64, correlation * WAVE, across, cells)) - LIMIT).max() < 0.3
+    # 32 surfaces: a standard error of 0.1 to 0.15 dB
+    assert np.abs(decibel(sigma0(32, correlation * WAVE, across, cells)) - LIMIT).max() < 0.3
 
 
 @pytest.mark.filterwarnings("ignore:mesh too coarse")
