@@ -7,10 +7,12 @@ import re
 import time
 import warnings
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from importlib.resources import files
 from pathlib import Path
+from typing import Any
 
+POCL = "Portable Computing Language"  # name of PoCL's platform
 STALE = 5.0  # s; an older lock on the cache of binaries belongs to a process that was killed
 
 
@@ -40,6 +42,21 @@ def source(file: str) -> str:
 def names_in(text: str) -> frozenset[str]:
     """Every identifier of OpenCL source text, those in comments left out."""
     return frozenset(re.findall(r"\b[A-Za-z_]\w*", re.sub(r"//.*", "", text)))
+
+
+def build(context: Any, text: str, options: list[str]) -> Any:
+    """The built program of OpenCL source text; pyopencl.Error where it does not build.
+
+    PoCL reads Clang's declarations of every built-in function, 900 kB, for each build, also of a program that it has
+    in its cache. It is told that it has read them (they are guarded by _OPENCL_H_) and given those that kernels use.
+    A version of PoCL where this does not build gets the text alone.
+    """
+    import pyopencl
+
+    if context.devices[0].platform.name == POCL:
+        with suppress(pyopencl.Error):
+            return pyopencl.Program(context, source("builtins.clh") + "\n" + text).build([*options, "-D_OPENCL_H_"])
+    return pyopencl.Program(context, text).build(options)
 
 
 @contextmanager

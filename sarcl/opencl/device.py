@@ -13,7 +13,7 @@ import numpy as np
 
 from ..base.text import first_line, size_text
 from ..base.threads import threads
-from ._programs import names_in, quiet, source
+from ._programs import build, names_in, quiet, source
 from .device_list import DeviceInfo
 
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
@@ -72,7 +72,7 @@ class Device:
         options = [f"-D{k}={int(v)}" for k, v in sorted(macros.items()) if k in names_in(text)]
         try:
             with quiet():
-                program = pyopencl.Program(self.context, text).build(options)
+                program = build(self.context, text, options)
         except pyopencl.Error as exc:
             raise RuntimeError(
                 f"kernels/{file} does not build on {self.info.name!r} ({self.info.driver}) with {' '.join(options)}: "

@@ -281,11 +281,50 @@ def test_programs_are_given_only_the_macros_they_name(device, monkeypatch):
 
     monkeypatch.setattr(pyopencl, "Program", Program)
     device._build("ray_casting.cl", {"VW": device.info.vector_width, "FP64": 0, "TAPS": 4})
-    assert given == [[]]
+    assert [option for option in given[-1] if option != "-D_OPENCL_H_"] == []
     assert {"VW", "FP64", "TAPS"} <= _programs.names_in(_programs.source("backproject.cl"))
     # tests/visibility runs on no twin of a device: none would change these
     for file in ("ray_casting.cl", "terrain_horizon.cl"):
         assert not {"VW", "FP64"} & _programs.names_in(_programs.source(file))
+
+
+# a value of each macro that some program needs
+MACROS = {
+    "BISTATIC": 1, "BEAM": 1, "WRAP": 0, "TAPS": 8, "TERMS": 5, "RANGE": 1, "ORDER": 2, "LOCAL": 0, "CHUNK": 64,
+    "VECTORS": 2, "SIDE": 16, "FINE": 2, "FINE_BITS": 1, "LINE_TAPS": 4, "LINE_TERMS": 4, "GROUP": 8, "SLOPE": 1,
+    "DOUBLE": 0, "ROWS": 4, "USED": 4, "LANES": 8, "FLUSH": 64, "FILTER_TAPS": 8, "SPAN": 2, "FROM_CENTRE": 1,
+    "NODES": 1, "PULSE_NODES": 1, "TILE": 32, "HH": 1, "HV": 1, "VH": 1, "VV": 1, "METAL": 0, "DISPERSIVE": 1,
+    "ROUGH": 1, "DIAGRAM_ISOTROPIC": 0, "DIAGRAM_COS": 1, "DIAGRAM_COS2": 2, "DIAGRAM_EXP": 3,
+    "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1,
+}  # fmt: skip
+PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
+
+
+@pytest.mark.parametrize("file", PROGRAMS)
+def test_pocl_needs_the_short_header_alone(device, monkeypatch, file):
+    if device.info.platform != _programs.POCL:
+        pytest.skip("not PoCL")
+    if not device.info.fp64 and "float64" in file:
+        pytest.skip("no float64")
+    import pyopencl
+
+    given = []
+
+    class Program(pyopencl.Program):
+        def build(self, options):
+            given.append("-D_OPENCL_H_" in options)
+            return super().build(options)
+
+    monkeypatch.setattr(pyopencl, "Program", Program)
+    assert device._build(file, {"VW": device.info.vector_width, "FP64": int(device.info.fp64), **MACROS})
+    assert given == [True]
+
+
+def test_a_version_of_pocl_that_refuses_the_short_header_gets_the_text_alone(device, monkeypatch):
+    monkeypatch.setattr(_programs, "POCL", device.info.platform)
+    whole = _programs.source
+    monkeypatch.setattr(_programs, "source", lambda file: "refused;" if file == "builtins.clh" else whole(file))
+    assert "hidden" in device._build("ray_casting.cl", {})
 
 
 def test_a_kernel_that_does_not_build_names_file_device_and_log(device, monkeypatch):
