@@ -76,25 +76,21 @@ class SpectralPart:
         )
 
     def add(
-        self, held: ReflectivityMap, polarization: int, frequencies: np.ndarray, out: np.ndarray, budget: float,
-        factors: list[np.ndarray], on_progress: Callable[[float], None],
+        self, held: ReflectivityMap, frequencies: np.ndarray, out: np.ndarray, budget: float,
+        on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
-        """Add the spectra of a polarisation at frequencies, Hz (n_f,), to out (n_u, n_f).
-
-        factors  of the expansion's terms: (n, n_polarizations) each
-        """
+        """Add the spectra at frequencies, Hz (n_f,), to out (n_polarizations, n_u, n_f); budget  bytes for the map."""
         weights = self.transfer.range_weights(self.amplitudes.slant_range[self.some])
-        at_once = max(1, int(budget / 3 / self.bytes()[0]))
-        done, total = 0, len(self.expansion) * len(weights) * self.grid.count
-        for j, factor in enumerate(factors):
-            for q, weight in enumerate(weights):
-                for start in range(0, self.grid.count, at_once):
-                    some = slice(start, min(start + at_once, self.grid.count))
-                    made = held.over_azimuth(factor[:, polarization] * weight, some, budget / 3)
-                    tables = self.transfer.tables[j, q]
-                    held.add(made, some, tables, self.transfer, frequencies, out[some])
-                    done += some.stop - some.start
-                    on_progress(done / total)
+        at_once = max(1, int(budget / self.bytes()[0]))
+        parts = [slice(i, min(i + at_once, self.grid.count)) for i in range(0, self.grid.count, at_once)]
+        for j in range(len(self.expansion)):
+            factors = self.expansion.factors(self.some, j).astype(np.complex64)
+            for n, spectra in enumerate(out):
+                for tables, weight in zip(self.transfer.tables[j], weights, strict=True):
+                    for some in parts:
+                        made = held.over_azimuth(factors[:, n] * weight.astype(np.float32), some, budget)
+                        held.add(made, some, tables, self.transfer, frequencies, spectra[some])
+            on_progress((j + 1) / len(self.expansion))
 
 
 def plan_part(
@@ -189,20 +185,22 @@ def _beam(
     n = min(DRAWN, len(amplitudes))
     some = np.sort(random.choice(len(amplitudes), n, replace=False))
     first, last = amplitudes.sines(0.0, some), amplitudes.sines(track.length, some)
-    sines = np.linspace(*limits, PROFILE)
-    power = np.zeros(PROFILE)
-    which = np.repeat(some, PROFILE)
-    for f in (band[0], band[1]):
-        made = amplitudes(which, np.tile(sines, n), f).reshape(n, PROFILE, -1)
-        seen = (sines >= first[:, None]) & (sines <= last[:, None])
-        power += ((np.abs(made) ** 2).sum(axis=2) * seen).sum(axis=0)
-    total = np.cumsum(power)
-    half = 0.5 * (allowed / 2) ** 2 * total[-1]
-    one = max(0, int(np.searchsorted(total, half)) - 1)
-    two = min(PROFILE - 1, int(np.searchsorted(total, total[-1] - half)) + 1)
+    which, cut = np.repeat(some, PROFILE), False
+    for _ in range(2):  # again between the limits that were found: beams may be narrow
+        sines = np.linspace(*limits, PROFILE)
+        power = np.zeros(PROFILE)
+        for f in (band[0], band[1]):
+            made = amplitudes(which, np.tile(sines, n), f).reshape(n, PROFILE, -1)
+            seen = (sines >= first[:, None]) & (sines <= last[:, None])
+            power += ((np.abs(made) ** 2).sum(axis=2) * seen).sum(axis=0)
+        total = np.cumsum(power)
+        half = 0.25 * (allowed / 2) ** 2 * total[-1]
+        one = max(0, int(np.searchsorted(total, half)) - 1)
+        two = min(PROFILE - 1, int(np.searchsorted(total, total[-1] - half)) + 1)
+        cut |= one > 0 or two < PROFILE - 1
+        limits = float(sines[one]), float(sines[two])
     main = np.flatnonzero(power >= HALF_POWER * power.max())
-    cut = one > 0 or two < PROFILE - 1
-    return float(sines[one]), float(sines[two]), allowed * cut, (float(sines[main[0]]), float(sines[main[-1]]))
+    return *limits, allowed * cut, (float(sines[main[0]]), float(sines[main[-1]]))
 
 
 def _check_doppler(track: StraightTrack, highest: float, main: tuple[float, float], has_beam: bool) -> None:

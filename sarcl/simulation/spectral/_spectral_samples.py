@@ -28,31 +28,26 @@ class SpectralSamples:
     def compute(self, output: EchoOutput) -> None:
         """Write the samples of all pulses to an output."""
         request, n_polarizations = self.request, len(self.request.polarizations)
-        held = [(part, part.on_device(self.device)) for part in self.parts]
-        factors = [[part.expansion.factors(part.some, j) for j in range(len(part.expansion))] for part in self.parts]
+        held = [part.on_device(request.device) for part in self.parts]
         request.clock.lap("map")
-        a_frequency = max(part.bytes()[1] for part in self.parts) + 16.0 * n_polarizations * self.line.n_pulses
-        at_once = int(np.clip(request.budget / 3 / a_frequency, 1, len(self.frequencies)))
-        n_blocks = -(-len(self.frequencies) // at_once)
+        a_frequency = max(part.bytes()[1] for part in self.parts) + 16.0 * self.line.n_pulses
+        at_once = int(np.clip(request.budget / 3 / (n_polarizations * a_frequency), 1, len(self.frequencies)))
+        n_steps = -(-len(self.frequencies) // at_once) * len(held)
         for i, start in enumerate(range(0, len(self.frequencies), at_once)):
             some = slice(start, min(start + at_once, len(self.frequencies)))
             block = np.zeros((self.line.n_pulses, n_polarizations, some.stop - start), np.complex64)
-            for n in range(n_polarizations):
-                for m, (part, on_device) in enumerate(held):
+            for m, (part, on_device) in enumerate(zip(self.parts, held, strict=True)):
 
-                    def on_progress(done: float, i: int = i, n: int = n, m: int = m) -> None:
-                        steps = n_polarizations * len(held)
-                        done = (i + (n * len(held) + m + done) / steps) / n_blocks
-                        request.report("echo", round(1000 * done), 1000)
+                def on_progress(done: float, step: int = i * len(held) + m) -> None:
+                    request.report("echo", round(1000 * (step + done) / n_steps), 1000)
 
-                    spectra = np.zeros((part.grid.count, some.stop - start), np.complex64)
-                    part.add(
-                        on_device, n, self.frequencies[some], spectra, request.budget, factors[m], on_progress
-                    )  # fmt: skip
-                    block[:, n] += self._along_track(part, spectra, self.frequencies[some])
+                spectra = np.zeros((n_polarizations, part.grid.count, some.stop - start), np.complex64)
+                part.add(on_device, self.frequencies[some], spectra, request.budget / 3, on_progress)
+                for n in range(n_polarizations):
+                    block[:, n] += self._along_track(part, spectra[n], self.frequencies[some])
             block *= self._reference(some)[:, None]
             output.keep_frequencies(start, block)
-            request.clock.lap("echo")
+        request.clock.lap("echo")
 
     def _along_track(self, part: SpectralPart, spectra: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
         """Samples (n_pulses, n_f) from spectra over the wavenumbers along the track (n_u, n_f)."""
