@@ -174,8 +174,10 @@ def response_error(
     for r in {aspects.nearest, aspects.farthest, 0.6 * aspects.nearest + 0.4 * aspects.farthest}:
         for f in {low, high, 0.4 * low + 0.6 * high}:
             k = float(wavenumber(f))
-            first = max(aspects.lags[0], r * float(tangent(aspects.low)))
-            last = min(aspects.lags[1], r * float(tangent(aspects.high)))
+            # a period away the response is 0 at all lags at which scatterers of this range are seen
+            begin, end = (r * float(tangent(sine)) for sine in aspects.support)
+            first = max(aspects.lags[0], r * float(tangent(aspects.low)), end - grid.period)
+            last = min(aspects.lags[1], r * float(tangent(aspects.high)), begin + grid.period)
             n = min(int((last - first) / track.spacing), grid.n_lags)
             if n < 1:
                 continue
