@@ -307,6 +307,16 @@ def bent(size):
     return noise_on(tx + np.sin(np.linspace(0, 40, len(tx)))[:, None] * [0, 0, size], time=time)
 
 
+def circling():
+    track = sarcl.Trajectory.circle(radius=7e3, height=5e3, arc=0.005, n_pulses=64, prf=100.0)
+    return noise_on(track.positions, time=track.times)
+
+
+def rocket():
+    tx = np.stack([np.full(64, -3e3), np.zeros(64), np.linspace(1e3, 1.03e3, 64)], axis=1)
+    return noise_on(tx, time=np.linspace(0, 0.3, 64))
+
+
 def uneven(raw):
     return replace(raw, time=raw.time + 0.1 * (raw.time[1] - raw.time[0]) * (np.arange(raw.n_rows) % 2))
 
@@ -329,6 +339,11 @@ REFUSED = {
     "doppler": (lambda: RAW, {"doppler": "guess"}, "doppler is 'guess'"),
     "near end": (lambda: RAW, {"doppler": 6399.0}, "near to the direction of flight"),
     "times": (lambda: RAW, {"times": (1, 0)}, "times is"),
+    "spacing": (lambda: RAW, {"spacing": (1, 2, 3)}, "spacing is .* wanted"),
+    "a circle": (lambda: circling(), {"side": "left"}, "turns about the scene.*polar_format"),
+    "climbing straight up": (lambda: rocket(), {"side": "left"}, "the track is vertical"),
+    "too high": (lambda: RAW, {"heights": 9e4}, "beyond the range window.*correct heights"),
+    "too large": (lambda: replace(RAW, samples=1e36 * RAW.samples), {}, "scale the samples down"),
     "other ranges": (lambda: RAW, {"ranges": (3980.0, 4300.0)}, r"range window.*is too small for slant ranges"),
     "underground": (lambda: RAW, {"ranges": (2000.0, 4000.0)}, "the ground is 28.* m from the track"),
     "beam elsewhere": (lambda: RAW, {"beam": 0.001, "times": (3, 3.1)}, "no row sees the times"),

@@ -11,6 +11,7 @@ For this folder alone:
     _focus          the work: azimuth FFT, secondary range compression, migration, azimuth compression
     _ground         positions at zero-Doppler times and slant ranges, at a height or on an elevation model
     _plan           rows, columns, Doppler bins, range blocks and the predicted error
+    _range_window   slant ranges that lie in the range window of every row
     _track          an evenly sampled smooth track
     _velocity       ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """

@@ -8,15 +8,16 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
-from ...base.rows import spread_over
 from ...base.validation import number
+from ...model.image_grid import pair
 from ...model.phase_history import PhaseHistory
 from ._doppler import STEEPEST, Band, delay, fresnel, sine
+from ._range_window import RangeWindow
 from ._track import REMEDY, Track
-from ._velocity import Hyperbolas, Positions, hyperbolas
+from ._velocity import Positions
 
 FILLED = 0.8  # of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
-ROWS, RANGES = 257, 513  # rows and ranges for which the range window is examined
+HELD = 0.6  # of the slant ranges that the range window holds at one time: default times leave as many
 MOST_PIXELS = 2**31
 
 
@@ -64,7 +65,7 @@ def choose_extent(
             f"the Doppler centroid is {np.degrees(np.arcsin(np.clip(centroid, -1, 1))):.3g} degrees from broadside, "
             f"too near to the direction of flight; {REMEDY}"
         )
-    wide = [None, None] if spacing is None else list(np.broadcast_to(np.asarray(spacing, object), 2))
+    wide = pair("spacing", (None, None) if spacing is None else spacing)
     steps = [None if d is None else number(f"spacing[{i}]", d, above=0) for i, d in enumerate(wide)]
     cosine = np.sqrt(1 - centroid**2)
     about = float(raw.reference_range[raw.n_rows // 2]) * cosine if ranges is None else sum(ranges) / 2
@@ -77,6 +78,7 @@ def choose_extent(
             float(np.sin(max(angle - beam / 2, -np.pi / 2))),
             float(np.sin(min(angle + beam / 2, np.pi / 2))),
         )
+    window = RangeWindow(raw, track, positions, sines, least, about)
     hertz = 2 * speed * float(raw.center_frequency[0]) / SPEED_OF_LIGHT
     middle = (track.start + track.stop) / 2 + delay(centroid, about, speed)
     if times is not None:
@@ -98,9 +100,13 @@ def choose_extent(
             if hertz * np.ptp(_ends(sines, middle, half, track, near, speed)) <= rate:
                 break
             half *= 0.9
-        times = middle - half, middle + half
         if beam is not None:
-            times = middle - (track.stop - track.start) / 2, middle + (track.stop - track.start) / 2
+            half = (track.stop - track.start) / 2
+        if ranges is None:  # under squint points that are far along the track leave the range window
+            most = window.length((middle, middle))
+            while half > track.step and window.length((middle - half, middle + half)) < HELD * most:
+                half *= 0.8
+        times = middle - half, middle + half
     zone = float(fresnel(SPEED_OF_LIGHT / float(raw.center_frequency[0]), np.array(about)))
     taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, zone, allowed).taper
     along, across = _wavenumbers(raw, np.clip([seen.min() - taper, seen.max() + taper], -STEEPEST, STEEPEST))
@@ -108,7 +114,7 @@ def choose_extent(
     if steps[0] is not None:
         finer = max(1, int(np.ceil(track.step / steps[0] - 1e-9)))
     column = steps[1] or FILLED / across
-    ranges = _ranges(raw, track, positions, sines, times, ranges, least, about)
+    ranges = window.longest(times) if ranges is None else window.checked(ranges, times)
     n_times = int(np.floor((times[1] - times[0]) / track.step * finer + 1e-6)) + 1
     n_ranges = int(np.floor((ranges[1] - ranges[0]) / column + 1e-6)) + 1
     if n_times * n_ranges > MOST_PIXELS:
@@ -156,50 +162,3 @@ def _ends(
     """Sines at which the ends of the track see the ends of an image, within the beam."""
     u = np.array([[middle - half], [middle + half]])
     return np.clip(sine(u, np.array(about), np.array([track.start, track.stop]), speed), *sines)
-
-
-def _ranges(
-    raw: PhaseHistory, track: Track, positions: Positions, sines: tuple[float, float], times: tuple[float, float],
-    asked: tuple[float, float] | None, least: float, about: float,
-) -> tuple[float, float]:  # fmt: skip
-    """Slant ranges that lie in the range window of every row that contributes, at all times: as asked, or all."""
-    half = raw.swath[0] / 2
-    near = max(least, float(raw.reference_range.min() - half) * 0.5 if asked is None else asked[0])
-    low = max(least, about - 2 * half)
-    candidates = np.linspace(low, about + 2 * half, RANGES) if asked is None else np.linspace(near, asked[1], 9)
-    if asked is not None and asked[0] < least:
-        raise ValueError(
-            f"ranges start at {asked[0]:.9g} m, but the ground is {least:.9g} m from the track; give a larger near "
-            "range"
-        )
-    rows = spread_over(track.n_rows, ROWS)
-    t = track.times[rows]
-    u = np.linspace(times[0], times[1], 3)
-    fit = Hyperbolas(candidates[0], candidates[-1], np.array([[track.speed, 0.0, 0.0]]))
-    if not track.is_line:
-        fit = hyperbolas(raw, track, positions, float(u[1]), candidates[0], candidates[-1], np.arange(track.n_rows))
-    where = fit.range(u[:, None, None], candidates, t[:, None])
-    s = sine(u[:, None, None], candidates, t[:, None], track.speed)
-    inside = np.abs(where - raw.reference_range[rows][:, None]) <= half
-    held = (inside | (s < sines[0]) | (s > sines[1])).all(axis=(0, 1))
-    if asked is not None:
-        if not held.all():
-            worst = float(np.abs(where - raw.reference_range[rows][:, None])[~inside].max())
-            raise ValueError(
-                f"the range window, +-{half:.5g} m about the reference ranges, is too small for slant ranges "
-                f"{asked[0]:.9g} to {asked[1]:.9g} m: with their migration they reach {worst:.5g} m from it; give "
-                "echoes of a wider range window, fewer times=, or leave ranges out for those that are held"
-            )
-        return asked
-    runs = np.flatnonzero(np.diff(np.concatenate([[0], held.astype(int), [0]])))
-    if len(runs) == 0:
-        walk = float(np.ptp(where - raw.reference_range[rows][:, None], axis=(0, 1)).min())
-        raise ValueError(
-            f"the range window of {2 * half:.5g} m is too small for the migration, {walk:.5g} m over these rows and "
-            "times: no slant range stays in it; give echoes of a wider range window, fewer times=, or a beam="
-        )
-    longest = int(np.argmax(runs[1::2] - runs[::2]))
-    first, last = runs[2 * longest], runs[2 * longest + 1] - 1
-    if first == last:
-        raise ValueError("the range window is too small for an image: give echoes of a wider range window, or ranges=")
-    return float(candidates[first]), float(candidates[last])

@@ -5,8 +5,8 @@
     I(u, r)   inverse azimuth FFT of I(q, r)
 
 H has the amplitude of the stationary phase and the taper of the Doppler band. The square root is taken as its value
-and slope at the centre frequency, exactly for every column (azimuth compression and migration), and the rest, from
-the slant ranges at the ends of each block (secondary range compression).
+and slope at the centre frequency, exactly for every column (azimuth compression and migration), and the rest, between
+some slant ranges (secondary range compression).
 """
 
 from __future__ import annotations
@@ -21,6 +21,7 @@ from ...base.stage_timer import Clock
 from ...base.text import size_text
 from ...model.phase_history import PhaseHistory
 from ...numerics import range_profiles
+from ...numerics.polynomials import lagrange
 from ...opencl import fft
 from ...opencl.device import Device
 from ._plan import SEGMENT, FocusPlan, band_frequencies
@@ -92,6 +93,12 @@ def _referenced(
     """Weighted rows start ... stop - 1 with the reference range `center`, m: complex64."""
     sample_weight, row_weight = weights
     samples = raw.read(start, stop) * np.outer(row_weight[start:stop], sample_weight).astype(np.float32)
+    largest = float(np.abs(samples).max(initial=0.0))
+    if largest > range_profiles.LARGEST[np.complex64] / raw.samples.size:
+        raise ValueError(
+            f"samples times weights reach {largest:.1e}; sums of {raw.samples.size} in complex64 hold up to "
+            f"{range_profiles.LARGEST[np.complex64]:.0e}: scale the samples down"
+        )
     moved = 2 / np.longdouble(SPEED_OF_LIGHT) * (center - raw.reference_range[start:stop].astype(np.longdouble))
     first, step = ((moved * f[0] % 1).astype(np.float64)[:, None] for f in (raw.frequency, raw.frequency_step))
     # n = width a + b: exp(j 2 pi n s) is a product of one power for each digit, which takes far fewer exponentials
@@ -145,13 +152,16 @@ class _Bins:
             profiles = self._profiles(spectra, doppler, float(ranges[len(ranges) // 2]))
             yield slice(*blocks[0]), self._straightened(profiles, doppler, ranges)
             return
-        after = self._profiles(spectra, doppler, float(ranges[0]))
-        for first, last in blocks:
-            here, end = ranges[first:last], min(last, len(ranges) - 1)
-            before, after = after, self._profiles(spectra, doppler, float(ranges[end]))
-            share = ((here - ranges[first]) / (ranges[end] - ranges[first] or 1.0)).astype(np.float32)
-            made = self._straightened(before, doppler, here)
-            yield slice(first, last), made + share * (self._straightened(after, doppler, here) - made)
+        nodes = np.array([ranges[first] for first, _ in blocks] + [ranges[-1]])
+        made: dict[int, np.ndarray] = {}  # profiles of the four nodes about a block
+        for i, (first, last) in enumerate(blocks):
+            start = min(max(i - 1, 0), len(nodes) - 4)
+            near = range(start, start + 4)
+            made = {k: made[k] if k in made else self._profiles(spectra, doppler, float(nodes[k])) for k in near}
+            here = ranges[first:last]
+            shares = lagrange(nodes[near.start : near.stop], here).astype(np.float32)
+            parts = (share * self._straightened(made[k], doppler, here) for share, k in zip(shares, near, strict=True))
+            yield slice(first, last), sum(parts, np.zeros((), np.complex64))
 
     def _profiles(self, spectra: np.ndarray, doppler: np.ndarray, middle: float) -> np.ndarray:
         """Range profiles after the secondary range compression of one slant range, m."""

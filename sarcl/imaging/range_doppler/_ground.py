@@ -31,7 +31,10 @@ class Ground:
 
     @classmethod
     def of(cls, track: Track, heights: float | ElevationModel, sign: float) -> Ground:
-        """ValueError for an elevation model where coordinates are local."""
+        """ValueError for a vertical track, and for an elevation model where coordinates are local."""
+        _, velocity = track.states(track.times)
+        if not track.is_earth_fixed and (np.hypot(*velocity.T[:2]) < 1e-6 * np.abs(velocity[:, 2])).any():
+            raise ValueError(f"the track is vertical: no side of it is left or right; {REMEDY}")
         if not isinstance(heights, ElevationModel):
             return cls(track, number("heights", heights), sign)
         if not track.is_earth_fixed:
@@ -96,8 +99,6 @@ class Ground:
         along = v / np.linalg.norm(v, axis=1, keepdims=True)
         down = (along @ UP)[:, None] * along - UP
         steep = np.linalg.norm(down, axis=1, keepdims=True)
-        if (steep < 1e-6).any():
-            raise ValueError(f"the track is vertical: no side of it is left or right; {REMEDY}")
         down = down / steep
         across = sign * np.cross(along, UP) / steep
         cosine = (height - p[:, 2])[:, None] / (ranges * down[:, 2:])

@@ -22,9 +22,10 @@ from ._velocity import Hyperbolas
 SEGMENT = 64  # columns along which positions and phases of a Doppler bin are linear
 ROUNDING = 4e-6  # relative error of complex64 FFTs and float32 phases
 INTERPOLATION, COMPRESSION = 0.4, 0.5  # shares of the tolerance that the other errors leave
-# Root mean squares over a band of a phase that grows with the square of the frequency from its middle, and of the
-# square of that phase, relative to those at its ends: 1/sqrt(5), 1/3, and some room for the phase's cubic part.
-QUADRATIC, QUARTIC = 0.5, 0.4
+# Root mean squares over a band of a phase that grows with the square of the frequency from its middle, and of its
+# fourth power, relative to those at its ends: 1/sqrt(5), 1/sqrt(17), and some room for the phase's cubic part.
+QUADRATIC, FOURTH = 0.5, 0.3
+CUBIC = 1 / 24  # largest error of a cubic through four nodes, in the first interval: of exp(j k psi), k the node
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,7 +37,8 @@ class FocusPlan:
     fit             effective velocity by slant range
     length          rows of the azimuth FFT;  bins  numbers of the Doppler bins, in steps of 1/(length step) Hz
     blocks          first and last column + 1 of range blocks. A single block has one secondary range compression,
-                    that of its middle; with several, each is interpolated between those of its ends
+                    that of its middle; with several (three at least) it is interpolated by cubics through four of
+                    their ends
     interpolator, profile_length   of range profiles;  center  their delay 0, m
     errors          predicted relative errors by cause
     """
@@ -143,19 +145,20 @@ def _blocks(
     """The fewest range blocks whose secondary range compression has an error of at most `allowed`, and that error.
 
     One filter has the error psi, the phase at the ends of the band by which the ranges at both ends of the swath differ
-    from its middle; linear interpolation between the filters of a block's ends has psi^2/8, psi their difference.
+    from its middle; cubics through the filters of the blocks' ends have psi^4/24, psi the largest difference of two.
     """
     n = len(ranges)
     one = QUADRATIC * max(_lacking(frequencies, center, fit, band, ranges[[n // 2, i]]) for i in (0, -1))
     if one <= allowed:
         return ((0, n),), one
     error = np.inf
-    for count in sorted({int(2 ** (i / 2)) for i in range(2, 17)}):
-        edges = np.linspace(0, n, min(count, n) + 1).astype(int)
+    for count in sorted({int(3 * 2 ** (i / 3)) for i in range(20)}):
+        if count > n:
+            break
+        edges = np.linspace(0, n, count + 1).astype(int)
         blocks = tuple((int(a), int(b)) for a, b in pairwise(edges))
-        error = QUARTIC / 8 * max(
-            _lacking(frequencies, center, fit, band, ranges[[a, min(b, n - 1)]]) ** 2 for a, b in blocks
-        )  # fmt: skip
+        psi = max(_lacking(frequencies, center, fit, band, ranges[[a, min(b, n - 1)]]) for a, b in blocks)
+        error = FOURTH * CUBIC * psi**4
         if error <= allowed:
             return blocks, error
     raise ToleranceUnreachable(

@@ -74,6 +74,11 @@ def hyperbolas(
             size = np.array([scale**2 / r, 1.0, track.speed**2 * scale / r])
             step = np.linalg.lstsq(slopes / size, truth[:, i] - offset - path, rcond=1e-11)[0] / size
             square, offset, shift = square + step[0], offset + step[1], shift + step[2]
+            if not square > 1e-6 * track.speed**2:
+                raise ValueError(
+                    f"at slant range {r:.7g} m the track's ranges do not grow on both sides of a closest approach: it "
+                    "turns about the scene, and there is no Doppler; use backproject, or polar_format"
+                )
         made[i] = np.sqrt(square), offset, shift
     return Hyperbolas(near, far, chebyshev.chebfit(nodes, made, DEGREE))
 
