@@ -72,6 +72,7 @@ def field(tolerance):
     )  # fmt: skip
 
 
+STRIP = noise_on(straight(32, aperture=10.0), time=np.linspace(0, 0.1, 32))
 SMOOTH = noise_on(straight(128), n_samples=32)
 RAW = noise_history()
 # name: (what is made at a tolerance, tolerance it refuses, what limits it)
@@ -81,6 +82,9 @@ REFUSED = {
     "float64 of listed points": (focused(RAW, LISTED), 3.25e-17, "float64 range profiles"),
     "sub-apertures": (focused(SMOOTH, PLANE, method="factorized"), 1.25e-6, "decimation of the pulses"),
     "sub-apertures below float32": (focused(SMOOTH, PLANE, method="factorized"), 1e-8, "float32 range profiles"),
+    "range Doppler": (
+        lambda t: sarcl.range_doppler(STRIP, tolerance=t, side="right", check=False), 1e-7, "rounding of complex64"
+    ),
     "polar format": (lambda t: sarcl.polar_format(SMOOTH, PLANE, tolerance=t, check=False), 1e-9, "float32 grid"),
     "field": (field, 1e-17, "path differences"),
     "points": (echoed(POINTS), 1.5e-7, "float32 range profiles"),

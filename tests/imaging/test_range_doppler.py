@@ -302,6 +302,12 @@ def test_noise_seen_from_an_orbit_is_focused_as_by_backproject(tolerance):
     assert np.linalg.norm(on_terrain.data - flat.data) <= 1e-4 * np.linalg.norm(flat.data)
 
 
+def test_a_swath_wider_than_the_pulse_interval_is_warned_of():
+    raw = noise(n=64, aperture=30.0)
+    with pytest.warns(sarcl.SarclWarning, match=r"echoes of the next pulse begin after 7\.1\d+ m"):
+        sarcl.range_doppler(replace(raw, time=1e-5 * raw.time), check=False)
+
+
 def bent(size):
     tx, time = flown()
     return noise_on(tx + np.sin(np.linspace(0, 40, len(tx)))[:, None] * [0, 0, size], time=time)

@@ -140,6 +140,12 @@ def choose_extent(
             f"the image spans {widest:.5g} Hz of Doppler, more than the pulse rate of "
             f"{rate:.5g} Hz: a point appears again {away:.4g} m along the track. Give fewer times=, or beam="
         )
+    unambiguous = SPEED_OF_LIGHT * track.step / 2
+    if made_ranges[-1] - made_ranges[0] > unambiguous:
+        warn(
+            f"the image is {made_ranges[-1] - made_ranges[0]:.5g} m wide, but echoes of the next pulse begin after "
+            f"{unambiguous:.5g} m: of measured echoes ranges farther apart are mixed. Give narrower ranges="
+        )
     zone = float(fresnel(SPEED_OF_LIGHT / float(raw.center_frequency[0]), made_ranges[0]))
     band = Band.tapered(*used, pixel_band, zone, allowed)
     return Extent(made_times, made_ranges, finer, band, pixel_band, track.times, speed)
