@@ -8,7 +8,7 @@ import pytest
 from sarcl.reference import spectral_echo as twin
 from sarcl.simulation.spectral._aspect_window import DopplerGrid, aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import transfer_tables
-from sarcl.simulation.spectral._map_plan import plan_map, range_wavenumbers, tile_of
+from sarcl.simulation.spectral._map_plan import CELLS, plan_map, range_wavenumbers
 from sarcl.simulation.spectral._map_spectrum import ReflectivityMap
 
 RANGES, BAND = (2000.0, 2040.0), (3.0e9, 3.1e9)
@@ -18,14 +18,14 @@ def ones(sines, frequency):
     return np.ones((1, len(sines)), np.complex128)
 
 
-@pytest.fixture
-def task(every_device):
+@pytest.fixture(params=CELLS)
+def task(request, every_device):
     seen = aspects(0.01, 0.03, RANGES, BAND, (-50.0, 50.0), 1e-3)
     transfer = transfer_tables(seen, ones, 1, 2, 4)
     ends = np.outer(2 * wavenumber(np.array(BAND)), transfer.limits) * 200.0 / (2 * np.pi)
     grid = DopplerGrid(200.0, 200, int(ends.min()), int(ends.max() - ends.min()))
     numbers = range_wavenumbers(transfer, grid)
-    plan = plan_map(1e-4, numbers, grid, RANGES, 0.0, tile_of(every_device), 1e-3)
+    plan = plan_map(1e-4, numbers, grid, RANGES, 0.0, request.param, 1e-3)
     random = np.random.default_rng(0)
     n = 300
     azimuth, slant_range = random.uniform(-150, 250, n), random.uniform(*RANGES, n)
