@@ -67,52 +67,22 @@ def choose_extent(
         )
     wide = pair("spacing", (None, None) if spacing is None else spacing)
     steps = [None if d is None else number(f"spacing[{i}]", d, above=0) for i, d in enumerate(wide)]
-    cosine = np.sqrt(1 - centroid**2)
-    about = float(raw.reference_range[raw.n_rows // 2]) * cosine if ranges is None else sum(ranges) / 2
-    about = max(about, least)
-    speed = track.speed
-    sines = (-1.0, 1.0)
-    if beam is not None:
-        angle = float(np.arcsin(centroid))
-        sines = (
-            float(np.sin(max(angle - beam / 2, -np.pi / 2))),
-            float(np.sin(min(angle + beam / 2, np.pi / 2))),
-        )
-    window = RangeWindow(raw, track, positions, sines, least, about)
-    hertz = 2 * speed * float(raw.center_frequency[0]) / SPEED_OF_LIGHT
-    middle = (track.start + track.stop) / 2 + delay(centroid, about, speed)
-    if times is not None:
-        middle = sum(times) / 2
-    seen = np.clip(sine(np.array(middle), np.array(about), track.times, speed), *sines)
-    pixel_band = float(np.ptp(seen))
-    rate = 1 / track.step
-    if hertz * pixel_band > rate:
-        most = 2 * np.arcsin(min(1.0, rate / hertz / 2)) / cosine
-        what = "all rows see a pixel under" if beam is None else "the beam has"
-        raise ValueError(
-            f"the pulse rate, {rate:.5g} Hz, is below the Doppler bandwidth: {what} {hertz * pixel_band:.5g} Hz; "
-            f"give echoes of at least that pulse rate, or beam= of at most {most:.2g} rad if the antenna sees no more"
-        )
+    at_middle = float(raw.reference_range[raw.n_rows // 2]) * np.sqrt(1 - centroid**2)
+    about = max(at_middle if ranges is None else sum(ranges) / 2, least)
+    sight = _Sight(track, centroid, beam, float(raw.center_frequency[0]), about)
+    window = RangeWindow(raw, track, positions, sight.sines, least, about)
+    middle = (track.start + track.stop) / 2 + delay(centroid, about, track.speed) if times is None else sum(times) / 2
+    pixel = sight.rows_at(middle)
+    pixel_band = float(np.ptp(pixel))
+    _check_pulse_rate(sight, pixel_band)
     if times is None:
-        half = (track.stop - track.start) / 2
         near = max(least, about - float(raw.swath[0]))
-        for _ in range(60):
-            if hertz * np.ptp(_ends(sines, middle, half, track, near, speed)) <= rate:
-                break
-            half *= 0.9
-        if beam is not None:
-            half = (track.stop - track.start) / 2
-        if ranges is None:  # under squint points that are far along the track leave the range window
-            most = window.length((middle, middle))
-            while half > track.step and window.length((middle - half, middle + half)) < HELD * most:
-                half *= 0.8
+        half = _default_half(sight, window, middle, near, None if ranges is not None else HELD)
         times = middle - half, middle + half
-    zone = float(fresnel(SPEED_OF_LIGHT / float(raw.center_frequency[0]), np.array(about)))
-    taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, zone, allowed).taper
-    along, across = _wavenumbers(raw, np.clip([seen.min() - taper, seen.max() + taper], -STEEPEST, STEEPEST))
-    finer = max(1, int(np.ceil(speed * along / (FILLED * rate) - 1e-9)))
-    if steps[0] is not None:
-        finer = max(1, int(np.ceil(track.step / steps[0] - 1e-9)))
+    taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, sight.zone(about), allowed).taper
+    along, across = _wavenumbers(raw, np.clip([pixel.min() - taper, pixel.max() + taper], -STEEPEST, STEEPEST))
+    finer = track.speed * along * track.step / FILLED if steps[0] is None else track.step / steps[0]
+    finer = max(1, int(np.ceil(finer - 1e-9)))
     column = steps[1] or FILLED / across
     ranges = window.longest(times) if ranges is None else window.checked(ranges, times)
     n_times = int(np.floor((times[1] - times[0]) / track.step * finer + 1e-6)) + 1
@@ -122,33 +92,109 @@ def choose_extent(
             f"an image of {n_times} x {n_ranges} pixels is larger than range_doppler makes; give times=, ranges= of a "
             "part of it, or a wider spacing="
         )
-    made_times = times[0] + track.step / finer * np.arange(n_times)
-    made_ranges = ranges[0] + column * np.arange(n_ranges)
-    corners = sine(
-        made_times[[0, -1], None, None], made_ranges[[0, -1], None], np.array([track.start, track.stop]), speed
-    )  # (times, ranges, rows)
-    used = float(max(sines[0], corners.min())), float(min(sines[1], corners.max()))
+    u, r = times[0] + track.step / finer * np.arange(n_times), ranges[0] + column * np.arange(n_ranges)
+    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), track.speed)
+    used = float(max(sight.sines[0], corners.min())), float(min(sight.sines[1], corners.max()))
     if not used[0] < used[1]:
         raise ValueError(
-            f"no row sees the times {made_times[0]:.6g} to {made_times[-1]:.6g} s in the beam; with this Doppler "
-            f"centroid the rows see zero-Doppler times about {middle:.6g} s: give times= there, or doppler='data'"
+            f"no row sees the times {u[0]:.6g} to {u[-1]:.6g} s in the beam; with this Doppler centroid the rows see "
+            f"zero-Doppler times about {(track.start + track.stop) / 2 + delay(centroid, about, track.speed):.6g} s: "
+            "give times= there, or doppler='data'"
         )
-    widest = hertz * float(np.ptp(corners, axis=(0, 2)).max())
-    if beam is None and widest > 1.001 * rate:
-        away = rate * SPEED_OF_LIGHT / float(raw.center_frequency[0]) * about / (2 * speed)
+    _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
+    band = Band.tapered(*used, pixel_band, sight.zone(float(r[0])), allowed)
+    return Extent(u, r, finer, band, pixel_band, track.times, track.speed)
+
+
+@dataclass(frozen=True, eq=False)
+class _Sight:
+    """How rows see points: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
+
+    frequency  in the middle of the band, Hz;  about  slant range in the middle of the image, m
+    """
+
+    track: Track
+    centroid: float
+    beam: float | None
+    frequency: float
+    about: float
+
+    @property
+    def sines(self) -> tuple[float, float]:
+        """Sines of the squint angles at the ends of the beam."""
+        if self.beam is None:
+            return -1.0, 1.0
+        angle = float(np.arcsin(self.centroid))
+        ends = np.clip([angle - self.beam / 2, angle + self.beam / 2], -np.pi / 2, np.pi / 2)
+        return float(np.sin(ends[0])), float(np.sin(ends[1]))
+
+    @property
+    def hertz(self) -> float:
+        """Doppler frequency, Hz, for a sine of 1."""
+        return 2 * self.track.speed * self.frequency / SPEED_OF_LIGHT
+
+    @property
+    def rate(self) -> float:
+        """Pulse rate, Hz."""
+        return 1 / self.track.step
+
+    def zone(self, distance: float) -> float:
+        """Width of a Fresnel zone at a slant range, m, as a sine."""
+        return float(fresnel(SPEED_OF_LIGHT / self.frequency, np.array(distance)))
+
+    def rows_at(self, u: float) -> np.ndarray:
+        """Sines under which the rows see a point at a zero-Doppler time, s, those beyond the beam at its ends."""
+        return np.clip(sine(np.array(u), np.array(self.about), self.track.times, self.track.speed), *self.sines)
+
+
+def _check_pulse_rate(sight: _Sight, pixel_band: float) -> None:
+    """ValueError where the rows see a pixel under more Doppler frequencies than the pulse rate."""
+    if sight.hertz * pixel_band > sight.rate:
+        most = 2 * np.arcsin(min(1.0, sight.rate / sight.hertz / 2)) / np.sqrt(1 - sight.centroid**2)
+        what = "all rows see a pixel under" if sight.beam is None else "the beam has"
+        raise ValueError(
+            f"the pulse rate, {sight.rate:.5g} Hz, is below the Doppler bandwidth: {what} "
+            f"{sight.hertz * pixel_band:.5g} Hz; give echoes of at least that pulse rate, or beam= of at most "
+            f"{most:.2g} rad if the antenna sees no more"
+        )
+
+
+def _default_half(sight: _Sight, window: RangeWindow, middle: float, near: float, held: float | None) -> float:
+    """Half the default span of zero-Doppler times about `middle`, s: that of the rows, or less.
+
+    Less where the image, at slant range `near`, has more Doppler frequencies than the pulse rate, and where less than
+    a share `held` of the slant ranges is left: under squint points far along the track leave the range window.
+    """
+    track = sight.track
+    half = (track.stop - track.start) / 2
+    ends = np.array([track.start, track.stop])
+
+    def image_band(half: float) -> float:
+        return float(np.ptp(sine(middle + half * np.array([[-1.0], [1.0]]), np.array(near), ends, track.speed)))
+
+    while sight.beam is None and half > track.step and sight.hertz * image_band(half) > sight.rate:
+        half *= 0.9
+    if held is not None:
+        most = window.length((middle, middle))
+        while half > track.step and window.length((middle - half, middle + half)) < held * most:
+            half *= 0.8
+    return half
+
+
+def _warn_of_ambiguities(sight: _Sight, image_band: float, width: float) -> None:
+    """Warn where points appear again along the track, or echoes of the next pulse fall into the image's width, m."""
+    if sight.beam is None and sight.hertz * image_band > 1.001 * sight.rate:
+        away = sight.rate / sight.hertz * sight.about
         warn(
-            f"the image spans {widest:.5g} Hz of Doppler, more than the pulse rate of "
-            f"{rate:.5g} Hz: a point appears again {away:.4g} m along the track. Give fewer times=, or beam="
+            f"the image spans {sight.hertz * image_band:.5g} Hz of Doppler, more than the pulse rate of "
+            f"{sight.rate:.5g} Hz: a point appears again {away:.4g} m along the track. Give fewer times=, or beam="
         )
-    unambiguous = SPEED_OF_LIGHT * track.step / 2
-    if made_ranges[-1] - made_ranges[0] > unambiguous:
+    unambiguous = SPEED_OF_LIGHT * sight.track.step / 2
+    if width > unambiguous:
         warn(
-            f"the image is {made_ranges[-1] - made_ranges[0]:.5g} m wide, but echoes of the next pulse begin after "
-            f"{unambiguous:.5g} m: of measured echoes ranges farther apart are mixed. Give narrower ranges="
+            f"the image is {width:.5g} m wide, but echoes of the next pulse begin after {unambiguous:.5g} m: of "
+            "measured echoes ranges farther apart are mixed. Give narrower ranges="
         )
-    zone = float(fresnel(SPEED_OF_LIGHT / float(raw.center_frequency[0]), made_ranges[0]))
-    band = Band.tapered(*used, pixel_band, zone, allowed)
-    return Extent(made_times, made_ranges, finer, band, pixel_band, track.times, speed)
 
 
 def _wavenumbers(raw: PhaseHistory, sines: np.ndarray) -> tuple[float, float]:
@@ -160,11 +206,3 @@ def _wavenumbers(raw: PhaseHistory, sines: np.ndarray) -> tuple[float, float]:
     nearest = np.clip(0.0, sines[0], sines[1])  # where the cosine is largest
     wide = 2 / SPEED_OF_LIGHT * band * np.sqrt(1 - np.append(sines, nearest) ** 2)
     return float(np.ptp(2 / SPEED_OF_LIGHT * band * sines)), float(np.ptp(wide))
-
-
-def _ends(
-    sines: tuple[float, float], middle: float, half: float, track: Track, about: float, speed: float
-) -> np.ndarray:
-    """Sines at which the ends of the track see the ends of an image, within the beam."""
-    u = np.array([[middle - half], [middle + half]])
-    return np.clip(sine(u, np.array(about), np.array([track.start, track.stop]), speed), *sines)

@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from ...base.constants import SPEED_OF_LIGHT
 from ...base.rows import spread_over
 from ...model.phase_history import PhaseHistory
 from ._track import Track
@@ -84,14 +85,19 @@ def hyperbolas(
 
 
 def phase_error(
-    raw: PhaseHistory, track: Track, positions: Positions, fit: Hyperbolas, u: np.ndarray, rows_of: Callable
+    raw: PhaseHistory,
+    track: Track,
+    positions: Positions,
+    fit: Hyperbolas,
+    u: np.ndarray,
+    rows_of: Callable[[float], np.ndarray],
 ) -> tuple[float, float]:
     """Root mean square and largest phase error, rad, of hyperbolas at zero-Doppler times u, s (n,).
 
     rows_of(u)  the rows that points at a zero-Doppler time are focused from
     """
     ranges = np.linspace(fit.near, fit.far, 9)
-    wavenumber = 4 * np.pi / 299792458.0 * float(raw.center_frequency.max())
+    wavenumber = 4 * np.pi / SPEED_OF_LIGHT * float(raw.center_frequency.max())
     worst, mean = 0.0, []
     for one in u:
         rows = rows_of(float(one))
