@@ -165,6 +165,16 @@ def test_an_image_is_saved_and_read(tmp_path):
     assert (again.grid.positions == image.grid.positions).all()
 
 
+def test_looks_are_at_the_middle_of_their_pixels():
+    image = sarcl.range_doppler(noise(n=60, aperture=20.0))
+    looks = image.multilook((4, 3))
+    assert looks.data.shape == looks.grid.shape == (15, image.data.shape[1] // 3)
+    assert looks.data[2, 1] == pytest.approx((np.abs(image.data[8:12, 3:6]) ** 2).mean(), rel=1e-5)
+    assert looks.grid.positions[2, 1] == pytest.approx(image.grid.positions[8:12, 3:6].mean(axis=(0, 1)), abs=1e-3)
+    assert looks.grid.times[2] == pytest.approx(image.grid.times[8:12].mean())
+    assert looks.grid.ranges[1] == pytest.approx(image.grid.ranges[4])
+
+
 def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
     raw = points([(0, 0, 0), (5, 60, 0)], aperture=400.0, n=500, reference=4e3)
     with pytest.raises(ValueError, match=r"PRF|pulse rate.*124\.\d+ Hz, is below the Doppler bandwidth.*beam="):
