@@ -68,7 +68,7 @@ def plot(
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
     floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
-    lines: Sequence[tuple[str, Any, Any]] = (),
+    lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
 ) -> Block:  # fmt: skip
     """A figure of decibels in grey; see `plots.picture`. percentile  of the values at which the scale has white."""
     db = np.asarray(db, np.float64)
@@ -81,9 +81,10 @@ def picture(
         floor_db=floor_db,
         box=box,
         lines=lines,
+        unit=unit,
     )
     white = "the largest value" if percentile == 100 else f"the percentile {percentile:g} of the values"
-    scale = f"White: {white}; black: {-floor_db:g} dB below."
+    scale = f"White: {white}; black: {-floor_db:g} {unit} below."
     return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}")
 
 

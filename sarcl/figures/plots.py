@@ -115,12 +115,12 @@ def decades(axis: Any) -> None:
 
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
-    box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (),
+    box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
 ) -> bytes:  # fmt: skip
     """PNG of decibels (rows, columns) in grey, row 0 at the bottom: white is the largest value, black floor_db below.
 
     x, y  edges of the frame;  box: half widths along x and y of a dashed rectangle about the origin
-    lines (name, x (n,), y (n,)) drawn over it, with a legend
+    lines (name, x (n,), y (n,)) drawn over it, with a legend;  unit  of the values, where they are not decibels
     """
     from matplotlib.patches import Rectangle
 
@@ -133,7 +133,7 @@ def picture(
     )  # fmt: skip
     names(axes, x_name, y_name)
     axes.grid(visible=False)
-    made.colorbar(shown, ax=axes, label="dB", fraction=0.08, pad=0.03)
+    made.colorbar(shown, ax=axes, label=unit, fraction=0.08, pad=0.03)
     if box is not None:
         corner = -box[0], -box[1]
         axes.add_patch(Rectangle(corner, 2 * box[0], 2 * box[1], fill=False, edgecolor="#2ecc71", linestyle="--"))

@@ -94,11 +94,10 @@ class Image:
     def multilook(self, looks: int | Sequence[int] | np.ndarray) -> Image:
         """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; incomplete blocks are left out.
 
-        Raises ValueError when the grid lists its points (unless by time and slant range, as `range_doppler` does), or
-        when the block is larger than the image.
+        Raises ValueError when the grid is not a plane or the block is larger than the image.
         """
-        if not self.grid.is_plane and self.grid.times is None:
-            raise ValueError("multilook is for images on a plane or by range_doppler; this grid lists its points")
+        if not self.grid.is_plane:
+            raise ValueError("multilook is for images on a plane; this grid lists its points")
         a, b = pair("looks", looks)
         a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
@@ -107,7 +106,14 @@ class Image:
         data = np.asarray(self.data)[: rows * a, : columns * b]
         power = np.abs(data) ** 2 if self.is_complex else data
         # the mean of a block lies at the mean position of its pixels
-        grid = self.grid.blocks(rows, columns, a, b)
+        center = self.grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
+        assert self.grid.spacing is not None
+        grid = replace(
+            self.grid,
+            shape=(rows, columns),
+            center=center,
+            spacing=(self.grid.spacing[0] * a, self.grid.spacing[1] * b),
+        )
         return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
 
     def show(

@@ -193,19 +193,6 @@ class ImageGrid:
         part.__dict__["_middle"] = self._middle - start
         return part
 
-    def blocks(self, rows: int, columns: int, high: int, wide: int) -> ImageGrid:
-        """rows x columns pixels in the middle of blocks of high x wide pixels of a plane or a `zero_doppler` grid."""
-        at = [(high - 1) / 2 + high * np.arange(rows), (wide - 1) / 2 + wide * np.arange(columns)]
-        if self.times is not None and self.ranges is not None:
-            axes = [np.interp(i, np.arange(len(a)), a) for i, a in zip(at, (self.times, self.ranges), strict=True)]
-            return ImageGrid.zero_doppler(axes[0], axes[1], self.at(at[0][:, None], at[1]))
-        self._need_plane("blocks")
-        assert self.spacing is not None
-        center = self.at((rows // 2) * high + (high - 1) / 2, (columns // 2) * wide + (wide - 1) / 2)
-        return replace(
-            self, shape=(rows, columns), center=center, spacing=(self.spacing[0] * high, self.spacing[1] * wide)
-        )
-
     def filled(self) -> ImageGrid:
         """The grid with some position of another cell in every empty cell; itself where no cell is empty."""
         if self.empty is None or self.listed is None:

@@ -165,16 +165,6 @@ def test_an_image_is_saved_and_read(tmp_path):
     assert (again.grid.positions == image.grid.positions).all()
 
 
-def test_looks_are_at_the_middle_of_their_pixels():
-    image = sarcl.range_doppler(noise(n=60, aperture=20.0))
-    looks = image.multilook((4, 3))
-    assert looks.data.shape == looks.grid.shape == (15, image.data.shape[1] // 3)
-    assert looks.data[2, 1] == pytest.approx((np.abs(image.data[8:12, 3:6]) ** 2).mean(), rel=1e-5)
-    assert looks.grid.positions[2, 1] == pytest.approx(image.grid.positions[8:12, 3:6].mean(axis=(0, 1)), abs=1e-3)
-    assert looks.grid.times[2] == pytest.approx(image.grid.times[8:12].mean())
-    assert looks.grid.ranges[1] == pytest.approx(image.grid.ranges[4])
-
-
 def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
     raw = points([(0, 0, 0), (5, 60, 0)], aperture=400.0, n=500, reference=4e3)
     with pytest.raises(ValueError, match=r"PRF|pulse rate.*124\.\d+ Hz, is below the Doppler bandwidth.*beam="):
@@ -189,6 +179,19 @@ def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
     rows = 0.015 * 4e3 / 400 * 500  # within the beam; each taper has half its width of rows
     assert 200 * rows < image.gain < 200 * 2 * rows
     assert "Hz of a pixel, PRF 124.7" in image.report.plan["Doppler band"]
+
+
+def test_a_track_longer_than_the_times_need_is_folded_and_changes_nothing():
+    raw = points([(0, 0, 0), (5, 60, 0), (3, -150, 0)], aperture=800.0, n=1000, reference=4e3)
+    wide = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, ranges=(3985, 4025), check=True)
+    narrow = sarcl.range_doppler(raw, beam=0.015, tolerance=1e-3, ranges=(3985, 4025), times=(3.9, 4.1), check=True)
+    assert int(narrow.report.plan["Doppler bins"].split()[-1]) < raw.n_rows
+    assert narrow.report.measured_error <= narrow.report.predicted_error <= 1e-3
+    at = np.array([0.0, 0.0, 0.0])
+    levels = [
+        abs(sarcl.measure(replace(one, tx=raw.tx[500], rx=None), near=at).peak) / one.gain for one in (wide, narrow)
+    ]
+    assert levels[0] == pytest.approx(levels[1], rel=0.02)
 
 
 @pytest.mark.parametrize("squint", [0.0, 0.3])

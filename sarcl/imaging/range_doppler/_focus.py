@@ -72,7 +72,10 @@ def _pieces(numbers: np.ndarray, period: int) -> list[tuple[int, int]]:
 def _azimuth_spectra(
     device: Device, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], clock: Clock
 ) -> np.ndarray:
-    """FFT of the rows along the track, all with the reference range plan.center: complex64 (length, n_samples)."""
+    """FFT of the rows along the track, all with the reference range plan.center: complex64 (length, n_samples).
+
+    A track longer than the FFT is folded: the plan's length keeps what is folded out of the pixels' Doppler band.
+    """
     rows = np.empty((raw.n_rows, raw.n_samples), np.complex64)
     for start in range(0, raw.n_rows, PIECE):
         rows[start : start + PIECE] = _referenced(raw, start, min(start + PIECE, raw.n_rows), plan.center, weights)
@@ -81,7 +84,9 @@ def _azimuth_spectra(
     for start in range(0, raw.n_samples, PIECE):
         columns = slice(start, start + PIECE)
         part = np.zeros((len(rows[0, columns]), plan.length), np.complex64)
-        part[:, : raw.n_rows] = rows[:, columns].T
+        for first in range(0, raw.n_rows, plan.length):
+            piece = rows[first : first + plan.length, columns].T
+            part[:, : piece.shape[1]] += piece
         out[:, columns] = fft.rows(device, part).T
     clock.lap("fft")
     return out

@@ -9,6 +9,7 @@ For this folder alone, a section or a group of sections of the page each, and wh
     _errata    errors in the printed equations
     _ground    material of the ground, radar for flat ground
     _patches   figure 12: patches of different materials and statistics
+    _raw       figures 9 and 10, section V: raw signals, their image, run times
     _relief    figures 10 and 13 to 17: layover, shadow, polarisation
     _speckle   figures 5 to 7 and table I: speckle of homogeneous ground
 """
@@ -18,7 +19,7 @@ from __future__ import annotations
 from .. import PAPERS
 from ..lab import Lab
 from ..paper import Paper
-from . import _errata, _patches, _relief, _speckle
+from . import _errata, _patches, _raw, _relief, _speckle
 
 __all__ = ["PAPER"]
 
@@ -50,9 +51,11 @@ PAPER = Paper(
     sections=(
         _speckle.section,
         _patches.section,
+        _raw.figure_9,
         _relief.parallelepiped,
         _relief.cone,
         _relief.composite,
+        _raw.times,
         _errata.section,
     ),
     quick="fields are smaller and looks fewer than in the paper.",
@@ -60,8 +63,8 @@ PAPER = Paper(
     main=(
         "autocorrelation at all 25 lags",
         "autocorrelation along range and the response of a point",
+        "raw signal by Fourier transforms and by the sum over facets and pulses",
         "the shadow",
-        "HV where the cone faces the radar",
         "HV over HH of tilted facets of a perfect conductor",
     ),
 )

@@ -6,6 +6,7 @@ Information Technology 26 (8), 2004, 1250-1255 (in Chinese). Numbers of figures 
 For this folder alone, a section or a group of sections of the page each, and what they share:
 
     _errata    errors in the printed equations
+    _orbit     figures 6 to 8: solids on rough ground, from an orbit to the image
     _patches   figures 4 and 5: patches of rising roughness or permittivity
     _radar     the radar for flat ground
     _speckle   figure 3: amplitudes and phases of rough ground
@@ -16,7 +17,7 @@ from __future__ import annotations
 from .. import PAPERS
 from ..lab import Lab
 from ..paper import Paper
-from . import _errata, _patches, _speckle
+from . import _errata, _orbit, _patches, _speckle
 
 __all__ = ["PAPER"]
 
@@ -38,8 +39,14 @@ PAPER = Paper(
     title="Spaceborne raw data of facet scenes: Wan et al. 2004, published and measured",
     about=ABOUT,
     lab=Lab,
-    sections=(_speckle.section, _patches.section, _errata.section),
+    sections=(_speckle.section, _patches.section, _orbit.section, _errata.section),
     quick="patches are smaller and looks fewer.",
     terms=TERMS,
-    main=("amplitudes", "phases", "coefficient as roughness grows", "coefficient as permittivity grows"),
+    main=(
+        "amplitudes",
+        "phases",
+        "coefficient as roughness grows",
+        "coefficient as permittivity grows",
+        "end of the cylinder's shadow",
+    ),
 )
