@@ -106,6 +106,7 @@ def test_the_papers_linear_correction_leaves_a_quadratic_phase():
     assert response(*cut(many))[1] < 0.9
 
 
+@pytest.mark.slow
 def test_off_centre_points_are_displaced_by_the_mapping():
     # worst where 4 k_c g y/R is an odd half of 2 pi: 2.25 m, with a side lobe as high as the peak
     for y, place, pslr in ((2.25, 2.162, -0.13), (2.0, 2.0, -5.1)):

@@ -247,6 +247,7 @@ def test_bad_input_is_found_before_the_work(options, said):
 SMALL = {"scenes": ["straight"], "sizes": [16], "tolerances": [1e-2], "repeats": 2, "pixels": 256, "devices": ["cpu"]}
 
 
+@pytest.mark.slow
 def test_sarcl_and_a_peer_in_one_run(stand_in, tmp_path):
     stand_in()
     lines = []

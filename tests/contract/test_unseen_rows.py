@@ -26,6 +26,7 @@ def test_sub_apertures_of_rows_shorter_than_what_their_tiles_reach(n_samples, to
     assert holds(raw, grid, tolerance, method="factorized").report.plan["method"] == "factorized"
 
 
+@pytest.mark.slow
 def test_a_few_rows_off_a_smooth_track():
     # half a metre in 5 rows of 1024: decimation would have an error of a radian there
     tx = straight(1024, aperture=300.0)

@@ -152,6 +152,7 @@ def rows_of(**fields):
     return found, {name: row["points"][0] for name, row in found["mapped"].items()}
 
 
+@pytest.mark.slow
 def test_half_power_widths_are_those_of_published_truth(tmp_path):
     # 10 GHz, 10 km, 100 m (100 steps of 1 m), widths as in test_aperture.py; what resolves is where phase centres are
     (tmp_path / "wide.toml").write_text(

@@ -93,6 +93,7 @@ def resolves(dotted: str) -> bool:
 # ---- citations
 
 
+@pytest.mark.slow
 def test_cited_files_and_names_exist():
     files, wrong, seen = tree(".py", ".cl", ".clh", ".md"), [], 0
     for path in files:

@@ -155,6 +155,7 @@ def test_a_phase_error_is_removed(points, name):
     assert np.abs(better.samples - wanted).max() <= 1e-5 * np.abs(wanted).max()
 
 
+@pytest.mark.slow
 def test_squinted_straight_track():
     n = N_PULSES
     squint = np.radians(50)
@@ -168,6 +169,7 @@ def test_squinted_straight_track():
     assert abs(20 * np.log10(highest(better, fine) / highest(truth, fine))) <= 0.5
 
 
+@pytest.mark.slow
 def test_bistatic_with_a_receiver_elsewhere():
     truth = echoes(*scatterers(seed=1), arc(extent=2 * ARC), arc(middle=0.9, extent=ARC / 2))
     phase = smooth(N_PULSES, 5, rms=10)

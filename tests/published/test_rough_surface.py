@@ -67,6 +67,7 @@ def test_the_limit_is_its_formula():
     assert decibel(wanted) == pytest.approx(LIMIT, abs=1e-3)
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:mesh too coarse")
 def test_a_conducting_surface_reaches_the_geometric_optics_limit():
     # 12 surfaces of 20 x 20 correlation lengths, s = 1.06 wavelengths: a standard error of 0.15 to 0.2 dB
@@ -81,6 +82,7 @@ def test_it_stays_there_on_average_and_with_longer_correlation(correlation, acro
     assert np.abs(decibel(sigma0(32, correlation * WAVE, across, cells)) - LIMIT).max() < 0.3
 
 
+@pytest.mark.slow
 @pytest.mark.filterwarnings("ignore:mesh too coarse")
 def test_a_dielectric_one_is_weaker_by_its_reflection_at_normal_incidence():
     # every point that shines faces the radar, however the surface is tilted: |R(0)|^2 = 1/9 for eps = 4

@@ -44,6 +44,7 @@ def test_fig_12_facets_that_are_rough_make_rayleigh_speckle(case):
     assert contrast == pytest.approx(1, abs=0.12)  # 1296 pixels: a standard error of 0.055
 
 
+@pytest.mark.slow
 def test_fig_12_smooth_facets_on_a_rough_profile_do_not():
     # smooth facets shine where they happen to face the radar: few a cell, and the brightest cells stand out
     for cells in ((16, 4), (4, 4)):
@@ -224,7 +225,8 @@ def solids():
 GRID = RELIEF.grid((80, 90), pixels=2)
 
 
-@pytest.mark.parametrize("n", [2, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12])
 def test_fig_17_everything_is_where_it_should_be(n):
     scene, hiding = solids()["fig 17"]
     power, wanted = looks(RELIEF, scene, GRID, n)[0], expected(RELIEF, scene, hiding, GRID, "hamming")
@@ -237,7 +239,8 @@ def test_fig_17_everything_is_where_it_should_be(n):
         assert misfit(power, np.roll(wanted, shift, (0, 1)), n)[0] > 1 + 3 * error
 
 
-@pytest.mark.parametrize("n", [2, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12])
 def test_figs_10_and_14_to_16_a_cone_in_three_polarisations(n):
     scene, hiding = solids()["fig 10"]
     power = looks(RELIEF, scene, GRID, n, ("HH", "VV", "HV"))

@@ -36,6 +36,7 @@ def test_a_fine_mesh_is_within_two_hundredths_of_a_decibel(device, ka):
     assert np.abs(excess(shapes.sphere(1.0, facets=FACETS[ka]), ka, device=device)).max() < 0.02
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("ka", [50, 200])
 def test_shadows_change_nothing_on_a_convex_body(ka):
     ball = shapes.sphere(1.0, facets=FACETS[ka])

@@ -82,6 +82,7 @@ def fig_5(size, roughness, permittivity, seeds):
 SIZES = [pytest.param(14, 1, id="small"), pytest.param(24, 1, id="large", marks=pytest.mark.slow)]
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("size, seeds", SIZES)
 def test_fig_5a_roughness_brightens_as_the_slopes_allow(size, seeds):
     got, wanted, error = fig_5(size, values(0.16, 0.01), np.full(16, 3.0), seeds)
@@ -105,6 +106,7 @@ def test_fig_5b_permittivity_brightens_as_fresnel_says(size, seeds):
     assert slope == pytest.approx(1, abs=max(0.05, 3 * slope_error)) and r > 0.98
 
 
+@pytest.mark.slow
 def test_fig_3_amplitudes_are_rayleigh_where_enough_facets_share_a_cell():
     radar, size = Radar(**LONG, n_pulses=52), 40
     ends = [(-size * n / 2, size * n / 2) for n in radar.null]
@@ -120,7 +122,8 @@ def test_fig_3_amplitudes_are_rayleigh_where_enough_facets_share_a_cell():
     assert few[0] < 1e-3 and few[1] > 0.01 and few[2] > 1.2
 
 
-@pytest.mark.parametrize("n", [2, pytest.param(12, marks=pytest.mark.slow)])
+@pytest.mark.slow
+@pytest.mark.parametrize("n", [12])
 def test_figs_6_to_8_a_frustum_a_cuboid_and_a_cylinder_on_rough_ground(n):
     # foreshortening in front, shadow behind: all where lines of sight put them
     stone = {"material": Material(eps_r=3.0, diagram="cos2")}

@@ -124,6 +124,7 @@ def test_where_echoes_are_not_smooth_over_the_array_every_channel_is_made(name):
     np.testing.assert_array_equal(raw.samples, each.samples)
 
 
+@pytest.mark.slow
 def test_facets_between_places():
     scene = shapes.box((0.5, 0.4, 0.3)) + shapes.sphere(0.2, edge=0.02).moved((0, 1, 0))
     track, array = passing(8), line(45, spacing=0.0144)

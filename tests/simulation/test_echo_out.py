@@ -208,6 +208,7 @@ print(peak() - before, raw.n_rows, raw.n_samples, raw.report.predicted_error)
 """
 
 
+@pytest.mark.slow
 @pytest.mark.skipif(sys.platform != "linux", reason="kilobytes of memory as Linux counts them")
 def test_450_senders_and_450_receivers_stream_within_their_limit(tmp_path):
     script = tmp_path / "_measure.py"
