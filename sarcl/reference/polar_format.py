@@ -19,7 +19,8 @@ def polar_format(
 ) -> tuple[np.ndarray, float]:
     """I(x) = sum_p sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3), for plane waves.
 
-    tau = (2/c)(|T - c| - u.(x - c)), u the unit vector from `center` c, m (3,), to the antenna T.
+    tau = (1/c)(|T - c| + |R - c| - (u + v).(x - c)), u and v the unit vectors from `center` c, m (3,), to the antennas
+    T and R.
     Returns I complex128 (n,) and the norm it would have if samples had random phases.
     """
     n = np.arange(raw.n_samples)
@@ -27,9 +28,9 @@ def polar_format(
     row_weight = np.ones(raw.n_rows) if row_weight is None else row_weight
     image, power = np.zeros(len(points), np.complex128), 0.0
     for p in range(raw.n_rows):
-        shift = half_path(raw.tx[p], raw.tx[p], center[None], raw.reference_range[p])[0]
-        away = (raw.tx[p] - center).astype(np.longdouble)
-        along = (points - center) @ (away / np.sqrt((away**2).sum()))
+        shift = half_path(raw.tx[p], raw.rx[p], center[None], raw.reference_range[p])[0]
+        away = (np.stack([raw.tx[p], raw.rx[p]]) - center).astype(np.longdouble)
+        along = (points - center) @ (away / np.sqrt((away**2).sum(axis=1, keepdims=True))).mean(axis=0)
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * (shift - along)
         samples = raw.read(p, p + 1)[0] * (sample_weight * row_weight[p])
         first = (raw.frequency[p] * delay) % 1

@@ -55,6 +55,14 @@ def test_contract_on_any_track(track, tolerance):
 
 
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
+@pytest.mark.parametrize("receiver", [ARC + [0, 40.0, 0], ARC[::-1] * [0.6, 1, 1.4], np.tile([900.0, 300, 80], (60, 1))])
+def test_contract_with_a_receiver_elsewhere(receiver, tolerance):
+    raw = noise_on(ARC, receiver)
+    for grid in (GRID, TILTED):
+        assert (hold(raw, grid, tolerance).rx == receiver[30]).all()
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
 def test_contract_on_every_device(device, tolerance):
     hold(noise_on(ARC), GRID, tolerance, device=device)
 
@@ -89,7 +97,7 @@ def test_contract_on_random_tasks():
     for seed in range(250):
         case = draw(seed, 1e5, -6.0)
         raw, grid = build(case)
-        if raw.is_monostatic and grid.is_plane and raw.n_rows > 1:
+        if grid.is_plane and raw.n_rows > 1:
             with warnings.catch_warnings():
                 warnings.simplefilter("ignore", sarcl.SarclWarning)  # close by, most are blurred
                 try:
@@ -236,6 +244,40 @@ def test_the_phase_that_planes_lack_is_that_of_the_paths():
     assert curvature(raw, waves_about(raw, center), GRID).phase == pytest.approx(wanted, rel=1e-6)
 
 
+def test_the_phase_that_planes_lack_is_that_of_both_paths():
+    raw, center = noise_on(ARC, ARC[::-1] * [0.6, 1, 1.4]), np.zeros(3)
+    border = GRID.at(np.array([0, 0, 25, 50, 50]), np.array([0, 63, 0, 0, 63])).astype(np.longdouble)
+    bend = 0.0
+    for ends in (raw.tx.astype(np.longdouble), raw.rx.astype(np.longdouble)):
+        r = np.sqrt((ends**2).sum(axis=1))
+        bend += np.sqrt(((ends[:, None] - border) ** 2).sum(axis=2)) - r[:, None] + (ends / r[:, None]) @ border.T
+    highest = raw.frequency[0] + 95 * raw.frequency_step[0]
+    wanted = float((2 * np.pi * highest / SPEED_OF_LIGHT * bend).max())
+    assert curvature(raw, waves_about(raw, center), GRID).phase == pytest.approx(wanted, rel=1e-6)
+
+
+def test_echoes_of_an_orbit_are_focused_as_backproject_does():
+    orbit = sarcl.Orbit.kepler(7.171e6, 0.001, 1.72, span=(-60, 60))
+    track = orbit.trajectory(start=0.0, prf=1500.0, n_pulses=256)
+    x = orbit.geolocate(0.085, 1e6, heights=200.0)
+    east, north, up = sarcl.wgs84.local_axes(*sarcl.wgs84.geodetic(x)[:2])
+    points = x + np.array([[0, 0, 0], [7.0, -5, 0]]) @ [east, north, up]
+    chirp = sarcl.Waveform.chirp(center=5.4e9, bandwidth=100e6, duration=10e-6)
+    raw = sarcl.echo(sarcl.Scene.points(points), chirp, track, range_window=(-60, 60), reference=x, tolerance=1e-4)
+    assert 30 < np.linalg.norm(raw.rx - raw.tx, axis=1).min()  # the receiver has moved on
+    grid = sarcl.ImageGrid.plane(center=x, shape=(20, 20), spacing=1.0, normal=up, x_axis=east)
+    image = hold(raw, grid, 1e-4)
+    oracle = sarcl.backproject(raw, grid, tolerance=1e-4)
+    neglected = float(image.report.plan["plane-wave phase error"].split()[0])
+    difference = np.linalg.norm(image.data - oracle.data) / np.linalg.norm(oracle.data)
+    print(f"{difference:.2e}, plane-wave phase error {neglected:.2e} rad")
+    assert difference <= neglected + 2e-4 and neglected < 0.05
+    assert image.gain == oracle.gain and (image.tx == oracle.tx).all() and (image.rx == oracle.rx).all()
+    # with the transmitter alone the image lies elsewhere: the range to the receiver changes it
+    wrong = sarcl.polar_format(replace(raw, rx=raw.tx), grid, tolerance=1e-4)
+    assert np.linalg.norm(wrong.data - oracle.data) > 0.5 * np.linalg.norm(oracle.data)
+
+
 def test_points_are_sharp_within_the_radius_named_and_blurred_far_beyond():
     track = sarcl.Trajectory.circle(radius=700, height=500, arc=0.3, n_pulses=300).positions
     raw = points_seen(track, [(0, 0, 0)])
@@ -341,9 +383,9 @@ def test_a_dark_image_is_reported():
 
 def test_bad_input_names_what_is_wrong_and_what_to_do():
     raw = noise_on(ARC)
-    bistatic = noise_on(ARC, ARC + np.array([0, 40.0, 0]))
+    received_there = noise_on(ARC, np.concatenate([ARC[:5], np.zeros((1, 3)), ARC[6:]]))
     for bad, grid, match in (
-        (bistatic, GRID, r"bistatic: rx\[0\].*use backproject"),
+        (received_there, GRID, r"rx\[5\] is at the grid's centre"),
         (replace(raw, compressed=False), GRID, "call sarcl.compress"),
         (raw[:1], GRID, "at least 2"),
         (replace(raw, weight=(np.arange(60) == 3).astype(float)), GRID, "1 row of weight > 0"),

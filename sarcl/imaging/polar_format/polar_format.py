@@ -1,4 +1,4 @@
-"""polar_format: monostatic echoes to an image with plane wavefronts, by one two-dimensional FFT."""
+"""polar_format: echoes to an image with plane wavefronts, by one two-dimensional FFT."""
 
 from __future__ import annotations
 
@@ -44,9 +44,11 @@ def polar_format(
 ) -> Image:
     """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
 
-    raw        PhaseHistory, compressed, monostatic, of at least 2 rows; any track
-    grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, with u the direction from c to the
-               antenna. Phases are relative to c, whatever reference_range is
+    raw        PhaseHistory, compressed, of at least 2 rows; any track, and any receiver: that of an orbit's echoes, at
+               their arrival, or one elsewhere
+    grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, with u the unit vector from c to
+               the antenna, or the mean of those to transmitter and receiver: less the gradient of half the path.
+               Phases are relative to c, whatever reference_range is
     tolerance  L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that
                add with random phases, sqrt(pixels sum |w s|^2)
     window, weights, max_bytes   as `backproject` takes them
@@ -57,8 +59,8 @@ def polar_format(
     The plan in the report gives the error of plane wavefronts against `backproject`, which the tolerance does not
     include: the largest neglected phase, the part of it that defocuses, the largest displacement of a pixel, and the
     radius in which images are sharp. sarcl.SarclWarning where images are not sharp up to the border of the grid, and
-    where the border lies beyond the range window, so that echoes repeat. ValueError: bistatic or uncompressed data,
-    listed points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an
+    where the border lies beyond the range window, so that echoes repeat. ValueError: uncompressed data, listed
+    points, one row. ToleranceUnreachable: a tolerance that cannot be met. ToleranceMissed: the check measured an
     error above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
@@ -69,11 +71,6 @@ def polar_format(
         raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
     tolerance = allowed_error(tolerance)
     task = make_task(raw, grid, window, weights, wrap=True, skip=True)
-    if not raw.is_monostatic:
-        row = int(np.argmax((raw.rx != raw.tx).any(axis=1)))
-        raise ValueError(
-            f"raw is bistatic: rx[{row}] is not tx[{row}], and polar_format has one direction per row; use backproject"
-        )
     if task.raw.n_rows < 2:
         raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
     opened = open_device(device)
