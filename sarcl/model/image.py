@@ -94,10 +94,11 @@ class Image:
     def multilook(self, looks: int | Sequence[int] | np.ndarray) -> Image:
         """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; incomplete blocks are left out.
 
-        Raises ValueError when the grid is not a plane or the block is larger than the image.
+        Raises ValueError when the grid is neither a plane nor that of `range_doppler`, or the block is larger than the
+        image.
         """
-        if not self.grid.is_plane:
-            raise ValueError("multilook is for images on a plane; this grid lists its points")
+        if not self.grid.is_plane and self.grid.times is None:
+            raise ValueError("multilook is for images on a plane, or by range_doppler; this grid lists its points")
         a, b = pair("looks", looks)
         a, b = validation.count("looks[0]", a), validation.count("looks[1]", b)
         rows, columns = self.grid.shape[0] // a, self.grid.shape[1] // b
@@ -105,16 +106,7 @@ class Image:
             raise ValueError(f"looks ({a}, {b}) is larger than the image {self.grid.shape}; take fewer")
         data = np.asarray(self.data)[: rows * a, : columns * b]
         power = np.abs(data) ** 2 if self.is_complex else data
-        # the mean of a block lies at the mean position of its pixels
-        center = self.grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
-        assert self.grid.spacing is not None
-        grid = replace(
-            self.grid,
-            shape=(rows, columns),
-            center=center,
-            spacing=(self.grid.spacing[0] * a, self.grid.spacing[1] * b),
-        )
-        return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=grid)
+        return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=_looked(self.grid, a, b))
 
     def show(
         self,
@@ -125,6 +117,9 @@ class Image:
         title: str | None = None,
     ) -> PIL.Image.Image:
         """The picture as a PIL.Image, grey in dB, with axes, a scale, and a caption that says what white and black are.
+
+        Axes are those of a plane, in metres; of an image by `range_doppler` metres along the track from its middle, in
+        the order of time upwards, and slant range; of other listed points rows and columns.
 
         floor_db    black, in dB below white
         top_db      white, dB, where a unit point in focus has 0 dB; None: from the data, by percentile
@@ -178,21 +173,40 @@ class Image:
         if len(self.grid.shape) != 2:
             raise ValueError(f"a picture needs two axes; this image has shape {tuple(self.grid.shape)}")
         origin, names = (0.0, 0.0), ("y", "x")
-        grid = self.grid
+        grid, spacing = self.grid, self.grid.spacing
         if grid.center is not None and grid.y_axis is not None and grid.x_axis is not None:
             origin = float(grid.center @ grid.y_axis), float(grid.center @ grid.x_axis)
             # axes parallel to the scene's show its coordinates, other axes the distance along themselves
             along = np.eye(3)[1], np.eye(3)[0]
             if not all(np.allclose(a, b, atol=1e-9) for a, b in zip((grid.y_axis, grid.x_axis), along, strict=True)):
                 names = ("along y_axis", "along x_axis")
+        elif grid.ranges is not None and min(grid.shape) > 1:
+            middle = grid.shape[0] // 2, grid.shape[1] // 2
+            spacing = grid.spacing_at(*middle)[0], float(grid.ranges[1] - grid.ranges[0])
+            origin, names = (0.0, float(grid.ranges[middle[1]])), ("along the track", "slant range")
         db = self.decibels()
         if not (db < np.inf).all():
             i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
             raise ValueError(f"image data[{i}, {j}] is {np.asarray(self.data)[i, j]}; a picture needs finite pixels")
         return picture(
-            db, grid.spacing, floor_db, title, top_db=top_db, percentile=percentile,
+            db, spacing, floor_db, title, top_db=top_db, percentile=percentile,
             zero="a unit point in focus", origin=origin, names=names,
         )  # fmt: skip
+
+
+def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:
+    """The grid of means over blocks of (a, b) pixels: the mean of a block lies at the mean position of its pixels."""
+    rows, columns = grid.shape[0] // a, grid.shape[1] // b
+    if grid.spacing is not None:
+        center = grid.at((rows // 2) * a + (a - 1) / 2, (columns // 2) * b + (b - 1) / 2)
+        spacing = grid.spacing[0] * a, grid.spacing[1] * b
+        return replace(grid, shape=(rows, columns), center=center, spacing=spacing)
+    assert grid.times is not None and grid.ranges is not None
+    i, j = np.arange(rows) * a + (a - 1) / 2, np.arange(columns) * b + (b - 1) / 2
+    times, ranges = (
+        values[: n * k].reshape(n, k).mean(axis=1) for values, n, k in ((grid.times, rows, a), (grid.ranges, columns, b))
+    )
+    return ImageGrid.zero_doppler(times, ranges, grid.at(i[:, None], j))
 
 
 def image_fields(image: Image) -> dict[str, Any]:

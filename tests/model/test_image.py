@@ -22,6 +22,11 @@ def noise(dtype=np.complex64, seed=0):
     return (random.standard_normal(SHAPE) + 1j * random.standard_normal(SHAPE)).astype(dtype)
 
 
+def noise_of(shape):
+    random = np.random.default_rng(1)
+    return (random.standard_normal(shape) + 1j * random.standard_normal(shape)).astype(np.complex64)
+
+
 # decibels
 
 
@@ -91,6 +96,52 @@ def test_looking_twice_is_looking_once_with_more():
     twice, once = image.multilook((2, 2)).multilook((2, 3)), image.multilook((4, 6))
     assert twice.data == pytest.approx(once.data, rel=TOLERANCE["mean"])
     assert np.abs(twice.grid.positions - once.grid.positions).max() <= TOLERANCE["position"]
+
+
+# images by range_doppler
+
+
+def by_time_and_range(shape=(12, 15)):
+    """Rows 2 m apart along the track, columns 1 m in slant range, on the ground 4 km below a straight track."""
+    t, r = 5 + 0.02 * np.arange(shape[0]), 5e3 + np.arange(shape[1])
+    x = np.sqrt(r**2 - 4e3**2)
+    positions = np.stack(np.broadcast_arrays(x, 100 * t[:, None], 0.0), axis=-1)
+    return sarcl.ImageGrid.zero_doppler(t, r, positions)
+
+
+@pytest.mark.parametrize("looks", [(2, 3), (4, 1), (1, 5), (12, 15)])
+def test_multilook_keeps_times_ranges_and_positions_of_range_doppler(looks, tmp_path):
+    grid, (a, b) = by_time_and_range(), looks
+    data = noise_of(grid.shape)
+    image = sarcl.Image(data, grid).multilook(looks)
+    n, m = image.grid.shape
+    assert (n, m) == (12 // a, 15 // b)
+    block = (np.abs(data[: n * a, : m * b]) ** 2).reshape(n, a, m, b)
+    assert image.data == pytest.approx(block.mean(axis=(1, 3)), rel=TOLERANCE["mean"])
+    assert image.grid.times == pytest.approx(grid.times[: n * a].reshape(n, a).mean(axis=1))
+    assert image.grid.ranges == pytest.approx(grid.ranges[: m * b].reshape(m, b).mean(axis=1))
+    # the position belongs to the mean time and range, on the same ground
+    position = image.grid.positions
+    assert np.abs(position[..., 1] - 100 * image.grid.times[:, None]).max() <= 1e-6
+    assert np.abs(np.hypot(position[..., 0], 4e3) - image.grid.ranges).max() <= 1e-6
+    image.save(tmp_path / "looked.h5")
+    again = sarcl.read(tmp_path / "looked.h5")
+    assert np.array_equal(again.grid.positions, position) and np.array_equal(again.grid.ranges, image.grid.ranges)
+    assert np.array_equal(again.grid.times, image.grid.times) and np.array_equal(again.data, image.data)
+
+
+def test_a_picture_of_range_doppler_has_axes_in_metres(monkeypatch):
+    from sarcl.figures import decibels
+
+    asked = []
+    real = decibels.picture
+    monkeypatch.setattr(decibels, "picture", lambda *a, **k: asked.append((a, k)) or real(*a, **k))
+    grid = by_time_and_range()
+    sarcl.Image(noise_of(grid.shape), grid).show()
+    (_, spacing, _, _), options = asked[0]
+    assert spacing == pytest.approx((2.0, 1.0))
+    assert options["origin"] == pytest.approx((0.0, grid.ranges[7]))
+    assert options["names"] == ("along the track", "slant range")
 
 
 def test_multilook_leaves_speckle_of_one_over_root_n():
@@ -180,7 +231,7 @@ BAD = {
     "too many looks": (lambda: image().multilook((12, 1)), r"looks \(12, 1\) is larger than the image \(11, 14\)"),
     "looks at a list of points": (
         lambda: sarcl.Image(np.ones(4), sarcl.ImageGrid.points(np.zeros((4, 3)))).multilook(2),
-        "multilook is for images on a plane",
+        "multilook is for images on a plane, or by range_doppler",
     ),
     "floor above zero": (lambda: image().show(floor_db=5), "floor_db is 5"),
     "pixel not finite": (
