@@ -119,7 +119,7 @@ class Image:
         """The picture as a PIL.Image, grey in dB, with axes, a scale, and a caption that says what white and black are.
 
         Axes are those of a plane, in metres; of an image by `range_doppler` metres along the track from its middle, in
-        the order of time upwards, and slant range; of other listed points rows and columns.
+        the order of time upwards, and slant range less that of its middle; of other listed points rows and columns.
 
         floor_db    black, in dB below white
         top_db      white, dB, where a unit point in focus has 0 dB; None: from the data, by percentile
@@ -183,7 +183,9 @@ class Image:
         elif grid.ranges is not None and min(grid.shape) > 1:
             middle = grid.shape[0] // 2, grid.shape[1] // 2
             spacing = grid.spacing_at(*middle)[0], float(grid.ranges[1] - grid.ranges[0])
-            origin, names = (0.0, float(grid.ranges[middle[1]])), ("along the track", "slant range")
+            near = float(np.round(grid.ranges[middle[1]]))  # labels of seven digits would leave room for one tick
+            origin = 0.0, float(grid.ranges[middle[1]]) - near
+            names = "along the track", f"slant range less {near:.0f} m"
         db = self.decibels()
         if not (db < np.inf).all():
             i, j = np.unravel_index(int(np.argmin(db < np.inf)), db.shape)
@@ -204,7 +206,8 @@ def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:
     assert grid.times is not None and grid.ranges is not None
     i, j = np.arange(rows) * a + (a - 1) / 2, np.arange(columns) * b + (b - 1) / 2
     times, ranges = (
-        values[: n * k].reshape(n, k).mean(axis=1) for values, n, k in ((grid.times, rows, a), (grid.ranges, columns, b))
+        values[: n * k].reshape(n, k).mean(axis=1)
+        for values, n, k in ((grid.times, rows, a), (grid.ranges, columns, b))
     )
     return ImageGrid.zero_doppler(times, ranges, grid.at(i[:, None], j))
 

@@ -54,9 +54,17 @@ def test_contract_on_any_track(track, tolerance):
         hold(noise_on(TRACKS[track]), grid, tolerance)
 
 
+RECEIVERS = {
+    "moved on": ARC + [0, 40.0, 0],
+    "on a track of its own": ARC[::-1] * [0.6, 1, 1.4],
+    "at rest nearby": np.tile([900.0, 300, 80], (60, 1)),
+}
+
+
 @pytest.mark.parametrize("tolerance", [1e-2, 1e-5])
-@pytest.mark.parametrize("receiver", [ARC + [0, 40.0, 0], ARC[::-1] * [0.6, 1, 1.4], np.tile([900.0, 300, 80], (60, 1))])
-def test_contract_with_a_receiver_elsewhere(receiver, tolerance):
+@pytest.mark.parametrize("name", RECEIVERS)
+def test_contract_with_a_receiver_elsewhere(name, tolerance):
+    receiver = RECEIVERS[name]
     raw = noise_on(ARC, receiver)
     for grid in (GRID, TILTED):
         assert (hold(raw, grid, tolerance).rx == receiver[30]).all()
@@ -260,12 +268,12 @@ def test_echoes_of_an_orbit_are_focused_as_backproject_does():
     orbit = sarcl.Orbit.kepler(7.171e6, 0.001, 1.72, span=(-60, 60))
     track = orbit.trajectory(start=0.0, prf=1500.0, n_pulses=256)
     x = orbit.geolocate(0.085, 1e6, heights=200.0)
-    east, north, up = sarcl.wgs84.local_axes(*sarcl.wgs84.geodetic(x)[:2])
-    points = x + np.array([[0, 0, 0], [7.0, -5, 0]]) @ [east, north, up]
+    axes = sarcl.wgs84.local_axes(*sarcl.wgs84.geodetic(x)[:2])  # east, north, up
+    points = x + np.array([[0, 0, 0], [7.0, -5, 0]]) @ axes
     chirp = sarcl.Waveform.chirp(center=5.4e9, bandwidth=100e6, duration=10e-6)
     raw = sarcl.echo(sarcl.Scene.points(points), chirp, track, range_window=(-60, 60), reference=x, tolerance=1e-4)
     assert 30 < np.linalg.norm(raw.rx - raw.tx, axis=1).min()  # the receiver has moved on
-    grid = sarcl.ImageGrid.plane(center=x, shape=(20, 20), spacing=1.0, normal=up, x_axis=east)
+    grid = sarcl.ImageGrid.plane(center=x, shape=(20, 20), spacing=1.0, normal=axes[2], x_axis=axes[0])
     image = hold(raw, grid, 1e-4)
     oracle = sarcl.backproject(raw, grid, tolerance=1e-4)
     neglected = float(image.report.plan["plane-wave phase error"].split()[0])
