@@ -55,7 +55,7 @@ def test_contract_on_any_track(track, tolerance):
 
 
 RECEIVERS = {
-    "moved on": ARC + [0, 40.0, 0],
+    "moved on": ARC + np.array([0, 40.0, 0]),
     "on a track of its own": ARC[::-1] * [0.6, 1, 1.4],
     "at rest nearby": np.tile([900.0, 300, 80], (60, 1)),
 }
