@@ -177,8 +177,23 @@ def test_the_beam_limits_the_rows_and_the_report_knows_the_band():
         assert np.linalg.norm(seen.position - place) <= 0.05
         assert abs(seen.peak) == pytest.approx(image.gain, rel=0.03)
     rows = 0.015 * 4e3 / 400 * 500  # within the beam; each taper has half its width of rows
-    assert 200 * rows < image.gain < 200 * 2 * rows
+    assert 200 * rows < image.gain < 200 * 2.3 * rows  # tapers 1.3 times as wide as the beam
     assert "Hz of a pixel, PRF 124.7" in image.report.plan["Doppler band"]
+
+
+@pytest.mark.parametrize("tolerance", [3e-2, 1e-3])
+@pytest.mark.parametrize("zones, squint", [(3, 0.0), (12, -0.3)])
+def test_white_noise_of_strips_has_the_predicted_error(zones, squint, tolerance):
+    # a beam of some Fresnel zones, a pulse rate 5 % above its Doppler bandwidth, a track of four apertures
+    zone = np.sqrt(SPEED_OF_LIGHT / 9.6e9 / 8e3)
+    hertz = 2 * SPEED * 9.6e9 / SPEED_OF_LIGHT
+    prf, length = 1.05 * hertz * zones * zone * np.cos(squint), 4 * zones * zone * 4e3
+    raw = noise(n=int(length / SPEED * prf), aperture=length, squint=np.arctan(np.tan(squint) / 0.7))
+    raw = replace(raw, reference_range=np.full(raw.n_rows, 4e3 / np.cos(squint)))
+    image = sarcl.range_doppler(
+        raw, beam=zones * zone, doppler=-hertz * np.sin(squint), side="right", tolerance=tolerance, check=True
+    )
+    assert image.report.measured_error <= image.report.predicted_error <= tolerance
 
 
 def test_a_track_longer_than_the_times_need_is_folded_and_changes_nothing():
@@ -313,6 +328,33 @@ def test_noise_seen_from_an_orbit_is_focused_as_by_backproject(tolerance):
     on_terrain = sarcl.range_doppler(noisy, tolerance=tolerance, side="right", heights=level, check=False)
     assert np.abs(on_terrain.grid.positions - flat.grid.positions).max() < 1e-6
     assert np.linalg.norm(on_terrain.data - flat.data) <= 1e-4 * np.linalg.norm(flat.data)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+@pytest.mark.parametrize("beam", [None, 0.0008])
+def test_squinted_orbits_have_doppler_frequencies_of_the_effective_velocity(side, beam):
+    # the speed of the satellite would put the band 7 % away: 280 Hz, more than a pixel has
+    n, prf = 128, 1500.0
+    track = ORBIT.trajectory(start=-n / prf / 2, prf=prf, n_pulses=n)
+    place = ORBIT.geolocate(2.0, 9e5, side=side)
+    chirp = sarcl.Waveform.chirp(center=5.4e9, bandwidth=40e6, duration=10e-6)
+    raw = sarcl.echo(sarcl.Scene.points([place]), chirp, track, range_window=(-80, 80), check=False)
+    random = np.random.default_rng(1).standard_normal((2, *raw.samples.shape)).astype(np.float32)
+    noisy = replace(raw, samples=random[0] + 1j * random[1])
+    image = sarcl.range_doppler(noisy, side=side, beam=beam, tolerance=5e-2, check=True)
+    assert image.report.measured_error <= image.report.predicted_error
+    assert image.grid.times[0] < 2.0 < image.grid.times[-1]
+    wanted = float(ORBIT.view(0.0, place).doppler(5.4e9))
+    assert float(image.report.plan["Doppler centroid"].split()[0]) == pytest.approx(wanted, abs=8)  # 3 ms of echo delay
+
+
+def test_the_needed_pulse_rate_of_an_orbit_is_that_of_its_doppler_rate():
+    raw, place = seen_from_orbit(n=200, prf=600.0, width=200.0)
+    rate = abs(ORBIT.view(1 / 6, place).doppler_rate(5.4e9))
+    with pytest.raises(ValueError, match="below the Doppler bandwidth") as refused:
+        sarcl.range_doppler(raw, side="right", heights=200.0, times=(0.16, 0.17))
+    needed = float(str(refused.value).split("under ")[1].split()[0])
+    assert needed == pytest.approx(rate * 199 / 600, rel=1e-3)
 
 
 def test_a_swath_wider_than_the_pulse_interval_is_warned_of():

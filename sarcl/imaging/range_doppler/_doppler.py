@@ -16,8 +16,8 @@ from ...model.phase_history import PhaseHistory
 STEEPEST = 0.98  # largest sine of a squint angle
 MOST_ROWS = 2048  # rows from which a Doppler centroid is estimated
 # Relative error by the ends of the band: FRESNEL / (k^3 sqrt(n)) for tapers of k Fresnel widths and a pixel's band of n
-# of them. Measured with noise: 0.1.
-FRESNEL = 0.2
+# of them. Measured with noise: 0.1 where the tapers lie beyond the rows, 0.45 where rows are weighted by them (beams).
+FRESNEL, FRESNEL_BEAM = 0.2, 0.6
 LEAST_ZONES = 1.5  # Fresnel widths of a taper, at least
 
 
@@ -31,12 +31,15 @@ class Band:
     error: float
 
     @classmethod
-    def tapered(cls, low: float, high: float, pixel_band: float, zone: float, allowed: float) -> Band:
+    def tapered(
+        cls, low: float, high: float, pixel_band: float, zone: float, allowed: float, has_beam: bool
+    ) -> Band:  # fmt: skip
         """The band whose tapers are as wide as an error of `allowed` needs.
 
         pixel_band  difference of the sines under which rows see one pixel;  zone  width of a Fresnel zone, as a sine
+        has_beam    rows within the tapers contribute, with the tapers' weights
         """
-        ringing = FRESNEL / np.sqrt(max(pixel_band / zone, 1e-3))
+        ringing = (FRESNEL_BEAM if has_beam else FRESNEL) / np.sqrt(max(pixel_band / zone, 1e-3))
         zones = max(LEAST_ZONES, float(ringing / allowed) ** (1 / 3))
         return cls(low, high, zones * zone, float(ringing) / zones**3)
 

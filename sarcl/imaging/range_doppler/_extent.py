@@ -50,12 +50,13 @@ class Extent:
 
 
 def choose_extent(
-    raw: PhaseHistory, track: Track, positions: Positions, centroid: float, beam: float | None,
+    raw: PhaseHistory, track: Track, positions: Positions, speed: float, centroid: float, beam: float | None,
     times: tuple[float, float] | None, ranges: tuple[float, float] | None, spacing: object, least: float,
     allowed: float,
 ) -> Extent:  # fmt: skip
     """The extent asked for, or the default: see `range_doppler`.
 
+    speed     effective velocity, m/s
     centroid  sine of the squint angle of the Doppler centroid;  beam  full angle, rad, or None
     least     shortest slant range that reaches the ground, m;  allowed  error of the ends of the Doppler band
     ValueError: a pulse rate below the Doppler bandwidth, ranges outside the range window, empty images.
@@ -69,9 +70,9 @@ def choose_extent(
     steps = [None if d is None else number(f"spacing[{i}]", d, above=0) for i, d in enumerate(wide)]
     at_middle = float(raw.reference_range[raw.n_rows // 2]) * np.sqrt(1 - centroid**2)
     about = max(at_middle if ranges is None else sum(ranges) / 2, least)
-    sight = _Sight(track, centroid, beam, float(raw.center_frequency[0]), about)
-    window = RangeWindow(raw, track, positions, sight.sines, least, about)
-    middle = (track.start + track.stop) / 2 + delay(centroid, about, track.speed) if times is None else sum(times) / 2
+    sight = _Sight(track, speed, centroid, beam, float(raw.center_frequency[0]), about)
+    window = RangeWindow(raw, track, positions, speed, sight.sines, least, about)
+    middle = (track.start + track.stop) / 2 + delay(centroid, about, speed) if times is None else sum(times) / 2
     pixel = sight.rows_at(middle)
     pixel_band = float(np.ptp(pixel))
     _check_pulse_rate(sight, pixel_band)
@@ -79,9 +80,9 @@ def choose_extent(
         near = max(least, about - float(raw.swath[0]))
         half = _default_half(sight, window, middle, near, None if ranges is not None else HELD)
         times = middle - half, middle + half
-    taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, sight.zone(about), allowed).taper
+    taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, sight.zone(about), allowed, True).taper
     along, across = _wavenumbers(raw, np.clip([pixel.min() - taper, pixel.max() + taper], -STEEPEST, STEEPEST))
-    finer = track.speed * along * track.step / FILLED if steps[0] is None else track.step / steps[0]
+    finer = speed * along * track.step / FILLED if steps[0] is None else track.step / steps[0]
     finer = max(1, int(np.ceil(finer - 1e-9)))
     column = steps[1] or FILLED / across
     ranges = window.longest(times) if ranges is None else window.checked(ranges, times)
@@ -93,27 +94,29 @@ def choose_extent(
             "part of it, or a wider spacing="
         )
     u, r = times[0] + track.step / finer * np.arange(n_times), ranges[0] + column * np.arange(n_ranges)
-    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), track.speed)
+    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)
     used = float(max(sight.sines[0], corners.min())), float(min(sight.sines[1], corners.max()))
     if not used[0] < used[1]:
         raise ValueError(
             f"no row sees the times {u[0]:.6g} to {u[-1]:.6g} s in the beam; with this Doppler centroid the rows see "
-            f"zero-Doppler times about {(track.start + track.stop) / 2 + delay(centroid, about, track.speed):.6g} s: "
+            f"zero-Doppler times about {(track.start + track.stop) / 2 + delay(centroid, about, speed):.6g} s: "
             "give times= there, or doppler='data'"
         )
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
-    band = Band.tapered(*used, pixel_band, sight.zone(float(r[0])), allowed)
-    return Extent(u, r, finer, band, pixel_band, track.times, track.speed)
+    band = Band.tapered(*used, pixel_band, sight.zone(float(r[0])), allowed, beam is not None)
+    return Extent(u, r, finer, band, pixel_band, track.times, speed)
 
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
     """How rows see points: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
 
+    speed      effective velocity, m/s
     frequency  in the middle of the band, Hz;  about  slant range in the middle of the image, m
     """
 
     track: Track
+    speed: float
     centroid: float
     beam: float | None
     frequency: float
@@ -131,7 +134,7 @@ class _Sight:
     @property
     def hertz(self) -> float:
         """Doppler frequency, Hz, for a sine of 1."""
-        return 2 * self.track.speed * self.frequency / SPEED_OF_LIGHT
+        return 2 * self.speed * self.frequency / SPEED_OF_LIGHT
 
     @property
     def rate(self) -> float:
@@ -144,7 +147,7 @@ class _Sight:
 
     def rows_at(self, u: float) -> np.ndarray:
         """Sines under which the rows see a point at a zero-Doppler time, s, those beyond the beam at its ends."""
-        return np.clip(sine(np.array(u), np.array(self.about), self.track.times, self.track.speed), *self.sines)
+        return np.clip(sine(np.array(u), np.array(self.about), self.track.times, self.speed), *self.sines)
 
 
 def _check_pulse_rate(sight: _Sight, pixel_band: float) -> None:
@@ -170,7 +173,7 @@ def _default_half(sight: _Sight, window: RangeWindow, middle: float, near: float
     ends = np.array([track.start, track.stop])
 
     def image_band(half: float) -> float:
-        return float(np.ptp(sine(middle + half * np.array([[-1.0], [1.0]]), np.array(near), ends, track.speed)))
+        return float(np.ptp(sine(middle + half * np.array([[-1.0], [1.0]]), np.array(near), ends, sight.speed)))
 
     while sight.beam is None and half > track.step and sight.hertz * image_band(half) > sight.rate:
         half *= 0.9

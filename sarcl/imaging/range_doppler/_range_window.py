@@ -20,6 +20,7 @@ REMEDY = "give echoes of a wider range window, fewer times=, or a beam="
 class RangeWindow:
     """The range windows of the rows, each half a swath about its reference range.
 
+    speed  effective velocity, m/s
     sines  of the squint angles between which rows contribute
     least  shortest slant range that reaches the ground, m;  about  slant range in the middle, m
     """
@@ -27,6 +28,7 @@ class RangeWindow:
     raw: PhaseHistory
     track: Track
     positions: Positions
+    speed: float
     sines: tuple[float, float]
     least: float
     about: float
@@ -92,11 +94,11 @@ class RangeWindow:
         """Ranges of points less the reference, m (3, rows, n), at three times, and whether all rows hold them (n,)."""
         rows = spread_over(self.track.n_rows, ROWS)
         t, u = self.track.times[rows], np.linspace(*times, 3)
-        fit = Hyperbolas(ranges[0], ranges[-1], np.array([[self.track.speed, 0.0, 0.0]]))
+        fit = Hyperbolas(ranges[0], ranges[-1], np.array([[self.speed, 0.0, 0.0]]))
         if not self.track.is_line:
             every = np.arange(self.track.n_rows)
             fit = hyperbolas(self.raw, self.track, self.positions, float(u[1]), ranges[0], ranges[-1], every)
         excess = fit.range(u[:, None, None], ranges, t[:, None]) - self.raw.reference_range[rows][:, None]
-        s = sine(u[:, None, None], ranges, t[:, None], self.track.speed)
+        s = sine(u[:, None, None], ranges, t[:, None], self.speed)
         held = (np.abs(excess) <= self.half) | (s < self.sines[0]) | (s > self.sines[1])
         return excess, held.all(axis=(0, 1))

@@ -84,6 +84,16 @@ def hyperbolas(
     return Hyperbolas(near, far, chebyshev.chebfit(nodes, made, DEGREE))
 
 
+def effective_speed(raw: PhaseHistory, track: Track, positions: Positions, distance: float) -> float:
+    """Effective velocity, m/s, at one slant range, m, of points at broadside of the middle of the track.
+
+    Of an orbit it is 5 to 10 % below the speed of the antenna, since the ground turns below it.
+    """
+    u, rows = (track.start + track.stop) / 2, np.arange(track.n_rows)
+    fit = hyperbolas(raw, track, positions, u, distance, distance, rows)
+    return float(fit.at(np.array([distance]))[0][0])
+
+
 def phase_error(
     raw: PhaseHistory,
     track: Track,

@@ -29,7 +29,7 @@ from ._focus import focus
 from ._ground import Ground
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
-from ._velocity import hyperbolas, phase_error
+from ._velocity import effective_speed, hyperbolas, phase_error
 
 EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 Progress = Callable[[str, int, int], None]
@@ -96,21 +96,23 @@ def range_doppler(
     track = Track.of(raw, 0.02 * tolerance)
     ground = Ground.of(track, heights, track.side(raw, side))
     smooth = ground.smooth().positions
+    least = ground.least_range()
+    speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
     wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
     if doppler in ("geometry", "data"):
-        centroid = centroid_of_geometry(raw, track.step, track.speed)
+        centroid = centroid_of_geometry(raw, track.step, speed)
         if doppler == "data":
-            centroid = centroid_of_data(raw, track.step, track.speed, centroid)
+            centroid = centroid_of_data(raw, track.step, speed, centroid)
     else:
         if isinstance(doppler, str):
             raise ValueError(f"doppler is {doppler!r}; choose 'geometry', 'data' or a frequency in Hz")
-        centroid = number("doppler", doppler) * wavelength / (2 * track.speed)
+        centroid = number("doppler", doppler) * wavelength / (2 * speed)
     opened = open_device(device)
     budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
 
     extent = choose_extent(
-        raw, track, smooth, centroid, None if beam is None else number("beam", beam, above=0),
-        _pair("times", times), _pair("ranges", ranges), spacing, ground.least_range(),
+        raw, track, smooth, speed, centroid, None if beam is None else number("beam", beam, above=0),
+        _pair("times", times), _pair("ranges", ranges), spacing, least,
         EDGES * tolerance,
     )  # fmt: skip
     fit = hyperbolas(
