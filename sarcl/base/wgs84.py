@@ -10,6 +10,14 @@ FLATTENING = 1 / 298.257223563  # defining
 ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
 
 
+ANTENNAS = 6.3e6, 5e7  # m: antennas at such distances from the origin are in Earth-fixed coordinates
+
+
+def is_earth_fixed(antenna: NDArray[np.float64]) -> bool:
+    """Whether the position of an antenna, m (3,), is Earth-fixed: told by its distance from the origin."""
+    return ANTENNAS[0] < float(np.linalg.norm(antenna)) < ANTENNAS[1]
+
+
 def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArray[np.float64]:
     """Earth-centred, Earth-fixed positions, m (..., 3), of degrees and heights above the ellipsoid, m.
 

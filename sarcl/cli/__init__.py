@@ -8,6 +8,7 @@ For this folder alone:
 
     _commands   what each command does
     _job        output files and interruption of a command
+    _methods    the methods of sarcl focus: options, plan, image
 """
 
 __all__ = ["parser"]

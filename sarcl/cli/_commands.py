@@ -10,7 +10,6 @@ import logging
 import sys
 import warnings
 from collections.abc import Callable, Sequence
-from dataclasses import fields
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -84,7 +83,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     scenario = load(args.scenario)
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
-    images = args.image or ([f"{stem}.png"] if scenario.grid is not None else [])
+    images = args.image or ([f"{stem}.png"] if scenario.has_image else [])
     _expect(job, [output], formats.writing("phase history"), [args.scenario])
     _expect(job, images, formats.writing("picture", "image"), [args.scenario, output])
     _check_scale(args)
@@ -92,8 +91,12 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     options: dict[str, Any] = {"device": open_device(args.device)}
     if args.tolerance is not None:
         options["tolerance"] = args.tolerance
+    if scenario.orbit is not None:
+        job.say(scenario.describe_orbit())
     if args.dry_run:
         print(scenario.plan(**options))
+        if images:
+            print(f"image: {scenario.describe_image()}")
         return 0
     if scenario.noise is None:  # pulse after pulse into the file
         raw = scenario.simulate(**options, out=output, progress=job.progress)
@@ -106,7 +109,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
     if images:
         raw = _compressed(raw, job)
-        grid = grid or _default_grid(raw, job, {})
+        if grid is None and scenario.needs_grid:
+            grid = _default_grid(raw, job, scenario.default_grid_options())
         _focus(
             lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
             images,
@@ -118,16 +122,15 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
 
 def focus(args: argparse.Namespace, job: Job) -> int:
     """Focus echoes."""
-    from ..imaging.focus_options import FocusOptions
     from ..model.phase_history import PhaseHistory
     from ..model.store import read
     from ..opencl.choose_device import open_devices
     from ..scenario.scenario import load
+    from ._methods import Method, check_default_grid, check_pieces, heights
 
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
-    for name in ("tile", "resume"):
-        if getattr(args, name) and all(formats.named(p, formats.writing("picture")) for p in outputs):
-            raise ValueError(f"--{name} keeps tiles beside an image file; give -o IMAGE.h5")
+    method = Method.of(args)
+    check_pieces(args, outputs)
     _expect(job, outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     given = _grid_options(args)
@@ -137,21 +140,26 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
     if args.polarization is not None or args.channel is not None:
         raw = raw.select(polarization=args.polarization, channel=args.channel)
-    devices = open_devices(args.device)
+    devices: Any = open_devices(args.device)
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
     raw = _compressed(raw, job)
-    grid = grid or _default_grid(raw, job, given)
-    names = {f.name for f in fields(FocusOptions)}
-    options: dict[str, Any] = {**{k: v for k, v in vars(args).items() if k in names}, "device": devices}
+    levels = heights(args)
+    if method.name == "range_doppler":
+        method.options["heights"] = levels
+    else:
+        check_default_grid(args, raw)
+    if grid is None and method.name != "range_doppler":
+        grid = _default_grid(raw, job, {**given, "side": args.side, "heights": levels})
+    if method.name != "backproject":  # by one device
+        devices = devices[0]
     if args.dry_run:
-        from ..imaging.forecast import plan
-
-        print(plan(raw, grid, **options))
+        made = method.plan(raw, grid, devices)
+        if grid is None:
+            job.say(f"grid: {made.plan['pixels']} zero-Doppler times x slant ranges")
+        print(made)
         return 0
-    from ..imaging.backproject import backproject
-
-    running = {"progress": job.progress, "tile": args.tile, "resume": args.resume}
-    _focus(lambda out: backproject(raw, grid, **options, **running, out=out), outputs, args, job)
+    running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
+    _focus(lambda out: method.image(raw, grid, out, devices, job.progress, **running), outputs, args, job)
     return 0
 
 

@@ -133,14 +133,23 @@ def _focus(p: argparse.ArgumentParser) -> None:
         "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
     )
     how = p.add_argument_group("focusing")
-    how.add_argument("--tolerance", type=float, default=1e-3, help="relative error allowed (default 1e-3)")
     how.add_argument(
-        "--method", choices=["auto", "direct", "factorized"], default="auto", help="default auto: the cheapest"
+        "--tolerance", type=float, help="relative error allowed (default 1e-3; polar_format, range_doppler: 1e-2)"
+    )
+    how.add_argument(
+        "--method",
+        choices=["auto", "direct", "factorized", "polar_format", "range_doppler"],
+        default="auto",
+        help="backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
+        "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
     )
     how.add_argument("--dry-run", action="store_true", help="print method, time, memory and error, and focus nothing")
     how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
     how.add_argument(
-        "--beam", type=degrees, metavar="DEG", help="full angle of the transmit beam, pointed at the grid's centre"
+        "--beam",
+        type=degrees,
+        metavar="DEG",
+        help="full angle of the transmit beam, pointed at the grid's centre; range_doppler: of the azimuth beam",
     )
     how.add_argument(
         "--mapping",
@@ -149,6 +158,20 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--wrap", action="store_true", help="repeat ranges outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
+    earth = p.add_argument_group("echoes of orbits, and range_doppler", "docs/guide/range_doppler.md")
+    earth.add_argument(
+        "--heights",
+        metavar="H|DEM",
+        help="of the pixels: m above the ellipsoid (local tracks: z), or a DEM (default 0)",
+    )
+    earth.add_argument("--heights-above", metavar="NAME", help="what a DEM's heights are above: ellipsoid, EGM96 ...")
+    earth.add_argument("--geoid", metavar="M|FILE", help="height of that geoid above the ellipsoid, m, or its raster")
+    earth.add_argument("--side", choices=["left", "right"], help="side of the track, seen from above")
+    earth.add_argument("--times", nargs=2, type=float, metavar=("FIRST", "LAST"), help="zero-Doppler times, s")
+    earth.add_argument("--ranges", nargs=2, type=float, metavar=("NEAR", "FAR"), help="slant ranges, m")
+    earth.add_argument(
+        "--doppler", type=doppler, metavar="HZ|data", help="Doppler centroid (default: from the geometry)"
+    )
     large = p.add_argument_group(
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
@@ -260,6 +283,11 @@ def size(text: str) -> float:
     if not 0 < value < float("inf"):
         raise argparse.ArgumentTypeError(f"{text!r} is not a size; give bytes, e.g. 2G, 500M or 1.5GiB")
     return value
+
+
+def doppler(text: str) -> Any:
+    """ "geometry", "data", or Hz."""
+    return text if text in ("geometry", "data") else float(text)
 
 
 def degrees(text: str) -> float:

@@ -5,6 +5,7 @@ For other folders:
     elevation      ElevationModel: heights above the ellipsoid by longitude and latitude
     kepler         Kepler orbits about the rotating Earth
     light_time     positions of antennas while a pulse is on its way to the rotating Earth and back
+    place          Place: a local frame on the Earth, east, north, up
     rotation       the Earth's rotation: sidereal time, inertial positions to Earth-fixed ones
     state_vectors  interpolation of state vectors, to an order chosen from the states
     two_line       orbits of two-line elements, by SGP4
@@ -16,6 +17,7 @@ __all__ = [
     "elevation",
     "kepler",
     "light_time",
+    "place",
     "rotation",
     "state_vectors",
     "two_line",

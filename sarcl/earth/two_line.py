@@ -18,7 +18,7 @@ STEP, NODES = 10.0, 12  # s, and number of positions of SGP4 per interpolation: 
 class TwoLineElements:
     """Two-line elements; times are in seconds since their epoch.
 
-    satellite  sgp4.api.Satrec;  epoch  UTC;  greenwich  mean sidereal time at the epoch, rad
+    satellite  sgp4.api.Satrec;  epoch  UTC;  greenwich  mean sidereal time at the epoch, rad;  lines  as given
 
     Velocities are the derivative of the positions. Those that SGP4 itself gives differ from it by metres per second,
     because they leave out rates of small terms: zero-Doppler times would not be times of closest approach.
@@ -27,6 +27,7 @@ class TwoLineElements:
     satellite: Any
     epoch: np.datetime64
     greenwich: float
+    lines: tuple[str, str]
 
     @classmethod
     def parsed(cls, line1: str, line2: str) -> TwoLineElements:
@@ -45,7 +46,7 @@ class TwoLineElements:
         epoch = np.datetime64(f"{year + (1900 if year >= 57 else 2000)}-01-01", "ns")
         nanoseconds = (int(whole) - 1) * 86_400 * 10**9 + int(part.ljust(8, "0")[:8]) * 864_000
         epoch = epoch + np.timedelta64(nanoseconds, "ns")
-        return cls(satellite, epoch, sidereal_time(epoch))
+        return cls(satellite, epoch, sidereal_time(epoch), (line1, line2))
 
     def teme(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions, m, and velocities, m/s (n, 3), as SGP4 gives them: true equator, mean equinox of date (TEME)."""

@@ -7,8 +7,12 @@ from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import wgs84
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
+from ..base.validation import choice, number
+from ..earth import zero_doppler
+from ..earth.elevation import ElevationModel
 from ..model.image_grid import ImageGrid
 
 if TYPE_CHECKING:
@@ -37,6 +41,8 @@ def default_grid(
     spacing: Any = None,
     normal: Any = None,
     x_axis: Any = None,
+    side: Any = None,
+    heights: Any = 0.0,
 ) -> DefaultGrid:
     """A plane (horizontal by default) for a phase history; arguments that are None are chosen from the data.
 
@@ -46,16 +52,27 @@ def default_grid(
     spacing  half the resolution along rows and columns, from the frequencies and directions in the data
     shape    the extent that the frequency step and the angle between rows leave unambiguous, at most 1024 pixels
     normal, x_axis   as in `ImageGrid.plane`
+
+    Of Earth-fixed echoes, as those of orbits, the centre lies at `heights` above the ellipsoid, m or an ElevationModel,
+    right or left of the track as `side` says, the plane is the ellipsoid's tangent there, and columns run east.
+    ValueError where the side is needed, and None.
     """
     part = raw if raw.n_rows <= ROWS else raw[spread_over(raw.n_rows, ROWS)]
     why = []
-    if center is None:
+    on_earth = needs_side(part)
+    if center is None and on_earth:
+        center, words = _center_on_earth(part, side, heights)
+        why.append(words)
+    elif center is None:
         center, words = _center(part)
         why.append(words)
+    upward, east = np.array([0.0, 0.0, 1.0]), None
+    if on_earth and (vertical := wgs84.vertical_at(np.asarray(center, np.float64))) is not None:
+        upward, east = vertical, wgs84.local_axes(*wgs84.geodetic(center)[:2])[0]  # type: ignore[misc]
     axes: dict[str, Any] = {
         "center": center,
-        "x_axis": x_axis,
-        "normal": (0, 0, 1) if normal is None else normal,
+        "x_axis": east if x_axis is None and normal is None else x_axis,
+        "normal": upward if normal is None else normal,
     }
     cell, swath = _resolution(part, ImageGrid.plane(shape=1, spacing=1, **axes), raw.n_rows)
     if spacing is None:
@@ -76,19 +93,58 @@ def _excess(raw: PhaseHistory, x: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return (r_tx + r_rx) / 2 - raw.reference_range, (to_tx / r_tx[:, None] + to_rx / r_rx[:, None]) / 2
 
 
+def needs_side(raw: PhaseHistory) -> bool:
+    """Whether the default centre needs the side of the track: in Earth-fixed coordinates, whose origin is no scene."""
+    return wgs84.is_earth_fixed(raw.tx[raw.n_rows // 2]) and _spread(raw, np.zeros(3)) > _cell(raw)
+
+
+def _cell(raw: PhaseHistory) -> float:
+    """Resolution in range, m."""
+    return SPEED_OF_LIGHT / (2 * float(raw.bandwidth.max()))
+
+
+def _spread(raw: PhaseHistory, x: np.ndarray) -> float:
+    """Root mean square of the range of x less the reference, m."""
+    return float(np.sqrt(np.mean(_excess(raw, x)[0] ** 2)))
+
+
+def _center_on_earth(raw: PhaseHistory, side: Any, heights: Any) -> tuple[np.ndarray, str]:
+    """The point at `heights` whose ranges to the antennas are the reference ranges, by least squares; and words."""
+    if side is None:
+        raise ValueError(
+            "the echoes are in Earth-fixed coordinates, where reference ranges meet on either side of the track; give "
+            "side='left' or 'right' of it (--side), or the grid's center (--center, --grid)"
+        )
+    sign = {"right": 1.0, "left": -1.0}[choice("side", side, ("right", "left"))]
+    middle = raw.n_rows // 2
+    ahead = raw.tx[-1] - raw.tx[0]
+    reference = raw.reference_range[[middle]]
+    start = heights if isinstance(heights, ElevationModel) else np.array([number("heights", heights)])
+    x = zero_doppler.geolocate(raw.tx[[middle]], ahead[None], reference, start, sign)[0]
+    for _ in range(20):
+        longitude, latitude, height = wgs84.geodetic(x)
+        level = heights.heights_at(longitude, latitude) if isinstance(heights, ElevationModel) else heights
+        excess, gradient = _excess(raw, x)
+        rows = np.concatenate([gradient, 1e3 * wgs84.up(longitude, latitude)[None]])
+        step = np.linalg.lstsq(rows, -np.append(excess, 1e3 * (height - level)), rcond=None)[0]
+        x = x + step
+        if np.linalg.norm(step) < 1e-4:
+            break
+    longitude, latitude, height = (float(v) for v in wgs84.geodetic(x))
+    return x, (
+        f"centre: longitude {longitude:.6f}, latitude {latitude:.6f}, height {height:.1f} m, {side} of the track, where "
+        f"the reference ranges meet, to {_spread(raw, x):.2g} m"
+    )
+
+
 def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
     origin = np.zeros(3)
-    near = SPEED_OF_LIGHT / (2 * float(raw.bandwidth.max()))
-
-    def spread(x: np.ndarray) -> float:
-        return float(np.sqrt(np.mean(_excess(raw, x)[0] ** 2)))
-
-    if spread(origin) <= near:
+    if _spread(raw, origin) <= _cell(raw):
         return origin, "centre: the origin, where all reference ranges meet"
     for free, words in ((3, "where the reference ranges meet"), (2, "where the reference ranges meet z = 0")):
         x = _meet(raw, free)
-        if x is not None and spread(x) <= float(raw.swath.min()) / 4:
-            return np.round(x, 3), f"centre: {words}, to {spread(x):.2g} m"
+        if x is not None and _spread(raw, x) <= float(raw.swath.min()) / 4:
+            return np.round(x, 3), f"centre: {words}, to {_spread(raw, x):.2g} m"
     return (
         origin,
         "centre: the origin, because the reference ranges meet in no point (--center names another)",

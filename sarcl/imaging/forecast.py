@@ -33,9 +33,9 @@ MOST_BANDS = 2**16  # bands that are divided into blocks; the memory of the firs
 
 @dataclass(frozen=True, eq=False)
 class Forecast:
-    """What `backproject` would do with the same options.
+    """What `backproject` would do with the same options, or `polar_format` or `range_doppler`.
 
-    method           "direct" or "factorized"
+    method           "direct" or "factorized"; "polar format" or "range-Doppler"
     plan             details of the plan, as in a report
     seconds          estimated run time at the present speed of the devices
     bytes            estimated memory: all pixels, and the blocks on every device
@@ -114,7 +114,7 @@ def _work(task: FocusingTask, chosen: MethodChoice) -> float:
 
 def _rate(devices: list[Device]) -> float:
     """Contributions per second of all devices together; drivers of the same CPU share its cores."""
-    return sum(_speed(d) for d in devices if not d.is_cpu) + max((_speed(d) for d in devices if d.is_cpu), default=0.0)
+    return sum(speed(d) for d in devices if not d.is_cpu) + max((speed(d) for d in devices if d.is_cpu), default=0.0)
 
 
 def _cheaper(
@@ -140,7 +140,7 @@ def _bytes(task: FocusingTask, chosen: MethodChoice, device: Device, budget: flo
 
 
 @functools.lru_cache(maxsize=16)
-def _speed(device: Device) -> float:
+def speed(device: Device) -> float:
     """Contributions per second of the per-pixel kernel with linear interpolation and ranges in float32: the unit of the
     costs of plans."""
     from .direct import direct

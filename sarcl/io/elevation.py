@@ -43,7 +43,7 @@ def load(path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = Non
         height = _heights(file, name, rows, columns, nodata)
         longitude, latitude = _places(file, rows, columns)
     if above:
-        height = height + _undulation(geoid, longitude, latitude, name, above)
+        height = height + undulation(geoid, longitude, latitude, name, above)
     log.info(
         "%s: %d x %d points, longitude %.5f to %.5f, latitude %.5f to %.5f, %d without data, heights above %s",
         name, *height.shape, longitude.min(), longitude.max(), latitude.min(), latitude.max(),
@@ -229,8 +229,8 @@ def _warped(file: Any) -> bool:
     return not (file.crs.is_geographic and 'DATUM["WGS_1984"' in wkt and degrees)
 
 
-def _undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str) -> np.ndarray:
-    """Height of the geoid above the ellipsoid, m, at points."""
+def undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str) -> np.ndarray:
+    """Height above the ellipsoid, m, of the geoid called `above`, at points, degrees (n_rows, n_columns)."""
     if isinstance(geoid, (str, Path)):
         return _raster(Path(geoid), longitude, latitude)
     if callable(geoid):

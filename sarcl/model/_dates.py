@@ -9,7 +9,7 @@ from collections.abc import Sequence
 import numpy as np
 from numpy.typing import NDArray
 
-Date = str | datetime.datetime | np.datetime64
+Date = str | datetime.date | np.datetime64  # a datetime.datetime is a datetime.date
 
 
 def date(value: Date) -> np.datetime64:
@@ -25,7 +25,7 @@ def date(value: Date) -> np.datetime64:
 
 def seconds(dates: Date | Sequence[Date] | NDArray[np.datetime64], epoch: np.datetime64) -> NDArray[np.float64]:
     """Seconds (...) from an epoch to dates (...), of days of 86 400 s."""
-    if isinstance(dates, (str, datetime.datetime)):
+    if isinstance(dates, (str, datetime.date)):
         dates = date(dates)
     elif not isinstance(dates, (np.datetime64, np.ndarray)):
         dates = np.array([date(d) for d in dates])

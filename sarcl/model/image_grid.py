@@ -163,6 +163,16 @@ class ImageGrid:
             axes.append(axis)
         return replace(made, times=axes[0], ranges=axes[1])
 
+    def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> ImageGrid:
+        """This grid, in x east, y north, z up of a place, in Earth-fixed coordinates: see `Scene.on_earth`."""
+        from ..earth.place import Place
+
+        place = Place(longitude, latitude, height)
+        if self.center is None or self.x_axis is None or self.y_axis is None:
+            return replace(self, listed=place.positions(self.positions))
+        axes: dict[str, Any] = {name: getattr(self, name) @ place.axes for name in ("x_axis", "y_axis")}
+        return replace(self, center=place.positions(self.center), **axes)
+
     @property
     def is_plane(self) -> bool:
         """Whether the grid was made by `plane`."""

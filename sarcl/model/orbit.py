@@ -2,10 +2,11 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import TYPE_CHECKING, Literal
+from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -156,15 +157,19 @@ class Orbit:
     def trajectory(
         self,
         *,
-        start: float,
+        start: float | Date | None = None,
         prf: float,
-        n_pulses: int,
+        n_pulses: int | None = None,
+        center: float | Date | None = None,
+        duration: float | None = None,
         attitude: Attitude | None = None,
         look: float | None = None,
         side: Literal["right", "left"] = "right",
     ) -> Trajectory:
         """The track of n_pulses pulses from time `start`, s, at `prf`, Hz, with velocities and accelerations.
 
+        start     or center, the time in the middle of the pulses: s since the epoch, or a date in UTC
+        n_pulses  or duration, s: so many pulses as it has pulse intervals, rounded
         attitude  of the antenna, whose boresight looks `look` rad from straight down (against the ellipsoid's normal):
                   "zero-doppler": across the Earth-fixed velocity; "yaw": across its horizontal part (yaw steering: what
                   is left is the Doppler frequency of the vertical velocity); "orbital": across the velocity in space,
@@ -173,9 +178,20 @@ class Orbit:
 
         The track is not stop-and-go: `echo` takes the receiver's positions when echoes arrive.
         """
-        start = validation.number("start", start)
         prf = validation.number("prf", prf, above=0)
-        t = start + np.arange(validation.count("n_pulses", n_pulses)) / prf
+        if (n_pulses is None) == (duration is None):
+            raise ValueError("the length of the track is n_pulses or duration (s); give one of them")
+        if duration is not None:
+            n_pulses = max(1, round(validation.number("duration", duration, above=0) * prf))
+        n_pulses = validation.count("n_pulses", n_pulses)
+        if (start is None) == (center is None):
+            raise ValueError(
+                "the time of the track is start or center (s since the epoch, or a date); give one of them"
+            )
+        first = self._time("start", start) if center is None else self._time("center", center)
+        if center is not None:
+            first -= (n_pulses - 1) / 2 / prf
+        t = first + np.arange(n_pulses) / prf
         p, v = self._states(t)
         track = Trajectory(t, p, v, accelerations=self.accelerations(t), stop_and_go=False)
         if attitude is None:
@@ -281,6 +297,12 @@ class Orbit:
         widths = [validation.number(f"width[{i}]", w, above=0) for i, w in enumerate(width)]
         body = ellipse(widths[0], widths[1], validation.count("n", n, 3))
         return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
+
+    def _time(self, name: str, value: Any) -> float:
+        """A time, s since the epoch: a number, or a date."""
+        if isinstance(value, (str, datetime.date, np.datetime64)):
+            return float(self.seconds(value))
+        return validation.number(name, value)
 
     def _times(self, t: ArrayLike) -> NDArray[np.float64]:
         """Times, s (...), all within the span."""

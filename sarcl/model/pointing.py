@@ -1,7 +1,8 @@
 """Pointing of antennas: tracks with an attitude that directs the beam.
 
 Every function returns the track with `attitude` set: columns are body axes in the scene, x along the beam (an
-antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, which is as vertical as possible.
+antenna's boresight, unless it is mounted otherwise), y azimuth, z elevation, which is as vertical as possible. The
+vertical, `up`, is z, and for tracks of orbits the ellipsoid's normal.
 """
 
 from __future__ import annotations
@@ -12,28 +13,31 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ..base import validation
+from ..base import validation, wgs84
 from .trajectory import Trajectory
 
 UP = (0.0, 0.0, 1.0)
 
 
-def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike = UP) -> Trajectory:
+def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
     """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3)."""
     look = _units("direction", direction, len(track))
-    return _looking(track, look, _units("up", up, len(track)))
+    return _looking(track, look, _vertical(track, up))
 
 
-def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike = UP) -> Trajectory:
+def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
     """Boresight towards a point, m (3,), or (n, 3) if it moves. ValueError where an antenna stands on it."""
     target = _vectors("point", point, len(track))
-    return _looking(
-        track, _units("point - position", target - track.positions, len(track)), _units("up", up, len(track))
-    )
+    return _looking(track, _units("point - position", target - track.positions, len(track)), _vertical(track, up))
 
 
 def stripmap(
-    track: Trajectory, look: float, *, squint: float = 0.0, side: Literal["right", "left"] = "right", up: ArrayLike = UP
+    track: Trajectory,
+    look: float,
+    *,
+    squint: float = 0.0,
+    side: Literal["right", "left"] = "right",
+    up: ArrayLike | None = None,
 ) -> Trajectory:
     """Boresight across the track, `look` rad from straight down, rotated by `squint` rad towards the velocity.
 
@@ -48,7 +52,7 @@ def stripmap(
         )
     sign = {"right": 1.0, "left": -1.0}[validation.choice("side", side, ("right", "left"))]
     along = _units("velocity", velocities(track), len(track))
-    vertical = _units("up", up, len(track))
+    vertical = _vertical(track, up)
     right = np.cross(along, vertical)
     length = np.linalg.norm(right, axis=1, keepdims=True)
     if length.min() < 1e-6:
@@ -123,6 +127,13 @@ def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:
             f"{name}{at} is no rotation; its columns must be three unit vectors at right angles, right-handed"
         )
     return out
+
+
+def _vertical(track: Trajectory, up: ArrayLike | None) -> np.ndarray:
+    """Unit vectors (n, 3): as asked, z, or the ellipsoid's normals along the track of an orbit."""
+    if up is None and not track.stop_and_go:
+        return wgs84.up(*wgs84.geodetic(track.positions)[:2])
+    return _units("up", UP if up is None else up, len(track))
 
 
 def _attitude(track: Trajectory) -> np.ndarray:

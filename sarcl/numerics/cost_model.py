@@ -36,6 +36,11 @@ MERGED_PROFILE = 6.0  # per sample of a range profile
 LEAF = {64: 0.35, 32: 0.45, 16: 0.8}  # per contribution to a leaf tile computed by lines, by its side in pixels
 LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on top of its taps
 
+# Range-Doppler images, in contributions (2026-11-22).
+REFERENCED = 8.0  # per sample: weights and reference range
+COMPRESSION_FILTER = 20.0  # per sample of a Doppler bin: secondary range compression
+STRAIGHTENED = 8.0  # per Doppler bin and column, on top of its taps
+
 # Choice of a method (2026-11-21).
 MERGING_PAYS = 0.8  # share of the direct method's cost below which sub-apertures are taken
 SEARCH_PAYS = 3e7  # pairs of row and pixel below which planning sub-apertures takes longer than they save
@@ -49,6 +54,7 @@ FLOAT64_TILE = 38.0  # per tile and row
 FLOAT64_SAMPLE = 10.0  # per sample of a range profile
 
 # Two-dimensional nonuniform FFT (kernels/nufft2d.cl), in steps of a cell's FFT (2026-11-22).
+GRID_UNIT = 0.5  # such a step, in contributions
 GRID_SAMPLE = 30.0  # per sample
 GRID_TAP = 0.9  # per sample and cell that it is spread over
 GRID_CELL = 1.0  # per cell and doubling of their number

@@ -6,6 +6,8 @@ For other folders:
 
 For this folder alone:
 
+    _earth     local coordinates of a place on the Earth, passes of orbits
+    _focusing  the function that makes the image, and its arguments
     _schema    tables and keys that a scenario may hold
     _tables    Python objects (Scene, Trajectory, ...) written as tables
 """

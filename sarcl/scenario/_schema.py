@@ -6,9 +6,10 @@ arguments, read from the signature, so that file format and library always agree
 
 from __future__ import annotations
 
+import datetime
 import inspect
 import re
-from collections.abc import Callable, Iterator, Mapping
+from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
 from typing import Any
@@ -20,9 +21,9 @@ Path = tuple[str | int, ...]
 Call = Callable[..., Any]
 
 # Arguments that are called `file` in a scenario: a mesh or an elevation model is always a file there.
-RENAMED = {"mesh": "file", "path": "file"}
+RENAMED = {"mesh": "file", "path": "file", "dem": "file"}
 # Arguments that are no keys: other sections describe them, or they belong to one run and not to the scenario.
-NOT_KEYS = {"scene", "waveform", "track", "receiver", "raw", "grid"}
+NOT_KEYS = {"self", "scene", "waveform", "track", "receiver", "raw", "grid"}
 NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
 NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material is named by its table; others are tables
 ON = "on"  # key of a part of the scene: the part stands on the parts before it
@@ -33,6 +34,7 @@ _TYPES = {
         lambda v: not isinstance(v, bool) and isinstance(v, (int, float)) and float(v).is_integer(),
     ),
     "str": ("a string", lambda v: isinstance(v, str)),
+    "Date": ('a date in UTC, such as "2024-03-01T05:00:12.5"', lambda v: isinstance(v, (str, datetime.date))),
     "bool": ("true or false", lambda v: isinstance(v, bool)),
 }
 
@@ -46,7 +48,20 @@ def calls(section: str) -> dict[str, Call]:
     if section in ("trajectory", "receiver"):
         from ..model.trajectory import Trajectory
 
-        return {"line": Trajectory.line, "circle": Trajectory.circle, "": Trajectory}
+        tracks: dict[str, Call] = {"line": Trajectory.line, "circle": Trajectory.circle}
+        if section == "trajectory":
+            from ..model.orbit import Orbit
+
+            tracks["orbit"] = Orbit.trajectory
+        return {**tracks, "": Trajectory}
+    if section == "orbit":
+        from ..model.orbit import Orbit
+
+        return {"kepler": Orbit.kepler, "tle": Orbit.tle, "states": Orbit.states, "": Orbit.read}
+    if section == "place":
+        from ..earth.place import Place
+
+        return {"": Place.above}
     if section == "waveform":
         from ..model.waveform import Waveform
 
@@ -96,7 +111,12 @@ def calls(section: str) -> dict[str, Call]:
     if section == "grid":
         from ..model.image_grid import ImageGrid
 
-        return {"plane": ImageGrid.plane, "points": ImageGrid.points}
+        return {
+            "plane": ImageGrid.plane,
+            "points": ImageGrid.points,
+            "on_terrain": ImageGrid.on_terrain,
+            "zero_doppler": ImageGrid.zero_doppler,
+        }
     if section == "noise":
         from ..effects.noise import add_noise
 
@@ -105,17 +125,32 @@ def calls(section: str) -> dict[str, Call]:
         from ..simulation.echo import echo
 
         return {"": echo}
+    if section == "spectral_echo":
+        from ..simulation.spectral.spectral_echo import spectral_echo
+
+        return {"": spectral_echo}
     if section == "backproject":
         from ..imaging.backproject import backproject
 
         return {"": backproject}
+    if section == "polar_format":
+        from ..imaging.polar_format.polar_format import polar_format
+
+        return {"": polar_format}
+    if section == "range_doppler":
+        from ..imaging.range_doppler.range_doppler import range_doppler
+
+        return {"": range_doppler}
     raise KeyError(section)
 
 
 SECTIONS = (
-    "waveform", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna", "array",
-    "radar", "materials", "scene", "grid", "echo", "noise", "backproject",
+    "waveform", "orbit", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna",
+    "array", "radar", "materials", "place", "scene", "grid", "echo", "spectral_echo", "noise", "backproject",
+    "polar_format", "range_doppler",
 )  # fmt: skip
+ECHOES = ("echo", "spectral_echo")  # sections for echoes, and for images: one of each at most
+IMAGES = ("backproject", "polar_format", "range_doppler")
 
 
 def parameters(call: Call) -> dict[str, inspect.Parameter]:
@@ -199,6 +234,19 @@ def check_section(section: str, table: Any, where: Where) -> None:
             _check_table(path, part, known[kind], where, extra={ON: _ON} if lying else {})
 
 
+def check_choices(given: Collection[str], where: Where) -> None:
+    """Refuse sections that exclude one another, and an orbit without its pulses."""
+    for sections, what in ((ECHOES, "echoes"), (IMAGES, "image")):
+        both = [s for s in sections if s in given]
+        if len(both) > 1:
+            raise ValueError(f"{where.text((both[1],))} [{both[0]}] makes the {what} too; keep one of them")
+    if "grid" in given and "range_doppler" in given:
+        raise ValueError(
+            f"{where.text(('grid',))} range_doppler makes a grid of its own, by zero-Doppler time and slant range; "
+            "leave [grid] out, and say times, ranges and spacing in [range_doppler]"
+        )
+
+
 def tables_of(section: str, kind: str, value: Any) -> list[tuple[Path, Any]]:
     """Each table of a kind with its path: a scene may hold several tables of one kind."""
     if section == "scene" and isinstance(value, list):
@@ -220,6 +268,11 @@ def _check_table(
             raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted a table")
         if key not in known:
             raise ValueError(f"{where.text(path, key)} {unknown(key, [*known, *(kinds or [])], 'key')}")
+        if isinstance(value, Mapping) and "ElevationModel" in str(known[key].annotation):
+            from ..earth.elevation import ElevationModel
+
+            _check_table((*path, key), value, ElevationModel.read, where)
+            continue
         wanted = _wanted(known[key], value, key)
         if wanted:
             raise ValueError(f"{where.text(path, key)} {key} is {_shown(value)}, wanted {wanted}")
@@ -240,7 +293,8 @@ def _wanted(parameter: inspect.Parameter, value: Any, key: str) -> str:
         return "" if any(_TYPES[n][1](value) for n in names) else " or ".join(_TYPES[n][0] for n in sorted(names))
     if re.search("Mapping|MapApertureOptions", str(parameter.annotation)) and isinstance(value, Mapping):
         return ""
-    good = isinstance(value, (bool, int, float, str, list)) and not _is_table(value)
+    kinds = (bool, int, float, str, list) + ((datetime.date,) if "Date" in names else ())
+    good = isinstance(value, kinds) and not _is_table(value)
     return "" if good else "a number, a string, true, false or an array"
 
 

@@ -9,9 +9,13 @@ from typing import Any
 
 import numpy as np
 
+from ..earth.place import Place
+from ..earth.state_vectors import StateVectors
+from ..earth.two_line import TwoLineElements
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.image_grid import ImageGrid
+from ..model.orbit import Orbit
 from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
@@ -27,7 +31,12 @@ def table_of(value: Any) -> Any:
     if isinstance(value, Waveform):
         return {value.kind: _waveform(value)}
     if isinstance(value, Trajectory):
-        return _without_none(value, ("times", "positions", "velocities", "attitude"))
+        table = _without_none(value, ("times", "positions", "velocities", "attitude", "accelerations"))
+        return table if value.stop_and_go else {**table, "stop_and_go": False}
+    if isinstance(value, Orbit):
+        return _orbit(value)
+    if isinstance(value, Place):
+        return _without_none(value, ("longitude", "latitude", "height"))
     if isinstance(value, Scene):
         return _scene(value)
     if isinstance(value, Material):
@@ -39,6 +48,8 @@ def table_of(value: Any) -> Any:
     if isinstance(value, Radar):
         return _without_none(value, ("power", "losses_db", "noise_temperature"))
     if isinstance(value, ImageGrid):
+        if value.times is not None:
+            return {"zero_doppler": {"times": value.times, "ranges": value.ranges, "positions": value.listed}}
         if not value.is_plane:
             return {"points": {"positions": value.listed}}
         return {"plane": _without_none(value, ("center", "shape", "spacing", "normal", "x_axis"))}
@@ -58,6 +69,20 @@ def plain(value: Any) -> Any:
     if isinstance(value, (list, tuple)):
         return [plain(v) for v in value]
     return sorted(value) if isinstance(value, (set, frozenset)) else value
+
+
+def _orbit(value: Orbit) -> dict[str, Any]:
+    epoch = {} if value.epoch is None else {"epoch": str(value.epoch)}
+    path = value.path
+    if isinstance(path, TwoLineElements):
+        return {"tle": {"line1": path.lines[0], "line2": path.lines[1], "span": value.span}}
+    if isinstance(path, StateVectors):
+        return {"states": {**_without_none(path, ("times", "positions", "velocities")), **epoch}}
+    elements = {
+        **_without_none(path, ("semi_major_axis", "eccentricity", "inclination", "node")),
+        "argument_of_perigee": path.perigee, "mean_anomaly": path.anomaly, "j2": path.with_j2, "span": value.span,
+    }  # fmt: skip
+    return {"kepler": {**elements, **epoch}}
 
 
 def _waveform(value: Waveform) -> dict[str, Any]:

@@ -325,6 +325,24 @@ class Scene:
             heights = x, y, z
         return replace(self, positions=positions, triangles=triangles, heights=heights)
 
+    def on_earth(self, longitude: float, latitude: float, height: float = 0.0) -> Scene:
+        """This scene, in x east, y north, z up of a place, in Earth-fixed coordinates, as for echoes of an orbit.
+
+        longitude, latitude, height   of the place, degrees and m above the ellipsoid
+
+        Terrain of from_heights has its shadows computed by rays afterwards, as other facets have. ValueError for angles
+        that are no place.
+        """
+        from ..earth.place import Place
+
+        place = Place(longitude, latitude, height)
+        moved: dict[str, Any] = {
+            n: validation.sealed(place.positions(getattr(self, n))) for n in ("positions", "triangles")
+        }
+        if self.has_random_points:
+            moved["point_roughness"] = validation.sealed(np.asarray(self.point_roughness @ place.axes))
+        return replace(self, heights=None, **moved)
+
     def realized(self, seed: int = 0) -> Scene:
         """One realization of the surface that point_roughness describes: corners are moved by seeded Gaussian numbers.
 

@@ -21,6 +21,7 @@ from ..scene.scene import Scene
 from . import echo_sampling
 from .echo import EchoOptions, echo, echo_request
 from .echo_output import log as output_log
+from .spectral.spectral_echo import SKIPS
 from .spectral.spectral_task import spectral_task
 
 # options of echo that make up its request, and those that a task of spectral_echo takes besides
@@ -122,6 +123,26 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
         rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), longer + slope * (len(track) - more),
         raw.report.contributions_done / more * len(track), dict(raw.report.plan) | motion, raw.report.predicted_error,
         *_spectral(scene, waveform, whole, options),
+    )  # fmt: skip
+
+
+def plan_spectral_echo(
+    scene: Scene, waveform: Waveform, track: Trajectory, *, variant: str = "exact", tolerance: float = 1e-2,
+    **options: Any,
+) -> EchoForecast:  # fmt: skip
+    """Forecast of `spectral_echo(scene, waveform, track, ...)` with these options, as an EchoForecast.
+
+    Nothing is transformed. Raises as `spectral_echo` does; `out` is not written.
+    """
+    validation.choice("variant", variant, ("exact", "saras"))
+    request = echo_request(scene, SKIPS, tolerance=tolerance, **{k: v for k, v in options.items() if k in REQUEST})
+    task = spectral_task(scene, waveform, track, request, **{k: v for k, v in options.items() if k in TASK})
+    prepared, parts, error = task.planned(variant)
+    rows, n_samples = len(track) * len(request.polarizations), len(task.frequencies)
+    largest = max(parts, key=lambda part: part.predicted_error)
+    return EchoForecast(
+        rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), task.seconds(prepared, parts),
+        float(rows) * sum(len(part.some) for part in parts), {**largest.describe(), **task.motion}, error,
     )  # fmt: skip
 
 

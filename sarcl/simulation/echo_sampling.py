@@ -78,7 +78,8 @@ def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:
     if height < DEEPEST:
         raise ValueError(
             f"the reference point of the scene is {-height:.4g} m under the ellipsoid, but tracks of Orbit.trajectory "
-            "are in Earth-fixed coordinates; place the scene there (sarcl.wgs84.ecef, Scene.from_dem(frame='ecef'))"
+            "are in Earth-fixed coordinates; place the scene there (Scene.on_earth, in scenario files "
+            "[place]; or sarcl.wgs84.ecef, Scene.from_dem(frame='ecef'))"
         )
     if hidden(antennas, point).all():
         raise ValueError(

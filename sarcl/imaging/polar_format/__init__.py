@@ -2,7 +2,7 @@
 
 For other folders:
 
-    polar_format   polar_format(): the image, and the error of plane wavefronts
+    polar_format   polar_format(): the image, and the error of plane wavefronts; plan_polar_format()
 
 For this folder alone:
 

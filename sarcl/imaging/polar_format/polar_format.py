@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import warnings
 from collections.abc import Callable
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -17,6 +18,7 @@ from ...base.validation import tolerance as allowed_error
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
+from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import LARGEST
 from ...numerics.windows import Window
@@ -24,6 +26,7 @@ from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import DeviceChoice
 from ..focusing_task import FocusingTask, make_task
+from ..forecast import Forecast, speed
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
 DEFOCUS = np.pi / 2  # rad: blurring phase at the border of the grid above which a warning is given
@@ -65,23 +68,9 @@ def polar_format(
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()
-    instance("raw", raw, PhaseHistory)
-    instance("grid", grid, ImageGrid)
-    if not grid.is_plane:
-        raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
-    tolerance = allowed_error(tolerance)
-    task = make_task(raw, grid, window, weights, wrap=True, skip=True)
-    if task.raw.n_rows < 2:
-        raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
-    opened = open_device(device)
-    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
-    waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
-    bent = curvature(task.raw, waves, grid)
-    _warn(task, waves, bent)
-    cycles, step = waves.pixel_cycles(task.raw, grid)
-    plan = make_plan(tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(opened))
-    engine = Gridder(opened, plan, cycles, step, raw.n_samples)
-    engine.blocks(budget)
+    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device)
+    task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance
+    plan, opened, budget = made.engine.plan, made.engine.device, made.budget
     clock.lap("plan")
 
     energy = np.zeros(task.raw.n_rows)
@@ -100,7 +89,7 @@ def polar_format(
     details = plan.describe()
     if norm < random:
         details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
-    details |= _describe(bent)
+    details |= _describe(made.bent)
     measured = None
     exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
     if check or (check is None and exact_seconds < 0.02 * clock.seconds["gridding"]):
@@ -130,6 +119,66 @@ def polar_format(
     return image
 
 
+def plan_polar_format(
+    raw: PhaseHistory,
+    grid: ImageGrid,
+    *,
+    tolerance: float = 1e-2,
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    max_bytes: float | None = None,
+    device: DeviceChoice | None = None,
+    **options: object,
+) -> Forecast:
+    """What `polar_format` would do with these arguments: a Forecast. Raises and warns as it does; no sample is read.
+
+    options   `check` and `progress`, which do not matter here
+    """
+    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device)
+    plan = made.engine.plan
+    held = 8.0 * (grid.size + plan.length[0] * plan.length[1])  # complex64
+    seconds = cost_model.GRID_UNIT * plan.cost / speed(made.engine.device)
+    details = {**plan.describe(), **_describe(made.bent)}
+    return Forecast("polar format", details, seconds, held, plan.predicted_error, None)
+
+
+@dataclass(frozen=True, eq=False)
+class _Prepared:
+    """What is to be focused, and how."""
+
+    tolerance: float
+    task: FocusingTask
+    waves: Waves
+    bent: Curvature
+    engine: Gridder
+    budget: float
+
+
+def _prepare(
+    raw: PhaseHistory, grid: ImageGrid, tolerance: float, window: Window | None, weights: ArrayLike | None,
+    max_bytes: float | None, device: DeviceChoice | None,
+) -> _Prepared:  # fmt: skip
+    """Arguments checked, plane waves and their error, and the plan on the device; warns where the image is blurred."""
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
+    if not grid.is_plane:
+        raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
+    tolerance = allowed_error(tolerance)
+    task = make_task(raw, grid, window, weights, wrap=True, skip=True)
+    if task.raw.n_rows < 2:
+        raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
+    opened = open_device(device)
+    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
+    waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
+    bent = curvature(task.raw, waves, grid)
+    _warn(task, waves, bent)
+    cycles, step = waves.pixel_cycles(task.raw, grid)
+    plan = make_plan(tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(opened))
+    engine = Gridder(opened, plan, cycles, step, raw.n_samples)
+    engine.blocks(budget)
+    return _Prepared(tolerance, task, waves, bent, engine, budget)
+
+
 def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
     """Samples of rows start ... stop - 1 times their weights, with phases relative to the grid's centre: complex64."""
     raw, rows = task.raw, slice(start, stop)
@@ -157,7 +206,7 @@ def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
             f"wavefronts are curved: at the grid's border {bent.defocus:.2g} rad are left that blur; polar_format "
             f"focuses within {bent.radius:.3g} m of its centre. Take a smaller grid, or backproject"
         )
-        warnings.warn(text, SarclWarning, stacklevel=3)
+        warnings.warn(text, SarclWarning, stacklevel=4)
     reach = np.abs(waves.toward @ (_corners(task.grid) - waves.center).T) + np.abs(waves.shift)[:, None]
     if (reach > task.raw.swath[:, None] / 2 * (1 + 1e-9)).any():
         text = (
@@ -165,7 +214,7 @@ def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
             f"{task.raw.swath.min() / 2:.4g} m: beyond it polar_format repeats echoes. "
             "Take a smaller grid, or backproject"
         )
-        warnings.warn(text, SarclWarning, stacklevel=3)
+        warnings.warn(text, SarclWarning, stacklevel=4)
 
 
 def _corners(grid: ImageGrid) -> np.ndarray:

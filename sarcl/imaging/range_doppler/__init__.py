@@ -2,7 +2,7 @@
 
 For other folders:
 
-    range_doppler   range_doppler(): the image, and its error against backprojection
+    range_doppler   range_doppler(): the image, and its error against backprojection; plan_range_doppler()
 
 For this folder alone:
 
@@ -12,6 +12,7 @@ For this folder alone:
     _ground         positions at zero-Doppler times and slant ranges, at a height or on an elevation model
     _plan           rows, columns, Doppler bins, range blocks and the predicted error
     _range_window   slant ranges that lie in the range window of every row
+    _task           arguments checked; track, ground, extent and plan of one image
     _track          an evenly sampled smooth track
     _velocity       ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """

@@ -12,6 +12,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import rounded_up
 from ...model.phase_history import PhaseHistory
+from ...numerics import cost_model
 from ...numerics.interpolation import Interpolator, choose_interpolator
 from ...opencl import fft
 from ._doppler import STEEPEST, Band, delay
@@ -60,6 +61,17 @@ class FocusPlan:
     def predicted_error(self) -> float:
         """Sum of the errors by cause."""
         return float(sum(self.errors.values()))
+
+    def cost(self, n_rows: int, n_samples: int) -> float:
+        """Cost in contributions of numerics/cost_model.py: FFTs, filters, reading along the migration."""
+        bins, columns, several = len(self.bins), len(self.ranges), len(self.blocks) > 1
+        filters = len(self.blocks) + 1 if several else 1
+        out = n_rows * n_samples * cost_model.REFERENCED + n_samples * cost_model.profile(self.length)
+        out += bins * filters * (n_samples * cost_model.COMPRESSION_FILTER + cost_model.profile(self.profile_length))
+        out += (
+            bins * columns * (4 if several else 1) * (cost_model.STRAIGHTENED + cost_model.TAPS[self.interpolator.taps])
+        )
+        return out + columns * cost_model.profile(self.length * self.finer)
 
     def describe(self) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.polynomial import chebyshev
 
+from ...base import wgs84
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 
 EVEN = 1e-3  # of a pulse interval: largest deviation of pulse times from even spacing
 DEGREES = 7  # highest degree of the polynomials of time through the positions
-EARTH_FIXED = 6.3e6, 5e7  # m: antennas at such distances from the origin are in Earth-fixed coordinates
 UP = np.array([0.0, 0.0, 1.0])
 REMEDY = "use backproject, which takes any track"
 
@@ -97,7 +97,7 @@ class Track:
     @property
     def is_earth_fixed(self) -> bool:
         """Whether coordinates are Earth-fixed: told by the distance from their origin."""
-        return EARTH_FIXED[0] < float(np.linalg.norm(self.coefficients[0])) < EARTH_FIXED[1]
+        return wgs84.is_earth_fixed(self.coefficients[0])
 
     def side(self, raw: PhaseHistory, asked: str | None) -> float:
         """1 right of the track, -1 left: as asked, or where the origin is if it lies in every row's range window."""

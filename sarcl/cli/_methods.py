@@ -1,0 +1,142 @@
+"""The methods of `sarcl focus --method`: which options each takes, its plan, and its image."""
+
+from __future__ import annotations
+
+import argparse
+from collections.abc import Callable
+from dataclasses import dataclass, fields
+from typing import TYPE_CHECKING, Any
+
+from ..io import formats
+from ..model.store import read
+
+if TYPE_CHECKING:
+    from ..model.image import Image
+    from ..model.image_grid import ImageGrid
+    from ..model.phase_history import PhaseHistory
+
+PLANE = ("grid", "center", "shape", "spacing", "normal", "x_axis")
+BLOCKS = ("tile", "resume")
+# Options, beside those that every method takes, by method; "backproject" is auto, direct, factorized
+TAKES = {
+    "backproject": (*PLANE, *BLOCKS, "beam", "mapping", "wrap", "side", "heights", "heights_above", "geoid"),
+    "polar_format": (*PLANE, "side", "heights", "heights_above", "geoid"),
+    "range_doppler": ("beam", "side", "heights", "heights_above", "geoid", "times", "ranges", "doppler"),
+}
+OPTIONS = sorted({name for names in TAKES.values() for name in names})
+WHY = {
+    "range_doppler": "makes its own grid, by zero-Doppler time and slant range, of all rows at once",
+    "polar_format": "makes its image on one plane, of all rows at once",
+    "backproject": "takes no such option",
+}
+TOLERANCE = {"backproject": 1e-3, "polar_format": 1e-2, "range_doppler": 1e-2}
+
+
+@dataclass(frozen=True)
+class Method:
+    """A method: its name in Python, and its options."""
+
+    name: str
+    options: dict[str, Any]
+
+    @classmethod
+    def of(cls, args: argparse.Namespace) -> Method:
+        """The method that is asked for. ValueError names an option that it does not take."""
+        name = args.method if args.method in TAKES else "backproject"
+        for option in OPTIONS:
+            if getattr(args, option) not in (None, False) and option not in TAKES[name]:
+                others = " or ".join(n for n in TAKES if option in TAKES[n])
+                raise ValueError(f"--{option.replace('_', '-')} is for {others}; --method {args.method} {WHY[name]}")
+        options = {"tolerance": TOLERANCE[name] if args.tolerance is None else args.tolerance}
+        options |= {"window": args.window, "max_bytes": args.max_bytes}
+        if name == "backproject":
+            from ..imaging.focus_options import FocusOptions
+
+            known = {f.name for f in fields(FocusOptions)} - {*options, "device"}
+            options |= {k: v for k, v in vars(args).items() if k in known}
+        if name == "range_doppler":
+            given = ("beam", "side", "times", "ranges", "doppler")
+            options |= {k: getattr(args, k) for k in given if getattr(args, k) is not None}
+        return cls(name, options)
+
+    def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any) -> Any:
+        """The Forecast."""
+        if self.name == "backproject":
+            from ..imaging.forecast import plan
+
+            assert grid is not None
+            return plan(raw, grid, **self.options, device=device)
+        if self.name == "polar_format":
+            from ..imaging.polar_format.polar_format import plan_polar_format
+
+            assert grid is not None
+            return plan_polar_format(raw, grid, **self.options, device=device)
+        from ..imaging.range_doppler.range_doppler import plan_range_doppler
+
+        return plan_range_doppler(raw, **self.options, device=device)
+
+    def image(
+        self, raw: PhaseHistory, grid: ImageGrid | None, out: str | None, device: Any, progress: Any, **running: Any
+    ) -> Image | None:
+        """The image, in the file `out` if one is named; None for a piece. running: `tile` and `resume`."""
+        verb: Callable[..., Any]
+        if self.name == "backproject":
+            from ..imaging.backproject import backproject as verb
+
+            made: Image | None = verb(raw, grid, **self.options, **running, device=device, progress=progress, out=out)
+            return made
+        if self.name == "polar_format":
+            from ..imaging.polar_format.polar_format import polar_format as verb
+        else:
+            from ..imaging.range_doppler.range_doppler import range_doppler as verb
+        pieces = (raw,) if grid is None else (raw, grid)
+        image: Image = verb(*pieces, **self.options, device=device, progress=progress)
+        if out is None:
+            return image
+        image.save(out)
+        kept: Any = read(out)
+        return kept
+
+
+def heights(args: argparse.Namespace) -> Any:
+    """--heights as a number, m, or an ElevationModel; 0 where it is left out. ValueError for options of the other."""
+    text = args.heights
+    try:
+        number = 0.0 if text is None else float(text)
+    except ValueError:
+        from ..earth.elevation import ElevationModel
+
+        geoid = args.geoid
+        try:
+            geoid = None if geoid is None else float(geoid)
+        except ValueError:
+            pass  # the name of a raster file
+        return ElevationModel.read(text, heights=args.heights_above, geoid=geoid)
+    for option in ("heights_above", "geoid"):
+        if getattr(args, option) is not None:
+            raise ValueError(
+                f"--{option.replace('_', '-')} is for --heights FILE; a number of --heights is above the ellipsoid"
+            )
+    return number
+
+
+def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
+    """ValueError for --side and --heights where no grid is chosen from Earth-fixed echoes."""
+    from ..imaging.default_grid import needs_side
+
+    given = next((n for n in ("side", "heights") if getattr(args, n) is not None), None)
+    if given is not None and (args.grid is not None or args.center is not None or not needs_side(raw)):
+        why = (
+            "the echoes are in local coordinates" if args.grid is None and args.center is None else "the grid is given"
+        )
+        raise ValueError(
+            f"--{given} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take --method "
+            "range_doppler"
+        )
+
+
+def check_pieces(args: argparse.Namespace, outputs: list[str]) -> None:
+    """ValueError for --tile or --resume where no image file is written."""
+    for name in BLOCKS:
+        if getattr(args, name) and all(formats.named(p, formats.writing("picture")) for p in outputs):
+            raise ValueError(f"--{name} keeps tiles beside an image file; give -o IMAGE.h5")

@@ -1,0 +1,124 @@
+"""One task of range_doppler: its arguments checked, the track, the ground, the extent and the plan."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.validation import array, instance, number
+from ...base.validation import tolerance as allowed_error
+from ...model.phase_history import PhaseHistory
+from ...opencl import memory_budget
+from ...opencl.choose_device import open_device
+from ...opencl.device import Device
+from ..focusing_task import weigh
+from ._doppler import centroid_of_data, centroid_of_geometry
+from ._extent import Extent, choose_extent
+from ._ground import Ground
+from ._plan import FocusPlan, make_plan
+from ._track import REMEDY, Track
+from ._velocity import effective_speed, hyperbolas, phase_error
+
+EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
+
+
+@dataclass(frozen=True, eq=False)
+class RangeDopplerTask:
+    """What is to be focused, and how.
+
+    sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes for blocks on the device
+    centroid   sine of the squint angle of the Doppler centroid;  wavelength  of sample n_samples//2, m
+    worst      largest phase error of the hyperbolas, rad
+    """
+
+    tolerance: float
+    track: Track
+    ground: Ground
+    extent: Extent
+    plan: FocusPlan
+    sample_weight: np.ndarray
+    row_weight: np.ndarray
+    device: Device
+    budget: float
+    centroid: float
+    wavelength: float
+    worst: float
+
+    def describe(self) -> dict[str, Any]:
+        """The plan, Doppler, velocity and the errors by cause, for a report."""
+        plan, extent, track, centroid = self.plan, self.extent, self.track, self.centroid
+        speed = float(plan.fit.at(np.array([plan.ranges.mean()]))[0][0])
+        hertz = 2 * speed / self.wavelength
+        rate = -hertz * speed / plan.ranges.mean() * (1 - centroid**2) ** 1.5
+        return {
+            **plan.describe(),
+            "Doppler centroid": f"{hertz * centroid:.6g} Hz",
+            "Doppler rate": f"{rate:.6g} Hz/s",
+            "Doppler band": f"{hertz * (plan.band.high - plan.band.low):.5g} Hz of the image, "
+            f"{hertz * extent.pixel_band:.5g} Hz of a pixel, PRF {1 / track.step:.5g} Hz",
+            "effective velocity": f"{speed:.7g} m/s",
+            "largest phase error of the hyperbolas": f"{self.worst:.1e} rad",
+            **{f"error, {cause}": f"{value:.1e}" for cause, value in plan.errors.items()},
+        }
+
+
+def make_task(
+    raw: PhaseHistory, heights: Any, side: Any, tolerance: Any, window: Any, weights: Any, times: Any, ranges: Any,
+    spacing: Any, beam: Any, doppler: Any, max_bytes: Any, device: Any,
+) -> RangeDopplerTask:  # fmt: skip
+    """The task of these arguments of `range_doppler`, which says what each is and what is refused."""
+    instance("raw", raw, PhaseHistory)
+    tolerance = allowed_error(tolerance)
+    if not raw.compressed:
+        raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
+    for name in ("frequency", "frequency_step"):
+        if np.ptp(getattr(raw, name)):
+            raise ValueError(f"raw.{name} differs between rows, and the FFT along the track needs one; {REMEDY}")
+    if raw.n_samples < 2:
+        raise ValueError("raw has one sample per row: without bandwidth there is no range; give at least 2 samples")
+    sample_weight, row_weight = weigh(raw, window, weights)
+    track = Track.of(raw, 0.02 * tolerance)
+    ground = Ground.of(track, heights, track.side(raw, side))
+    smooth = ground.smooth().positions
+    least = ground.least_range()
+    speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
+    wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
+    if doppler in ("geometry", "data"):
+        centroid = centroid_of_geometry(raw, track.step, speed)
+        if doppler == "data":
+            centroid = centroid_of_data(raw, track.step, speed, centroid)
+    else:
+        if isinstance(doppler, str):
+            raise ValueError(f"doppler is {doppler!r}; choose 'geometry', 'data' or a frequency in Hz")
+        centroid = number("doppler", doppler) * wavelength / (2 * speed)
+    opened = open_device(device)
+    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
+
+    extent = choose_extent(
+        raw, track, smooth, speed, centroid, None if beam is None else number("beam", beam, above=0),
+        _pair("times", times), _pair("ranges", ranges), spacing, least,
+        EDGES * tolerance,
+    )  # fmt: skip
+    fit = hyperbolas(
+        raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
+        extent.rows_of(extent.middle_time),
+    )  # fmt: skip
+    ends = np.linspace(extent.times[0], extent.times[-1], 3)
+    model_error, worst = phase_error(raw, track, ground.positions, fit, ends, extent.rows_of)
+    plan = make_plan(raw, track, extent, fit, model_error, tolerance)
+    return RangeDopplerTask(
+        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, centroid, wavelength, worst
+    )
+
+
+def _pair(name: str, value: Sequence[float] | None) -> tuple[float, float] | None:
+    if value is None:
+        return None
+    made = array(name, value, np.float64, (2,))
+    if not made[0] < made[1]:
+        raise ValueError(f"{name} is ({made[0]:g}, {made[1]:g}); the first must be less than the last")
+    return float(made[0]), float(made[1])
