@@ -126,12 +126,11 @@ def check_default_grid(args: argparse.Namespace, raw: PhaseHistory) -> None:
 
     given = next((n for n in ("side", "heights") if getattr(args, n) is not None), None)
     if given is not None and (args.grid is not None or args.center is not None or not needs_side(raw)):
-        why = (
-            "the echoes are in local coordinates" if args.grid is None and args.center is None else "the grid is given"
-        )
+        local = args.grid is None and args.center is None
+        why = "the echoes are in local coordinates" if local else "the grid is given"
         raise ValueError(
-            f"--{given} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take --method "
-            "range_doppler"
+            f"--{given} places the grid that is chosen for Earth-fixed echoes, and {why}: leave it out, or take "
+            "--method range_doppler"
         )
 
 

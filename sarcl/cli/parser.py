@@ -162,7 +162,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     earth.add_argument(
         "--heights",
         metavar="H|DEM",
-        help="of the pixels: m above the ellipsoid (local tracks: z), or a DEM (default 0)",
+        help="of pixels: m above the ellipsoid (local tracks: z), or a DEM (default 0)",
     )
     earth.add_argument("--heights-above", metavar="NAME", help="what a DEM's heights are above: ellipsoid, EGM96 ...")
     earth.add_argument("--geoid", metavar="M|FILE", help="height of that geoid above the ellipsoid, m, or its raster")

@@ -68,7 +68,8 @@ def default_grid(
         why.append(words)
     upward, east = np.array([0.0, 0.0, 1.0]), None
     if on_earth and (vertical := wgs84.vertical_at(np.asarray(center, np.float64))) is not None:
-        upward, east = vertical, wgs84.local_axes(*wgs84.geodetic(center)[:2])[0]  # type: ignore[misc]
+        longitude, latitude, _ = wgs84.geodetic(center)
+        upward, east = vertical, wgs84.local_axes(float(longitude), float(latitude))[0]
     axes: dict[str, Any] = {
         "center": center,
         "x_axis": east if x_axis is None and normal is None else x_axis,
@@ -130,11 +131,8 @@ def _center_on_earth(raw: PhaseHistory, side: Any, heights: Any) -> tuple[np.nda
         x = x + step
         if np.linalg.norm(step) < 1e-4:
             break
-    longitude, latitude, height = (float(v) for v in wgs84.geodetic(x))
-    return x, (
-        f"centre: longitude {longitude:.6f}, latitude {latitude:.6f}, height {height:.1f} m, {side} of the track, where "
-        f"the reference ranges meet, to {_spread(raw, x):.2g} m"
-    )
+    place = "longitude {:.6f}, latitude {:.6f}, height {:.1f} m".format(*wgs84.geodetic(x))
+    return x, (f"centre: {place}, {side} of the track, where the reference ranges meet, to {_spread(raw, x):.2g} m")
 
 
 def _center(raw: PhaseHistory) -> tuple[np.ndarray, str]:
