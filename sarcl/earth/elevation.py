@@ -158,7 +158,7 @@ class ElevationModel:
 def _bilinear(values: NDArray[np.float64], at: NDArray[np.float64]) -> NDArray[np.float64]:
     """A grid of values (n_rows, n_columns) at fractional (row, column) (2, n), extrapolated outside: (n,)."""
     size = np.array(values.shape)[:, None]
-    low = np.clip(np.floor(at).astype(np.int64), 0, size - 2)
+    low = np.clip(np.nan_to_num(np.floor(at)), 0, size - 2).astype(np.int64)  # NaN in, NaN out: by the weights
     (i, j), (u, v) = low, at - low
     out = np.zeros(at.shape[1])
     for weight, corner in (

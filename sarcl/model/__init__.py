@@ -5,6 +5,7 @@ For other folders:
     antenna           Antenna: pattern in its own axes, mounting
     antenna_array     AntennaArray: positions and carriers of elements
     antenna_pattern   gain of a pattern in given directions, its steepest slope, its extent
+    dates             dates in UTC to seconds since an epoch
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels
     lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
@@ -19,7 +20,6 @@ For other folders:
 For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
-    _dates            dates in UTC to seconds since an epoch
     _listed_surface   positions between the points of a listed grid, and indices of positions
     _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
 """
@@ -28,6 +28,7 @@ __all__ = [
     "antenna",
     "antenna_array",
     "antenna_pattern",
+    "dates",
     "image",
     "image_grid",
     "lazy_rows",

@@ -18,8 +18,8 @@ from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
-from ._dates import Date, date, seconds
 from ._orbit_attitude import Attitude, axes_of, ellipse
+from .dates import Date, date, seconds
 from .trajectory import Trajectory
 
 if TYPE_CHECKING:

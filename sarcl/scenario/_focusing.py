@@ -39,13 +39,13 @@ def focused(
 
 def range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of range_doppler; with [place], its height and its side of the orbit's track are the defaults."""
-    given = scenario.options("range_doppler", options)
+    given = scenario._options("range_doppler", options)
     heights = given.get("heights")
     if isinstance(heights, (str, Mapping)):
         from ..earth.elevation import ElevationModel
 
         table = {"file": heights} if isinstance(heights, str) else heights
-        given["heights"] = scenario.call(("range_doppler", "heights"), table, ElevationModel.read)
+        given["heights"] = scenario._call(("range_doppler", "heights"), table, ElevationModel.read)
     place = scenario.build_place()
     if place is not None:
         given.setdefault("heights", place.height)
@@ -60,6 +60,6 @@ def check_window(scenario: Scenario) -> None:
     from ..numerics.windows import weights
 
     section = section_of(scenario)
-    given = scenario.options(section, {})
+    given = scenario._options(section, {})
     with scenario.where.blame((section,), given, always=False):
         weights(given.get("window"), 8)

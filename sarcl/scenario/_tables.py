@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import datetime
 from collections.abc import Mapping
 from dataclasses import fields
 from pathlib import Path
@@ -14,6 +15,7 @@ from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
+from ..model.dates import date
 from ..model.image_grid import ImageGrid
 from ..model.orbit import Orbit
 from ..model.radar import Radar
@@ -57,7 +59,10 @@ def table_of(value: Any) -> Any:
 
 
 def plain(value: Any) -> Any:
-    """A value with arrays and tuples as lists, complex numbers as [real, imaginary] and paths as text, at any depth."""
+    """A value with arrays and tuples as lists, complex numbers as [real, imaginary], paths and dates (UTC) as text, at
+    any depth."""
+    if isinstance(value, (datetime.date, np.datetime64)):
+        return str(np.datetime_as_string(date(value), unit="auto"))
     if isinstance(value, Mapping):
         return {str(k): plain(v) for k, v in value.items()}
     if isinstance(value, (np.ndarray, np.generic)):
@@ -72,7 +77,7 @@ def plain(value: Any) -> Any:
 
 
 def _orbit(value: Orbit) -> dict[str, Any]:
-    epoch = {} if value.epoch is None else {"epoch": str(value.epoch)}
+    epoch = {} if value.epoch is None else {"epoch": value.epoch}
     path = value.path
     if isinstance(path, TwoLineElements):
         return {"tle": {"line1": path.lines[0], "line2": path.lines[1], "span": value.span}}

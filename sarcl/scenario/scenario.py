@@ -187,7 +187,7 @@ class Scenario:
         if place is not None and not {"start", "center"} & set(table):
             with self.where.blame(("place",), {}):
                 table["center"] = time_over(orbit, place)
-        return self._aimed(self.call(("trajectory", "orbit"), table, orbit.trajectory), "pointing")
+        return self._aimed(self._call(("trajectory", "orbit"), table, orbit.trajectory), "pointing")
 
     def describe_orbit(self) -> str:
         """The orbit, its pulses and how it sees the place, in lines of text; empty where there is no orbit."""
@@ -227,7 +227,7 @@ class Scenario:
             return self._one("grid")
         with self.where.blame(("grid", kind), table):
             local = on_terrain(place, table) if kind == "on_terrain" else table
-        made: ImageGrid = self.call(("grid", kind), local, _schema.calls("grid")[kind])
+        made: ImageGrid = self._call(("grid", kind), local, _schema.calls("grid")[kind])
         return made.on_earth(place.longitude, place.latitude, place.height)
 
     def build_scene(self) -> Scene:
@@ -236,7 +236,7 @@ class Scenario:
         from ._tables import look_up
 
         materials = {
-            name: self.call(("materials", name), table, partial(Material, name=name))
+            name: self._call(("materials", name), table, partial(Material, name=name))
             for name, table in (self.materials or {}).items()
         }
         scene, origin = None, self.build_place()
@@ -247,7 +247,7 @@ class Scenario:
                 if origin is not None and kind == "from_dem":
                     with self.where.blame(path, table):
                         table = on_terrain(origin, table)
-                part = self.call(path, table, _schema.calls("scene")[kind])
+                part = self._call(path, table, _schema.calls("scene")[kind])
                 if place is not None:
                     with self.where.blame(path, {_schema.ON: place}):
                         part = _stand(part, scene, place)
@@ -270,7 +270,7 @@ class Scenario:
             return raw
         from ..effects.noise import add_noise
 
-        level = self.options("noise", {})
+        level = self._options("noise", {})
         if "nesz" in level or "nesz_db" in level:
             level.setdefault("grid", None if "cell_area" in level else self.build_grid())
         with self.where.blame(("noise",), level):
@@ -330,13 +330,13 @@ class Scenario:
         if section == "backproject":
             from ..imaging.backproject import backproject
 
-            return focused(self, backproject, raw, grid, options, self.options(section, options))
+            return focused(self, backproject, raw, grid, options, self._options(section, options))
         given: dict[str, Any] = dict(options)
         out = given.pop("out", None)
         if section == "polar_format":
             from ..imaging.polar_format.polar_format import polar_format
 
-            image = focused(self, polar_format, raw, grid, given, self.options(section, given))
+            image = focused(self, polar_format, raw, grid, given, self._options(section, given))
         else:
             from ..imaging.range_doppler.range_doppler import range_doppler
 
@@ -354,7 +354,7 @@ class Scenario:
             from ..imaging.range_doppler.range_doppler import plan_range_doppler
 
             return focused(self, plan_range_doppler, raw, grid, options, range_doppler_options(self, options))
-        given = self.options(section, options)
+        given = self._options(section, options)
         if section == "polar_format":
             from ..imaging.polar_format.polar_format import plan_polar_format
 
@@ -371,7 +371,7 @@ class Scenario:
             return track
         ((kind, given),) = table.items()
         given = earth_fixed(self.build_place(), given)
-        return self.call((section, kind), given, partial(_schema.calls(section)[kind], track))
+        return self._call((section, kind), given, partial(_schema.calls(section)[kind], track))
 
     def _check_local(self, kind: str, section: str) -> None:
         """ValueError for a track in local coordinates where [place] makes the scene Earth-fixed."""
@@ -394,10 +394,10 @@ class Scenario:
         known = _schema.calls(name)
         kind = next(iter(table))
         if kind in known:
-            return self.call((name, kind), table[kind], known[kind])
-        return self.call((name,), table, known[""])
+            return self._call((name, kind), table[kind], known[kind])
+        return self._call((name,), table, known[""])
 
-    def call(self, path: _schema.Path, table: Mapping[str, Any], call: _schema.Call) -> Any:
+    def _call(self, path: _schema.Path, table: Mapping[str, Any], call: _schema.Call) -> Any:
         """call(**table), with files relative to the scenario's folder; messages name file, line and table."""
         renamed = {new: old for old, new in _schema.RENAMED.items() if old in inspect.signature(call).parameters}
         with self.where.blame(path, table):
@@ -407,7 +407,7 @@ class Scenario:
                     given[name] = self.folder / given[name]
             return call(**given)
 
-    def options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
+    def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of a function. A list is a pair, or a name with its parameters: a tuple in Python."""
         table = getattr(self, name) or {}
         return {k: tuple(v) if isinstance(v, list) else v for k, v in {**table, **options}.items()}
