@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
+
 import numpy as np
 
 from ..numerics.interpolation import Interpolator
@@ -42,3 +44,18 @@ def migrate(
     shares = lagrange(np.array([-1.0, 0, 1, 2]), cell_rest.ravel()).reshape(4, *cell.shape)
     amplitude = sum(shares[i] * table[np.arange(len(table)), np.maximum(cell, 0) + i] for i in range(4))
     return np.asarray(np.where(cell < 0, 0, amplitude * made * np.exp(2j * np.pi * cycles)))
+
+
+def beam_edge(
+    amplitudes: np.ndarray, azimuth: np.ndarray, slant_range: np.ndarray, first: np.ndarray, side: int,
+    places: np.ndarray, weight: Callable[[np.ndarray], np.ndarray], wavenumber: float, middle_range: float,
+) -> np.ndarray:  # fmt: skip
+    """Samples at places on the track, m (n_p,), of scatterers seen from pulse `first` (n,) on, up to it if side is -1.
+
+    sum_k b_k weight(s) exp(-j 2 k (R - r_c)), complex128 (n_p,);  k the wavenumber, rad/m, r_c the middle range, m
+    """
+    lag = places[:, None] - azimuth
+    distance = np.hypot(lag, slant_range)
+    seen = side * (np.arange(len(places))[:, None] - first) >= 0
+    wave = np.exp(-2j * wavenumber * (distance - middle_range)) * weight((lag / distance).ravel()).reshape(lag.shape)
+    return np.asarray((wave * seen) @ amplitudes)

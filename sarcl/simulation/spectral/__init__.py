@@ -8,8 +8,12 @@ For other folders:
 For this folder alone:
 
     _aspect_expansion       amplitudes over aspect and frequency as sums of few products
-    _aspect_window          the aspects that a track sees, and the wavenumbers along it
+    _aspect_window          a window over the aspects that a track sees, and the wavenumbers along it
+    _aspects_seen           limits of these aspects: the track's ends, beams, the pulse repetition frequency
     _azimuth_transfer       responses along the track, transformed numerically
+    _beam_edges             hard edges of beams: the aspects at which each scatterer passes them
+    _edge_map               what hard edges add: maps whose azimuths are numbers of pulses
+    _map_part               one map of a part of a scene, with its transfer functions
     _map_plan               grid of the map, and the range wavenumbers at which its spectrum is read
     _map_spectrum           the map's spectrum at the range wavenumbers of every frequency
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track

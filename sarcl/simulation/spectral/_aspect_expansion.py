@@ -56,8 +56,8 @@ class AspectExpansion:
     def functions(self, sines: np.ndarray, frequency: float) -> np.ndarray:
         """psi at sines (n,) and one frequency, Hz: complex128 (J, n)."""
         n, m = len(sines), len(self.scatterers)
-        made = self.amplitudes(np.repeat(self.scatterers, n), np.tile(sines, m), frequency).reshape(m, n, -1)
-        return np.asarray(self.inverse @ made[np.arange(m), :, self.polarizations])
+        made = self.amplitudes(np.repeat(self.scatterers, n), np.tile(sines, m), frequency)
+        return np.asarray(self.inverse @ made.reshape(m, n, made.shape[-1])[np.arange(m), :, self.polarizations])
 
 
 class AmplitudeSamples:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
 import scipy.special
@@ -16,6 +17,7 @@ class Aspects:
 
     lags       (lowest, highest), m: antenna minus scatterer along the track
     taper      width of the window's edges, in sines;  edge  of its error function
+    hard       whether the beam ends at the lowest, and at the highest aspect: the window then falls to 0 within it
     """
 
     low: float
@@ -26,6 +28,7 @@ class Aspects:
     lags: tuple[float, float]
     taper: float
     edge: float
+    hard: tuple[bool, bool] = (False, False)
 
     @property
     def fresnel(self) -> float:
@@ -50,6 +53,13 @@ class Aspects:
         """Sines beyond which the window is 0."""
         return self.low - self.taper, self.high + self.taper
 
+    @property
+    def seen(self) -> tuple[float, float]:
+        """Sines between which responses are the window times the amplitudes: its falling edges are part of the echoes
+        at hard edges of a beam, and beyond all that a pulse sees elsewhere."""
+        low, high = self.support
+        return low if self.hard[0] else self.low, high if self.hard[1] else self.high
+
 
 def fresnel_zone(low: float, high: float, slant_range: float, frequency: float) -> float:
     """Width of a Fresnel zone, in sines of the aspect: H's phase over u/2k curves by 1 rad in it."""
@@ -59,16 +69,20 @@ def fresnel_zone(low: float, high: float, slant_range: float, frequency: float) 
 
 def aspects(
     low: float, high: float, ranges: tuple[float, float], band: tuple[float, float], lags: tuple[float, float],
-    tolerance: float,
+    tolerance: float, hard: tuple[bool, bool] = (False, False),
 ) -> Aspects:  # fmt: skip
-    """Aspects with a window whose edges cause errors of about `tolerance`.
+    """Aspects between two sines with a window whose edges cause errors of about `tolerance`; where an end is a hard
+    edge of the beam, the window's edge lies within, over half the beam at most.
 
     The ratio of the window's edge to a Fresnel zone was measured: errors of 1.9e-3, 3e-4, 3e-5 at 0.67, 1, 1.33.
     """
     edge = 2 * float(scipy.special.erfcinv(min(tolerance / 3, 0.1)))
     ratio = max(0.7, (-np.log10(tolerance) - 0.55) / 2.9)
     taper = edge * ratio * fresnel_zone(low, high, ranges[0], band[0])
-    return Aspects(low, high, *ranges, band, lags, taper, edge)
+    if any(hard):
+        taper = min(taper, (high - low) / sum(hard))
+    low, high = low + taper * hard[0], high - taper * hard[1]
+    return Aspects(low, high, *ranges, band, lags, taper, edge, hard)
 
 
 @dataclass(frozen=True, eq=False)
@@ -108,6 +122,27 @@ class DopplerGrid:
 def wavenumber(frequency: float | np.ndarray) -> np.ndarray:
     """k = 2 pi f/c, rad/m."""
     return np.asarray(2 * np.pi * frequency / SPEED_OF_LIGHT)
+
+
+class ResponsePhase(Protocol):
+    """A phase that is taken out of transfer functions before they are tabulated; the tables' variable."""
+
+    @property
+    def middle_range(self) -> float:
+        """Range from which the phases of samples count, m."""
+
+    @property
+    def paraxial(self) -> float | None:
+        """Of SARAS's approximation: k_0, rad/m."""
+
+    def ratio(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """The variable of the tables at wavenumbers along the track and k, rad/m."""
+
+    def kappa(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """Wavenumber over slant range, rad/m."""
+
+    def at_middle(self, u: np.ndarray, k: np.ndarray | float) -> np.ndarray:
+        """Phase at the middle range, rad."""
 
 
 @dataclass(frozen=True, eq=False)

@@ -20,7 +20,7 @@ import numpy as np
 from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...numerics.polynomials import chebyshev, lagrange
 from ...opencl import fft
-from ._aspect_window import Aspects, DopplerGrid, KnownPhase, wavenumber
+from ._aspect_window import Aspects, DopplerGrid, KnownPhase, ResponsePhase, wavenumber
 from ._straight_track import StraightTrack, tangent
 
 # Ranges and frequencies of the tables, and width of their margins in Fresnel zones, that are tried one after the other.
@@ -42,7 +42,7 @@ class AzimuthTransfer:
     """
 
     aspects: Aspects
-    phase: KnownPhase
+    phase: ResponsePhase
     ranges: np.ndarray
     frequencies: np.ndarray
     start: float
@@ -83,7 +83,7 @@ class AzimuthTransfer:
 
 def doppler_grid(transfer: AzimuthTransfer, track: StraightTrack, reach: tuple[float, float]) -> DopplerGrid:
     """The wavenumbers of a transfer function; reach  lowest and highest end of any scatterer's response, m (2,)."""
-    length = max(reach[1], track.length - reach[0]) + 2 * track.spacing
+    length = max(reach[1], track.length - min(reach[0], 0.0)) + 2 * track.spacing
     n_lags = fft.good_length(int(np.ceil(length / track.spacing)))
     period = n_lags * track.spacing
     k = wavenumber(np.array(transfer.aspects.band))
@@ -167,36 +167,47 @@ def plan_transfer(
 def response_error(
     made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float]
 ) -> float:
-    """Largest relative error of responses along the track made from tables, over stretches as long as the track."""
-    aspects, grid = made.aspects, doppler_grid(made, track, reach)
-    u, worst = grid.wavenumbers, 0.0
+    """Largest relative error of responses along the track made from tables, over stretches as long as the track.
+
+    Where the track sees little of the responses at one range, their error counts relative to the mean of all ranges.
+    """
+    aspects, worst = made.aspects, 0.0
     low, high = aspects.band
-    for r in {aspects.nearest, aspects.farthest, 0.6 * aspects.nearest + 0.4 * aspects.farthest}:
-        for f in {low, high, 0.4 * low + 0.6 * high}:
-            k = float(wavenumber(f))
-            # a period away the response is 0 at all lags at which scatterers of this range are seen
-            begin, end = (r * float(tangent(sine)) for sine in aspects.support)
-            first = max(aspects.lags[0], r * float(tangent(aspects.low)), end - grid.period)
-            last = min(aspects.lags[1], r * float(tangent(aspects.high)), begin + grid.period)
-            n = min(int((last - first) / track.spacing), grid.n_lags)
-            if n < 1:
-                continue
-            lag = first + np.arange(n) * track.spacing
-            turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - aspects.middle_range)
-            known = np.exp(1j * (turn + u * first)) / grid.period
-            shares = made.range_weights(np.array([r]))[:, 0]
-            tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
-            terms = np.einsum("q,jqu->ju", shares, np.array(tables))
-            spectra = (factors @ terms) * known
-            response = fft.rows(None, grid.folded(spectra), inverse=True)[:, :n]
-            distance = np.hypot(r, lag)
-            wave = np.exp(-2j * k * lag**2 / (distance + r))
-            exact = (factors @ functions(lag / distance, f)) * wave
-            span = min(n, track.n_pulses)
-            wrong = _largest_sum(np.abs(response - exact) ** 2, span)
-            right = _largest_sum(np.abs(exact) ** 2, span)
-            worst = max(worst, float(np.sqrt(wrong / right)) if right else 0.0)
+    ranges = sorted({aspects.nearest, aspects.farthest, 0.6 * aspects.nearest + 0.4 * aspects.farthest})
+    for f in {low, high, 0.4 * low + 0.6 * high}:
+        power = np.array([_power_and_error(made, functions, factors, track, reach, r, f) for r in ranges])
+        right = np.maximum(power[:, 0], power[:, 0].mean())
+        worst = max(worst, float(np.sqrt((power[:, 1] / right).max())) if right.any() else 0.0)
     return worst
+
+
+def _power_and_error(
+    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack,
+    reach: tuple[float, float], r: float, f: float,
+) -> tuple[float, float]:  # fmt: skip
+    """Power of the responses at slant range r, m, and frequency f, Hz, and of their error."""
+    aspects, grid = made.aspects, doppler_grid(made, track, reach)
+    u, k = grid.wavenumbers, float(wavenumber(f))
+    # a period away the response is 0 at all lags at which scatterers of this range are seen
+    begin, end = (r * float(tangent(sine)) for sine in aspects.support)
+    low_seen, high_seen = (r * float(tangent(sine)) for sine in aspects.seen)
+    first = max(aspects.lags[0], low_seen, end - grid.period)
+    last = min(aspects.lags[1], high_seen, begin + grid.period)
+    n = min(int((last - first) / track.spacing), grid.n_lags)
+    if n < 1:
+        return 0.0, 0.0
+    lag = first + np.arange(n) * track.spacing
+    turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - aspects.middle_range)
+    known = np.exp(1j * (turn + u * first)) / grid.period
+    shares = made.range_weights(np.array([r]))[:, 0]
+    tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
+    spectra = (factors @ np.einsum("q,jqu->ju", shares, np.array(tables))) * known
+    response = fft.rows(None, grid.folded(spectra), inverse=True)[:, :n]
+    distance = np.hypot(r, lag)
+    wave = np.exp(-2j * k * lag**2 / (distance + r)) * aspects.window(lag / distance)
+    exact = (factors @ functions(lag / distance, f)) * wave
+    span = min(n, track.n_pulses)
+    return _largest_sum(np.abs(exact) ** 2, span), _largest_sum(np.abs(response - exact) ** 2, span)
 
 
 def _largest_sum(power: np.ndarray, n: int) -> float:

@@ -12,7 +12,7 @@ from ...numerics.error_bounds import FLOAT32
 from ...numerics.interpolation import Interpolator, interpolator
 from ...opencl import fft
 from ...opencl.device import Device
-from ._aspect_window import DopplerGrid, KnownPhase, wavenumber
+from ._aspect_window import DopplerGrid, ResponsePhase, wavenumber
 from ._azimuth_transfer import AzimuthTransfer
 
 KERNELS = ((6, 1.5), (6, 2.0), (8, 1.5), (8, 2.0), (8, 2.5))  # taps and oversampling that are tried, cheapest first
@@ -27,7 +27,7 @@ class RangeWavenumbers:
     phase  that is known;  u_c, kappa_c  rad/m;  slope  d kappa/d u;  spread  (lowest, highest) rest of kappa, rad/m
     """
 
-    phase: KnownPhase
+    phase: ResponsePhase
     u_c: float
     kappa_c: float
     slope: float
@@ -114,3 +114,15 @@ def plan_map(
 def tile_of(device: Device) -> int:
     """Cells per side of a tile."""
     return CELLS[0] if device.is_cpu else CELLS[1]
+
+
+def scatterers_per_cell(azimuth: np.ndarray, ranges: np.ndarray, grid: DopplerGrid, numbers: RangeWavenumbers) -> float:
+    """Most scatterers in a resolution cell."""
+    cells = []
+    for place, band in (
+        (azimuth, 2 * np.pi * grid.count / grid.period),
+        (ranges, numbers.spread[1] - numbers.spread[0]),
+    ):
+        size = max(2 * np.pi / max(band, 1e-9), float(np.ptp(place)) / 4096, 1e-9)
+        cells.append(((place - place.min()) / size).astype(np.int64))
+    return float(np.bincount(cells[0] * (cells[1].max() + 1) + cells[1]).max())

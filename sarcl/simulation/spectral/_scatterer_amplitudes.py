@@ -13,6 +13,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scattering.scatterers import Points
 from ...scene.triangles import areas, centroids
+from ._beam_edges import BeamEdges, beam_edges, continued_weights
 from ._straight_track import StraightTrack
 
 AT_ONCE = 50_000  # facets per block: their geometry stays in a cache
@@ -63,12 +64,14 @@ class ScattererAmplitudes:
     """Amplitudes of points or facets, weights of antennas included, seen from places on a straight track.
 
     azimuth, slant_range  m (n,);  size  (n,), by which scatterers are drawn as samples
+    edges                 hard edges of the beam, beyond which the amplitudes are continued; None: it has none
     """
 
     def __init__(
         self, part: Points | FacetSet, weights: AntennaWeights, track: StraightTrack, polarizations: Sequence[str],
-        vertical: np.ndarray,
+        vertical: np.ndarray, hard: float | None = None,
     ) -> None:  # fmt: skip
+        """hard  tolerance to which hard edges of the beam are followed; None: amplitudes fall to 0 there"""
         self.part, self.weights, self.track = part, weights, track
         self.polarizations, self.vertical = tuple(polarizations), vertical
         self.shares: Shares | None = None
@@ -80,6 +83,11 @@ class ScattererAmplitudes:
             if part.illumination is not None and not part.illumination.full[part.kept].all():
                 self.shares = shares_of(part, track.n_pulses)
         self.azimuth, self.slant_range = track.coordinates(self.positions)
+        self.edges: BeamEdges | None = None
+        if hard is not None:
+            self.weights = continued_weights(weights, hard)
+            edges = beam_edges(weights, self.weights, track, self.positions)
+            self.edges = edges and edges.along(self.azimuth, self.slant_range, track.length)
 
     def __len__(self) -> int:
         return len(self.positions)

@@ -10,6 +10,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...opencl import fft
 from ..echo_output import EchoOutput
 from ..scene_echoes import EchoRequest
+from ._map_part import MapPart
 from ._spectral_part import SpectralPart
 from ._straight_track import StraightTrack
 
@@ -30,7 +31,7 @@ class SpectralSamples:
         request, n_polarizations = self.request, len(self.request.polarizations)
         held = [part.on_device(request.device) for part in self.parts]
         request.clock.lap("map")
-        a_frequency = max(part.bytes()[1] for part in self.parts) + 16.0 * self.line.n_pulses
+        a_frequency = max(part.bytes_per_frequency for part in self.parts) + 16.0 * self.line.n_pulses
         at_once = int(np.clip(request.budget / 3 / (n_polarizations * a_frequency), 1, len(self.frequencies)))
         n_steps = -(-len(self.frequencies) // at_once) * len(held)
         for i, start in enumerate(range(0, len(self.frequencies), at_once)):
@@ -41,19 +42,21 @@ class SpectralSamples:
                 def on_progress(done: float, step: int = i * len(held) + m) -> None:
                     request.report("echo", round(1000 * (step + done) / n_steps), 1000)
 
-                spectra = np.zeros((n_polarizations, part.grid.count, some.stop - start), np.complex64)
+                shape = some.stop - start
+                spectra = [np.zeros((n_polarizations, one.grid.count, shape), np.complex64) for one in part.maps]
                 part.add(on_device, self.frequencies[some], spectra, request.budget / 3, on_progress)
-                for n in range(n_polarizations):
-                    block[:, n] += self._along_track(part, spectra[n], self.frequencies[some])
+                for one, made in zip(part.maps, spectra, strict=True):
+                    for n in range(n_polarizations):
+                        block[:, n] += self._along_track(one, made[n], self.frequencies[some])
             block *= self._reference(some)[:, None]
             output.keep_frequencies(start, block)
         request.clock.lap("echo")
 
-    def _along_track(self, part: SpectralPart, spectra: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
+    def _along_track(self, part: MapPart, spectra: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
         """Samples (n_pulses, n_f) from spectra over the wavenumbers along the track (n_u, n_f)."""
         folded = part.grid.folded(np.ascontiguousarray(spectra.T))
         made = fft.rows(self.device, folded, inverse=True)[:, : self.line.n_pulses].T
-        # the spectra's phases count from the middle range of the part
+        # the spectra's phases count from the middle range of the map
         return np.asarray(
             made * (self._turns(part.numbers.phase.middle_range, frequencies) / np.float32(part.grid.period))
         )

@@ -40,6 +40,12 @@ class StraightTrack:
         offset -= azimuth[:, None] * self.along
         return azimuth, np.sqrt((offset**2).sum(axis=1))
 
+    def across(self, points: np.ndarray) -> np.ndarray:
+        """Unit vectors from the line to points, m (n, 3), at closest approach: (n, 3)."""
+        offset = points - self.start
+        offset -= (offset @ self.along)[:, None] * self.along
+        return np.asarray(offset / np.linalg.norm(offset, axis=1, keepdims=True))
+
     def antennas(self, azimuth: np.ndarray, slant_range: np.ndarray, sine: float | np.ndarray) -> np.ndarray:
         """Positions on the line, m (n, 3), from which scatterers are seen at `sine`: (antenna - scatterer) . along over
         their distance."""

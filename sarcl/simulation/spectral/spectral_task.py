@@ -70,7 +70,10 @@ class SpectralTask:
             if part is prepared.facets and prepared.subdivision is not None:
                 gain, fixed = prepared.subdivision.gain, prepared.subdivision.plan.predicted_error
                 random = not prepared.facets.is_mirror
-            amplitudes = ScattererAmplitudes(part, prepared.weights, self.line, request.polarizations, request.vertical)
+            amplitudes = ScattererAmplitudes(
+                part, prepared.weights, self.line, request.polarizations, request.vertical,
+                share if variant == "exact" else None,
+            )  # fmt: skip
             made = plan_part(
                 amplitudes, self.line, band, prepared.weights.pair is not None, random, variant,
                 share / gain - fixed - straight, request.tolerance, request.device,
@@ -90,9 +93,11 @@ class SpectralTask:
             n, terms = len(part.some), len(part.expansion)
             of_facets = part.amplitudes.part is prepared.facets
             amplitude = cost_model.SPECTRAL_FACET if of_facets else cost_model.SPECTRAL_POINT
-            of_map = cost_model.SPECTRAL_SPREAD * n
-            of_map += cost_model.SPECTRAL_SAMPLE * part.grid.count * len(self.frequencies)
-            total += 1e-6 * terms * (n * amplitude + n_polarizations * len(part.transfer.ranges) * of_map)
+            total += 1e-6 * terms * n * amplitude
+            for one in part.maps:
+                of_map = cost_model.SPECTRAL_SPREAD * len(one.azimuth)
+                of_map += cost_model.SPECTRAL_SAMPLE * one.grid.count * len(self.frequencies)
+                total += 1e-6 * terms * n_polarizations * one.nodes * of_map
         return total
 
 
@@ -136,7 +141,7 @@ def _check_window(
 ) -> None:
     """NotApplicable where a scatterer lies outside the range window at a pulse that sees it."""
     azimuth, slant_range = part.amplitudes.azimuth[part.some], part.amplitudes.slant_range[part.some]
-    low, high = part.transfer.aspects.low, part.transfer.aspects.high
+    low, high = part.seen
     for p in np.unique(np.linspace(0, line.n_pulses - 1, WINDOW_PULSES).astype(int)).tolist():
         lag = p * line.spacing - azimuth
         distance = np.hypot(lag, slant_range)

@@ -173,13 +173,6 @@ def test_an_empty_scene_and_one_out_of_the_beam(device):
         sarcl.spectral_echo(points(), CHIRP, aimed, antenna=antenna, device=device)
 
 
-def test_a_beam_with_hard_edges_is_refused_where_it_cannot_be_met(device):
-    aimed = pointing.stripmap(TRACK, look=LOOK, side="right")
-    table = sarcl.Antenna.table(np.linspace(-0.004, 0.004, 9), np.linspace(-0.1, 0.1, 5), np.ones((9, 5)))
-    with pytest.raises(sarcl.ToleranceUnreachable, match=r"cannot be met by spectral_echo.*use echo"):
-        sarcl.spectral_echo(points(), CHIRP, aimed, antenna=table, tolerance=1e-3, device=device)
-
-
 def test_the_forecast_of_echo_says_what_this_would_take(device):
     options = {"tolerance": 1e-3, "device": device, "skip": {"range window", "out of beam"}}
     forecast = sarcl.plan_echo(points(), CHIRP, TRACK, **options)
