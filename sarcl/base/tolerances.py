@@ -6,6 +6,7 @@ import decimal
 from collections.abc import Callable
 
 from .errors import ToleranceUnreachable
+from .validation import LARGEST_TOLERANCE
 
 _UP = decimal.Context(prec=2, rounding=decimal.ROUND_CEILING)
 
@@ -16,12 +17,13 @@ def rounded_up(value: float) -> float:
 
 
 def reachable(plan: Callable[[float], object], above: float) -> float | None:
-    """The smallest tolerance found for which `plan` raises no ToleranceUnreachable; None where none below 1 is found.
+    """The smallest tolerance found for which `plan` raises no ToleranceUnreachable; None where none is found
+    that may be asked for.
 
     The search starts at `above`. The next tolerance is the best one that the planner names, else one a quarter larger.
     """
     best = rounded_up(above)
-    while best < 1:
+    while best <= LARGEST_TOLERANCE:
         try:
             plan(best)
         except ToleranceUnreachable as refused:

@@ -122,6 +122,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
 
 def focus(args: argparse.Namespace, job: Job) -> int:
     """Focus echoes."""
+    from ..imaging.focusing_task import check_polarizations
     from ..model.phase_history import PhaseHistory
     from ..model.store import read
     from ..opencl.choose_device import open_devices
@@ -140,6 +141,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         raise ValueError(f"{args.raw[0]!r} holds an image; focus wants echoes (sarcl measure takes images)")
     if args.polarization is not None or args.channel is not None:
         raw = raw.select(polarization=args.polarization, channel=args.channel)
+    check_polarizations(raw, args.sum_polarizations, "--polarization {}", "--sum-polarizations")
     devices: Any = open_devices(args.device)
     job.say(f"{raw.n_rows} rows of {raw.n_samples} samples at {raw.center_frequency.mean() / 1e9:.4g} GHz")
     raw = _compressed(raw, job)

@@ -19,8 +19,19 @@ PLANE = ("grid", "center", "shape", "spacing", "normal", "x_axis")
 BLOCKS = ("tile", "resume")
 # Options, beside those that every method takes, by method; "backproject" is auto, direct, factorized
 TAKES = {
-    "backproject": (*PLANE, *BLOCKS, "beam", "mapping", "wrap", "side", "heights", "heights_above", "geoid"),
-    "polar_format": (*PLANE, "side", "heights", "heights_above", "geoid"),
+    "backproject": (
+        *PLANE,
+        *BLOCKS,
+        "beam",
+        "mapping",
+        "wrap",
+        "sum_polarizations",
+        "side",
+        "heights",
+        "heights_above",
+        "geoid",
+    ),
+    "polar_format": (*PLANE, "sum_polarizations", "side", "heights", "heights_above", "geoid"),
     "range_doppler": ("beam", "side", "heights", "heights_above", "geoid", "times", "ranges", "doppler"),
 }
 OPTIONS = sorted({name for names in TAKES.values() for name in names})
@@ -54,6 +65,8 @@ class Method:
 
             known = {f.name for f in fields(FocusOptions)} - {*options, "device"}
             options |= {k: v for k, v in vars(args).items() if k in known}
+        if name == "polar_format":
+            options["sum_polarizations"] = args.sum_polarizations
         if name == "range_doppler":
             given = ("beam", "side", "times", "ranges", "doppler")
             options |= {k: getattr(args, k) for k in given if getattr(args, k) is not None}

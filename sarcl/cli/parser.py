@@ -185,6 +185,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this polarisation, e.g. HV")
+    rows.add_argument("--sum-polarizations", action="store_true", help="add rows of several polarisations coherently")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
     rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
     _picture(p)

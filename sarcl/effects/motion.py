@@ -52,10 +52,10 @@ def perturbed(
     validation.instance("track", track, Trajectory)
     seed = validation.count("seed", seed, 0)
     drawn = frequencies(correlation_time, spectrum, seed)
-    offset, rate = random_process(track.times, deviation("rms", rms), drawn, seed, 0)
+    offset, rate = random_process(track.known_times, deviation("rms", rms), drawn, seed, 0)
     out = _moved(track, offset, rate, frame)
     angles = deviation("attitude_rms", attitude_rms)
-    return turned(out, random_process(track.times, angles, drawn, seed, 1)[0]) if angles.any() else out
+    return turned(out, random_process(track.known_times, angles, drawn, seed, 1)[0]) if angles.any() else out
 
 
 def sinusoidal(
@@ -74,7 +74,7 @@ def sinusoidal(
     size = validation.array("amplitude", amplitude, np.float64, (3,))
     rate = 2 * np.pi * validation.number("frequency", frequency, above=0)
     phase = validation.array("phase", np.broadcast_to(phase, (3,)), np.float64, (3,))
-    angle = rate * track.times[:, None] + phase
+    angle = rate * track.known_times[:, None] + phase
     return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
 
@@ -136,7 +136,7 @@ def relative(
             ("center", center),
         )
     )
-    t = (track.times - validation.number("epoch", epoch))[:, None]
+    t = (track.known_times - validation.number("epoch", epoch))[:, None]
     back = np.swapaxes(Rotation.from_rotvec(w * t).as_matrix(), 1, 2)
     positions = c + np.einsum("nij,nj->ni", back, track.positions - c - v * t - a * t**2 / 2)
     changes: dict[str, Any] = {"positions": positions}
@@ -217,8 +217,8 @@ def _pulse_of_row(raw: PhaseHistory, track: Trajectory) -> np.ndarray:
         raise ValueError(
             f"raw has {raw.n_rows} rows and no times, the track {len(track)} pulses; give one position per row"
         )
-    row = np.clip(np.searchsorted(track.times, raw.time - 1e-9), 0, len(track) - 1)
-    off = np.abs(track.times[row] - raw.time)
+    row = np.clip(np.searchsorted(track.known_times, raw.time - 1e-9), 0, len(track) - 1)
+    off = np.abs(track.known_times[row] - raw.time)
     if (off > 1e-9 * (1 + np.abs(raw.time))).any():
         bad = int(np.argmax(off))
         raise ValueError(
@@ -238,7 +238,7 @@ def _moved(track: Trajectory, offset: np.ndarray, rate: np.ndarray, frame: str) 
             raise ValueError(f"the track stands still or goes straight up at pulse {bad}; use frame='scene'")
         along, left = unit(along), left / level
         axes = np.stack([along, left, np.cross(along, left)], axis=-1)
-        turning = np.gradient(axes, track.times, axis=0) if len(track) > 1 else np.zeros_like(axes)
+        turning = np.gradient(axes, track.known_times, axis=0) if len(track) > 1 else np.zeros_like(axes)
         rate = np.einsum("nij,nj->ni", axes, rate) + np.einsum("nij,nj->ni", turning, offset)
         offset = np.einsum("nij,nj->ni", axes, offset)
     speed = None if track.velocities is None else track.velocities + rate

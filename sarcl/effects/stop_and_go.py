@@ -76,7 +76,7 @@ def stop_and_go_error(
         phase=4 * np.pi * fc / c * flight + np.pi * (fc * slope) ** 2 / rate,
         smear=np.abs(np.pi * slope * waveform.bandwidth * waveform.duration / 2 * (1 + slope / 2)),
         doppler=-fc * slope,
-        times=track.times,
+        times=track.known_times,
     )
 
 
@@ -91,8 +91,8 @@ def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajec
     moving = track if receiver is None else receiver
     tau, _ = _delays(track, moving, x[None])
     at = _Path(moving)
-    when = track.times + tau[:, 0]
-    return replace(moving, times=track.times, positions=at(when), velocities=at(when, 1))
+    when = track.known_times + tau[:, 0]
+    return replace(moving, times=track.known_times, positions=at(when), velocities=at(when, 1))
 
 
 def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> PhaseHistory:
@@ -141,9 +141,9 @@ class _Path:
 
         self.track, self.spline = track, None
         if track.velocities is not None and len(track) > 1:
-            self.spline = CubicHermiteSpline(track.times, track.positions, track.velocities)
+            self.spline = CubicHermiteSpline(track.known_times, track.positions, track.velocities)
         elif len(track) > 3:
-            self.spline = CubicSpline(track.times, track.positions)
+            self.spline = CubicSpline(track.known_times, track.positions)
         elif track.velocities is None:
             raise ValueError(f"a track of {len(track)} pulses has no velocity; give Trajectory(..., velocities=...)")
 
@@ -153,21 +153,22 @@ class _Path:
         assert self.track.velocities is not None  # one pulse
         if derivative:
             return np.broadcast_to(self.track.velocities[0], (*times.shape, 3))
-        return np.asarray(self.track.positions[0] + (times - self.track.times[0])[..., None] * self.track.velocities[0])
+        since = (times - self.track.known_times[0])[..., None]
+        return np.asarray(self.track.positions[0] + since * self.track.velocities[0])
 
 
 def _delays(track: Trajectory, moving: Trajectory, points: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """tau of c tau = |T(t) - x| + |x - R(t + tau)|, s, and its rate of change with t: (n_pulses, n_points)."""
     c, at, from_tx = constants.SPEED_OF_LIGHT, _Path(moving), _Path(track)
     out = _distance(track.positions[:, None], points)
-    start = np.broadcast_to(track.times[:, None], out.shape)
+    start = np.broadcast_to(track.known_times[:, None], out.shape)
     tau = (out + _distance(at(start), points)) / c
     for _ in range(20):  # each iteration reduces the error by a factor of c/speed
         rx = at(start + tau)
         last, tau = tau, (out + _distance(rx, points)) / c
         if np.abs(tau - last).max() <= 4e-16 * tau.max():
             break
-    speed = from_tx(track.times, 1)[:, None]
+    speed = from_tx(track.known_times, 1)[:, None]
     return tau, _slope(track.positions[:, None] - points, speed, rx - points, at(start + tau, 1))
 
 

@@ -85,6 +85,7 @@ def backproject(
     tile: Tile | None = None,
     check: bool | None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
+    sum_polarizations: bool = False,
     cluster: distributed.Client | None = None,
     progress: Progress | None = None,
 ) -> Image | None:
@@ -114,6 +115,7 @@ def backproject(
                completes the image assembles and returns it, the others return None
     check      recompute 256 random pixels exactly; None: where that costs less than 2 %
     device     see `sarcl.devices`; a list of devices, or "all", for several at once
+    sum_polarizations   True: rows of several polarisations are summed coherently; False: they are refused
     cluster    a dask.distributed.Client whose workers compute the tiles, each on a device of its own
     progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
@@ -124,7 +126,9 @@ def backproject(
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
-    options = FocusOptions(tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device)
+    options = FocusOptions(
+        tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
+    )
     tolerance = options.tolerance
     piece = _piece(tile, resume, out)
     raw, task = options.task(raw, grid)

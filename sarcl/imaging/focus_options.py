@@ -33,6 +33,7 @@ class FocusKeywords(TypedDict, total=False):
     skip: bool | Collection[Skip]
     max_bytes: float | None
     device: DeviceChoice | Sequence[DeviceChoice] | None
+    sum_polarizations: bool
 
 
 @dataclass(frozen=True, eq=False)
@@ -49,6 +50,7 @@ class FocusOptions:
     skip: bool | Collection[Skip] = True
     max_bytes: float | None = None
     device: DeviceChoice | Sequence[DeviceChoice] | None = None
+    sum_polarizations: bool = False
 
     def __post_init__(self) -> None:
         choice("method", self.method, METHODS)
@@ -60,7 +62,9 @@ class FocusOptions:
         instance("grid", grid, ImageGrid)
         if self.mapping is not None:
             raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
-        return raw, make_task(raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam)
+        return raw, make_task(
+            raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam, self.sum_polarizations
+        )
 
     def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
         """The method for these devices together; tolerance: another one than asked for."""

@@ -103,10 +103,12 @@ def make_task(
     wrap: bool,
     skip: bool | Collection[Skip],
     beam: BeamCone | None = None,
+    sum_polarizations: bool = False,
 ) -> FocusingTask:
     """The task for the options of `backproject`; ValueError for options that do not fit the data."""
     if not raw.compressed:
         raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
+    check_polarizations(raw, sum_polarizations)
     skips = known_skips(skip, SKIPS)
     sample_weight, row_weight = weigh(raw, window, weights)
     toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0))
@@ -118,6 +120,27 @@ def make_task(
         grid = grid.filled()
     return FocusingTask(
         raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips)
+    )
+
+
+def check_polarizations(
+    raw: PhaseHistory,
+    sum_polarizations: bool,
+    select: str = "raw.select(polarization={!r})",
+    sum_up: str = "sum_polarizations=True",
+) -> None:
+    """Raise ValueError where rows of several polarisations would be summed and nobody asked for it.
+
+    select, sum_up  how the caller's user selects one of them, and asks for the sum: for the message
+    """
+    if not isinstance(sum_polarizations, (bool, np.bool_)):
+        raise TypeError(f"sum_polarizations is {sum_polarizations!r}; give True or False")
+    if raw.polarization is None or sum_polarizations or (raw.polarization == raw.polarization[0]).all():
+        return
+    kinds = sorted(set(raw.polarization.tolist()))
+    raise ValueError(
+        f"raw has rows of the polarisations {', '.join(kinds)}, which are different measurements of the scene: make an "
+        f"image of each, {select.format(kinds[0])}, or pass {sum_up} for their coherent sum"
     )
 
 

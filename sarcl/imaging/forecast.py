@@ -72,6 +72,7 @@ def plan(
     skip: bool | Collection[Skip] = True,
     max_bytes: float | None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
+    sum_polarizations: bool = False,
 ) -> Forecast:
     """Predict how `backproject(raw, grid, ...)` would make the image with these options: a Forecast.
 
@@ -79,7 +80,9 @@ def plan(
     all are read and mapped first. Time is scaled from a short run of the kernel on each device. ValueError and
     MemoryError where `backproject` would raise one.
     """
-    options = FocusOptions(tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device)
+    options = FocusOptions(
+        tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
+    )
     raw, task = options.task(raw, grid)
     devices = open_devices(device)
     chosen = options.choose(task, devices)

@@ -118,8 +118,13 @@ def named(path: Any, among: list[Format]) -> Format | None:
 
 
 def writer_functions(path: Any, kind: Written) -> Any:
-    """Functions of the format in which `path` is written: by its suffix, else sarcl's own format."""
-    return (named(path, writing(kind)) or HDF5).functions
+    """Functions of the format in which `path` is written, by its suffix; ValueError where no format is written so."""
+    among = writing(kind)
+    form = named(path, among)
+    if form is None:
+        ending, wanted = Path(path).suffix, suggested(among, "'")
+        raise ValueError(f"{kind} path {str(path)!r} ends in {ending!r}; sarcl writes a {kind} to {wanted}")
+    return form.functions
 
 
 def fields_of(value: Any) -> dict[str, Any]:

@@ -22,12 +22,14 @@ class Mesh:
     """triangles (k, 3, 3) in the file's units; part (k,): index into `names`; closed: the mesh has an outside.
 
     names holds, for each part, the words it can be called by: node, geometry, material.
+    unit   m per unit of the file, where the file names its unit (.dae and .3mf do); else None
     """
 
     triangles: np.ndarray
     part: np.ndarray
     names: list[tuple[str, ...]]
     closed: bool
+    unit: float | None = None
 
 
 def load(mesh: Any, repair: bool = True) -> Mesh:
@@ -56,7 +58,20 @@ def load(mesh: Any, repair: bool = True) -> Mesh:
     validation.finite(f"{what} vertices", vertices)
     kept, turned, closed = _repaired(vertices, faces, repair, what)
     faces = np.where(turned[:, None], faces[:, ::-1], faces)[kept]
-    return Mesh(vertices[faces], part[kept], names, closed)
+    return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
+
+
+def _unit(scene: Any, what: str) -> float | None:
+    """Metres per unit of a trimesh.Scene, None where it names no unit; ValueError where its parts have several."""
+    from trimesh.units import unit_conversion
+
+    named = {geometry.units for geometry in scene.geometry.values() if getattr(geometry, "units", None)}
+    if not named:
+        return None
+    found = {float(f"{unit_conversion(unit, 'meters'):.12g}") for unit in named}
+    if len(found) > 1:
+        raise ValueError(f"{what} has parts in several units ({', '.join(sorted(named))}); export it in one unit")
+    return found.pop()
 
 
 def _read(path: Path, what: str) -> Any:

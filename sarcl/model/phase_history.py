@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass, fields, replace
+from dataclasses import dataclass, field, fields, replace
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -39,7 +39,8 @@ class PhaseHistory:
                      A writeable array is copied, a read-only one is not
     frequency        of sample 0, Hz, one or per row
     frequency_step   Hz, one or per row, positive
-    tx, rx           antenna positions, m (n_rows, 3); rx defaults to tx
+    tx, rx           antenna positions, m (n_rows, 3); rx=None: one antenna. Such data stay monostatic:
+                     dataclasses.replace(raw, tx=...) moves rx too, for a receiver that stays give rx=raw.rx.copy()
     reference_range  m, one or per row: half the two-way path whose phase is already removed
     time, tx_channel, rx_channel, polarization, weight, tx_velocity, rx_velocity   optional, one per row
     waveform         the transmitted Waveform, or None;  array  the AntennaArray that transmitted, or None: one antenna
@@ -67,6 +68,8 @@ class PhaseHistory:
     array: AntennaArray | None = None
     compressed: bool = True
     report: Report | None = None
+    # the array that rx is where it was given as None; dataclasses.replace hands it on, and tells a new rx from the old
+    _rx_of_tx: Any = field(default=None, repr=False)
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -104,6 +107,7 @@ class PhaseHistory:
             if samples.flags.writeable or not samples.dtype.isnative:
                 samples = validation.sealed(np.array(samples, samples.dtype.newbyteorder("="), order="C"))
         self._set("samples", samples)
+        self._check_axis()
         for name in ("frequency", "frequency_step", "reference_range"):
             self._set(name, self._rows(name, getattr(self, name), np.float64, (), spread=True))
         if not (self.frequency_step > 0).all():
@@ -115,7 +119,12 @@ class PhaseHistory:
             bad = int(np.argmin(self.frequency))
             raise ValueError(f"frequency[{bad}] is {self.frequency[bad]:g} Hz; it must be positive")
         self._set("tx", self._rows("tx", self.tx, np.float64, (3,)))
-        self._set("rx", self.tx if self.rx is None else self._rows("rx", self.rx, np.float64, (3,)))
+        if self.rx is None or self.rx is self._rx_of_tx:
+            self._set("rx", self.tx)
+            self._set("_rx_of_tx", self.tx)
+        else:
+            self._set("rx", self._rows("rx", self.rx, np.float64, (3,)))
+            self._set("_rx_of_tx", None)
         for name, (dtype, tail) in PER_ROW.items():
             if getattr(self, name) is not None:
                 self._set(name, self._rows(name, getattr(self, name), dtype, tail, spread=tail == ()))
@@ -126,6 +135,27 @@ class PhaseHistory:
             raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
         if self.array is not None and not hasattr(self.array, "offsets_at"):
             raise TypeError(f"array is a {type(self.array).__name__}; give a sarcl.AntennaArray or None")
+
+    def _check_axis(self) -> None:
+        """Raise ValueError where `frequency` is the axis of the samples, not one frequency per row.
+
+        With as many rows as samples the shape does not show it. Rows whose first frequencies lie frequency_step apart
+        are then taken for an axis, unless the rows name channels.
+        """
+        n_rows, n_samples = self.samples.shape
+        given = np.asarray(self.frequency)
+        if given.shape != (n_samples,) or n_samples < 2 or self.tx_channel is not None or self.rx_channel is not None:
+            return
+        axis = n_rows != n_samples
+        if not axis and np.ndim(self.frequency_step) == 0 and given.dtype.kind in "iuf":
+            step, wanted = np.diff(given.astype(np.float64)), float(np.asarray(self.frequency_step))
+            axis = bool((np.abs(step - wanted) <= 0.02 * abs(wanted)).all())
+        if axis:
+            raise ValueError(
+                f"frequency has {n_samples} values, one per sample: it is the axis of the samples, where the frequency "
+                "of sample 0 is wanted, one number or one per row; give frequency=f[0], frequency_step=f[1] - f[0]. "
+                "(Rows that do start frequency_step apart: give them tx_channel=, such as numpy.arange(n_rows))"
+            )
 
     def _set(self, name: str, value: Any) -> None:
         object.__setattr__(self, name, value)
@@ -214,19 +244,18 @@ class PhaseHistory:
     ) -> PhaseHistory:
         """Rows of one polarisation ("HV"), receive channel, transmitting element. ValueError lists those that exist."""
         keep, where = np.ones(self.n_rows, bool), "these data"
-        for name, field, wanted in (
+        for name, there, wanted in (
             ("polarization", self.polarization, polarization),
             ("channel", self.rx_channel, channel),
             ("sender", self.tx_channel, sender),
         ):
             if wanted is None:
                 continue
-            if field is None:
+            if there is None:
                 raise ValueError(f"these data name no {name}; it is the same for every row")
-            if not (keep & (field == wanted)).any():
-                there = sorted(set(field[keep].tolist()))
-                raise ValueError(f"{name} {wanted!r} is not in {where}; there are {there}")
-            keep &= field == wanted
+            if not (keep & (there == wanted)).any():
+                raise ValueError(f"{name} {wanted!r} is not in {where}; there are {sorted(set(there[keep].tolist()))}")
+            keep &= there == wanted
             where = f"the rows of {name} {wanted!r}"
         return self[keep]
 
@@ -305,14 +334,14 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
         if part.compressed != parts[0].compressed:
             raise ValueError(f"part {i} and part 0 differ: one is compressed, one is not; call compress on it first")
     joined: dict[str, Any] = {}
-    for field in fields(PhaseHistory):
-        values = [getattr(p, field.name) for p in parts]
-        if field.name == "samples":
+    for name in (f.name for f in fields(PhaseHistory) if f.name != "_rx_of_tx"):
+        values = [getattr(p, name) for p in parts]
+        if name == "samples":
             joined["samples"] = stack(values)
-        elif field.name in ("waveform", "array"):
-            joined[field.name] = values[0] if all(_alike(v, values[0]) for v in values) else None
+        elif name in ("waveform", "array"):
+            joined[name] = values[0] if all(_alike(v, values[0]) for v in values) else None
         elif isinstance(values[0], np.ndarray) and all(v is not None for v in values):
-            joined[field.name] = np.concatenate(values)
+            joined[name] = np.concatenate(values)
     if not parts[0].compressed and joined["waveform"] is None and any(p.waveform for p in parts):
         raise ValueError("parts that are not compressed have different waveforms; call compress on each first")
     if all(p.rx is p.tx for p in parts):

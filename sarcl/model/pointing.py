@@ -113,7 +113,7 @@ def velocities(track: Trajectory) -> np.ndarray:
         return track.velocities
     if len(track) < 2:
         raise ValueError("a track of one pulse has no velocity; give Trajectory(..., velocities=...)")
-    return np.asarray(np.gradient(track.positions, track.times, axis=0))
+    return np.asarray(np.gradient(track.positions, track.known_times, axis=0))
 
 
 def rotations(name: str, value: ArrayLike, lead: tuple[int, ...]) -> np.ndarray:

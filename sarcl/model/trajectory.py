@@ -15,7 +15,7 @@ from ..base import validation
 class Trajectory:
     """Positions of an antenna's phase centre, one per pulse.
 
-    times          s (n,), increasing
+    times          s (n,), increasing; or None where they are not known: then there are no velocities either
     positions      m (n, 3)
     velocities     m/s (n, 3) or None
     attitude       rotation from body to scene axes (n, 3, 3) or None
@@ -27,7 +27,7 @@ class Trajectory:
     Raises ValueError when shapes disagree, a value is not finite, or times do not increase.
     """
 
-    times: NDArray[np.float64]
+    times: NDArray[np.float64] | None
     positions: NDArray[np.float64]
     velocities: NDArray[np.float64] | None = None
     attitude: NDArray[np.float64] | None = None
@@ -38,7 +38,7 @@ class Trajectory:
 
         def __init__(
             self,
-            times: ArrayLike,
+            times: ArrayLike | None,
             positions: ArrayLike,
             velocities: ArrayLike | None = None,
             attitude: ArrayLike | None = None,
@@ -49,14 +49,18 @@ class Trajectory:
     def __post_init__(self) -> None:
         positions = validation.array("trajectory positions", self.positions, np.float64, ("n_pulses", 3))
         n = len(positions)
-        times = validation.array("trajectory times", self.times, np.float64, (n,))
-        if n > 1 and not (np.diff(times) > 0).all():
-            at = int(np.argmax(np.diff(times) <= 0)) + 1
-            raise ValueError(
-                f"trajectory times[{at}] is {times[at]:g} after {times[at - 1]:g}; times must increase: "
-                "give every pulse a later time than the one before"
-            )
-        object.__setattr__(self, "times", times)
+        if self.times is None:
+            if self.velocities is not None or self.accelerations is not None:
+                raise ValueError("a trajectory without times has no velocities and no accelerations; give times too")
+        else:
+            times = validation.array("trajectory times", self.times, np.float64, (n,))
+            if n > 1 and not (np.diff(times) > 0).all():
+                at = int(np.argmax(np.diff(times) <= 0)) + 1
+                raise ValueError(
+                    f"trajectory times[{at}] is {times[at]:g} after {times[at - 1]:g}; times must increase: "
+                    "give every pulse a later time than the one before"
+                )
+            object.__setattr__(self, "times", times)
         object.__setattr__(self, "positions", positions)
         if self.velocities is not None:
             v = validation.array("trajectory velocities", self.velocities, np.float64, (n, 3))
@@ -74,7 +78,16 @@ class Trajectory:
             )
 
     def __len__(self) -> int:
-        return len(self.times)
+        return len(self.positions)
+
+    @property
+    def known_times(self) -> NDArray[np.float64]:
+        """Times, s (n,); ValueError where the track has none."""
+        if self.times is None:
+            raise ValueError(
+                "the track has no times, which this needs; give Trajectory.circle prf= or speed=, or Trajectory times"
+            )
+        return self.times
 
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:
         """The track at the pulses of a slice, or at increasing pulse numbers."""
@@ -104,25 +117,36 @@ class Trajectory:
         arc: float = 2 * np.pi,
         n_pulses: int,
         center: ArrayLike = (0.0, 0.0, 0.0),
-        prf: float = 1.0,
+        prf: float | None = None,
+        speed: float | None = None,
     ) -> Trajectory:
         """Circle about the z axis through `center`, at `height` above it, m.
 
         Pulse i is at azimuth start + arc i/(n_pulses - 1), rad from +x towards +y: the first pulse at
-        `start`, the last at start + arc. prf (Hz) affects times and velocities only.
+        `start`, the last at start + arc. Either prf (Hz) or speed (m/s) gives times and velocities; without both the
+        track has none, and the antenna rests at each pulse.
         """
         radius = validation.number("radius", radius, above=0)
         height = validation.number("height", height)
         start = validation.number("start", start)
         arc = validation.number("arc", arc)
-        prf = validation.number("prf", prf, above=0)
         n = validation.count("n_pulses", n_pulses)
         center = validation.array("center", center, np.float64, (3,))
         if n > 1 and arc == 0:
             raise ValueError("arc is 0; the positions of several pulses must differ")
+        if speed is not None:
+            if prf is not None:
+                raise ValueError(f"prf {prf!r} and speed {speed!r} both give the times; give one of them")
+            if n == 1:
+                raise ValueError("speed gives the times of several pulses, and n_pulses is 1; give prf instead")
+            prf = validation.number("speed", speed, above=0) * (n - 1) / (radius * abs(arc))
+        elif prf is not None:
+            prf = validation.number("prf", prf, above=0)
         angle = start + arc * (np.arange(n) / max(n - 1, 1))
-        rate = arc / max(n - 1, 1) * prf
         zero = np.zeros(n)
         ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), zero + height], axis=-1)
+        if prf is None:
+            return cls(None, center + ring)
+        rate = arc / max(n - 1, 1) * prf
         tangent = np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
         return cls(np.arange(n) / prf, center + ring, radius * rate * tangent)

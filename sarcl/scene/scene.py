@@ -13,6 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..base.boxes import box
+from ..base.errors import warn
 from . import terrain
 from . import triangles as geometry
 from .material import FacetMaterials, Material, MaterialLike, checked_table, merge, resolve
@@ -164,7 +165,7 @@ class Scene:
         mesh: str | Path | trimesh.Trimesh | trimesh.Scene,
         *,
         material: MaterialLike | Mapping[str, MaterialLike] = "metal",
-        scale: float = 1.0,
+        scale: float | None = None,
         position: ArrayLike = (0.0, 0.0, 0.0),
         rotation: ArrayLike | Rotation | None = None,
         max_edge: float | None = None,
@@ -175,7 +176,8 @@ class Scene:
 
         material  one for all, or {part: material}, a part named by its node, geometry or material in the file;
                   "*" is every part not named
-        scale     m per unit of the file
+        scale     m per unit of the file; None: the unit that the file names (.dae and .3mf do; a warning says so where
+                  it is not the metre), else 1
         position  m (3,)
         rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
@@ -187,13 +189,23 @@ class Scene:
         """
         from ..io.mesh import load, part_materials
 
-        scale = validation.number("scale", scale, above=0)
+        if scale is not None:
+            scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)
         loaded = load(mesh, repair)
+        parts = part_materials(material, loaded)
+        if scale is None:
+            scale = 1.0 if loaded.unit is None else loaded.unit
+            if scale != 1:
+                size = float(np.ptp(loaded.triangles.reshape(-1, 3), axis=0).max()) * scale
+                warn(
+                    f"the unit of this mesh is {scale:g} m, as its file says: its longest side is taken as {size:.4g} "
+                    f"m. Give scale={scale:g} to confirm it, or another scale, m per unit, where the file is wrong"
+                )
         scene = cls.facets(
             loaded.triangles * scale @ rotate.T + position,
-            **part_materials(material, loaded),
+            **parts,
             roughness=roughness,
             two_sided=not loaded.closed,
         )

@@ -51,7 +51,9 @@ def in_flight(
     still = half_path(track.positions, track.positions, point)
     if track.stop_and_go:
         said: dict[str, object] = {"receiver": "stop and go"}
-        if track.velocities is not None:
+        if track.times is None:
+            said["stop_and_go_error_m"] = "unknown: the track has no times"
+        elif track.velocities is not None:
             after = track.positions + 2 * still[:, None] / SPEED_OF_LIGHT * track.velocities
             said["stop_and_go_error_m"] = _rounded(half_path(track.positions, after, point) - still)
         return track, None, said

@@ -6,6 +6,7 @@ import signal
 import subprocess
 import sys
 import time
+from dataclasses import replace
 from pathlib import Path
 from types import SimpleNamespace
 
@@ -247,6 +248,16 @@ def test_a_polarization_that_is_not_there_lists_what_is(raw_file, capsys, no_wor
     assert "polarization 'HV' is not in these data; there are ['HH']" in refused(
         capsys, "focus", raw_file, "--polarization", "HV"
     )
+
+
+def test_files_of_two_polarizations_are_not_summed_unless_asked_for(raw_file, here, capsys):
+    raw = sarcl.read(raw_file)
+    replace(raw, polarization="VV").save(here / "vv.h5")
+    said = refused(capsys, "focus", raw_file, here / "vv.h5", "--shape", 8, 8)
+    assert "polarisations HH, VV" in said and "--polarization HH, or pass --sum-polarizations" in said
+    argv = ["focus", raw_file, "vv.h5", "--shape", 8, 8, "--sum-polarizations", "-o", "sum.h5"]
+    assert parser.main([str(a) for a in argv]) == 0
+    assert sarcl.read("sum.h5").gain == 2 * 48 * 64
 
 
 def test_tracebacks_are_for_debug_only(here, capsys):

@@ -10,6 +10,7 @@ import pytest
 from helpers.cases import REPEATED, image_error, noise_history
 
 import sarcl
+from sarcl.base import validation
 from sarcl.reference.backproject import backproject as exact_image
 
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(33, 45), spacing=(0.3, 0.2))
@@ -248,7 +249,8 @@ def test_samples_whose_sums_overflow_are_refused():
         sarcl.backproject(raw, PLANE)
 
 
-def test_the_best_tolerance_that_is_named_can_be_asked_for():
+def test_the_best_tolerance_that_is_named_can_be_asked_for(monkeypatch):
+    monkeypatch.setattr(validation, "LEAST_TOLERANCE", 0.0)  # float64 is exhausted below what users may ask for
     raw = noise_history(n_rows=1, n_samples=20000)
     grid = sarcl.ImageGrid.plane(shape=(9, 9), spacing=1.0)
     with pytest.raises(ValueError, match="best here is") as caught:
@@ -259,7 +261,8 @@ def test_the_best_tolerance_that_is_named_can_be_asked_for():
 
 BAD = {
     "tolerance zero": ({"tolerance": 0}, "tolerance is 0"),
-    "tolerance too small": ({"tolerance": 1e-16}, "best here is"),
+    "tolerance too small": ({"tolerance": 1e-12}, "float64 do not carry an error below 1e-11: give more"),
+    "tolerance too large": ({"tolerance": 0.5}, "an error above 0.3 of the norm leaves no image: give less"),
     "tolerance not a number": ({"tolerance": "low"}, "must be a number"),
     "method unknown": ({"method": "magic"}, "'direct'"),
     "window unknown": ({"window": "square"}, "hamming"),
@@ -322,3 +325,17 @@ def test_wrong_kinds_of_argument_are_named():
         sarcl.backproject(noise_history(), [1, 2])
     with pytest.raises(TypeError, match=r"raw is a ndarray; wanted a sarcl\.PhaseHistory"):
         sarcl.backproject(np.zeros((3, 3), complex), PLANE)
+
+
+def test_rows_of_several_polarizations_are_summed_only_where_the_sum_is_asked_for():
+    raw = replace(noise_history(), polarization=["HH", "VV"] * 20)
+    for verb in (sarcl.backproject, sarcl.plan, sarcl.polar_format):
+        with pytest.raises(
+            ValueError, match=r"polarisations HH, VV.*raw.select\(polarization='HH'\).*sum_polarizations"
+        ):
+            verb(raw, PLANE)
+    parts = [sarcl.backproject(raw.select(polarization=kind), PLANE).data for kind in ("HH", "VV")]
+    both = sarcl.backproject(raw, PLANE, sum_polarizations=True).data
+    assert np.linalg.norm(both - sum(parts)) <= 2e-3 * np.linalg.norm(both)
+    with pytest.raises(TypeError, match="sum_polarizations is 'HH'"):
+        sarcl.backproject(raw, PLANE, sum_polarizations="HH")

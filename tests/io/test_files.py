@@ -698,3 +698,11 @@ def test_parts_that_do_not_fit_together_are_refused(tmp_path):
     a_raw(3, 6).save(tmp_path / "b.h5")
     with pytest.raises(ValueError, match="part 1 has 6 samples"):
         sarcl.read([tmp_path / "a.h5", tmp_path / "b.h5"])
+
+
+@pytest.mark.parametrize("name", ["x.mat", "x.png", "x.raw", "x"])
+def test_echoes_are_written_to_no_file_whose_name_promises_another_format(tmp_path, name):
+    raw = sarcl.PhaseHistory(np.ones((2, 4), complex), 9e9, 1e6, np.ones((2, 3)), 10.0)
+    with pytest.raises(ValueError, match=r"phase history path .* sarcl writes a phase history to '.h5'"):
+        raw.save(tmp_path / name)
+    assert not list(tmp_path.iterdir())

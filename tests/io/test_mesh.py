@@ -250,3 +250,32 @@ def test_corners_that_are_not_finite_are_named_by_file_and_place(tmp_path):
 def test_corners_are_one_by_their_distance_over_the_meshs_size_not_in_its_unit(unit):
     ball = soup(trimesh.creation.icosphere(subdivisions=2))
     assert load(trimesh.Trimesh(ball.vertices * unit, ball.faces, process=False)).closed
+
+
+CENTIMETRES = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><created>2020-01-01T00:00:00</created><modified>2020-01-01T00:00:00</modified>
+<unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="9">0 0 0 501 0 0 0 200 0</float_array><technique_common>
+<accessor source="#a" count="3" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="1"><input semantic="VERTEX" source="#v" offset="0"/><p>0 1 2</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+def test_the_unit_that_a_mesh_file_names_is_used_and_said(tmp_path):
+    path = tmp_path / "car.dae"
+    path.write_text(CENTIMETRES)
+    with pytest.warns(
+        sarcl.SarclWarning, match=r"unit of this mesh is 0.01 m.*longest side is taken as 5.01 m.*scale=0.01"
+    ):
+        scene = sarcl.Scene.from_mesh(path)
+    assert np.ptp(scene.triangles[..., 0]) == pytest.approx(5.01, rel=1e-12)
+    assert np.ptp(sarcl.Scene.from_mesh(path, scale=2.0).triangles[..., 0]) == 1002  # m per unit of the file, as given
+    path.write_text(CENTIMETRES.replace('meter="0.01"', 'meter="1"'))
+    assert np.ptp(sarcl.Scene.from_mesh(path).triangles[..., 0]) == 501  # metres: nothing to say
+    assert np.ptp(sarcl.Scene.from_mesh(box((0, 0, 0))).triangles[..., 0]) == np.ptp(box((0, 0, 0)).vertices[:, 0])

@@ -485,3 +485,31 @@ def test_selecting_what_one_element_sent():
     assert (raw.select(sender=1, channel=1).time == raw.time[4:5]).all()
     with pytest.raises(ValueError, match=r"sender 5 is not in these data; there are \[0, 1, 2\]"):
         raw.select(sender=5)
+
+
+def test_an_axis_of_frequencies_is_not_taken_for_one_frequency_per_row():
+    axis = 9e9 + 1e6 * np.arange(8)
+    for n_rows in (5, 8):
+        given = {"samples": np.ones((n_rows, 8), complex), "tx": np.ones((n_rows, 3)), "reference_range": 10.0}
+        with pytest.raises(ValueError, match=r"frequency has 8 values, one per sample: .*give frequency=f\[0\]"):
+            sarcl.PhaseHistory(frequency=axis, frequency_step=1e6, **given)
+        assert (sarcl.PhaseHistory(frequency=axis[0], frequency_step=1e6, **given).frequency == axis[0]).all()
+    for rows in (9e9 + 20e6 * np.arange(8), 9e9 * np.ones(8), axis[::-1]):  # stepped carriers, one carrier, falling
+        assert (sarcl.PhaseHistory(frequency=rows, frequency_step=1e6, **given).frequency == rows).all()
+    meant = sarcl.PhaseHistory(frequency=axis, frequency_step=1e6, tx_channel=np.arange(8), **given)
+    assert (meant[2:].frequency == axis[2:]).all() and (meant[:].frequency == axis).all()
+
+
+def test_data_of_one_antenna_stay_so_when_it_is_moved():
+    raw = sarcl.PhaseHistory(np.ones((4, 8), complex), 9e9, 1e6, np.arange(12.0).reshape(4, 3), 10.0)
+    for made in (raw, raw[1:], pickle.loads(pickle.dumps(raw)), sarcl.concatenate([raw, raw])):
+        moved = replace(made, tx=made.tx + 0.1)
+        assert moved.rx is moved.tx and moved.is_monostatic and (moved.rx == made.tx + 0.1).all()
+        again = replace(moved, weight=1.0)
+        assert again.rx is again.tx
+    apart = replace(raw, rx=raw.tx + 5)
+    assert not apart.is_monostatic and not replace(apart, tx=raw.tx + 0.1).is_monostatic
+    assert (replace(apart, tx=raw.tx + 0.1).rx == raw.tx + 5).all()
+    assert (replace(raw, tx=raw.tx + 0.1, rx=raw.rx.copy()).rx == raw.tx).all()  # a receiver that stays
+    assert replace(apart, rx=None).is_monostatic
+    assert (sarcl.PhaseHistory(np.ones((4, 8), complex), 9e9, 1e6, raw.tx + 1, 10.0, rx=raw.tx).rx == raw.tx).all()

@@ -144,6 +144,12 @@ BAD = {
     "line in the plane": (lambda: line(start=(0, 0)), r"start has shape \(2,\), wanted \(3,\)"),
     "circle without arc": (lambda: circle(arc=0), "arc is 0; .* positions of several pulses must differ"),
     "circle without radius": (lambda: circle(radius=0), "radius is 0; it must be greater than 0"),
+    "prf and speed": (lambda: circle(prf=100.0, speed=50.0), "both give the times; give one of them"),
+    "speed of one pulse": (lambda: circle(n_pulses=1, speed=50.0), "n_pulses is 1; give prf instead"),
+    "velocities without times": (
+        lambda: sarcl.Trajectory(None, [[1, 2, 3]], [[1, 0, 0]]),
+        "without times has no velocities and no accelerations; give times too",
+    ),
     "circle not finite": (lambda: circle(height=np.inf), "height is inf; it must be finite"),
 }
 
@@ -153,3 +159,23 @@ def test_bad_tracks_say_what_was_wanted(name):
     make, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_a_circle_without_prf_or_speed_has_no_times_and_echoes_say_so():
+    still = circle()
+    assert len(still) == circle(prf=1.0).positions.shape[0] and (still.positions == circle(prf=1.0).positions).all()
+    assert still.times is None and still.velocities is None and still.picked(slice(3, 5)).times is None
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=100e6, duration=1e-6)
+    raw = sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), chirp, still.picked(slice(0, 3)))
+    assert raw.time is None and raw.tx_velocity is None
+    assert raw.report.plan["receiver"] == "stop and go"
+    assert raw.report.plan["stop_and_go_error_m"] == "unknown: the track has no times"
+    with pytest.raises(ValueError, match="the track has no times, which this needs"):
+        sarcl.motion.sinusoidal(still, amplitude=(0.01, 0, 0), frequency=1.0)
+
+
+def test_a_circle_flies_at_the_speed_asked_for():
+    track = circle(speed=120.0)
+    assert np.linalg.norm(track.velocities, axis=1) == pytest.approx(120.0, rel=1e-12)
+    step = np.linalg.norm(np.diff(track.positions, axis=0), axis=1) / np.diff(track.times)
+    assert step == pytest.approx(120.0, rel=1e-6)

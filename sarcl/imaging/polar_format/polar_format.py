@@ -42,6 +42,7 @@ def polar_format(
     weights: ArrayLike | None = None,
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
+    sum_polarizations: bool = False,
     check: bool | None = None,
     progress: Progress | None = None,
 ) -> Image:
@@ -54,7 +55,7 @@ def polar_format(
                Phases are relative to c, whatever reference_range is
     tolerance  L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that
                add with random phases, sqrt(pixels sum |w s|^2)
-    window, weights, max_bytes   as `backproject` takes them
+    window, weights, max_bytes, sum_polarizations   as `backproject` takes them
     check      compute 256 random pixels of that sum exactly; None: where that costs less than 2 %
     device     see `sarcl.devices`
     progress   called as progress(stage, done, total), in thousandths
@@ -68,7 +69,7 @@ def polar_format(
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
     clock = Clock()
-    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device)
+    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance
     plan, opened, budget = made.engine.plan, made.engine.device, made.budget
     clock.lap("plan")
@@ -129,12 +130,13 @@ def plan_polar_format(
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
     **options: object,
+    sum_polarizations: bool = False,
 ) -> Forecast:
     """What `polar_format` would do with these arguments: a Forecast. Raises and warns as it does; no sample is read.
 
     options   `check` and `progress`, which do not matter here
     """
-    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device)
+    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     plan = made.engine.plan
     held = 8.0 * (grid.size + plan.length[0] * plan.length[1])  # complex64
     seconds = cost_model.GRID_UNIT * plan.cost / speed(made.engine.device)
@@ -156,7 +158,7 @@ class _Prepared:
 
 def _prepare(
     raw: PhaseHistory, grid: ImageGrid, tolerance: float, window: Window | None, weights: ArrayLike | None,
-    max_bytes: float | None, device: DeviceChoice | None,
+    max_bytes: float | None, device: DeviceChoice | None, sum_polarizations: bool,
 ) -> _Prepared:  # fmt: skip
     """Arguments checked, plane waves and their error, and the plan on the device; warns where the image is blurred."""
     instance("raw", raw, PhaseHistory)
@@ -164,7 +166,7 @@ def _prepare(
     if not grid.is_plane:
         raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
     tolerance = allowed_error(tolerance)
-    task = make_task(raw, grid, window, weights, wrap=True, skip=True)
+    task = make_task(raw, grid, window, weights, wrap=True, skip=True, sum_polarizations=sum_polarizations)
     if task.raw.n_rows < 2:
         raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
     opened = open_device(device)

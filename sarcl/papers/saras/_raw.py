@@ -65,7 +65,7 @@ def figure_9(lab: Lab) -> Section:
     ))  # fmt: skip
     middle, across = float(np.hypot(HEIGHT, DISTANCE)), half * np.sin(LOOK)
     speed = float(np.linalg.norm(track.velocities[0])) if track.velocities is not None else 1.0
-    closest = float(track.times[0]) + np.array([-half, half]) / speed - track.positions[0, 1] / speed
+    closest = float(track.known_times[0]) + np.array([-half, half]) / speed - track.positions[0, 1] / speed
     image = range_doppler(
         compress(raw), beam=1.5 * WIDTH, side="right", tolerance=1e-2, window="hamming", check=False,
         times=closest, ranges=(middle - across, middle + across), device=lab.device,

@@ -97,7 +97,7 @@ class ChannelRows:
         pulse, tx_channel, rx_channel = (i.ravel() for i in np.indices(self.shape))
         out: dict[str, Any] = {
             "frequency": frequency.reshape(n), "tx": tx.reshape(n, 3), "rx": rx.reshape(n, 3),
-            "reference_range": reference.reshape(n), "time": track.times[pulse],
+            "reference_range": reference.reshape(n), "time": None if track.times is None else track.times[pulse],
             "tx_channel": tx_channel if self.separated else None, "rx_channel": tx_channel if own else rx_channel,
         }  # fmt: skip
         for name, velocities in (("tx_velocity", track.velocities), ("rx_velocity", back.velocities)):

@@ -77,7 +77,7 @@ def straight_track(track: Trajectory, frequency: float, allowed: float) -> Strai
             f"place on the line from the first to the last, where this tolerance allows {most:.2g} m; use echo, which "
             "takes any track, or Trajectory.line"
         )
-    prf = (n - 1) / float(track.times[-1] - track.times[0])
+    prf = (n - 1) / float(track.known_times[-1] - track.known_times[0])
     if track.attitude is not None:
         turn = np.abs(track.attitude - track.attitude[0]).max(axis=(1, 2))
         if turn.max() > 1e-9:
