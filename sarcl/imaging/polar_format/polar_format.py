@@ -129,8 +129,8 @@ def plan_polar_format(
     weights: ArrayLike | None = None,
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
-    **options: object,
     sum_polarizations: bool = False,
+    **options: object,
 ) -> Forecast:
     """What `polar_format` would do with these arguments: a Forecast. Raises and warns as it does; no sample is read.
 
