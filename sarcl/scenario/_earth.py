@@ -57,7 +57,7 @@ def side_of(orbit: Orbit, place: Place, t: float) -> str:
 
 def pass_text(orbit: Orbit, track: Trajectory, place: Place | None) -> str:
     """The pulses of an orbit, and how it sees the place, in words."""
-    first, last = float(track.known_times[0]), float(track.times[-1])
+    first, last = float(track.known_times[0]), float(track.known_times[-1])
     lines = [f"orbit: {orbit.describe()}", f"pulses: {len(track)} from {_time(orbit, first)} to {_time(orbit, last)}"]
     if place is not None:
         t = time_over(orbit, place)
