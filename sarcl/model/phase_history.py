@@ -69,7 +69,7 @@ class PhaseHistory:
     compressed: bool = True
     report: Report | None = None
     # the array that rx is where it was given as None; dataclasses.replace hands it on, and tells a new rx from the old
-    _rx_of_tx: Any = field(default=None, repr=False)
+    _rx_of_tx: NDArray[np.float64] | None = field(default=None, repr=False)
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -92,6 +92,7 @@ class PhaseHistory:
             array: AntennaArray | None = None,
             compressed: bool = True,
             report: Report | None = None,
+            _rx_of_tx: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
