@@ -22,6 +22,7 @@ CHIP = 32  # pixels on each side of the point from whose spectrum the occupied b
 LEAST = 8  # pixels on each side that a spectrum needs at least
 BAND = 0.42  # cycles per pixel, largest occupied band: the kernel's transition takes the rest of 0.5
 FALL = 1e-3  # of the largest spectral density: the band ends where the density stays below it
+SHRINK = 0.9  # factor by which a cut is shortened whose ends lie too near to the border of a grid of terrain
 KAISER = 8.96, 5.715  # shape, and pixels times transition width, for 90 dB by Kaiser's formulas
 
 
@@ -72,7 +73,15 @@ class ImageInterpolator:
         ahead = np.array(self.image.grid.shape) - 1 - self.taps // 2 - here
         behind = here - (self.taps // 2 - 1)
         with np.errstate(divide="ignore"):
-            return float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
+            made = float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
+        if not self.image.grid.is_plane:  # rows and columns of terrain are not evenly spaced: the ends must fit too
+            low, high = self.taps // 2 - 1, np.array(self.image.grid.shape) - 1 - self.taps // 2
+            while made > 0:
+                ends = self.image.grid.index(position + made * np.array([[-1.0], [1.0]]) * axis)
+                if (ends >= low).all() and (ends <= high).all():
+                    break
+                made *= SHRINK
+        return made
 
 
 def antennas(image: Image) -> tuple[np.ndarray, np.ndarray]:

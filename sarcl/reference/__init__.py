@@ -14,6 +14,7 @@ For other folders:
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
+    map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation
     polar_format   the image of plane waves
     quality        a point response by brute force
@@ -31,6 +32,7 @@ __all__ = [
     "geometry",
     "image",
     "interp",
+    "map_drift",
     "merge",
     "polar_format",
     "quality",

@@ -18,12 +18,14 @@ def backproject(
     beam: tuple[float, np.ndarray] | None = None,
     edge: float = 0.0,
     share: np.ndarray | None = None,
+    longer: np.ndarray | None = None,
 ) -> tuple[np.ndarray, float]:
     """I(x) = sum_p v_p(x) sum_n s_p(f_n) exp(+j 2 pi f_n (tau - tau_ref)) at points, m (n, 3).
 
     v_p(x) is 1 in the range window and in the beam: (full angle, rad, and directions, (3,) or (n_rows, 3), from tx).
     Points nearer than `edge` to the edge of a window (relative to half of it) or beam (rad) come out NaN: rounding
     may put them on either side. share (n, n_rows): weights of rows in each point, such as those of a tapered beam.
+    longer (n, n_rows): m added to half the two-way paths.
 
     Returns I complex128 (n,) and the norm it would have if contributions had random phases.
     """
@@ -37,6 +39,8 @@ def backproject(
     clear = np.ones(len(points), bool)
     for p in range(raw.n_rows):
         delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(raw.tx[p], raw.rx[p], points, raw.reference_range[p])
+        if longer is not None:
+            delay = delay + 2 / np.longdouble(SPEED_OF_LIGHT) * longer[:, p]
         position = abs(delay) * (2 * raw.frequency_step[p])
         seen = wrap | (position <= 1)
         clear &= wrap | (abs(position - 1) >= edge)

@@ -293,6 +293,21 @@ def test_a_small_image_is_measured_as_far_as_it_reaches():
     assert f"{got.reach[0]:.1f}" in str(got)
 
 
+def test_a_cut_ends_before_the_border_of_a_grid_whose_rows_are_not_even():
+    """Terrain: rows of a range-Doppler image lie closer or farther apart, so that the border comes sooner or later."""
+    rows, columns = np.arange(120), np.arange(90)
+    y, x = rows + 0.004 * (rows - 40.0) ** 2, columns - 45.0
+    positions = np.stack([*np.broadcast_arrays(x, y[:, None]), np.zeros((120, 90))], axis=-1)
+    grid = sarcl.ImageGrid.zero_doppler(rows * 1e-3, 1e5 + columns, positions)
+    data = np.exp(-((rows[:, None] - 40.0) ** 2 + (columns - 45.0) ** 2) / 18).astype(np.complex64)
+    image = sarcl.Image(data, grid, frequency=1e3, tx=(-1e5, 0, 1e5))
+    interpolated = ImageInterpolator.about(image, 40, 45)
+    middle, along = grid.at(40, 45), np.array([0.0, 1.0, 0.0])
+    room = interpolated.room(middle, along)
+    assert 15 < room < 40
+    interpolated(middle + room * np.array([[-1.0], [1.0]]) * along)  # no ValueError
+
+
 def test_the_response_prints_as_a_table_with_units(pair):
     text = str(sarcl.measure(pair[1]))
     for part in ("position", " m\n", "IRW, half power", "PSLR", "-13.26", "ISLR", "dB", "RCS", "cross-range"):

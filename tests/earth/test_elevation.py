@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 
@@ -39,6 +41,16 @@ def test_a_grid_that_is_even_in_a_map_projection_is_inverted():
     turned = sarcl.ElevationModel(lon, lat, 100 + 3 * i + 2 * j)
     there = turned.heights_at(_bilinear(lon, at), _bilinear(lat, at))
     assert np.abs(there - (100 + 3 * at[0] + 2 * at[1])).max() < 1e-6
+
+
+def test_a_grid_on_a_turned_model_is_empty_outside_it():
+    i, j = np.meshgrid(np.arange(41.0), np.arange(61.0), indexing="ij")
+    turned = sarcl.ElevationModel(12 + 1e-3 * (0.94 * j + 0.34 * i), 42 - 1e-3 * (0.94 * i - 0.34 * j), 100 + 2 * j)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        grid = sarcl.ImageGrid.on_terrain(turned, 200.0, frame="ecef")
+        assert np.isnan(turned.heights_at([np.nan, 12.01], [42.0, np.nan])).all()
+    assert grid.empty is not None and 0.2 < grid.empty.mean() < 0.6
 
 
 def test_missing_heights_are_missing_in_the_cells_around_them():

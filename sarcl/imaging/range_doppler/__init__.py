@@ -10,6 +10,8 @@ For this folder alone:
     _extent         rows and columns of the image, the range window and the pulse rate they need
     _focus          the work: azimuth FFT, secondary range compression, migration, azimuth compression
     _ground         positions at zero-Doppler times and slant ranges, at a height or on an elevation model
+    _looks          two looks of an image along the track
+    _map_drift      Doppler rate from the displacement of two looks
     _plan           rows, columns, Doppler bins, range blocks and the predicted error
     _range_window   slant ranges that lie in the range window of every row
     _task           arguments checked; track, ground, extent and plan of one image

@@ -37,6 +37,7 @@ class Extent:
     pixel_band: float
     row_times: np.ndarray
     speed: float
+    has_beam: bool
 
     @property
     def middle_time(self) -> float:
@@ -104,14 +105,15 @@ def choose_extent(
         )
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
     band = Band.tapered(*used, pixel_band, sight.zone(float(r[0])), allowed, beam is not None)
-    return Extent(u, r, finer, band, pixel_band, track.times, speed)
+    return Extent(u, r, finer, band, pixel_band, track.times, speed, beam is not None)
 
 
 @dataclass(frozen=True, eq=False)
 class _Sight:
     """How rows see points: about the Doppler centroid, a sine, within a beam, rad, or wherever (None).
 
-    speed      effective velocity, m/s
+    speed      effective velocity, m/s: Doppler frequencies are 2 f speed/c times the sines of this file. Those of the
+               antenna's angles are speed/track.speed times as large, since its own speed makes the same frequencies
     frequency  in the middle of the band, Hz;  about  slant range in the middle of the image, m
     """
 
@@ -127,9 +129,11 @@ class _Sight:
         """Sines of the squint angles at the ends of the beam."""
         if self.beam is None:
             return -1.0, 1.0
-        angle = float(np.arcsin(self.centroid))
+        ratio = self.track.speed / self.speed
+        angle = float(np.arcsin(np.clip(self.centroid / ratio, -1, 1)))
         ends = np.clip([angle - self.beam / 2, angle + self.beam / 2], -np.pi / 2, np.pi / 2)
-        return float(np.sin(ends[0])), float(np.sin(ends[1]))
+        low, high = np.clip(np.sin(ends) * ratio, -1, 1)
+        return float(low), float(high)
 
     @property
     def hertz(self) -> float:

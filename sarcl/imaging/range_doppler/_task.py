@@ -19,9 +19,11 @@ from ..focusing_task import weigh
 from ._doppler import centroid_of_data, centroid_of_geometry
 from ._extent import Extent, choose_extent
 from ._ground import Ground
+from ._looks import TwoLooks
+from ._map_drift import converged
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
-from ._velocity import effective_speed, hyperbolas, phase_error
+from ._velocity import Hyperbolas, effective_speed, factor_of_rate, hyperbolas, phase_error, rate_of
 
 EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 
@@ -31,7 +33,9 @@ class RangeDopplerTask:
     """What is to be focused, and how.
 
     sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes for blocks on the device
-    centroid   sine of the squint angle of the Doppler centroid;  wavelength  of sample n_samples//2, m
+    speed      effective velocity, m/s, to which the centroids refer;  wavelength  of sample n_samples//2, m
+    centroids  sines of the squint angles of the Doppler centroid: of the geometry, and used
+    known      hyperbolas of the geometry, those of the plan unless the Doppler rate is another
     worst      largest phase error of the hyperbolas, rad
     """
 
@@ -44,23 +48,31 @@ class RangeDopplerTask:
     row_weight: np.ndarray
     device: Device
     budget: float
-    centroid: float
+    speed: float
+    centroids: tuple[float, float]
+    known: Hyperbolas
     wavelength: float
     worst: float
 
     def describe(self) -> dict[str, Any]:
         """The plan, Doppler, velocity and the errors by cause, for a report."""
-        plan, extent, track, centroid = self.plan, self.extent, self.track, self.centroid
-        speed = float(plan.fit.at(np.array([plan.ranges.mean()]))[0][0])
-        hertz = 2 * speed / self.wavelength
-        rate = -hertz * speed / plan.ranges.mean() * (1 - centroid**2) ** 1.5
+        plan, extent, (expected, centroid) = self.plan, self.extent, self.centroids
+        middle = float(plan.ranges.mean())
+        hertz = 2 * self.speed / self.wavelength
+        used, geometry = (
+            rate_of(fit, middle, centroid * self.speed, self.wavelength) for fit in (plan.fit, self.known)
+        )
+        out = {**plan.describe(), "Doppler centroid": f"{hertz * centroid:.6g} Hz"}
+        if centroid != expected:
+            out["Doppler centroid of the geometry"] = f"{hertz * expected:.6g} Hz"
+        out["Doppler rate"] = f"{used:.6g} Hz/s"
+        if plan.fit is not self.known:
+            out["Doppler rate of the geometry"] = f"{geometry:.6g} Hz/s"
         return {
-            **plan.describe(),
-            "Doppler centroid": f"{hertz * centroid:.6g} Hz",
-            "Doppler rate": f"{rate:.6g} Hz/s",
+            **out,
             "Doppler band": f"{hertz * (plan.band.high - plan.band.low):.5g} Hz of the image, "
-            f"{hertz * extent.pixel_band:.5g} Hz of a pixel, PRF {1 / track.step:.5g} Hz",
-            "effective velocity": f"{speed:.7g} m/s",
+            f"{hertz * extent.pixel_band:.5g} Hz of a pixel, PRF {1 / self.track.step:.5g} Hz",
+            "effective velocity": f"{float(plan.fit.at(np.array([middle]))[0][0]):.7g} m/s",
             "largest phase error of the hyperbolas": f"{self.worst:.1e} rad",
             **{f"error, {cause}": f"{value:.1e}" for cause, value in plan.errors.items()},
         }
@@ -68,7 +80,7 @@ class RangeDopplerTask:
 
 def make_task(
     raw: PhaseHistory, heights: Any, side: Any, tolerance: Any, window: Any, weights: Any, times: Any, ranges: Any,
-    spacing: Any, beam: Any, doppler: Any, max_bytes: Any, device: Any,
+    spacing: Any, beam: Any, doppler: Any, doppler_rate: Any, max_bytes: Any, device: Any,
 ) -> RangeDopplerTask:  # fmt: skip
     """The task of these arguments of `range_doppler`, which says what each is and what is refused."""
     instance("raw", raw, PhaseHistory)
@@ -87,14 +99,11 @@ def make_task(
     least = ground.least_range()
     speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
     wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
-    if doppler in ("geometry", "data"):
-        centroid = centroid_of_geometry(raw, track.step, speed)
-        if doppler == "data":
-            centroid = centroid_of_data(raw, track.step, speed, centroid)
-    else:
-        if isinstance(doppler, str):
-            raise ValueError(f"doppler is {doppler!r}; choose 'geometry', 'data' or a frequency in Hz")
-        centroid = number("doppler", doppler) * wavelength / (2 * speed)
+    expected = centroid = centroid_of_geometry(raw, track.step, speed)
+    if doppler == "data":
+        centroid = centroid_of_data(raw, track.step, speed, expected)
+    elif doppler != "geometry":
+        centroid = _number("doppler", doppler, "Hz") * wavelength / (2 * speed)
     opened = open_device(device)
     budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
 
@@ -109,10 +118,24 @@ def make_task(
     )  # fmt: skip
     ends = np.linspace(extent.times[0], extent.times[-1], 3)
     model_error, worst = phase_error(raw, track, ground.positions, fit, ends, extent.rows_of)
+    known = fit
+    if doppler_rate == "data":
+        looks = TwoLooks(opened, raw, track, extent, fit, (sample_weight, row_weight), budget, wavelength)
+        fit = fit.scaled(converged(looks.focused))
+    elif doppler_rate != "geometry":
+        wanted, middle = _number("doppler_rate", doppler_rate, "Hz/s"), float(extent.ranges.mean())
+        fit = fit.scaled(factor_of_rate(wanted, fit, middle, centroid * speed, wavelength))
     plan = make_plan(raw, track, extent, fit, model_error, tolerance)
     return RangeDopplerTask(
-        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, centroid, wavelength, worst
-    )
+        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, (expected, centroid),
+        known, wavelength, worst,
+    )  # fmt: skip
+
+
+def _number(name: str, value: Any, unit: str) -> float:
+    if isinstance(value, str):
+        raise ValueError(f"{name} is {value!r}; choose 'geometry', 'data' or a number in {unit}")
+    return number(name, value)
 
 
 def _pair(name: str, value: Sequence[float] | None) -> tuple[float, float] | None:

@@ -6,10 +6,11 @@ R(t) = offset + sqrt(r^2 + v^2 (t - u - shift)^2),   u the zero-Doppler time and
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.polynomial import chebyshev
+from scipy import optimize
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.rows import spread_over
@@ -18,6 +19,7 @@ from ._track import Track
 
 RANGES = 7  # slant ranges at which hyperbolas are fitted
 DEGREE = 4  # of the polynomials of range through their parameters
+MOST_FACTOR = 4.0  # largest ratio of the squares of velocities for a Doppler rate that is given and the geometry's
 MOST_ROWS = 129  # rows from which they are fitted, and their error is measured
 Positions = Callable[[np.ndarray, np.ndarray], np.ndarray]  # m (n, m, 3) of times (n,) and ranges (m,)
 
@@ -35,6 +37,10 @@ class Hyperbolas:
         x = (2 * np.asarray(ranges) - self.near - self.far) / max(self.far - self.near, 1e-300)
         v, offset, shift = np.broadcast_to(chebyshev.chebval(x, self.coefficients).T, (len(x), 3)).T
         return v, offset, shift
+
+    def scaled(self, factor: float) -> Hyperbolas:
+        """These hyperbolas with the squares of their velocities, and so their Doppler rates, times `factor`."""
+        return replace(self, coefficients=self.coefficients * np.array([np.sqrt(factor), 1.0, 1.0]))
 
     def range(self, u: np.ndarray, ranges: np.ndarray, t: np.ndarray) -> np.ndarray:
         """R(t), m, of arrays of zero-Doppler times, slant ranges (m,) and times that broadcast, ranges last."""
@@ -92,6 +98,29 @@ def effective_speed(raw: PhaseHistory, track: Track, positions: Positions, dista
     u, rows = (track.start + track.stop) / 2, np.arange(track.n_rows)
     fit = hyperbolas(raw, track, positions, u, distance, distance, rows)
     return float(fit.at(np.array([distance]))[0][0])
+
+
+def rate_of(fit: Hyperbolas, distance: float, closing: float, wavelength: float) -> float:
+    """Doppler rate, Hz/s, at a slant range, m, where half the path shortens by `closing` m/s: wavelength/2 times the
+    Doppler centroid."""
+    speed = float(fit.at(np.array([distance]))[0][0])
+    return -2 * speed**2 / (wavelength * distance) * max(1 - (closing / speed) ** 2, 1e-6) ** 1.5
+
+
+def factor_of_rate(rate: float, fit: Hyperbolas, distance: float, closing: float, wavelength: float) -> float:
+    """The factor of the squares of velocities that makes `rate_of` equal to `rate`; ValueError where none does."""
+    given = rate_of(fit, distance, closing, wavelength)
+
+    def less(exponent: float) -> float:
+        return rate_of(fit.scaled(np.exp(exponent)), distance, closing, wavelength) / rate - 1 if rate else np.inf
+
+    most = np.log(MOST_FACTOR)
+    if not less(-most) < 0 < less(most):
+        raise ValueError(
+            f"doppler_rate is {rate:.6g} Hz/s, but the geometry has {given:.6g} Hz/s: they differ by more than a "
+            f"factor of about {MOST_FACTOR:g}; give a negative rate in Hz/s at the centre frequency"
+        )
+    return float(np.exp(optimize.brentq(less, -most, most, xtol=1e-12)))
 
 
 def phase_error(

@@ -22,7 +22,7 @@ from ..forecast import Forecast, speed
 from ._doppler import fresnel, sine
 from ._focus import focus
 from ._plan import FocusPlan
-from ._task import make_task
+from ._task import RangeDopplerTask, make_task
 from ._track import Track
 
 Progress = Callable[[str, int, int], None]
@@ -41,6 +41,7 @@ def range_doppler(
     spacing: tuple[float | None, float | None] | None = None,
     beam: float | None = None,
     doppler: Literal["geometry", "data"] | float = "geometry",
+    doppler_rate: Literal["geometry", "data"] | float = "geometry",
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
     check: bool | None = None,
@@ -64,21 +65,27 @@ def range_doppler(
                centroid: rows that see a pixel outside it do not contribute. Its ends are tapered
     doppler    centroid of the beam, and of the default times: "geometry", from reference ranges that change (else
                broadside); "data", from the phases of neighbouring rows; or in Hz, at the centre frequency
+    doppler_rate  of the azimuth compression: "geometry", from the track; "data", from the displacement of two looks
+               (map drift), which needs ground with contrast; or in Hz/s at the centre frequency, in the middle of the
+               ranges and at the centroid. Effective velocities at all ranges are scaled alike. `tolerance` then refers
+               to backprojection with ranges that have this rate
     check      compute 128 random pixels exactly; None: where that costs less than 2 %
     device     see `sarcl.devices`
     progress   called as progress(stage, done, total), in thousandths
 
     Returns an Image whose grid lists positions, and knows `times` and `ranges`. Gain, carrier and phase are those of
-    `backproject` on image.grid. The report names the errors by cause. ValueError: bad input, a pulse rate below the
-    Doppler bandwidth, ranges that the range window does not hold in all rows. ToleranceUnreachable: a track that is
-    not straight enough for the tolerance. ToleranceMissed: the check measured an error above the tolerance.
+    `backproject` on image.grid. The report names the errors by cause, and the centroid and rate of the geometry where
+    others are used. ValueError: bad input, a pulse rate below the Doppler bandwidth, ranges that the range window does
+    not hold in all rows, echoes that do not tell a rate. ToleranceUnreachable: a track that is not straight enough for
+    the tolerance. ToleranceMissed: the check measured an error above the tolerance.
     Source: Cumming and Wong, "Digital Processing of Synthetic Aperture Radar Data", 2005, chapter 6;
     docs/theory/range_doppler.md.
     """
     clock = Clock()
     task = make_task(
-        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, max_bytes, device
-    )
+        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, doppler_rate,
+        max_bytes, device,
+    )  # fmt: skip
     plan, track, weight = task.plan, task.track, (task.sample_weight, task.row_weight)
     grid = ImageGrid.zero_doppler(plan.times, plan.ranges, task.ground.positions(plan.times, plan.ranges))
     clock.lap("plan")
@@ -91,7 +98,7 @@ def range_doppler(
     measured = None
     exact_seconds = 128 * raw.n_rows * raw.n_samples * 3e-8
     if check or (check is None and exact_seconds < 0.02 * sum(clock.seconds.values())):
-        measured = _measure_error(raw, track, plan, grid, data, weight, task.wavelength)
+        measured = _measure_error(raw, task, grid, data)
         clock.lap("check")
     middle = raw.n_rows // 2
     seen = _row_weights(
@@ -132,17 +139,21 @@ def plan_range_doppler(
     spacing: tuple[float | None, float | None] | None = None,
     beam: float | None = None,
     doppler: Literal["geometry", "data"] | float = "geometry",
+    doppler_rate: Literal["geometry", "data"] | float = "geometry",
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
     **options: object,
 ) -> Forecast:
-    """What `range_doppler` would do with these arguments: a Forecast. Raises as it does; no sample is read.
+    """What `range_doppler` would do with these arguments: a Forecast. Raises as it does.
+
+    Samples are read only for a centroid or rate from the data.
 
     options   `check` and `progress`, which do not matter here
     """
     task = make_task(
-        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, max_bytes, device
-    )
+        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, doppler_rate,
+        max_bytes, device,
+    )  # fmt: skip
     plan = task.plan
     pixels = len(plan.times) * len(plan.ranges)
     details: dict[str, object] = {"pixels": f"{len(plan.times)} x {len(plan.ranges)}", **task.describe()}
@@ -158,15 +169,21 @@ def _row_weights(track: Track, plan: FocusPlan, u: np.ndarray, r: np.ndarray, wa
     return plan.band.row_weight(sines, fresnel(wavelength, r)[:, None])
 
 
-def _measure_error(
-    raw: PhaseHistory, track: Track, plan: FocusPlan, grid: ImageGrid, data: np.ndarray,
-    weights: tuple[np.ndarray, np.ndarray], wavelength: float,
-) -> float:  # fmt: skip
-    """Relative error at up to 128 random pixels against the exact float64 sum over the rows in the beam."""
+def _measure_error(raw: PhaseHistory, task: RangeDopplerTask, grid: ImageGrid, data: np.ndarray) -> float:
+    """Relative error at up to 128 random pixels against the exact float64 sum over the rows in the beam.
+
+    Ranges are those of the geometry, and longer by what the plan's hyperbolas have more than those of the geometry.
+    """
     from ...reference.backproject import backproject as exact
 
     index, points = grid.sample(128, seed=0)
-    share = _row_weights(track, plan, plan.times[index[0]], plan.ranges[index[1]], wavelength)
-    wanted, random = exact(raw, points, *weights, wrap=True, share=share)
+    plan, track = task.plan, task.track
+    u, r = plan.times[index[0]], plan.ranges[index[1]]
+    share = _row_weights(track, plan, u, r, task.wavelength)
+    longer = None
+    if plan.fit is not task.known:
+        t = track.times[:, None]
+        longer = (plan.fit.range(u, r, t) - task.known.range(u, r, t)).T
+    wanted, random = exact(raw, points, task.sample_weight, task.row_weight, wrap=True, share=share, longer=longer)
     wrong = float(np.linalg.norm(data[index] - wanted))
     return wrong / max(float(np.linalg.norm(wanted)), random) if wrong else 0.0
