@@ -7,7 +7,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from .rotation import spin
+from ..base import wgs84
+from .rotation import GM, spin
 
 LEAST_STATES = 4
 # Numbers of states per interpolation, cheapest first: Hermite uses velocities too, Lagrange positions alone.
@@ -15,6 +16,9 @@ HERMITE, LAGRANGE = (2, 3, 4, 5, 6, 7, 8), (4, 6, 8, 10, 12, 14)
 FINE = 1e-7  # m: an error so small needs no higher order
 WORST = 1.0  # m: states that do not fit their neighbours better are refused
 VELOCITY_MISFIT = 1.0  # m/s: the same of velocities
+DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
+MISFIT = 0.01  # of gravity and the Earth's rotation: states that accelerate otherwise are refused. J2 has 0.003
+INERTIAL = 0.004  # the same where the states accelerate as in an inertial frame
 GAP = 2.1  # of the usual spacing: leaving out a state measures the error over twice the spacing, and no more
 BLOCK = 32_768  # times that are interpolated at once
 
@@ -43,10 +47,12 @@ class StateVectors:
     ) -> StateVectors:
         """The states with the interpolation that predicts each of them best from the others.
 
-        ValueError for too few states, times that do not increase, gaps, velocities that are not the derivative of
-        the positions, and states that do not fit the others.
+        ValueError for too few states, times that do not increase, gaps, positions inside the Earth, velocities that are
+        not the derivative of the positions, states that do not fit the others, and states that do not fall as
+        satellites over the rotating Earth do.
         """
         _check_times(times)
+        _check_heights(positions)
         _check_velocities(times, positions, velocities)
         tried = []
         for hermite, counts in ((True, HERMITE), (False, LAGRANGE)):
@@ -61,6 +67,7 @@ class StateVectors:
                 f"positions[{worst}] (at {times[worst]:g} s) is {error:.3g} m away from the curve through the other "
                 "states; correct or remove a wrong state, or give states at a closer spacing"
             )
+        _check_fall(times, positions, velocities)
         return cls(times, positions, velocities, n, hermite, error)
 
     def at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
@@ -148,6 +155,44 @@ def _check_times(times: NDArray[np.float64]) -> None:
         raise ValueError(
             f"the states have a gap of {steps[at]:g} s from times[{at}] = {times[at]:.9g} s on, where they are usually "
             f"{usual:g} s apart; give the missing states, or make one orbit before the gap and one after it"
+        )
+
+
+def _check_heights(positions: NDArray[np.float64]) -> None:
+    height = wgs84.geodetic(positions)[2]
+    if (height < DEEPEST).any():
+        at = int(np.argmin(height))
+        raise ValueError(
+            f"positions[{at}] is {np.linalg.norm(positions[at]):.7g} m from the Earth's centre, inside the Earth; give "
+            "Earth-fixed positions in m: are they in km?"
+        )
+
+
+def _check_fall(times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]) -> None:
+    """ValueError where accelerations are not those of satellites over the rotating Earth, g - 2 w x v - w x (w x r)."""
+    most = min(len(times), 8)
+    inner = slice(1, -1)
+    found, other = (_slopes(times, velocities, n)[inner] for n in (most, most - 1))
+    p, v = positions[inner], velocities[inner]
+    gravity = -GM * p / np.linalg.norm(p, axis=1, keepdims=True) ** 3
+    turn = -2 * spin(v) - spin(spin(p))
+
+    def size(a: NDArray[np.float64]) -> float:
+        return float(np.sqrt((a**2).sum(axis=1).mean()))
+
+    off, off_inertial = size(found - gravity - turn), size(found - gravity)
+    scale, doubt = size(gravity) + size(turn), 10 * size(found - other)
+    is_inertial = off_inertial < 0.3 * off
+    if off > (INERTIAL if is_inertial else MISFIT) * scale + doubt:
+        why = (
+            "these are positions and velocities in an inertial frame: turn both by the sidereal time into an "
+            "Earth-fixed frame"
+            if is_inertial
+            else "check units (m, m/s, s) and the frame"
+        )
+        raise ValueError(
+            f"the states accelerate by {size(found):.4g} m/s^2, where gravity and the Earth's rotation cause "
+            f"{size(gravity + turn):.4g} m/s^2 there; wanted Earth-fixed states of a satellite: {why}"
         )
 
 

@@ -11,6 +11,18 @@ from numpy.typing import NDArray
 from .rotation import SIDEREAL_RATE, rotated, sidereal_time
 from .state_vectors import interpolate
 
+# Name, columns and limits (first included, last not) of the numbers that SGP4 needs, by line
+FIELDS = {
+    1: (("year of the epoch", slice(18, 20), 0, 100), ("day of the epoch", slice(20, 32), 1, 367)),
+    2: (
+        ("inclination, degrees,", slice(8, 16), 0, 180.0001),
+        ("right ascension of the node, degrees,", slice(17, 25), 0, 360.0001),
+        ("eccentricity, its decimal point left out,", slice(26, 33), 0, 1e7),
+        ("argument of perigee, degrees,", slice(34, 42), 0, 360.0001),
+        ("mean anomaly, degrees,", slice(43, 51), 0, 360.0001),
+        ("mean motion, revolutions per day,", slice(52, 63), 0.01, 20),
+    ),
+}
 STEP, NODES = 10.0, 12  # s, and number of positions of SGP4 per interpolation: below the rounding of float64
 
 
@@ -34,6 +46,7 @@ class TwoLineElements:
         """The elements of two lines. ValueError names the line and what is wrong with it."""
         for number, line in ((1, line1), (2, line2)):
             _check(number, line)
+        _check_fields(line1, line2)
         if line1[2:7] != line2[2:7]:
             raise ValueError(f"line1 is of satellite {line1[2:7]} and line2 of {line2[2:7]}; give lines of one")
         try:
@@ -53,12 +66,12 @@ class TwoLineElements:
         positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))
         for i, t in enumerate(times.tolist()):
             failed, positions[i], velocities[i] = self.satellite.sgp4_tsince(t / 60)
-            if failed:
+            if failed or not np.isfinite(positions[i]).all():
                 from sgp4.api import SGP4_ERRORS
 
                 raise ValueError(
                     f"the two-line elements give no position at {t:g} s from their epoch {self.epoch}: "
-                    f"{SGP4_ERRORS[failed]}; use elements of a date that is closer"
+                    f"{SGP4_ERRORS.get(failed, 'not finite')}; use elements of a date that is closer"
                 )
         return positions * 1e3, velocities * 1e3
 
@@ -91,3 +104,19 @@ def _check(number: int, line: Any) -> None:
         raise ValueError(
             f"{name} has check sum {line[68]!r}, but its characters add up to {total}; copy the damaged line again"
         )
+
+
+def _check_fields(line1: str, line2: str) -> None:
+    """ValueError where a number that SGP4 needs is missing, or outside its limits."""
+    for number, line in ((1, line1), (2, line2)):
+        for name, columns, low, high in FIELDS[number]:
+            text = line[columns]
+            try:
+                value = float(text) if text.strip("0123456789. ") == "" else np.nan
+            except ValueError:
+                value = np.nan
+            if not low <= value < high:
+                raise ValueError(
+                    f"line{number} has {text!r} in columns {columns.start + 1} to {columns.stop}; the {name} is a "
+                    f"number from {low:g} to {high:g}: copy the damaged line again"
+                )

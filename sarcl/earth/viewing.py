@@ -72,11 +72,10 @@ def hidden(positions: NDArray[np.float64], points: NDArray[np.float64]) -> NDArr
     """Whether the ellipsoid stands between antennas and points, m (..., 3) each."""
     axes = wgs84.SEMI_MAJOR * np.array([1, 1, 1 - wgs84.FLATTENING])
     start, path = points / axes, (positions - points) / axes
-    along = (start * path).sum(axis=-1)
-    nearest = (start**2).sum(axis=-1) - along**2 / (path**2).sum(
-        axis=-1
-    )  # squared distance of the line from the centre
-    return np.asarray((along < 0) & (nearest < 1))
+    along, length = (start * path).sum(axis=-1), (path**2).sum(axis=-1)
+    share = np.clip(-along / np.where(length == 0, 1, length), 0, 1)  # of the path, where it is closest to the centre
+    nearest = ((start + share[..., None] * path) ** 2).sum(axis=-1)
+    return np.asarray((share > 0) & (nearest < 1))
 
 
 def ground_range(positions: NDArray[np.float64], points: NDArray[np.float64]) -> NDArray[np.float64]:

@@ -183,6 +183,11 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
     short = wgs84.geodetic(arc.at(low))[2] >= heights
     if short.any():
         at = int(np.argmax(short))
+        if arc.ranges[at] > top[at]:  # through the Earth, and out on its other side
+            raise ValueError(
+                f"slant range[{at}] = {arc.ranges[at]:.9g} m reaches beyond the Earth; give a shorter range (one "
+                "way, in m)"
+            )
         raise ValueError(
             f"slant range[{at}] = {arc.ranges[at]:.9g} m does not reach the ground, which is "
             f"{top[at] - heights[at]:.9g} m below the satellite; give a longer range (one way, in m), or lower heights"

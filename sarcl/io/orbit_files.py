@@ -47,10 +47,10 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     """Epoch (UTC of the first state), seconds since then (n,), positions, m, and velocities, m/s (n, 3), Earth-fixed.
 
     FileNotFoundError where there is no file; ValueError where it is not XML, of an unknown layout, has no state vectors
-    or states in another frame.
+    or fewer than it announces, or states in another frame or other units.
     """
-    if not path.exists():
-        raise FileNotFoundError(f"orbit file {str(path)!r} does not exist; check the name and the folder")
+    if not path.is_file():
+        raise FileNotFoundError(f"orbit file {str(path)!r} is no file; check the name and the folder")
     name = f"orbit file {path.name!r}"
     try:
         root = ElementTree.fromstring(path.read_bytes())
@@ -65,6 +65,12 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     states = list(root.iter(layout.state))
     if not states:
         raise ValueError(f"{name} is {layout.name} without state vectors (<{layout.state}>); give one that has them")
+    for said in root.iter(f"List_of_{layout.state}s"):
+        if said.get("count", "").isdigit() and int(said.get("count", "")) != len(states):
+            raise ValueError(
+                f"{name} announces {int(said.get('count', ''))} state vectors and has {len(states)}: it was cut off; "
+                "copy it again"
+            )
     frames = [f for state in states for f in state.iter(layout.frame)] or [*root.iter(layout.frame)]
     for frame in frames:
         if (frame.text or "").strip().upper().replace(" ", "_") != "EARTH_FIXED":
@@ -89,11 +95,21 @@ def _date(name: str, layout: _Layout, state: Any) -> np.datetime64:
     text = _text(name, state, layout.time).removeprefix("UTC=").removesuffix("Z")
     if not re.fullmatch(r"\d{4}-\d\d-\d\dT\d\d:\d\d:\d\d(\.\d{1,9})?", text):
         raise ValueError(f"{name} has the time {text!r}; wanted UTC such as 2021-12-23T05:10:21.029300")
-    return np.datetime64(text, "ns")
+    try:
+        return np.datetime64(text, "ns")
+    except ValueError as exc:
+        why = (
+            "is within a leap second; keep the states before it, or those after it"
+            if text[17:19] == "60"
+            else f"does not exist ({exc})"
+        )
+        raise ValueError(f"{name} has the time {text!r}, which {why}") from None
 
 
 def _number(name: str, state: Any, tag: str) -> float:
-    text = _text(name, state, tag)
+    text, unit = _text(name, state, tag), state.find(tag).get("unit")
+    if unit not in (None, "m", "m/s"):
+        raise ValueError(f"{name} has <{tag}> in {unit!r}; wanted m and m/s")
     if not re.fullmatch(r"[+-]?(\d+\.?\d*|\.\d+)([eE][+-]?\d+)?", text):
         raise ValueError(f"{name} has <{tag}> {text!r}; wanted a number")
     return float(text)

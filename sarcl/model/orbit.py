@@ -27,6 +27,7 @@ if TYPE_CHECKING:
 
 LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
+DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
 DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
 
 
@@ -52,7 +53,8 @@ class Orbit:
         Positions in between are interpolated: by Hermite polynomials through positions and velocities, or Lagrange
         polynomials through positions, whichever predicts states that are left out best. `describe` says which, and the
         error. ValueError for NaN, times that do not increase, gaps (twice the usual spacing and more), velocities that
-        are not the derivative of the positions (inertial ones), and states more than 1 m off their neighbours' curve.
+        are not the derivative of the positions (inertial ones), states more than 1 m off their neighbours' curve, and
+        states that do not fall as satellites do over the rotating Earth (inertial ones, km, wrong units of time).
         """
         p = validation.array("positions", positions, np.float64, ("n_states", 3))
         t = validation.array("times", times, np.float64, (len(p),))
@@ -210,10 +212,7 @@ class Orbit:
         span  (first, last) time to search, s, default the orbit's. Of several passes the closest counts.
         ValueError names the first position that the satellite never sees.
         """
-        x = validation.converted("positions", positions, np.float64)
-        if x.shape[-1:] != (3,):
-            raise ValueError(f"positions has shape {x.shape}, wanted (..., 3): Earth-fixed, m")
-        validation.finite("positions", x)
+        x = _places(positions)
         within = self.span if span is None else _span(span)
         self._times(np.array(within))
         t, r = zero_doppler.locate(self._at, within, x.reshape(-1, 3))
@@ -244,17 +243,20 @@ class Orbit:
         model = heights if isinstance(heights, ElevationModel) else None
         levels = np.zeros(()) if model is not None else validation.converted("heights", heights, np.float64)
         validation.finite("heights", levels)
-        times, ranges, levels = np.broadcast_arrays(times, ranges, levels)
+        times, ranges, levels = _broadcast(t=times, r=ranges, heights=levels)
         p, v = self._at(times.ravel())
         found = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
         return found.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
         """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
-        x = validation.converted("positions", positions, np.float64)
-        validation.finite("positions", x)
-        p, v = self._states(t)
-        return viewing.view(*np.broadcast_arrays(p, v, self.accelerations(t), x))
+        x = _places(positions)
+        times, _ = _broadcast(t=self._times(t), positions=x[..., 0])
+        p, v = self._states(times)
+        x = np.broadcast_to(x, p.shape)
+        if (p == x).all(axis=-1).any():
+            raise ValueError("positions has the satellite's own position, which is in no direction from it")
+        return viewing.view(p, v, self.accelerations(times), x)
 
     def boresight(
         self,
@@ -294,8 +296,10 @@ class Orbit:
         """
         p, v = self._states(validation.number("t", t))
         axes = axes_of(p[None], v[None], attitude, look, side)[0]
-        widths = [validation.number(f"width[{i}]", w, above=0) for i, w in enumerate(width)]
-        body = ellipse(widths[0], widths[1], validation.count("n", n, 3))
+        widths = validation.array("width", width, np.float64, (2,))
+        if not ((widths > 0) & (widths < np.pi)).all():
+            raise ValueError(f"width is ({widths[0]:g}, {widths[1]:g}) rad; wanted two angles from 0 to pi")
+        body = ellipse(float(widths[0]), float(widths[1]), validation.count("n", n, 3))
         return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
 
     def _time(self, name: str, value: Any) -> float:
@@ -327,6 +331,32 @@ class Orbit:
     def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and velocities (n, 3) at times (n,) within the span."""
         return self.path.at(times)
+
+
+def _places(positions: ArrayLike) -> NDArray[np.float64]:
+    """Earth-fixed positions, m (..., 3). ValueError for positions deep inside the Earth."""
+    x = validation.converted("positions", positions, np.float64)
+    if x.shape[-1:] != (3,):
+        raise ValueError(f"positions has shape {x.shape}, wanted (..., 3): Earth-fixed, m")
+    validation.finite("positions", x)
+    height = wgs84.geodetic(x)[2]
+    if (height < DEEPEST).any():
+        at = np.unravel_index(int(np.argmin(height)), height.shape)
+        where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+        raise ValueError(
+            f"positions{where} is {-height[at]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
+            "(local ones: see sarcl.wgs84.ecef and local_axes)"
+        )
+    return x
+
+
+def _broadcast(**arrays: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Arrays of one shape; ValueError names those whose shapes do not fit together."""
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ValueError(f"shapes do not fit together: {shapes}; give equal shapes, or axes of length 1") from None
 
 
 def _span(value: Sequence[float]) -> tuple[float, float]:

@@ -91,6 +91,28 @@ def test_damaged_lines_are_refused(line1, line2, wanted):
         sarcl.Orbit.tle(line1, line2)
 
 
+def summed(line, columns, text):
+    """A line with other text in some columns (from 1, as they are counted), and its check sum."""
+    line = line[: columns - 1] + text + line[columns - 1 + len(text) : 68]
+    return line + str(sum(int(c) if c.isdigit() else c == "-" for c in line) % 10)
+
+
+@pytest.mark.parametrize(
+    "line1, line2, wanted",
+    [
+        (summed(LINE1, 21, "000"), LINE2, "line1 has '000.*columns 21 to 32; the day of the epoch is .* from 1 to 367"),
+        (summed(LINE1, 21, "-01"), LINE2, "the day of the epoch"),
+        (summed(LINE1, 19, "XX"), LINE2, "line1 has 'XX' in columns 19 to 20"),
+        (LINE1, summed(LINE2, 9, "200.0000"), "inclination, degrees, is a number from 0 to 180"),
+        (LINE1, summed(LINE2, 27, "       "), "line2 has '       ' in columns 27 to 33; the eccentricity"),
+        (LINE1, summed(LINE2, 53, "-5.72125391"), "mean motion"),  # SGP4 gives NaN for it, and no error
+    ],
+)
+def test_numbers_that_no_orbit_has_are_refused_in_spite_of_a_right_check_sum(line1, line2, wanted):
+    with pytest.raises(ValueError, match=wanted):
+        sarcl.Orbit.tle(line1, line2)
+
+
 def test_a_decayed_satellite_has_no_position():
     # case 28872 of the verification set decays within an hour
     line1 = "1 28872U 05037B   05333.02012661  .25992681  00000-0  24476-3 0  1534"

@@ -273,3 +273,35 @@ def test_the_projections_of_sarkit_agree():
                 look, x[i] + 500, sets, h[i], delta_hae_max=1e-6, nlim=20
             )
             assert met and np.linalg.norm(there - x[i]) < 1e-7  # m
+
+
+def test_positions_above_the_satellite_are_seen():
+    orbit = sarcl.Orbit.kepler(7.07e6, 0.001, 1.7)
+    time, distance = orbit.locate(1.2 * orbit.positions(5.0))
+    assert time == pytest.approx(5.0, abs=0.1) and distance == pytest.approx(0.2 * 7.07e6, rel=2e-3)
+    with pytest.raises(ValueError, match="never seen"):
+        orbit.locate(-1.2 * orbit.positions(5.0), span=(-100, 100))
+
+
+@pytest.mark.parametrize("x", [[0.0, 0, 0], [[10.0, -20, 5]], [[7e6, 0, 0], [7070.0, 0, 0]]])
+def test_positions_inside_the_earth_are_refused(x):
+    orbit = sarcl.Orbit.kepler(7.07e6, 0.001, 1.7)
+    for call in (orbit.locate, lambda y: orbit.view(0.0, y)):
+        with pytest.raises(ValueError, match=r"positions.* is 6\.\d+e\+06 m under the ellipsoid; wanted Earth-fixed"):
+            call(x)
+
+
+def test_shapes_that_do_not_fit_are_named():
+    orbit = sarcl.Orbit.kepler(7.07e6, 0.001, 1.7)
+    x = orbit.geolocate([0.0, 1.0], 9e5)
+    with pytest.raises(ValueError, match=r"t \(3,\), positions \(2,\)"):
+        orbit.view([0.0, 1.0, 2.0], x)
+    with pytest.raises(ValueError, match=r"t \(3,\), r \(2,\)"):
+        orbit.geolocate([0.0, 1.0, 2.0], [9e5, 9e5])
+    with pytest.raises(ValueError, match="own position"):
+        orbit.view(0.0, orbit.positions(0.0))
+    assert orbit.view([[0.0], [1.0]], x).slant_range.shape == (2, 2)
+    with pytest.raises(ValueError, match=r"width has shape \(1,\)"):
+        orbit.footprint(0.0, look=0.5, width=(0.1,))
+    with pytest.raises(ValueError, match="reaches beyond the Earth; give a shorter range"):
+        orbit.geolocate(0.0, 2e7)

@@ -159,7 +159,15 @@ def bad_states():
     wild[9] += 100
     gap = np.delete(np.arange(61), [20, 21])
     inertial = v + np.cross([0, 0, 7.292115e-5], p)
+    space = kepler().path.inertial(t)
     return [
+        (
+            (t, *space),
+            "the states accelerate by .* m/s.2, where .* in an inertial frame: turn both by the sidereal time",
+        ),
+        ((t, p / 1e3, v / 1e3), r"positions\[\d+\] is .* m from the Earth's centre, inside the Earth.*in km"),
+        ((t * 1e3, p, v / 1e3), "the states accelerate by .*check units"),
+        ((t, p / 0.3048, v / 0.3048), "the states accelerate by .*check units"),
         ((late, p, v), r"times\[5\] = -261 s is before times\[4\] = -260 s.*sort"),
         ((twice, p, v), r"times\[5\] = -260 s repeats times\[4\].*keep one"),
         ((t[gap], p[gap], v[gap]), r"gap of 30 s from times\[19\] = -110 s on, where they are usually 10 s"),
@@ -173,10 +181,30 @@ def bad_states():
     ]
 
 
-@pytest.mark.parametrize("given, wanted", bad_states(), ids=range(10))
+@pytest.mark.parametrize("given, wanted", bad_states(), ids=range(14))
 def test_bad_states_are_refused(given, wanted):
     with pytest.raises(ValueError, match=wanted):
         sarcl.Orbit.states(*given)
+
+
+@pytest.mark.parametrize(
+    "changed",
+    [
+        {"inclination": np.pi / 2, "eccentricity": 0.0, "argument_of_perigee": 0.0, "mean_anomaly": 0.0},
+        {"inclination": 3.0},
+        {"semi_major_axis": 4.2164e7, "eccentricity": 0.0, "inclination": 0.0},
+        {"semi_major_axis": 6.6e6, "eccentricity": 0.005},
+        {"semi_major_axis": 2.66e7, "eccentricity": 0.7},
+        {"j2": True},
+    ],
+)
+def test_states_of_all_kinds_of_orbits_are_taken_and_inertial_ones_are_not(changed):
+    t = np.arange(0.0, 200.0, 10.0)
+    orbit = kepler(**changed, span=(0, 1000))
+    rough = np.random.default_rng(1).normal(size=(20, 3)) * 1e-3
+    sarcl.Orbit.states(t, orbit.positions(t) + rough, orbit.velocities(t) + rough)
+    with pytest.raises(ValueError, match="inertial frame"):
+        sarcl.Orbit.states(t, *orbit.path.inertial(t))
 
 
 def test_one_missing_state_is_no_gap():
@@ -228,6 +256,25 @@ def test_dates_become_seconds_since_the_epoch():
     assert orbit.seconds(["2021-12-23T05:10:21.0293Z", "2021-12-24T05:10:21.0293"]).tolist() == [0.0, 86400.0]
     with pytest.raises(ValueError, match="no epoch"):
         sarcl.Orbit.states(*states()).seconds("2021-12-23")
+    assert orbit.seconds(np.array(["2021-12-23T05:10:22.0293"])).tolist() == [1.0]
+
+
+@pytest.mark.parametrize(
+    ("value", "wanted"),
+    [
+        ("2016-12-31T23:59:60", "within a leap second"),
+        ("2021-13-45", "does not exist"),
+        ("1500-01-01", "years from 1678 to 2261"),
+        (np.datetime64("3000-01-01"), "years from 1678 to 2261"),  # nanoseconds would wrap around in silence
+        (np.datetime64("NaT"), "NaT"),
+        (20211223, "is a int; wanted UTC"),
+    ],
+)
+def test_dates_that_do_not_exist_are_refused(value, wanted):
+    with pytest.raises(ValueError, match=wanted):
+        sarcl.Orbit.states(*states(), epoch=value)
+    with pytest.raises(ValueError, match=wanted):
+        sarcl.Orbit.states(*states(), epoch="2021-12-23").seconds(np.array([value]))
 
 
 # files
@@ -274,6 +321,10 @@ def test_an_orbit_file_of_sentinel_1_gives_its_states(tmp_path):
         ),
         ({'<X unit="m">': '<X unit="m">n'}, "has <X> 'n.*wanted a number"),
         ({"<VY": "<WY"}, "XML|without <VY>"),
+        ({"<List_of_OSVs>": '<List_of_OSVs count="42">'}, "announces 42 state vectors and has 21: it was cut off"),
+        ({'<X unit="m">': '<X unit="km">'}, "<X> in 'km'; wanted m"),
+        ({"UTC=2021-12-23T00:00:00.": "UTC=2021-12-23T23:59:60."}, "leap second"),
+        ({"UTC=2021-12-23T00:00:00.": "UTC=2021-02-30T00:00:00."}, "does not exist"),
     ],
 )
 def test_damaged_orbit_files_are_refused(tmp_path, changed, wanted):
@@ -284,6 +335,8 @@ def test_damaged_orbit_files_are_refused(tmp_path, changed, wanted):
 def test_files_that_are_no_orbits_are_refused(tmp_path):
     with pytest.raises(FileNotFoundError, match=r"none\.EOF.*check the name"):
         sarcl.Orbit.read(tmp_path / "none.EOF")
+    with pytest.raises(FileNotFoundError, match="is no file"):
+        sarcl.Orbit.read(tmp_path)
     (tmp_path / "a.xml").write_text("<kml></kml>")
     with pytest.raises(ValueError, match=r"begins with <kml>; orbits are read from .*EOF.*annotation.*ISCE3"):
         sarcl.Orbit.read(tmp_path / "a.xml")
