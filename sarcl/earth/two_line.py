@@ -20,7 +20,7 @@ FIELDS = {
         ("eccentricity, its decimal point left out,", slice(26, 33), 0, 1e7),
         ("argument of perigee, degrees,", slice(34, 42), 0, 360.0001),
         ("mean anomaly, degrees,", slice(43, 51), 0, 360.0001),
-        ("mean motion, revolutions per day,", slice(52, 63), 0.01, 20),
+        ("mean motion, revolutions per day,", slice(52, 63), 1e-9, 20),
     ),
 }
 STEP, NODES = 10.0, 12  # s, and number of positions of SGP4 per interpolation: below the rounding of float64

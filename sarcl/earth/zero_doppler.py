@@ -21,6 +21,7 @@ PAIRS = 4_000_000  # of positions and coarse times that are examined at once
 DOUBT = 50e3  # m: of passes whose first ranges differ by less, all zero-Doppler times are computed
 EXACT = 1e-12  # s: below it, times follow the rounding of positions, 1e-9 m
 EARLY = 1e-9  # s: a zero-Doppler time outside the span by less counts as its end
+EXCESS = 2e-9  # m: differences of heights below it are rounding
 LEAST_SPEED = 1.0  # m/s over the ground: below it there is no zero-Doppler plane
 
 
@@ -180,10 +181,11 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
     if (heights >= top).any():
         at = int(np.argmax(heights >= top))
         raise ValueError(f"heights[{at}] = {heights[at]:.9g} m is above the satellite ({top[at]:.9g} m); give metres")
+    drop = np.abs((arc.centers * arc.down).sum(axis=1))
     short = wgs84.geodetic(arc.at(low))[2] >= heights
     if short.any():
         at = int(np.argmax(short))
-        if arc.ranges[at] > top[at]:  # through the Earth, and out on its other side
+        if arc.ranges[at] > drop[at]:  # through the Earth, and out on its other side
             raise ValueError(
                 f"slant range[{at}] = {arc.ranges[at]:.9g} m reaches beyond the Earth; give a shorter range (one "
                 "way, in m)"
@@ -193,7 +195,6 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
             f"{top[at] - heights[at]:.9g} m below the satellite; give a longer range (one way, in m), or lower heights"
         )
     distance = np.linalg.norm(arc.centers, axis=1)
-    drop = np.abs((arc.centers * arc.down).sum(axis=1))
     ground = distance - top + heights
     angle = np.arccos(
         np.clip((distance**2 + arc.ranges**2 - ground**2) / (2 * drop * arc.ranges), -1, 1)
@@ -207,9 +208,10 @@ def _angle_at(arc: _Arc, heights: np.ndarray) -> np.ndarray:
         with np.errstate(divide="ignore", invalid="ignore"):
             moved = angle - excess / slope
         moved = np.where((moved >= low) & (moved <= high), moved, (low + high) / 2)
+        moved = np.where(np.abs(excess) <= EXCESS, angle, moved)  # straight down the slope is 0, and no step is right
         step = np.abs(moved - angle)
         angle = moved
-        if (step <= 4e-16).all() or (np.abs(excess) <= 2e-9).all():
+        if (step <= 4e-16).all():
             break
     return np.asarray(angle)
 

@@ -155,6 +155,17 @@ def test_poles_and_antimeridian_are_places_like_others():
         assert np.linalg.norm(back - x[i]) < 1e-5
 
 
+def test_the_point_straight_below_is_met():
+    orbit = sarcl.Orbit.kepler(7.07e6, 0.0, np.pi / 2, mean_anomaly=np.pi / 2)
+    for latitude in (90.0, 89.9999, -90.0, -89.9999):
+        for longitude in (0.0, 180.0, -180.0):
+            x = sarcl.wgs84.ecef(longitude, latitude, 100.0)
+            t, r = orbit.locate(x)
+            again = [orbit.geolocate(t, r, 100.0, side) for side in ("left", "right")]
+            # the height changes with the square of the angle: 2e-9 m of height are 6 cm there
+            assert min(np.linalg.norm(one - x) for one in again) <= 0.1, latitude
+
+
 def test_the_closest_of_several_passes_counts():
     wide = sarcl.Orbit.kepler(7.07e6, 0.001, 1.71, span=(-43200, 43200))
     x = sarcl.wgs84.ecef(20.0, 60.0, 0.0)
