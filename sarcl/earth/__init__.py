@@ -11,6 +11,10 @@ For other folders:
     two_line       orbits of two-line elements, by SGP4
     viewing        incidence, look and squint angles, ground range, Doppler frequencies
     zero_doppler   time and range of closest approach to positions, and positions from time and range
+
+For this folder alone:
+
+    _grid_index    rows and columns of longitudes and latitudes in a grid
 """
 
 __all__ = [

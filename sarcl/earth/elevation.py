@@ -14,10 +14,12 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation, wgs84
 from ..io import elevation
+from ._grid_index import Axes, Curvilinear
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
+HIGHEST = 20e3  # m: the Earth's surface reaches from -10 935 to 8849
 Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
 
@@ -28,8 +30,10 @@ class ElevationModel:
     longitude  degrees (n_columns,), or (n_rows, n_columns);  latitude  degrees (n_rows,), or (n_rows, n_columns)
     height     m (n_rows, n_columns), above the ellipsoid (not above a geoid), NaN without data
 
-    A grid may cross the antimeridian: its longitudes then go on beyond 180 degrees. Raises ValueError for shapes that
-    disagree, longitudes that jump by 180 degrees, and heights that are infinite or all NaN. `read` takes files.
+    Longitudes (n_columns,) that cross the antimeridian go on beyond 180 degrees; grids (n_rows, n_columns) may jump
+    there, and may cover a pole. Where the columns go around the Earth, the first follows the last. Raises ValueError
+    for shapes that disagree, axes that go back or jump by 180 degrees, folded grids, and heights that are infinite, all
+    NaN, or beyond +-20 km. `read` takes files.
     """
 
     longitude: NDArray[np.float64]
@@ -48,6 +52,8 @@ class ElevationModel:
             raise ValueError(
                 "height is infinite somewhere, or NaN everywhere; give metres, and NaN where data is missing"
             )
+        if np.nanmax(np.abs(height)) > HIGHEST:
+            raise ValueError(f"height reaches {np.nanmax(np.abs(height)):.6g} m, which no land has; give metres")
         for name, axis in (("longitude", 1), ("latitude", 0)):
             given = np.asarray(getattr(self, name))
             shape = (height.shape[axis],) if given.ndim == 1 else height.shape
@@ -57,11 +63,7 @@ class ElevationModel:
             object.__setattr__(self, name, values)
         if np.abs(self.latitude).max() > 90:
             raise ValueError(f"latitude reaches {np.abs(self.latitude).max():g}; give degrees from -90 to 90")
-        if max(np.abs(np.diff(self.longitude, axis=a)).max() for a in (0, 1)) >= 180:
-            raise ValueError(
-                "longitude jumps by 180 degrees or more between neighbours; across the antimeridian let it go on "
-                "beyond 180 (179, 180, 181)"
-            )
+        Axes.of(self.longitude, self.latitude)
         object.__setattr__(self, "height", validation.sealed(height))
 
     @classmethod
@@ -97,28 +99,27 @@ class ElevationModel:
 
     def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
         """Heights above the ellipsoid, m (...), at degrees (...); NaN outside the grid and in cells without data."""
-        shape = np.broadcast_shapes(np.shape(longitude), np.shape(latitude))
-        lon = np.broadcast_to(np.asarray(longitude, np.float64), shape).ravel()
-        lat = np.broadcast_to(np.asarray(latitude, np.float64), shape).ravel()
-        (i0, j0), affine = self._index
-        middle = self.longitude[i0, j0], self.latitude[i0, j0]
-        wanted = np.stack([middle[0] + (lon - middle[0] + 180) % 360 - 180, lat])
-        at = np.array([[i0], [j0]]) + affine @ (wanted - np.reshape(middle, (2, 1)))
-        for _ in range(20):  # grids that are even in a map projection are nearly affine in degrees
-            step = affine @ (wanted - np.stack([_bilinear(v, at) for v in (self.longitude, self.latitude)]))
-            at = at + step
-            if np.abs(step).max(initial=0.0) < 1e-9:
-                break
-        size = np.array(self.height.shape)[:, None] - 1
-        inside = ((at >= -1e-6) & (at <= size + 1e-6)).all(axis=0)
-        return np.where(inside, _bilinear(self.height, np.clip(at, 0, size)), np.nan).reshape(shape)
+        lon, lat = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
+        try:
+            lon, lat = np.broadcast_arrays(lon, lat)
+        except ValueError:
+            raise ValueError(f"longitude has shape {lon.shape} and latitude {lat.shape}; give equal ones") from None
+        shape, (index, height) = lon.shape, self._index
+        known = np.isfinite(lon) & np.isfinite(lat)
+        at = index.at(*(np.where(known, v, w[0, 0]).ravel() for v, w in ((lon, self.longitude), (lat, self.latitude))))
+        at = np.where(np.abs(at - np.rint(at)) < 1e-9, np.rint(at), at)  # a point needs no height of its neighbours
+        size = np.array(height.shape)[:, None] - 1
+        inside = known.ravel() & ((at >= -1e-6) & (at <= size + 1e-6)).all(axis=0)
+        return np.where(inside, _bilinear(height, np.clip(at, 0, size)), np.nan).reshape(shape)
 
     @functools.cached_property
-    def _index(self) -> tuple[tuple[int, int], NDArray[np.float64]]:
-        """(row, column) in the middle, and the matrix (2, 2) from degrees about it to rows and columns, nearly."""
-        i, j = (n // 2 for n in self.height.shape)
-        ends = [[v[-1, j] - v[0, j], v[i, -1] - v[i, 0]] for v in (self.longitude, self.latitude)]
-        return (i, j), np.linalg.inv(np.array(ends) / (np.array(self.height.shape) - 1))
+    def _index(self) -> tuple[Axes | Curvilinear, NDArray[np.float64]]:
+        """Rows and columns by degrees, and the heights there: the first column again after the last one around the
+        Earth."""
+        axes = Axes.of(self.longitude, self.latitude)
+        if axes is None:
+            return Curvilinear.of(self.longitude, self.latitude), self.height
+        return axes, np.concatenate([self.height, self.height[:, :1]], axis=1) if axes.is_around else self.height
 
     def grid_positions(
         self, spacing: tuple[float, float], frame: str, center: Sequence[float] | np.ndarray | None

@@ -67,7 +67,11 @@ def place(tile: Tile, frame: Any, center: Any) -> tuple[np.ndarray, np.ndarray]:
 
 def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
     """Origin, m (3,), and axes east, north, up (3, 3) of the local frame of Scene.from_dem, in Earth-centred axes."""
-    middle = [(a.min() + a.max()) / 2 for a in (tile.longitude, tile.latitude)]
+    longitudes = tile.longitude
+    if np.ptp(longitudes) > 180:  # across the antimeridian: counted from the first one
+        near = longitudes[0, 0] + (longitudes - longitudes[0, 0] + 180) % 360 - 180
+        longitudes = near if np.ptp(near) < np.ptp(longitudes) else longitudes
+    middle = [(a.min() + a.max()) / 2 for a in (longitudes, tile.latitude)]
     if center is None:
         center = middle
     center = validation.array("center", center, np.float64, ("n",))

@@ -189,3 +189,75 @@ def test_ranges_beyond_the_model_name_where_it_ends(passing):
         ValueError, match=r"slant range\[1\] = .* meets no terrain of the elevation model: near longitude"
     ):
         orbit.geolocate(t, r, model(np.full((41, 61), 300.0)), side=side)
+
+
+@pytest.mark.parametrize("middle", [(1e6, -3e5), (3e5, 0.0), (1e5, 1e4), (0.0, 0.0)])
+def test_a_polar_map_is_read_beside_and_over_the_pole(middle):
+    pyproj = pytest.importorskip("pyproj")
+    to_degrees = pyproj.Transformer.from_crs(3413, 4326, always_xy=True)  # polar stereographic, m
+    x, y = (m + np.linspace(-2e5, 2e5, 81) for m in middle)
+    model = sarcl.ElevationModel(*to_degrees.transform(*np.meshgrid(x, y)), np.tile(x / 1e3, (81, 1)))
+    some = np.random.default_rng(0).uniform(-0.99, 0.99, (2, 300)) * 2e5 + np.array(middle)[:, None]
+    found = model.heights_at(*to_degrees.transform(*some))
+    # bilinear in another projection than the map's: (5 km/(2 x 6371 km))^2 of a cell's 5 m, and the scale's change
+    assert np.abs(found - some[0] / 1e3).max() <= 2e-3
+    outside = to_degrees.transform(middle[0] + np.array([2.1e5, 0, 9e5]), middle[1] + np.array([0, -2.1e5, 3e5]))
+    assert np.isnan(model.heights_at(*outside)).all()
+    assert np.isnan(model.heights_at(0.0, -90.0))
+
+
+def test_a_map_across_the_antimeridian_has_longitudes_of_either_sign():
+    x, y = np.meshgrid(np.linspace(-1, 1, 41), np.linspace(-17, -16, 21))
+    model = sarcl.ElevationModel((180 + x + 0.1 * y + 180) % 360 - 180, y, 100 * x)
+    at = np.array([-0.7, -0.1, 0.0, 0.3])
+    assert model.heights_at(180 + at - 1.65, np.full(4, -16.5)) == pytest.approx(100 * at, abs=0.02)
+    grid = sarcl.ImageGrid.on_terrain(model, spacing=5e3)
+    assert np.nanmax(np.abs(grid.positions[..., :2])) < 1.5e5  # the local frame is at the middle of the map
+
+
+@pytest.mark.parametrize("first", [-180.0, 0.0])
+def test_the_last_column_around_the_earth_is_followed_by_the_first(first):
+    longitude, latitude = first + np.arange(360.0), np.linspace(-90, 90, 181)
+    height = 100 * np.cos(np.radians(longitude)) * np.cos(np.radians(latitude))[:, None]
+    model = sarcl.ElevationModel(longitude, latitude, height)
+    at = np.array([179.5, -179.5, 180.0, -180.0, 359.7, -0.3, 0.0])
+    wanted = 100 * np.cos(np.radians(at)) * np.cos(np.radians(10))
+    assert model.heights_at(at, np.full(7, 10.0)) == pytest.approx(wanted, abs=0.005)
+    assert model.heights_at(33.0, 90.0) == pytest.approx(0, abs=1e-9)
+
+
+@pytest.mark.parametrize("change", ["rows", "columns", "both"])
+def test_rows_and_columns_may_descend_and_be_uneven(change):
+    longitude, latitude = np.cumsum([12.0, 0.01, 0.03, 0.02]), np.cumsum([47.0, 0.02, 0.01])
+    height = 1e3 * longitude + 500 * latitude[:, None] - 1.4e5
+    rows, columns = (slice(None, None, -1 if change in (name, "both") else 1) for name in ("rows", "columns"))
+    model = sarcl.ElevationModel(longitude[columns], latitude[rows], height[rows, columns] % 20e3 / 10)
+    assert model.heights_at(12.035, 47.011) == pytest.approx(((12035 + 23505.5 - 1.4e5) % 20e3) / 10, abs=1e-6)
+
+
+@pytest.mark.parametrize(
+    ("longitude", "latitude", "height", "wanted"),
+    [
+        ([8.0, 8.2, 8.1], [47.0, 47.1], 0.0, r"longitude 8.1 at 2 follows 8.2; it must increase or decrease"),
+        ([8.0, 8.1, 8.1], [47.0, 47.1], 0.0, r"longitude 8.1 at 2 follows 8.1"),
+        ([8.0, 8.1, 8.2], [47.0, 47.0], 0.0, r"latitude 47 at 1 follows 47"),
+        ([8.0, 8.1, 8.2], [47.0, 47.1], 1e6, r"height reaches 1e\+06 m, which no land has; give metres"),
+    ],
+)
+def test_axes_that_go_back_and_heights_of_no_land_are_refused(longitude, latitude, height, wanted):
+    with pytest.raises(ValueError, match=wanted):
+        sarcl.ElevationModel(longitude, latitude, np.full((2, 3), height))
+
+
+def test_a_folded_map_is_refused():
+    x, y = np.meshgrid([0.0, 1.0, 2.0, 3.0], [0.0, 1.0, 2.0])
+    x[1, 2] = 0.5
+    with pytest.raises(ValueError, match="folded"):
+        sarcl.ElevationModel(x, y + 0.1 * x, np.zeros((3, 4))).heights_at(0.5, 0.5)
+
+
+def test_places_without_a_number_have_no_height_and_shapes_must_fit():
+    model = sarcl.ElevationModel([8.0, 9.0], [47.0, 48.0], [[1.0, 1.0], [1.0, 1.0]])
+    assert np.isnan(model.heights_at([np.nan, np.inf, 8.5], [47.5, 47.5, np.nan])).all()
+    with pytest.raises(ValueError, match=r"longitude has shape \(3,\) and latitude \(2,\)"):
+        model.heights_at([1, 2, 3], [1, 2])
