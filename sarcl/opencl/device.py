@@ -91,6 +91,15 @@ class Device:
         with self._explain("a buffer", array.nbytes):
             return pyopencl.Buffer(self.context, flags, hostbuf=array)
 
+    def copied(self, array: np.ndarray) -> Any:
+        """A buffer with a copy of `array`, for kernels that may still run when buffer and array are dropped here.
+
+        A buffer of `upload` shares the array's memory on CPUs, which then must live until the kernels have ended.
+        """
+        buffer = self.empty(array.nbytes)
+        self.write(buffer, array)
+        return buffer
+
     def zeros(self, nbytes: int) -> Any:
         """A buffer of `nbytes` zero bytes."""
         import pyopencl
@@ -107,6 +116,13 @@ class Device:
         self._check_size(nbytes)
         with self._explain("a buffer", nbytes):
             return pyopencl.Buffer(self.context, pyopencl.mem_flags.READ_WRITE, nbytes)
+
+    def write(self, buffer: Any, values: np.ndarray) -> None:
+        """Copy `values` into a buffer, from its beginning on."""
+        import pyopencl
+
+        with self._explain("a copy", values.nbytes):
+            pyopencl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
 
     def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
         """Copy a buffer, from byte `offset` on, into `out` and return it."""

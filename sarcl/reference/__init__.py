@@ -10,12 +10,14 @@ For other folders:
     compress       the matched filter
     echo           the echo equation, term by term
     facet          echo of triangular facets by physical optics
+    fdtd           the steps of a Yee grid
     field          field of an array
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
     map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation
+    mie            echoes of a conducting sphere
     polar_format   the image of plane waves
     quality        a point response by brute force
     range_doppler  reading of a profile along the range migration
@@ -28,12 +30,14 @@ __all__ = [
     "compress",
     "echo",
     "facet",
+    "fdtd",
     "field",
     "geometry",
     "image",
     "interp",
     "map_drift",
     "merge",
+    "mie",
     "polar_format",
     "quality",
     "range_doppler",

@@ -1,0 +1,86 @@
+"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl, fdtd_absorb.cl and fdtd_lists.cl.
+
+Fields are float64 (3, nx, ny, nz): component a of E stands at half a cell along axis a, of H at half a cell along the
+other two. H is the magnetic field times the impedance of vacuum. Fields, `old` and `psi` are changed in place. Cells of
+lists are given as places in the raveled field.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+CYCLIC = ((0, 1, 2), (1, 2, 0), (2, 0, 1))
+
+
+def before(field: np.ndarray, axis: int) -> np.ndarray:
+    """field[i] - field[i - 1] along an axis; beyond the grid fields are 0."""
+    return np.diff(field, axis=axis, prepend=0)
+
+
+def after(field: np.ndarray, axis: int) -> np.ndarray:
+    """field[i + 1] - field[i] along an axis; beyond the grid fields are 0."""
+    return np.diff(field, axis=axis, append=0)
+
+
+def update_e(e: np.ndarray, h: np.ndarray, s: float) -> None:
+    """E += s curl H."""
+    for a, b, c in CYCLIC:
+        e[a] += s * (before(h[c], b) - before(h[b], c))
+
+
+def update_h(e: np.ndarray, h: np.ndarray, s: float) -> None:
+    """H -= s curl E."""
+    for a, b, c in CYCLIC:
+        h[a] -= s * (after(e[c], b) - after(e[b], c))
+
+
+def absorb(
+    to: np.ndarray, source: np.ndarray, psi: np.ndarray, axis: int, beta: np.ndarray, gamma: np.ndarray, s: float
+) -> None:
+    """The correction by layers that absorb along an axis: E (to) from H (source) with s > 0, H from E with s < 0.
+
+    psi  (2, nx, ny, nz);  beta, gamma  of each cell along the axis, gamma 0 outside the layers
+    """
+    a, b, c = CYCLIC[axis]
+    difference = before if s > 0 else after
+    along = tuple(slice(None) if n == axis else None for n in range(3))
+    for part, (target, field, sign) in enumerate(((b, c, -1), (c, b, 1))):
+        psi[part] = beta[along] * psi[part] + gamma[along] * difference(source[field], a)
+        to[target] += sign * s * psi[part]
+
+
+def edges(e: np.ndarray, at: np.ndarray, share: np.ndarray, old: np.ndarray) -> np.ndarray:
+    """E = p E_old + q E at places `at` (n,), share (2, n) holds p and q: the change of E, (n,)."""
+    vacuum = e.flat[at]
+    old[:] = share[0] * old + share[1] * vacuum
+    e.flat[at] = old
+    return np.asarray(old - vacuum)
+
+
+def faces(e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, old: np.ndarray, s: float) -> np.ndarray:
+    """H = H_old - s (weighted sum of E about the face) at places `at` (n,), weight (4, n): the change of H, (n,)."""
+    vacuum = h.flat[at]
+    a, *cell = np.unravel_index(at, h.shape)
+    b, c = (a + 1) % 3, (a + 2) % 3
+    padded = np.pad(e, ((0, 0), (0, 1), (0, 1), (0, 1)))
+
+    def edge(component: np.ndarray, along: np.ndarray | None) -> np.ndarray:
+        return np.asarray(padded[(component, *(x if along is None else x + (along == n) for n, x in enumerate(cell)))])
+
+    old -= s * (weight[0] * edge(c, b) - weight[1] * edge(c, None) - weight[2] * edge(b, c) + weight[3] * edge(b, None))
+    h.flat[at] = old
+    return np.asarray(old - vacuum)
+
+
+def incident(field: np.ndarray, at: np.ndarray, values: np.ndarray, rest: np.ndarray, amount: np.ndarray) -> None:
+    """Field += amount u at places `at` (n,): u from 6 values (n, 6) at -2 ... 3, read at `rest` (n,)."""
+    u = np.zeros(len(at))
+    for i, node in enumerate(range(-2, 4)):
+        others = [other for other in range(-2, 4) if other != node]
+        u += values[:, i] * np.prod([(rest - other) / (node - other) for other in others], axis=0)
+    field.flat[at] += amount * u
+
+
+def transform(residual: np.ndarray, times: np.ndarray, omega: np.ndarray) -> np.ndarray:
+    """sum_b r_b exp(-j omega_f t_b) of residuals (n_steps, n): complex128 (n_frequencies, n)."""
+    return np.asarray(np.exp(-1j * np.outer(omega, times)) @ residual)

@@ -1,0 +1,201 @@
+"""Laws of fields on the grid: energy, stability, materials; and the lengths and areas of cut cells."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.devices import opened, variants
+from helpers.fdtd_cases import sphere_intervals
+
+from sarcl.fullwave import _cut_cells
+from sarcl.fullwave._cut_cells import Intervals, conductor
+from sarcl.fullwave._fields import Fields
+from sarcl.fullwave._lattice import COURANT, Lattice
+from sarcl.fullwave._lists import BLOCK
+from sarcl.fullwave._target import VACUUM_PERMITTIVITY, Target, material_edges
+from sarcl.reference import fdtd
+
+CELL = 0.01  # m
+SHAPE = (13, 14, 16)
+CENTRE = CELL * (np.array(SHAPE) / 2 + [0.13, 0.27, -0.41])
+
+on_devices = pytest.mark.parametrize("param", variants(names=()))
+
+
+def grid_of(shape=SHAPE):
+    return Lattice(CELL, shape, np.zeros(3))
+
+
+def started(param, grid, target, **options):
+    """Fields that begin at random, and at 0 in the lists of conductors."""
+    e, h = np.random.default_rng(7).uniform(-1, 1, (2, 3, *grid.shape))
+    e.flat[target.edges] = 0
+    fields = Fields(opened(param), grid, target, **options)
+    fields.start(e, h)
+    return fields, e, h
+
+
+@on_devices
+def test_a_closed_cavity_with_a_cut_sphere_keeps_its_energy(param):
+    """sum of l E(n) E(n) + A H(n - 1/2) H(n + 1/2), l and A the free lengths and areas, is constant."""
+    grid = grid_of()
+    intervals = sphere_intervals(grid, CENTRE, 4.3 * CELL)
+    target = conductor(grid, intervals)
+    inside = _cut_cells._nodes(grid, intervals[0])
+    length = np.stack([_cut_cells._free_lengths(grid, a, part) for a, part in enumerate(intervals)])
+    area = np.stack([_cut_cells._free_area(inside, length, a) for a in range(3)])
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        around = [length[c], _cut_cells._next(length[c], b, 1), length[b], _cut_cells._next(length[b], c, 1)]
+        area[a] = np.maximum(area[a], _cut_cells.LEAST_AREA * np.max(around, axis=0))
+    e, h = np.random.default_rng(7).uniform(-1, 1, (2, 3, *grid.shape))
+    e[length == 0], h[area == 0] = 0, 0
+    fields = Fields(opened(param), grid, target)
+    fields.start(e, h)
+    energy = []
+    for _ in range(60):
+        e, h = fields.download()
+        fields.advance(1)
+        _, later = fields.download()
+        energy.append((length * e.astype(float) ** 2).sum() + (area * h.astype(float) * later).sum())
+        fields.advance(BLOCK - 1)
+    assert len(target.faces) > 300 and (area < 1).sum() > 300
+    assert np.ptp(energy) < 2e-5 * energy[0]
+
+
+@pytest.mark.slow
+@on_devices
+def test_twenty_thousand_steps_beside_a_cut_sphere_are_stable(param):
+    grid = grid_of()
+    fields, e, _ = started(param, grid, conductor(grid, sphere_intervals(grid, CENTRE, 4.3 * CELL)))
+    for _ in range(20_000 // BLOCK):
+        fields.advance(BLOCK)
+    assert 0.1 < np.abs(fields.download()[0]).max() < 10 * np.abs(e).max()
+
+
+@on_devices
+def test_without_the_least_area_of_cut_faces_the_fields_explode(param, monkeypatch):
+    monkeypatch.setattr(_cut_cells, "LEAST_AREA", 0.05 * COURANT**2)
+    grid = grid_of()
+    fields, e, _ = started(param, grid, conductor(grid, sphere_intervals(grid, CENTRE, 4.3 * CELL)))
+    for _ in range(60):
+        fields.advance(BLOCK)
+    assert not np.abs(fields.download()[0]).max() < 1e3 * np.abs(e).max()
+
+
+@on_devices
+def test_a_dielectric_that_fills_the_cavity_slows_waves_by_the_root_of_its_permittivity(param):
+    """E and H sqrt(eps) of the dielectric are E and H of vacuum with half the time step, for eps = 4."""
+    grid = grid_of((5, 6, 16))
+    everywhere = np.arange(3 * np.prod(grid.shape))
+    target = material_edges(grid, everywhere, np.full(len(everywhere), 4.0), np.zeros(len(everywhere)))
+    e, h = np.random.default_rng(8).uniform(-1, 1, (2, 3, *grid.shape))
+    fields = Fields(opened(param), grid, target)
+    fields.start(e, h)
+    slow_e, slow_h = e.copy(), h / 2
+    for _ in range(5):
+        fields.advance(BLOCK)
+    for _ in range(5 * BLOCK):
+        fdtd.update_h(slow_e, slow_h, COURANT / 2)
+        fdtd.update_e(slow_e, slow_h, COURANT / 2)
+    # H of the dielectric begins at H and follows -s curl E; in units of 1/sqrt(eps) it is H/2 and follows -(s/2) curl E
+    got_e, got_h = fields.download()
+    assert np.abs(got_e - slow_e).max() < 2e-5
+    assert np.abs(got_h / 2 - slow_h).max() < 2e-5
+
+
+@on_devices
+def test_a_lossy_medium_relaxes_by_its_conductivity_over_its_permittivity(param):
+    """A field without curl decays by (1 - x)/(1 + x) per step: exp(-sigma t/eps) to second order."""
+    grid = grid_of((3, 4, 16))
+    at = np.arange(3 * np.prod(grid.shape))
+    sigma, eps = 0.02, 3.0
+    target = material_edges(grid, at, np.full(len(at), eps), np.full(len(at), sigma))
+    fields = Fields(opened(param), grid, target)
+    potential = np.random.default_rng(9).uniform(-1, 1, grid.shape)
+    potential[-1], potential[:, -1], potential[:, :, -1] = 0, 0, 0  # walls
+    e = np.stack([np.diff(potential, axis=a, append=0) for a in range(3)])
+    fields.start(e, np.zeros_like(e))
+    for _ in range(5):
+        fields.advance(BLOCK)
+    x = sigma * grid.time_step / (2 * eps * VACUUM_PERMITTIVITY)
+    decay = ((1 - x) / (1 + x)) ** (5 * BLOCK)
+    assert 0.1 < decay < 0.9
+    assert np.isclose(decay, np.exp(-sigma * 5 * BLOCK * grid.time_step / (eps * VACUUM_PERMITTIVITY)), rtol=1e-3)
+    got_e, got_h = fields.download()
+    assert np.abs(got_e - decay * e).max() < 1e-6
+    assert np.abs(got_h).max() < 1e-6
+
+
+def plate(grid, along, start, end):
+    """Intervals of a slab that fills the grid, from `start` to `end` along one axis."""
+    out = []
+    for a in range(3):
+        b, c = (a + 1) % 3, (a + 2) % 3
+        line = np.stack(np.meshgrid(np.arange(grid.shape[b]), np.arange(grid.shape[c]), indexing="ij"), -1).reshape(
+            -1, 2
+        )
+        if a == along:
+            out.append(Intervals(line, np.full(len(line), start), np.full(len(line), end)))
+        else:
+            line = line[(line[:, (along - a - 1) % 3] >= start) & (line[:, (along - a - 1) % 3] <= end)]
+            out.append(Intervals(line, np.full(len(line), -1.0), np.full(len(line), grid.shape[a] + 1.0)))
+    return tuple(out)
+
+
+@pytest.mark.parametrize("along", [0, 1, 2])
+def test_a_slab_cuts_edges_across_it_and_the_faces_beside_them(along):
+    grid, b = grid_of((9, 10, 16)), (along + 1) % 3
+    target = conductor(grid, plate(grid, along, 3.3, 6.6))
+    component, *node = np.unravel_index(target.faces, (3, *grid.shape))
+    within = (np.stack(node, 1) < np.array(grid.shape) - 1).all(axis=1)  # not at the walls of the grid
+    assert set(np.unique(component[within])) == {b, (along + 2) % 3}  # faces across the slab stay whole
+    assert set(np.unique(node[along][within])) == {3, 6}
+    low = target.weight[:, (node[along] == 3) & (component == b) & within]
+    # of the edges of such a face two cross the surface, of one only its end is outside, and one is inside
+    assert np.allclose(np.sort(low, axis=0), np.array([0, 1, 1, 1 / 0.3])[:, None])
+    component, *node = np.unravel_index(target.edges, (3, *grid.shape))
+    within = (np.stack(node, 1) < np.array(grid.shape) - 1).all(axis=1)
+    assert (component[within] != along).all() and set(np.unique(node[along][within])) == {4, 6}
+
+
+def test_the_free_area_of_a_face_is_that_of_its_polygon():
+    """Every number of corners inside, for a plane that cuts a face at an angle."""
+    grid = Lattice(CELL, (2, 2, 16), np.zeros(3))
+    rng = np.random.default_rng(10)
+    seen = set()
+    for _ in range(60):
+        normal, offset = rng.normal(size=2), rng.uniform(-0.5, 1.5)
+        value = np.add.outer(normal[0] * np.arange(2), normal[1] * np.arange(2)) - offset * normal.sum()
+        inside = np.zeros(grid.shape, bool)
+        inside[:, :, 0] = value < 0
+        free = np.ones((3, *grid.shape))
+
+        def outside(start, end):
+            return 1.0 if min(start, end) >= 0 else 0.0 if max(start, end) < 0 else max(start, end) / abs(start - end)
+
+        for at in (0, 1):
+            free[0, 0, at, 0] = outside(value[0, at], value[1, at])
+            free[1, at, 0, 0] = outside(value[at, 0], value[at, 1])
+        fine = (np.arange(400) + 0.5) / 400
+        wanted = (np.add.outer(normal[0] * fine, normal[1] * fine) - offset * normal.sum() >= 0).mean()
+        assert abs(_cut_cells._free_area(inside, free, 2)[0, 0, 0] - wanted) < 0.005
+        seen.add(int((value < 0).sum()))
+    assert seen == {0, 1, 2, 3, 4}
+
+
+def test_a_staircase_has_no_cut_faces():
+    grid = grid_of()
+    target = conductor(grid, sphere_intervals(grid, CENTRE, 4.3 * CELL), staircase=True)
+    assert len(target.faces) == 0 and len(target.edges) > 300
+
+
+def test_the_least_area_is_that_of_a_fifth_above_the_limit_of_stability():
+    grid = grid_of()
+    target = conductor(grid, sphere_intervals(grid, CENTRE, 4.3 * CELL))
+    assert np.isclose(_cut_cells.LEAST_AREA, 1.2 * COURANT**2)
+    assert np.isclose(target.weight.max(), 1 / _cut_cells.LEAST_AREA, rtol=1e-6)
+
+
+def test_an_empty_target_has_empty_lists():
+    assert [len(part) for part in (Target.nothing().edges, Target.nothing().faces)] == [0, 0]

@@ -1,0 +1,102 @@
+"""The Mie series of conducting spheres against published values, and full-wave echoes of spheres against the series."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.devices import opened, variants
+from helpers.fdtd_cases import sphere_intervals
+
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.fullwave._currents import currents
+from sarcl.fullwave._cut_cells import conductor
+from sarcl.fullwave._far_field import amplitude
+from sarcl.fullwave._incident import PlaneWave
+from sarcl.fullwave._lattice import lattice_around
+from sarcl.fullwave._pulse import Pulse
+from sarcl.reference.mie import conducting_sphere
+
+# RCS over pi a^2 by ka: the series itself, evaluated elsewhere
+SERIES = {
+    0.1: 0.00089834, 0.5: 0.52957628, 1: 3.63756654, 1.02808: 3.654954, 1.74327: 0.285039, 2: 1.00814308,
+    2.33545: 1.969581, 2.95725: 0.505599, 4: 0.78532864, 5: 1.16883705, 10: 0.92923022, 20: 0.96635740,
+    30: 1.01610017, 55: 0.99461424, 100: 0.99902542,
+}  # fmt: skip
+RADII = {"s2": 0.3, "s7": 9.6}  # m, of the spheres of the Austin RCS Benchmark Suite, problem IA
+
+
+@pytest.mark.parametrize("ka", SERIES)
+def test_the_series_has_the_known_values(ka):
+    assert np.isclose(abs(conducting_sphere(1.0, ka)[0]) ** 2 / np.pi, SERIES[ka], rtol=5e-6)
+
+
+def test_large_spheres_echo_as_physical_optics():
+    a = conducting_sphere(1.0, 200.0)
+    assert np.isclose(a[0], -1j * np.sqrt(np.pi) * np.exp(400j), rtol=5e-3)
+    assert np.isclose(a[1], -a[0], rtol=1e-9)
+
+
+@pytest.mark.parametrize("sphere", RADII)
+@pytest.mark.parametrize("frequency", ["f1", "f6"])
+@pytest.mark.parametrize("polarization", ["H", "V"])
+def test_bistatic_echoes_are_those_of_the_austin_benchmark(data_folder, sphere, frequency, polarization):
+    rows = np.loadtxt(data_folder / "austin_rcs" / "IA" / f"ref_rcs.I.A.{sphere}.{frequency}.{polarization}.txt")
+    angle, k = np.pi - np.radians(rows[:, 2]), 2 * np.pi * rows[0, 0] / SPEED_OF_LIGHT
+    a = conducting_sphere(RADII[sphere], k, angle)["VH".index(polarization)]
+    assert np.abs(20 * np.log10(np.abs(a)) - rows[:, 3]).max() < 2e-6  # dB; the files have six digits
+
+
+def sphere_run(param, ka, cells, travel, n, staircase=False):
+    """Currents of a sphere of 1 m radius at n wavenumbers up to ka, `cells` cells per shortest wavelength."""
+    cell = 2 * np.pi / ka / cells
+    centre = cell * np.array([0.13, 0.27, 0.41])
+    grid = lattice_around(centre - 1, centre + 1, cell, 16)
+    target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase)
+    top = ka * SPEED_OF_LIGHT / (2 * np.pi)
+    wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), Pulse.gaussian(0.05 * top, top))
+    k = np.linspace(0.5, ka, n)
+    return currents(opened(param), grid, target, wave, k, absorber=10, gap=3), centre
+
+
+def echo(run, centre, towards, polarization):
+    """Amplitudes about the centre of the sphere: the wave's path to it and back is taken out."""
+    k_back = np.array([run.k]).T @ np.array([towards - run.wave.travel])
+    return amplitude(run, towards, polarization) * np.exp(-1j * k_back @ (centre - run.centre))
+
+
+@pytest.mark.parametrize("param", variants(names=()))
+def test_a_small_sphere_echoes_to_the_radar_and_to_the_side(param):
+    """Up to ka 1.5 at 20 cells per wavelength, a radius of five cells: amplitude, phase and polarisation."""
+    run, centre = sphere_run(param, 1.5, 20, (0.0, 0.0, -1.0), 8)
+    assert run.left < 1e-5 and run.n_steps < 1500
+    wanted = np.array([conducting_sphere(1.0, k)[0] for k in run.k])
+    got = echo(run, centre, -run.wave.travel, run.wave.polarization)
+    assert np.abs(got - wanted).max() < 0.03 * np.abs(wanted).max()
+    across = np.cross(run.wave.travel, run.wave.polarization)
+    assert (
+        np.abs(echo(run, centre, -run.wave.travel, across)).max() < 0.01 * np.abs(wanted).max()
+    )  # no cross-polarisation
+    side = np.array([conducting_sphere(1.0, k, np.pi / 2)[0] for k in run.k])
+    assert np.abs(echo(run, centre, across, run.wave.polarization) - side).max() < 0.03 * np.abs(side).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("param", variants(names=()))
+@pytest.mark.parametrize("travel", [(0.0, 0.0, -1.0), (0.5, -0.3, -0.8)])
+def test_a_sphere_from_ka_half_to_ten_at_ten_cells_per_wavelength(param, travel):
+    """0.15 dB rms and 3 % complex in steps of ka 0.1, by one run."""
+    run, centre = sphere_run(param, 10.0, 10, travel, 96)
+    wanted = np.array([conducting_sphere(1.0, k)[0] for k in run.k])
+    got = echo(run, centre, -run.wave.travel, run.wave.polarization)
+    assert np.sqrt(np.mean((20 * np.log10(np.abs(got / wanted))) ** 2)) < 0.15
+    assert np.abs(got / wanted - 1).max() < 0.03
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("param", variants(names=()))
+def test_a_staircase_sphere_is_far_worse(param):
+    run, centre = sphere_run(param, 6.0, 10, (0.0, 0.0, -1.0), 20, staircase=True)
+    assert run.n_steps < 2000
+    wanted = np.array([conducting_sphere(1.0, k)[0] for k in run.k])
+    got = echo(run, centre, -run.wave.travel, run.wave.polarization)
+    assert 0.5 < np.sqrt(np.mean((20 * np.log10(np.abs(got / wanted))) ** 2)) < 4
