@@ -19,7 +19,9 @@ EPILOG = """examples:
   sarcl demo                                            simulate and focus a scene: out/demo.png
   sarcl simulate scene.toml -o raw.h5 --image image.png
   sarcl focus raw.h5 -o image.png -o image.h5 --window taylor:35:5
+  sarcl focus orbit_raw.h5 --method range_doppler --side right --heights 250 -o image.h5
   sarcl measure image.h5 --near 10 0 0
+  sarcl papers saras --quick                            published beside measured: saras.html
 
 environment: SARCL_DEVICE (default of --device), SARCL_THREADS (threads of CPU devices).
 exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted."""
@@ -61,8 +63,8 @@ def parser() -> argparse.ArgumentParser:
 
     command("devices", "list the OpenCL devices: which work, which do not and why")
     _demo(command("demo", "simulate the echoes of a scene, focus them and write the picture", device))
-    _simulate(command("simulate", "make the echoes that a scenario file describes", device))
-    _focus(command("focus", "turn echoes into an image", device))
+    _simulate(command("simulate", "make the echoes that a scenario file describes, and their image", device))
+    _focus(command("focus", "turn echoes into an image: backprojection, polar_format or range_doppler", device))
     measure = command("measure", "measure a point response: resolution and side lobes")
     measure.add_argument(
         "image", metavar="IMAGE", help=f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})"
@@ -78,7 +80,7 @@ def parser() -> argparse.ArgumentParser:
     _papers(
         command(
             "papers",
-            "list the reproduced papers, or reproduce one: published and measured values, page and JSON",
+            "list the reproduced papers, or reproduce one (farooq, saras, wan): published and measured values",
             device,
         )
     )
@@ -211,7 +213,7 @@ def _fda(p: argparse.ArgumentParser) -> None:
 
 def _papers(p: argparse.ArgumentParser) -> None:
     p.add_argument(
-        "paper", nargs="?", metavar="NAME", help="the paper to reproduce (docs/guide/papers.md); none: list the papers"
+        "paper", nargs="?", metavar="NAME", help="farooq, saras or wan (docs/guide/papers.md); none: list the papers"
     )
     p.add_argument(
         "-o",
@@ -220,7 +222,9 @@ def _papers(p: argparse.ArgumentParser) -> None:
         help="the page, or a folder for it, default NAME.html, with NAME.json beside it",
     )
     p.add_argument(
-        "--quick", action="store_true", help="leave out arrays of more than 100 elements; takes a fifth of the time"
+        "--quick",
+        action="store_true",
+        help="compute less: smaller fields, fewer elements and looks; the page says what",
     )
 
 

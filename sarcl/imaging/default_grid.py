@@ -67,9 +67,9 @@ def default_grid(
         center, words = _center(part)
         why.append(words)
     upward, east = np.array([0.0, 0.0, 1.0]), None
-    if on_earth and (vertical := wgs84.vertical_at(np.asarray(center, np.float64))) is not None:
+    if on_earth and wgs84.vertical_at(np.asarray(center, np.float64)) is not None:
         longitude, latitude, _ = wgs84.geodetic(center)
-        upward, east = vertical, wgs84.local_axes(float(longitude), float(latitude))[0]
+        east, _, upward = wgs84.local_axes(float(longitude), float(latitude))
     axes: dict[str, Any] = {
         "center": center,
         "x_axis": east if x_axis is None and normal is None else x_axis,

@@ -5,7 +5,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.default_grid import default_grid
+from sarcl.imaging.default_grid import default_grid, needs_side
 
 
 def seen(track, point, n_samples=64, bandwidth=300e6):
@@ -59,3 +59,26 @@ def test_what_the_caller_names_is_kept():
     grid = default_grid(seen(ARC, (0, 0, 0)), center=(1, 2, 3), shape=(5, 6), normal=(0, 1, 0)).grid
     assert grid.center.tolist() == [1, 2, 3] and grid.shape == (5, 6)
     np.testing.assert_allclose(grid.normal, (0, 1, 0), atol=1e-12)
+
+
+@pytest.mark.parametrize("side", ["right", "left"])
+def test_the_grid_of_an_orbit_touches_the_ellipsoid_where_the_ranges_meet(side):
+    orbit = sarcl.Orbit.kepler(7.171e6, 0.001, 1.72, span=(-60, 60))
+    point = orbit.geolocate(0.1, 1e6, heights=150.0, side=side)
+    track = orbit.trajectory(start=0.0, prf=1000.0, n_pulses=200)
+    raw = seen(track, point, bandwidth=100e6)
+    assert needs_side(raw) and not needs_side(seen(ARC, (0, 0, 0)))
+    grid = default_grid(raw, side=side, heights=150.0).grid
+    assert np.linalg.norm(grid.center - point) < 1e-3
+    up = sarcl.wgs84.up(*sarcl.wgs84.geodetic(point)[:2])
+    assert grid.normal == pytest.approx(up, abs=1e-9) and abs(grid.x_axis[2]) < 1e-9
+    longitude, latitude, _ = sarcl.wgs84.geodetic(point)
+    level = sarcl.ElevationModel(longitude + np.array([-1, 1]), latitude + np.array([-1, 1]), np.full((2, 2), 150.0))
+    assert np.linalg.norm(default_grid(raw, side=side, heights=level).grid.center - point) < 1e-3
+    given = default_grid(raw, center=point + 5 * up).grid  # the side does not matter
+    assert given.normal == pytest.approx(up, abs=1e-9)
+    with pytest.raises(ValueError, match="on either side of the track; give side='left' or 'right'"):
+        default_grid(raw)
+    # far away in local coordinates the origin is the scene
+    far = sarcl.Trajectory.circle(radius=5e6, height=6e6, start=-0.03, arc=0.06, n_pulses=50)
+    assert default_grid(seen(far, (0, 0, 0))).grid.center.tolist() == [0, 0, 0]

@@ -403,3 +403,26 @@ def test_an_attitude_needs_a_look_angle_and_a_known_name():
         kepler().trajectory(start=0.0, prf=1.0, n_pulses=1, look=0.5)
     with pytest.raises(ValueError, match="choose one of 'zero-doppler', 'yaw', 'orbital'"):
         kepler().trajectory(start=0.0, prf=1.0, n_pulses=1, attitude="roll", look=0.5)
+
+
+def test_a_track_may_be_named_by_its_middle_its_duration_and_dates():
+    orbit = sarcl.Orbit.kepler(7.17e6, 0.001, 1.72, epoch="2024-03-01T05:00:00")
+    wanted = orbit.trajectory(start=99.9, prf=1000.0, n_pulses=201)
+    for track in (
+        orbit.trajectory(center=100.0, prf=1000.0, n_pulses=201),
+        orbit.trajectory(center="2024-03-01T05:01:40", prf=1000.0, duration=0.201),
+        orbit.trajectory(start=datetime.datetime(2024, 3, 1, 5, 1, 39, 900_000), prf=1000.0, duration=0.2014),
+        orbit.trajectory(start=np.datetime64("2024-03-01T05:01:39.9"), prf=1000.0, n_pulses=201),
+    ):
+        assert np.abs(track.times - wanted.times).max() < 1e-9
+        assert np.abs(track.positions - wanted.positions).max() < 1e-5
+    for given, said in (
+        ({"start": 1, "center": 2, "n_pulses": 3}, "start or center"),
+        ({"n_pulses": 3}, "start or center"),
+        ({"start": 1}, "n_pulses or duration"),
+        ({"start": 1, "n_pulses": 3, "duration": 1}, "n_pulses or duration"),
+        ({"start": 1, "duration": -1}, "duration is -1"),
+        ({"start": "noon", "n_pulses": 1}, "date 'noon' is not in UTC"),
+    ):
+        with pytest.raises(ValueError, match=said):
+            orbit.trajectory(prf=10.0, **given)
