@@ -13,6 +13,7 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.range_doppler._focus import _Bins
 from sarcl.imaging.range_doppler._plan import curved
+from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
 from sarcl.numerics.interpolation import interpolator
 from sarcl.numerics.range_profiles import correction, from_samples
 from sarcl.reference.range_doppler import straighten
@@ -369,6 +370,19 @@ def test_the_needed_pulse_rate_of_an_orbit_is_that_of_its_doppler_rate():
         sarcl.range_doppler(raw, side="right", heights=200.0, times=(0.16, 0.17))
     needed = float(str(refused.value).split("under ")[1].split()[0])
     assert needed == pytest.approx(rate * 199 / 600, rel=1e-3)
+
+
+def test_the_forecast_is_of_the_plan_that_is_carried_out():
+    raw = noise(n=96, aperture=40.0)
+    options = {"tolerance": 3e-3, "window": "hamming"}
+    forecast = plan_range_doppler(raw, **options)
+    image = sarcl.range_doppler(raw, **options, check=False)
+    assert forecast.predicted_error == image.report.predicted_error and forecast.method == "range-Doppler"
+    assert forecast.plan["pixels"] == " x ".join(map(str, image.data.shape))
+    assert {k: forecast.plan[k] for k in image.report.plan} == image.report.plan
+    assert image.data.nbytes < forecast.bytes and 0 < forecast.seconds < 60
+    with pytest.raises(ValueError, match="side is 'up'"):
+        plan_range_doppler(raw, side="up")
 
 
 def test_a_swath_wider_than_the_pulse_interval_is_warned_of():
