@@ -32,7 +32,17 @@ TAKES = {
         "geoid",
     ),
     "polar_format": (*PLANE, "sum_polarizations", "side", "heights", "heights_above", "geoid"),
-    "range_doppler": ("beam", "side", "heights", "heights_above", "geoid", "times", "ranges", "doppler"),
+    "range_doppler": (
+        "beam",
+        "side",
+        "heights",
+        "heights_above",
+        "geoid",
+        "times",
+        "ranges",
+        "doppler",
+        "doppler_rate",
+    ),
 }
 OPTIONS = sorted({name for names in TAKES.values() for name in names})
 WHY = {
@@ -68,7 +78,7 @@ class Method:
         if name == "polar_format":
             options["sum_polarizations"] = args.sum_polarizations
         if name == "range_doppler":
-            given = ("beam", "side", "times", "ranges", "doppler")
+            given = ("beam", "side", "times", "ranges", "doppler", "doppler_rate")
             options |= {k: getattr(args, k) for k in given if getattr(args, k) is not None}
         return cls(name, options)
 

@@ -174,6 +174,9 @@ def _focus(p: argparse.ArgumentParser) -> None:
     earth.add_argument(
         "--doppler", type=doppler, metavar="HZ|data", help="Doppler centroid (default: from the geometry)"
     )
+    earth.add_argument(
+        "--doppler-rate", type=doppler, metavar="HZ/S|data", help="Doppler rate (default: from the geometry)"
+    )
     large = p.add_argument_group(
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
@@ -291,7 +294,7 @@ def size(text: str) -> float:
 
 
 def doppler(text: str) -> Any:
-    """ "geometry", "data", or Hz."""
+    """ "geometry", "data", or Hz (Hz/s)."""
     return text if text in ("geometry", "data") else float(text)
 
 
