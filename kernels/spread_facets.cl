@@ -16,8 +16,7 @@
 //           HH, HV, VH, VV   1: wanted (first letter received)
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
-//           ROUGH      1: materials with roughness finer than a facet
-//           DIAGRAM_*  where ROUGH: number of each re-irradiation diagram (sarcl/scene/material.py:DIAGRAMS)
+//           ROUGH, DIAGRAM_*  see facet_planes.clh
 //           TILE       facets per tile, a multiple of VW
 // reference: sarcl/reference/facet.py:facet_amplitude
 
@@ -31,14 +30,9 @@
 #include "pattern.clh"
 #include "gains.clh"
 #include "facet.clh"
+#include "facet_planes.clh"
 
 #define CHANNELS (NODES * (HH + HV + VH + VV))
-enum { F_EDGE = 0, F_FACTOR = 6, F_ROUGH = 7, F_M = ROUGH ? 13 : 7 };  // planes of `facets`
-
-inline triple load_triple(__global const float *restrict planes, size_t at, size_t n) {
-    return t_make(LOAD(at, planes), LOAD(at, planes + n), LOAD(at, planes + 2 * n));
-}
-
 #define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
 #define BRIGHT 2
 
@@ -46,27 +40,6 @@ inline void put_channel(__global float *out, int channel, complex_v a, fv scale)
     STORE(scale * a.re, 2 * channel, out);
     STORE(scale * a.im, 2 * channel + 1, out);
 }
-
-#if ROUGH
-// Mean of exp(j q.rho) over a facet that is rough below its size: the rest of the coherent `mean`, and a random part
-// that re-radiates as the facet's diagram says (sarcl/scattering/_rough_surface.py:rough_mean).
-//   q_normal  cycles/m of q along the normal;  cosine  between normal and bisector;  area  m^2;  wave  1/wavelength
-//   planes    rms height, m; number of the diagram; 1/width; 1/Omega; random re, im;  `at` counts vectors
-inline complex_v rough_mean(complex_v mean, fv q_normal, fv cosine, fv area, float wave, __global const float *restrict planes,
-                            size_t at, size_t n) {
-    fv height = LOAD(at, planes), diagram = LOAD(at, planes + n), inverse_width = LOAD(at, planes + 2 * n);
-    fv cycles = min(fabs(q_normal * height), (fv)3.0f), coherent_power = exp((fv)-39.478418f * cycles * cycles);
-    fv delta = acos(clamp(cosine, (fv)-1.0f, (fv)1.0f)) * inverse_width, ahead = max(cosine, (fv)0.0f), D = 0;
-    D = diagram == (fv)DIAGRAM_ISOTROPIC ? (fv)1.0f : D;
-    D = diagram == (fv)DIAGRAM_COS ? ahead : D;
-    D = diagram == (fv)DIAGRAM_COS2 ? ahead * ahead : D;
-    D = diagram == (fv)DIAGRAM_EXP ? exp(-delta * delta) : D;
-    fv coherent = sqrt(coherent_power);
-    fv random = sqrt(D * ((fv)1.0f - coherent_power) * LOAD(at, planes + 3 * n) / max(area, (fv)1e-30f)) / wave;
-    return c_make(fma(coherent, mean.re, random * LOAD(at, planes + 4 * n)),
-                  fma(coherent, mean.im, random * LOAD(at, planes + 5 * n)));
-}
-#endif
 
 // Amplitudes at pulse nodes. global size (pulse nodes, tiles of this call).
 //   constants  of the nodes, n of them per tile, as in backproject.cl, of all tiles

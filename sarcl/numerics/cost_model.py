@@ -72,7 +72,8 @@ CHANNEL_INTERPOLATED = 0.05  # per sample of an interpolated channel
 INTERPOLATION_PAYS = 0.7  # share of the cost of separate channels below which interpolation is taken
 
 # Spectral echoes, in us (2026-11-22).
-SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 3.5  # per scatterer and function of aspect: amplitudes, weights of antennas
+SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 0.05  # per scatterer and function of aspect: amplitudes, weights of antennas
+SPECTRAL_PLANES = 0.4  # per facet: numbers for the kernel of the amplitudes
 SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map
 SPECTRAL_SAMPLE = 0.35  # per wavenumber along the track and frequency: transforms, and the samples read from them
 

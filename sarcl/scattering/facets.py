@@ -150,3 +150,9 @@ def roughness_planes(materials: Sequence[Material]) -> np.ndarray:
 def diagram_macros() -> dict[str, int]:
     """Build-time macros of spread_facets.cl with the numbers of the diagrams: DIAGRAM_ISOTROPIC and so on."""
     return {f"DIAGRAM_{name.upper()}": number for number, name in enumerate(DIAGRAMS)}
+
+
+def vertical_axes(up: np.ndarray) -> np.ndarray:
+    """`up`, and the direction that replaces it for lines of sight along it (6,)."""
+    other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
+    return np.array([*up, *other], np.float32)

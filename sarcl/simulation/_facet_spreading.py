@@ -16,7 +16,7 @@ from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros
+from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ..scattering.pulse_nodes import plan_pulse_nodes
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
@@ -112,7 +112,7 @@ class FacetSpreader:
         at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
         self.patterns, self.second = weights.upload(device)
-        self.reach, self.up = device.upload(weights.limits), device.upload(_vertical(vertical))
+        self.reach, self.up = device.upload(weights.limits), device.upload(vertical_axes(vertical))
         self.table = device.upload(plan.interpolator.table)
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
         self.channels = len(nodes) * len(self.made)
@@ -207,9 +207,3 @@ class FacetSpreader:
         pulse, held, whole = device.upload(packed), self.tiles, (0, tiles.n_tiles)
         constants = self.constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
         return pulse, constants, n
-
-
-def _vertical(up: np.ndarray) -> np.ndarray:
-    """`up`, and the direction that replaces it for lines of sight along it (6,)."""
-    other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
-    return np.array([*up, *other], np.float32)

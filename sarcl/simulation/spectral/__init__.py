@@ -13,6 +13,7 @@ For this folder alone:
     _azimuth_transfer       responses along the track, transformed numerically
     _beam_edges             hard edges of beams: the aspects at which each scatterer passes them
     _edge_map               what hard edges add: maps whose azimuths are numbers of pulses
+    _facet_factors          amplitudes of facets at one aspect after the other, on a device
     _map_part               one map of a part of a scene, with its transfer functions
     _map_plan               grid of the map, and the range wavenumbers at which its spectrum is read
     _map_spectrum           the map's spectrum at the range wavenumbers of every frequency

@@ -11,12 +11,14 @@ import numpy as np
 from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import rounded_up
 from ...opencl.device import Device
+from ...scattering.facets import FacetSet
 from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_function
 from ._aspect_window import aspects
 from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspects
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
 from ._azimuth_transfer import TESTED, doppler_grid, plan_transfer, response_error
 from ._edge_map import edge_map, places_of_edges
+from ._facet_factors import FacetFactors
 from ._map_part import MapPart
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
 from ._map_spectrum import ReflectivityMap
@@ -73,21 +75,46 @@ class SpectralPart:
             words["maps of hard edges of the beam"] = sum(one.nodes for one in self.maps[1:])
         return words
 
-    def on_device(self, device: Device) -> list[ReflectivityMap]:
-        """The maps of the scatterers, sorted for the kernels."""
-        return [one.on_device(device) for one in self.maps]
+    def on_device(self, device: Device, budget: float) -> PartOnDevice:
+        """The maps of the scatterers, sorted for the kernels, and their factors;  budget  bytes"""
+        if isinstance(self.amplitudes.part, FacetSet):
+            factors: PointFactors | FacetFactors = FacetFactors(device, self.amplitudes, self.some, budget)
+        else:
+            factors = PointFactors(self.amplitudes, self.some)
+        return PartOnDevice([one.on_device(device) for one in self.maps], factors)
 
     def add(
-        self, held: Sequence[ReflectivityMap], frequencies: np.ndarray, out: Sequence[np.ndarray], budget: float,
+        self, held: PartOnDevice, frequencies: np.ndarray, out: Sequence[np.ndarray], budget: float,
         on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
         """Add the spectra of every map at frequencies, Hz (n_f,), to out, (n_polarizations, n_u, n_f) each; budget
         bytes for the map."""
-        for j in range(len(self.expansion)):
-            factors = self.expansion.factors(self.some, j).astype(np.complex64)
-            for one, on_device, spectra in zip(self.maps, held, out, strict=True):
+        expansion = self.expansion
+        for j in range(len(expansion)):
+            factors = held.factors(float(expansion.sines[j]), float(expansion.frequencies[j]))
+            for one, on_device, spectra in zip(self.maps, held.maps, out, strict=True):
                 one.add(on_device, factors, j, frequencies, spectra, budget)
-            on_progress((j + 1) / len(self.expansion))
+            on_progress((j + 1) / len(expansion))
+
+
+@dataclass(frozen=True, eq=False)
+class PointFactors:
+    """Amplitudes of some points: what FacetFactors are for facets."""
+
+    amplitudes: ScattererAmplitudes
+    some: np.ndarray
+
+    def __call__(self, sine: float, frequency: float) -> np.ndarray:
+        return self.amplitudes(self.some, sine, frequency).astype(np.complex64)
+
+
+@dataclass(frozen=True, eq=False)
+class PartOnDevice:
+    """The maps of a part, and amplitudes of its scatterers at a sine and a frequency, Hz: complex64
+    (n, n_polarizations)."""
+
+    maps: list[ReflectivityMap]
+    factors: PointFactors | FacetFactors
 
 
 def plan_part(
@@ -126,7 +153,10 @@ def plan_part(
         reached &= amplitudes.edges.seen
     reach = float(ends[0][reached].min()), float(ends[1][reached].max())
     edges = places_of_edges(amplitudes, seen_aspects, track)
-    some = np.unique(np.concatenate([np.flatnonzero(reached), *(places.picked for places in edges)]))
+    here = reached.copy()
+    for places in edges:
+        here[places.picked] = True
+    some = np.flatnonzero(here)
     drawn = some[np.linspace(0, len(some) - 1, min(len(some), MANY)).astype(int)]
     factors = np.stack([expansion.factors(drawn, j) for j in range(len(expansion))], axis=-1)
     factors = factors[:, np.abs(factors).sum(axis=(0, 2)).argmax()]
@@ -145,8 +175,7 @@ def plan_part(
     tile = tile_of(device)
     per_cell = 0.0 if is_random else scatterers_per_cell(azimuth[reached], ranges[reached], grid, numbers)
     made = plan_map(of_grid, numbers, grid, (nearest, farthest), per_cell, tile, asked)
-    picked = np.searchsorted(some, np.flatnonzero(reached))
-    whole = slice(None) if len(picked) == len(some) else picked
+    whole = np.flatnonzero(reached[some]) if edges else slice(None)
     x, r = azimuth[reached], ranges[reached]
     maps = [MapPart(whole, x, r, lambda: transfer.range_weights(r), transfer, grid, numbers, made)]
     for places in edges:

@@ -29,7 +29,7 @@ class SpectralSamples:
     def compute(self, output: EchoOutput) -> None:
         """Write the samples of all pulses to an output."""
         request, n_polarizations = self.request, len(self.request.polarizations)
-        held = [part.on_device(request.device) for part in self.parts]
+        held = [part.on_device(request.device, request.budget) for part in self.parts]
         request.clock.lap("map")
         a_frequency = max(part.bytes_per_frequency for part in self.parts) + 16.0 * self.line.n_pulses
         at_once = int(np.clip(request.budget / 3 / (n_polarizations * a_frequency), 1, len(self.frequencies)))

@@ -93,7 +93,7 @@ class SpectralTask:
             n, terms = len(part.some), len(part.expansion)
             of_facets = part.amplitudes.part is prepared.facets
             amplitude = cost_model.SPECTRAL_FACET if of_facets else cost_model.SPECTRAL_POINT
-            total += 1e-6 * terms * n * amplitude
+            total += 1e-6 * n * (terms * amplitude + cost_model.SPECTRAL_PLANES * of_facets)
             for one in part.maps:
                 of_map = cost_model.SPECTRAL_SPREAD * len(one.azimuth)
                 of_map += cost_model.SPECTRAL_SAMPLE * one.grid.count * len(self.frequencies)
