@@ -36,6 +36,7 @@
 #define VECS (SIDE / VW)
 #define PARTS (SLOPE ? 4 : 2)       // of a weight: re, im, and of its slope
 #define MOST (2 * SIDE + 2 * VW)    // samples of T per FINE-th phase
+#define LEAST_STEP 1e-30f           // samples per pixel; one over less may be no float32
 // of one pulse, in local memory: T[FINE][re, im][MOST], W[LINE_TAPS][PARTS][SIDE], at[SIDE][LINE_TAPS]
 #define T_SIZE (FINE * 2 * MOST)
 #define W_SIZE (LINE_TAPS * PARTS * SIDE)
@@ -113,8 +114,9 @@ inline int fits(group pulses, line_geometry line, float limit_cycles, float limi
 }
 
 // Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
-// steep line.
+// steep line, or have no spacing, as where the range is the same along a line.
 inline int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
+    if (fabs(line.along) < LEAST_STEP) return 0;
     fv lane = lanes();
     float samples_of_T = FINE / line.along, farthest = 0;  // samples of T per sample of the profile
 #pragma unroll

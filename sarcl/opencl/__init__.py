@@ -10,6 +10,7 @@ For other folders:
 
 For this folder alone:
 
+    _after_fork    refusal of OpenCL in a process that was forked after its parent had used it
     _trial_record  devices that passed their trial, on disk
     _programs      source texts of kernels, and precautions for building programs
 """

@@ -13,6 +13,7 @@ import numpy as np
 
 from ..base.text import first_line, size_text
 from ..base.threads import threads
+from . import _after_fork
 from ._programs import build, names_in, quiet, source
 from .device_list import DeviceInfo
 
@@ -171,6 +172,7 @@ class Device:
         """Turn an OpenCL error into one that names the device, the need and the remedy."""
         import pyopencl
 
+        _after_fork.check()
         try:
             yield
         except pyopencl.MemoryError as exc:

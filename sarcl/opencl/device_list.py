@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.text import first_line
-from . import _trial_record
+from . import _after_fork, _trial_record
 from ._programs import quiet
 
 
@@ -57,9 +57,14 @@ def tried_again() -> tuple[DeviceInfo, ...]:
     return devices()
 
 
-@functools.cache
 def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
     """Every device of every platform before its trial (works is False), with pyopencl's handle."""
+    _after_fork.check()
+    return _listed()
+
+
+@functools.cache
+def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
     import pyopencl
 
     try:

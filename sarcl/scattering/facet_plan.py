@@ -14,6 +14,7 @@ import numpy as np
 from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
+from ..base.text import size_text
 from ..numerics import cost_model
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
@@ -26,6 +27,8 @@ GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smal
 LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
 SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
+# bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
+FACET_BYTES = 512
 TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
 
 
@@ -72,14 +75,18 @@ def coherent(scene: Scene) -> np.ndarray:
 def plan_facets(
     tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
     polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
-    weights: WeightError | None = None,
+    weights: WeightError | None = None, max_bytes: float = np.inf,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest plan for facets whose error is at most SHARE of `tolerance`.
 
     center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
     cut                False: facets stay as they are;  weights  errors of the antenna weights
-    ToleranceUnreachable where more than 50 million facets would be needed, with the best tolerance of fewer.
+    max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
+    ToleranceUnreachable where more facets would be needed than that, or than 50 million, with the best tolerance of
+    fewer.
     """
+    in_memory = max(2.0 * len(scene.triangles), max_bytes / FACET_BYTES)
+    most = min(float(MOST_FACETS), in_memory)
     longest = np.maximum.reduce(edges(scene.triangles))
     mirror, highest = coherent(scene), center + bandwidth / 2
     top = float(longest[mirror].max(initial=0.0)) or float(longest.max())
@@ -94,7 +101,7 @@ def plan_facets(
         fixed = _rounding(edge, highest) + weights.rounding
         if mirror.any():
             fixed += _spherical(corner, distance, highest) + weights.gradient * corner
-        if fixed < SHARE * tolerance and count <= MOST_FACETS:
+        if fixed < SHARE * tolerance and count <= most:
             fine = True
             band = over_band(
                 scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
@@ -107,10 +114,10 @@ def plan_facets(
                     cost = count * (cost_model.FACET + n * per_node)
                     if best is None or cost < best[0]:
                         best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power)
-        elif count <= MOST_FACETS:
+        elif count <= most:
             least = min(least, fixed)
         settled = best is not None and count > 4 * best[1].n_facets
-        if settled or not cut or not mirror.any() or count > MOST_FACETS:
+        if settled or not cut or not mirror.any() or count > most:
             break
         edge /= LADDER
     reach = least / SHARE * (1 + 1e-9) if np.isfinite(least) else None
@@ -126,10 +133,11 @@ def plan_facets(
     if best is None and _rounding(0.0, highest) + weights.rounding >= SHARE * tolerance:
         raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
     if best is None:
-        raise ToleranceUnreachable(
-            tolerance, reach, "number of facets", "take a smaller scene",
-            how=f"without cutting these facets into more than {MOST_FACETS:,}",
-        )  # fmt: skip
+        how, remedy = f"without cutting these facets into more than {most:,.0f}", "take a smaller scene"
+        if in_memory < MOST_FACETS:
+            how += f" (about {FACET_BYTES} bytes per facet of max_bytes, {size_text(max_bytes)})"
+            remedy += ", a track farther away, or a larger max_bytes"
+        raise ToleranceUnreachable(tolerance, reach, "number of facets", remedy, how=how)
     return best[1]
 
 

@@ -46,11 +46,11 @@ class Subdivision:
 
 def plan_cut(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, polarizations: Sequence[str], vertical: np.ndarray,
-    max_edge: float | str | None, share: float, weights: WeightError,
+    max_edge: float | str | None, share: float, weights: WeightError, max_bytes: float = np.inf,
 ) -> Subdivision:  # fmt: skip
     """How to cut a scene's facets within `share` of a tolerance.
 
-    max_edge  as `sarcl.echo` takes it;  weights  errors of the antenna weights
+    max_edge  as `sarcl.echo` takes it;  weights  errors of the antenna weights;  max_bytes  for the cut facets
     ValueError for another max_edge, ToleranceUnreachable where the share cannot be met.
     """
     scene = _without_points(scene)
@@ -66,7 +66,7 @@ def plan_cut(
         try:
             plan = plan_facets(
                 share / gain, scene, antennas, waveform.center, waveform.bandwidth, polarizations,
-                vertical, finest, cut=max_edge is not None, weights=weights,
+                vertical, finest, cut=max_edge is not None, weights=weights, max_bytes=max_bytes,
             )  # fmt: skip
         except ToleranceUnreachable as refused:
             raise refused.restated(share, None if refused.best is None else refused.best * gain) from None

@@ -30,6 +30,7 @@ REQUEST = {
 }  # fmt: skip
 TASK = {"receiver", "array", "reference", "range_window", "antenna", "radar", "compressed"}
 FEW, MORE = 8, 40  # pulses from the middle of the track that are computed and timed
+KERNELS = 10.0  # s; pulses that take longer are not computed again to leave out the building of kernels
 
 
 @dataclass(frozen=True, eq=False)
@@ -112,8 +113,10 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     output_log.setLevel(logging.WARNING)  # the log is for the echoes that were asked for, not for these pulses
     try:
         few, more = min(FEW, len(track)), min(MORE, len(track))
-        made(few)  # builds kernels
-        (once, _), (longer, raw) = made(few), made(more)
+        once, _ = made(few)  # builds kernels, which takes seconds
+        if once < KERNELS:
+            once, _ = made(few)
+        longer, raw = made(more)
     finally:
         output_log.setLevel(level)
     slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more

@@ -332,8 +332,9 @@ def plan_scene(
     weight_error.check(share)
     if len(scene.triangles):
         made = plan_cut(
-            scene, waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error
-        )
+            scene, waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error,
+            request.budget,
+        )  # fmt: skip
         left = share / made.gain - made.plan.predicted_error
         _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)  # pieces: not counted yet
     n_points = len(scene.amplitudes)

@@ -21,6 +21,7 @@ LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
 SIDES = (64, 32, 16)  # pixels along a side of a tile
 FINES = (1, 2, 4, 8)  # samples of a line's profile per pixel
 GROUP_SIZES = (16, 8, 4)  # pulses per group
+LEAST_CELLS = 1e-30  # resolution cells per pixel; as LEAST_STEP of kernels/backproject_lines.cl
 
 
 def components(beam: bool) -> int:
@@ -194,7 +195,8 @@ def choose(
             continue
         fixed += 2 * np.pi * bend_cycles + error_bounds.sum_rounding(group, n_samples)
         position_phase = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
-        cells = directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT  # resolution cells per pixel
+        # resolution cells per pixel; where every pulse sees all pixels at one range they are added pixel by pixel
+        cells = max(directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT, LEAST_CELLS)
         for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
             size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
             if cells * 1.2 >= fine or size > LOCAL_BYTES:
