@@ -1,4 +1,4 @@
-"""One run of a command: its printed lines, progress bar, output files, and its interruption by Ctrl-C."""
+"""One run of a command: its printed lines, progress bar, output files, and its interruption by Ctrl-C or SIGTERM."""
 
 from __future__ import annotations
 
@@ -33,38 +33,42 @@ class Job:
 
     Ctrl-C raises KeyboardInterrupt at once, except while an output file is begun or put in its place: then the next
     report of progress or printed line raises it. The same happens where Python drops the exception, in a destructor or
-    a callback of a C library; an error that follows from that becomes a KeyboardInterrupt too.
+    a callback of a C library; an error that follows from that becomes a KeyboardInterrupt too. SIGTERM, with which
+    batch systems end a job, does the same. The argument of the KeyboardInterrupt is the number of the signal.
     """
 
     def __init__(self, outputs: Outputs) -> None:
         self.outputs = outputs
         self.bar = Bar()
-        self.interrupted = False
-        self._before: Any = None
+        self.interrupted = 0  # number of the signal
+        self._before: dict[int, Any] = {}
         self._hook = sys.unraisablehook
 
     def __enter__(self) -> Job:
         # Left alone: processes in which Ctrl-C is ignored (nohup, background jobs), programs that handle it themselves.
-        if signal.getsignal(signal.SIGINT) is signal.default_int_handler:
-            try:
-                self._before = signal.signal(signal.SIGINT, self._interrupt)
-            except ValueError:  # not the main thread, where no signal arrives
-                return self
+        for number, default in ((signal.SIGINT, signal.default_int_handler), (signal.SIGTERM, signal.SIG_DFL)):
+            if signal.getsignal(number) is default:
+                try:
+                    self._before[number] = signal.signal(number, self._interrupt)
+                except ValueError:  # not the main thread, where no signal arrives
+                    return self
+        if self._before:
             sys.unraisablehook = self._unraisable
         return self
 
     def __exit__(self, kind: Any, *_: Any) -> None:
         self.bar.wipe()
-        if self._before is not None:
-            signal.signal(signal.SIGINT, self._before)
+        for number, before in self._before.items():
+            signal.signal(number, before)
+        if self._before:
             sys.unraisablehook = self._hook
         if kind is not None:
             self.check()
 
     def check(self) -> None:
-        """Raise KeyboardInterrupt where Ctrl-C was pressed."""
+        """Raise KeyboardInterrupt where a signal has arrived."""
         if self.interrupted:
-            raise KeyboardInterrupt
+            raise KeyboardInterrupt(self.interrupted)
 
     def progress(self, stage: str, done: int, total: int) -> None:
         """The progress callback of verbs: draws the bar, and raises a KeyboardInterrupt that is due."""
@@ -82,13 +86,13 @@ class Job:
         output_paths.check_writable(path)
         self.outputs[str(path)] = identity(path)
 
-    def _interrupt(self, _: int, frame: FrameType | None) -> None:
-        self.interrupted = True
+    def _interrupt(self, number: int, frame: FrameType | None) -> None:
+        self.interrupted = number
         while frame is not None:
-            if frame.f_code.co_filename == output_paths.__file__:
+            if frame.f_code.co_filename in output_paths.FILES:
                 return  # a file is being begun or put in its place, which must not be interrupted
             frame = frame.f_back
-        raise KeyboardInterrupt
+        raise KeyboardInterrupt(number)
 
     def _unraisable(self, unraisable: Any) -> None:
         if not isinstance(unraisable.exc_value, KeyboardInterrupt):

@@ -10,6 +10,7 @@ import math
 import os
 import re
 import shlex
+import signal
 import sys
 from typing import Any, NoReturn
 
@@ -24,9 +25,10 @@ EPILOG = """examples:
   sarcl papers saras --quick                            published beside measured: saras.html
 
 environment: SARCL_DEVICE (default of --device), SARCL_THREADS (threads of CPU devices).
-exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted."""
+exit status: 0 done, 1 something failed, 2 bad input, 3 no working OpenCL device, 130 interrupted,
+143 ended by SIGTERM."""
 
-FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED = 1, 2, 3, 130
+FAILED, BAD_INPUT, NO_DEVICE, INTERRUPTED, ENDED = 1, 2, 3, 130, 143
 
 
 class _Parser(argparse.ArgumentParser):
@@ -322,11 +324,12 @@ def main(argv: list[str] | None = None) -> int:
         from ._commands import run
 
         return run(args, outputs)
-    except KeyboardInterrupt:
+    except KeyboardInterrupt as exc:
         if debug:
             raise
-        print(f"sarcl: interrupted; {_kept(outputs)}", file=sys.stderr)
-        return INTERRUPTED
+        by_term = signal.SIGTERM in exc.args
+        print(f"sarcl: {'ended by SIGTERM' if by_term else 'interrupted'}; {_kept(outputs)}", file=sys.stderr)
+        return ENDED if by_term else INTERRUPTED
     except BrokenPipeError:  # the reader of our output has ended: `sarcl devices | head -1`
         os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
         return FAILED

@@ -5,6 +5,7 @@ For other folders:
     elevation      elevation models through rasterio: positions on WGS84
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
+    input_paths    input files: regular files that can be read, named where they are not
     mesh           meshes through trimesh: triangles, names of parts, repairs
     orbit_files    state vectors of orbit files in XML
     output_paths   output files: checked before the computation, written completely or not at all
@@ -13,8 +14,13 @@ For other folders:
 
 For this folder alone:
 
+    _checked_rows  rows of an HDF5 file, whose checksums are compared when they are read
+    _checksums     checksums of sarcl's own HDF5 file, behind its end
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
+    _hdf5_safety   what an HDF5 file may do to its reader: refused
+    _mesh_checks   what a mesh file declares, compared with what it holds
+    _part          files that are being written: random names, locked, removed where no process owns them
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
 """
 
-__all__ = ["elevation", "formats", "hdf5", "mesh", "orbit_files", "output_paths", "sarcl_hdf5", "toml"]
+__all__ = ["elevation", "formats", "hdf5", "input_paths", "mesh", "orbit_files", "output_paths", "sarcl_hdf5", "toml"]

@@ -6,7 +6,6 @@ import errno
 import logging
 import os
 import re
-import shutil
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
@@ -14,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from . import hdf5, output_paths
+from . import _checksums, hdf5, output_paths
 
 log = logging.getLogger(__name__)
 
@@ -31,16 +30,13 @@ class Unfinished:
     def __init__(self, path: Any, kind: str, n_bytes: int, claim: bool = False) -> None:
         import h5py
 
-        self.path, self.kind, self.n_bytes = Path(path), kind, n_bytes
-        self._part: Path | None
-        self._lock: int | None
-        self._part, self._lock = (
-            output_paths.claim(path, n_bytes) if claim else (output_paths.begin(path, n_bytes), None)
-        )
+        self.path, self.kind, self.n_bytes, self.claimed = Path(path), kind, n_bytes, claim
+        self._rows: tuple[str, _checksums.RunningSums] | None = None
+        self._part: output_paths.Part | None = output_paths.begin(path, n_bytes, alone=claim)
         try:
             with self.writing():
                 # our own lock is held already, and HDF5's would collide with it
-                self.file = h5py.File(self._part, "w", locking=False if claim else None)
+                self.file = h5py.File(self._part.path, "w", locking=False)
                 hdf5.sign(self.file, kind)
         except BaseException:
             self.abandon()
@@ -60,19 +56,18 @@ class Unfinished:
             found = re.search(r"errno = (\d+)", str(exc))
             number = int(found[1]) if found else getattr(exc, "errno", None)
             why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
-            free, wanted = shutil.disk_usage(self.path.parent or ".").free, self.n_bytes
-            room = "raise the limit on files' sizes (ulimit -f)" if number == errno.EFBIG else "make room there"
-            remedy = f"{room} for {wanted / 1e9:.2f} GB and give the same call again"
-            if self._lock is not None:
-                remedy += "; it goes on from its tiles where some were kept"
-            text = f"cannot write {str(self.path)!r}: {why}; the {self.kind.replace('_', ' ')} needs "
-            text += f"{wanted / 1e9:.2f} GB, its disk has {free / 1e9:.2f} GB free: {remedy}"
-            raise OSError(text) from exc
+            more = " and give the same call again"
+            if self.claimed:
+                more += "; it goes on from its tiles where some were kept"
+            what = f"the {self.kind.replace('_', ' ')}"
+            raise output_paths.no_room(self.path, OSError(number, why), self.n_bytes, what, more) from exc
 
     def dataset(self, name: str, shape: tuple[int, ...], dtype: Any) -> Filled:
-        """A dataset, zero until written."""
+        """The dataset of the file's rows, zero until written; it gets checksums by blocks."""
+        sums = _checksums.RunningSums(shape, dtype)
+        self._rows = name, sums
         with self.writing():
-            return Filled(self, self.file.create_dataset(name, shape, dtype))
+            return Filled(self, self.file.create_dataset(name, shape, dtype), sums)
 
     def reserve(self, n_bytes: int) -> None:
         """Allocate n_bytes more on the disk. Without them HDF5 may lose data, or crash, when it closes a dataset."""
@@ -92,12 +87,12 @@ class Unfinished:
         assert self._part is not None
         with self.writing():
             self.file.flush()
-            size = self.file.id.get_filesize()
+            found = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
             self.file.close()
-            os.truncate(self._part, size)  # releases the bytes that were reserved and not used
-        output_paths.commit(self._part, self.path)
+            os.truncate(self._part.path, found.size)  # releases the bytes that were reserved and not used
+            _checksums.append(self._part.path, found)
+        self._part.commit()
         self._part = None
-        self._unlock()
 
     def abandon(self) -> None:
         """Remove the file; `path` is as it was. Nothing happens after `commit`."""
@@ -108,10 +103,9 @@ class Unfinished:
                     self._forget()
                     self.file.close()
             except (OSError, RuntimeError) as exc:  # HDF5 cannot write its buffers; the file is removed anyway
-                log.debug("%s could not be closed in order: %s", part, exc)
+                log.debug("%s could not be closed in order: %s", part.path, exc)
             finally:
-                part.unlink(missing_ok=True)
-                self._unlock()
+                part.remove()
 
     def _forget(self) -> None:
         """Redirect the remaining writes to the null device: on a full disk HDF5 crashes when it closes its file."""
@@ -122,17 +116,12 @@ class Unfinished:
         except (OSError, RuntimeError, TypeError, NotImplementedError) as exc:
             log.debug("%s is closed as it is: %s", self.path, exc)
 
-    def _unlock(self) -> None:
-        if self._lock is not None:
-            os.close(self._lock)
-            self._lock = None
-
 
 class Filled:
     """A dataset of an unfinished file, read and written in slices like an h5py.Dataset."""
 
-    def __init__(self, owner: Unfinished, dataset: Any) -> None:
-        self.owner, self.dataset = owner, dataset
+    def __init__(self, owner: Unfinished, dataset: Any, sums: _checksums.RunningSums) -> None:
+        self.owner, self.dataset, self.sums = owner, dataset, sums
         self.shape, self.dtype = dataset.shape, np.dtype(dataset.dtype)
 
     def __getitem__(self, at: Any) -> Any:
@@ -141,3 +130,4 @@ class Filled:
     def __setitem__(self, at: Any, values: Any) -> None:
         with self.owner.writing():
             self.dataset[at] = values
+        self.sums.wrote(at, values)

@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base import errors, validation, wgs84
+from . import input_paths
 
 log = logging.getLogger(__name__)
 
@@ -95,8 +96,8 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
         from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
     except ImportError as exc:
         raise ImportError("elevation models need the package rasterio: pip install sarcl[dem]") from exc
-    if not path.exists():
-        raise FileNotFoundError(f"DEM file {str(path)!r} does not exist; check the name and the folder")
+    if not path.is_dir():  # some formats are folders
+        input_paths.check(path, "DEM file")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:

@@ -18,6 +18,8 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+from . import input_paths
+
 Kind = Literal["phase history", "image"]
 Written = Literal["phase history", "image", "picture"]
 Make = Callable[[Kind, Mapping[str, Any]], Any]
@@ -68,23 +70,17 @@ NOT_READ = {  # first bytes of files that are often met, and what to say of them
 }
 
 
-def load(path: Path, make: Make, autofocus: bool = False) -> Any:
+def load(path: Path, make: Make, autofocus: bool = False, external: bool = False) -> Any:
     """What make(kind, fields) makes of a file, whose format follows from its first bytes.
 
-    ValueError for a file that is of no known format, truncated or damaged; FileNotFoundError, IsADirectoryError.
+    external  HDF5 files may lead into other files
+    ValueError for a file that is of no known format, truncated or damaged, or a pipe; FileNotFoundError,
+    IsADirectoryError, PermissionError.
     """
-    if path.is_dir():
-        raise IsADirectoryError(
-            f"{str(path)!r} is a folder; give the files in it, e.g. sorted(Path(folder).glob('*.mat'))"
-        )
-    try:
-        with open(path, "rb") as file:
-            head = file.read(32)
-    except FileNotFoundError:
-        raise FileNotFoundError(f"{str(path)!r} does not exist; check the name and the folder") from None
+    head = input_paths.head(path, folder="give the files in it, e.g. sorted(Path(folder).glob('*.mat'))")
     found = next((f for f in FORMATS if f.starts and head.startswith(f.starts)), None)
     if found is not None:
-        return found.functions.load(path, make, autofocus)
+        return found.functions.load(path, make, autofocus, **({"external": True} if external and found is HDF5 else {}))
     known = (text for starts, text in NOT_READ.items() if head.startswith(starts))
     other = f"starts with {head[:12]!r}, which is no file kind sarcl knows" if head else "is empty"
     promised = any(path.suffix.lower() in f.endings for f in FORMATS if f.starts)

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
+from . import _mesh_checks, input_paths
 
 log = logging.getLogger(__name__)
 
@@ -41,16 +42,17 @@ def load(mesh: Any, repair: bool = True) -> Mesh:
     """
     import trimesh
 
-    what = "mesh"
+    what, declared = "mesh", None
     if isinstance(mesh, (str, Path)):
         what = f"mesh file {Path(mesh).name!r}"
-        mesh = _read(Path(mesh), what)
+        mesh, declared = _read(Path(mesh), what)
     if isinstance(mesh, trimesh.Trimesh):
         alone, mesh = mesh, trimesh.Scene()
         mesh.add_geometry(alone, geom_name=alone.metadata.get("name"))
     if not isinstance(mesh, trimesh.Scene):
         raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
-    vertices, faces, part, names = _parts(mesh)
+    vertices, faces, part, names = _parts(mesh, what)
+    _mesh_checks.check_held(declared, len(faces), what)
     if len(faces) == 0:
         raise ValueError(
             f"{what} has no faces; nothing would reflect: check what the file holds and how it was exported"
@@ -74,20 +76,18 @@ def _unit(scene: Any, what: str) -> float | None:
     return found.pop()
 
 
-def _read(path: Path, what: str) -> Any:
-    """What trimesh makes of a file."""
+def _read(path: Path, what: str) -> tuple[Any, int | None]:
+    """What trimesh makes of a file, and the number of faces that the file says it has."""
     import trimesh
 
-    if not path.exists():
-        raise FileNotFoundError(f"mesh file {str(path)!r} does not exist; check the name and the folder")
-    if path.is_dir():
-        raise IsADirectoryError(f"mesh file {str(path)!r} is a folder; give the name of a file in it")
+    input_paths.check(path, "mesh file")
     known = sorted(trimesh.available_formats())
     if path.suffix.lower().lstrip(".") not in known:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
+    declared = _mesh_checks.declared_faces(path, what)
     try:
         # process=False: merging and reordering corners is not needed and hides what the file holds
-        return trimesh.load_scene(path, process=False)
+        return trimesh.load_scene(path, process=False), declared
     except Exception as exc:
         # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
         guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
@@ -98,7 +98,7 @@ def _read(path: Path, what: str) -> Any:
         ) from exc
 
 
-def _parts(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
+def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:
     """Corners (n, 3), faces (k, 3), part of each face (k,), and the names of the parts."""
     import trimesh
 
@@ -111,6 +111,7 @@ def _parts(scene: Any) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[s
         if not isinstance(mesh, trimesh.Trimesh) or len(mesh.faces) == 0:
             continue
         corners, triangles = np.asarray(mesh.vertices, np.float64), np.asarray(mesh.faces, np.int64)
+        _mesh_checks.check_indices(corners, triangles, what)
         if not np.array_equal(matrix, np.eye(4)):
             corners = corners @ matrix[:3, :3].T + matrix[:3, 3]
             if np.linalg.det(matrix[:3, :3]) < 0:  # a mirror reverses windings

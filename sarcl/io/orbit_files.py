@@ -10,6 +10,8 @@ from xml.etree import ElementTree
 
 import numpy as np
 
+from . import input_paths
+
 _SPACE = re.compile(r"\{[^}]*\}")
 
 
@@ -49,11 +51,10 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     FileNotFoundError where there is no file; ValueError where it is not XML, of an unknown layout, has no state vectors
     or fewer than it announces, or states in another frame or other units.
     """
-    if not path.is_file():
-        raise FileNotFoundError(f"orbit file {str(path)!r} is no file; check the name and the folder")
+    text = input_paths.contents(path, "orbit file")
     name = f"orbit file {path.name!r}"
     try:
-        root = ElementTree.fromstring(path.read_bytes())
+        root = ElementTree.fromstring(text)
     except ElementTree.ParseError as exc:
         raise ValueError(f"{name} cannot be read as XML ({exc}): it is damaged, or no orbit file") from None
     for element in root.iter():

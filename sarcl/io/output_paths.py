@@ -2,14 +2,22 @@
 
 from __future__ import annotations
 
+import errno
 import os
-import secrets
 import shutil
 import stat
 from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
+
+from ..base.text import size_text
+from . import _part
+from ._part import Part
+
+FILES = (__file__, _part.__file__)  # whose functions begin and finish files, and must not be interrupted by signals
+LEAST_ROOM = 2**16  # bytes that must be free for a file whose size is not known: none is smaller than a disk's blocks
+FULL = (errno.ENOSPC, errno.EDQUOT, errno.EFBIG)
 
 
 def check_writable(path: Any, n_bytes: int = 0) -> Path:
@@ -42,18 +50,31 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
             raise PermissionError(f"cannot write {shown!r}: it is write-protected; chmod u+w it or choose another name")
     # Asking for permission is not enough: root has all of them, even on /proc or a read-only disk. So try.
     try:
-        _create_beside(target).unlink()
+        Part(target).remove()
     except OSError as exc:
+        if exc.errno in FULL:
+            raise no_room(path, exc, n_bytes) from None
         raise PermissionError(
             f"cannot write {shown!r}: {exc.strerror} in folder {str(folder)!r}; choose a folder you may write to"
         ) from None
-    free = shutil.disk_usage(folder).free
-    if n_bytes > free:
-        raise OSError(
-            f"cannot write {shown!r}: it needs {n_bytes / 1e9:.2f} GB, "
-            f"its disk has {free / 1e9:.2f} GB free; make room or choose another disk"
-        )
+    if max(n_bytes, LEAST_ROOM) > shutil.disk_usage(folder).free:
+        raise no_room(path, None, n_bytes)
     return target
+
+
+def no_room(path: Any, cause: OSError | None, n_bytes: float = 0, what: str = "it", more: str = "") -> OSError:
+    """The error of a full disk: the file, why, what it needs and what is free, and a remedy; more  said after that."""
+    why = f"{cause.strerror}; " if cause is not None and cause.strerror else ""
+    folder = os.path.dirname(os.path.realpath(os.fspath(path)))
+    free = size_text(shutil.disk_usage(folder).free)
+    needs = f"needs {size_text(n_bytes)}, its disk has {free} free" if n_bytes else f"is on a disk with {free} free"
+    remedy = "make room there or choose another disk"
+    if cause is not None and cause.errno == errno.EFBIG:
+        remedy = "raise the limit on files' sizes (ulimit -f)"
+    number = errno.ENOSPC if cause is None else cause.errno
+    made = OSError(f"cannot write {str(path)!r}: {why}{what} {needs}; {remedy}{more}")
+    made.errno = number
+    return made
 
 
 @contextmanager
@@ -64,69 +85,18 @@ def atomic(path: Any, n_bytes: int = 0) -> Iterator[Path]:
     """
     part = begin(path, n_bytes)
     try:
-        yield part
-        commit(part, path)
-    except BaseException:  # Ctrl-C too
-        part.unlink(missing_ok=True)
+        yield part.path
+        part.commit()
+    except BaseException as exc:  # Ctrl-C too
+        part.remove()
+        if isinstance(exc, OSError) and exc.errno in FULL:
+            raise no_room(path, exc, n_bytes) from None
         raise
 
 
-def begin(path: Any, n_bytes: int = 0) -> Path:
-    """A new, empty file beside `path`, to be given to `commit` or unlinked: `atomic` in two steps."""
-    return _create_beside(check_writable(path, n_bytes))
+def begin(path: Any, n_bytes: int = 0, alone: bool = False) -> Part:
+    """A new, empty file beside `path`, to be committed or removed: `atomic` in steps.
 
-
-def commit(part: Path, path: Any) -> None:
-    """Make the finished file `part` the file `path`, with the permissions `path` had."""
-    target = Path(os.path.realpath(os.fspath(path)))
-    if target.exists():
-        shutil.copymode(target, part)
-    os.replace(part, target)
-
-
-def claim(path: Any, n_bytes: int = 0) -> tuple[Path, int]:
-    """The one work file of `path` and a descriptor that holds its lock: commit or unlink the one, then close the other.
-
-    Its name follows from `path`, so that a later run takes over the file that a killed run left.
-    FileExistsError while another run holds it; else raises what `check_writable` does.
+    alone  FileExistsError while another run writes a file for `path`. Raises what `check_writable` raises.
     """
-    target = check_writable(path, n_bytes)
-    part = target.parent / f".sarcl-{target.name}.part"
-    while True:
-        lock = os.open(part, os.O_RDWR | os.O_CREAT, 0o666)
-        try:
-            _lock(lock, path)
-            # between opening and locking, the run before may have put this file in its place or removed it
-            if os.path.exists(part) and os.path.samestat(os.fstat(lock), os.stat(part)):
-                return part, lock
-        except BaseException:
-            os.close(lock)
-            raise
-        os.close(lock)
-
-
-def _lock(descriptor: int, path: Any) -> None:
-    """Lock a file without waiting; without effect where the system or the disk has no locks."""
-    try:
-        import fcntl
-    except ImportError:
-        return
-    try:
-        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
-    except BlockingIOError:
-        raise FileExistsError(
-            f"cannot write {str(path)!r}: another run is writing it; wait for that one or choose another name"
-        ) from None
-    except OSError:
-        pass
-
-
-def _create_beside(target: Path) -> Path:
-    """An empty file of a new, hidden name beside `target`, with the permissions any new file gets."""
-    while True:
-        part = target.parent / f".sarcl-{secrets.token_hex(6)}.part"
-        try:
-            os.close(os.open(part, os.O_WRONLY | os.O_CREAT | os.O_EXCL, 0o666))
-        except FileExistsError:
-            continue
-        return part
+    return Part.begun(check_writable(path, n_bytes), path, alone)

@@ -3,7 +3,8 @@
 Root attributes: sarcl_file = "phase_history" or "image", format = 1. Every field is an attribute (a number or a
 word), a dataset (an array) or a group of these (a grid, a waveform, an array of antennas), named as the field of
 the Python object; a field that is None is left out. Samples and image data lie row after row, uncompressed, and
-are written in blocks of rows. Only plain values come in and out; sarcl/model/store.py makes objects of them.
+are written in blocks of rows. Checksums lie behind the end of the HDF5 file (_checksums.py). Only plain values
+come in and out; sarcl/model/store.py makes objects of them.
 """
 
 from __future__ import annotations
@@ -15,7 +16,7 @@ from typing import Any
 
 import numpy as np
 
-from . import hdf5
+from . import _checksums, _hdf5_safety, hdf5
 from ._partial_hdf5 import Unfinished
 from .formats import Kind, Make
 
@@ -25,46 +26,97 @@ ROW_BYTES = 130  # bytes per row besides its samples: its geometry, numbers and 
 ROWS: dict[str, tuple[Kind, str]] = {"phase_history": ("phase history", "samples"), "image": ("image", "data")}
 
 
-def load(path: Any, make: Make, autofocus: bool = False) -> Any:
+def load(path: Any, make: Make, autofocus: bool = False, external: bool = False) -> Any:
     """make(kind, fields) of a file of sarcl's; samples or data stay in it as an h5py.Dataset that keeps it open.
 
     A group of the file is a mapping among the fields; what the file leaves out is no field. autofocus has no effect.
-    ValueError when the file is not HDF5, is truncated or damaged, is not sarcl's, or is of a newer format.
+    external  follow links and datasets that lead into other files; sarcl writes none
+    Checksums are compared where the file has them: of all but the rows now, of rows when they are read, then OSError.
+    ValueError when the file is not HDF5, is truncated or damaged, is not sarcl's, is of a newer format, or leads into
+    other files.
     """
-    import h5py
-
     name = str(path)
+    sums = _checked(path)
+    file = _opened(path)
     try:
-        file = h5py.File(path, "r", locking="best-effort")
-    except OSError as exc:
-        what = "truncated" if "truncated" in str(exc) else "not an HDF5 file, or damaged"
-        raise ValueError(f"{name!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
-    try:
-        mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
+        try:
+            mark, version = file.attrs.get("sarcl_file"), file.attrs.get("format")
+        except (KeyError, OSError, RuntimeError, TypeError, ValueError) as exc:
+            raise ValueError(f"{name!r} is damaged: its attributes cannot be read ({exc}); copy it again") from None
         if not isinstance(mark, str) or mark not in ROWS or version is None:
             raise ValueError(f"{name!r} is HDF5 but not sarcl's (it has no sarcl_file mark); sarcl reads what it saved")
-        if version != hdf5.FORMAT:
+        if np.ndim(version) or version != hdf5.FORMAT:
             raise ValueError(f"{name!r} has format {version}, this sarcl reads format {hdf5.FORMAT}; update sarcl")
+        kind, rows = ROWS[mark]
         try:
-            kind, rows = ROWS[mark]
-            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: file[rows], "report": hdf5.get_report(file)}
+            _hdf5_safety.check_contents(file, Path(path).stat().st_size, external)
+            held = file[rows]
+            if sums is not None and sums.rows is not None:
+                held = _with_checksums(held, sums)
+            fields = {**hdf5.get_all(file, leave=("report", rows)), rows: held, "report": hdf5.get_report(file)}
             return make(kind, fields)
-        except (KeyError, OSError, RuntimeError, TypeError, ValueError, AttributeError) as exc:
+        except _hdf5_safety.Refused as exc:
+            raise ValueError(f"{name!r} {exc}") from None
+        except MemoryError as exc:
+            raise MemoryError(
+                f"{name!r} holds arrays for which there is no memory ({exc}); read it elsewhere"
+            ) from None
+        except Exception as exc:  # h5py, json and the objects that are made fail in many ways on a damaged file
             raise ValueError(f"{name!r} is damaged: it holds no whole {kind} ({exc}); save or copy it again") from exc
     except BaseException:
         file.close()
         raise
 
 
-def job_of(path: Any) -> str | None:
-    """The mark of the job that made an image file; None where there is no such file, or no mark in it."""
+def open_rows(path: Any, name: str) -> Any:
+    """The dataset `name` of a file of sarcl's, or of another HDF5 file, with the checksums that the file has for it.
+
+    ValueError where the file is damaged, OSError or KeyError where there is no such file or dataset.
+    """
+    sums = _checked(path)
+    found = _opened(path)[name]
+    return (
+        found if sums is None or sums.rows is None or sums.rows[0] != name.strip("/") else _with_checksums(found, sums)
+    )
+
+
+def _checked(path: Any) -> _checksums.Checksums | None:
+    """Checksums of a file after a check of all but its rows; one without checksums is tried in another process."""
+    try:
+        sums = _checksums.of(Path(path))
+        if sums is None:
+            _hdf5_safety.check_readable(path)
+    except _checksums.Truncated as exc:
+        raise ValueError(f"{str(path)!r} is truncated or damaged: {exc}; copy it again") from None
+    except (_checksums.Damaged, _hdf5_safety.Refused) as exc:
+        raise ValueError(f"{str(path)!r} is damaged: {exc}; save or copy it again") from None
+    return sums
+
+
+def _opened(path: Any) -> Any:
     import h5py
 
     try:
-        with h5py.File(path, "r", locking="best-effort") as file:
+        return h5py.File(path, "r", locking="best-effort")
+    except OSError as exc:
+        what = "truncated" if "truncated" in str(exc) else "not an HDF5 file, or damaged"
+        raise ValueError(f"{str(path)!r} is {what} ({exc}); copy it again or give a file saved by sarcl") from None
+
+
+def _with_checksums(dataset: Any, sums: _checksums.Checksums) -> Any:
+    from ._checked_rows import CheckedRows
+
+    return CheckedRows(dataset, sums)
+
+
+def job_of(path: Any) -> str | None:
+    """The mark of the job that made an image file; None where there is no such file, or no mark in a whole file."""
+    try:
+        _checked(path)
+        with _opened(path) as file:
             job = file.attrs.get("job")
             return job if isinstance(job, str) else None
-    except OSError:
+    except (OSError, KeyError, RuntimeError, ValueError):
         return None
 
 

@@ -14,7 +14,7 @@ from typing import TYPE_CHECKING, Any, Unpack
 import numpy as np
 
 from ..base.text import unknown
-from ..io import toml
+from ..io import input_paths, toml
 from . import _schema
 from ._earth import earth_fixed, on_terrain, pass_text, time_over
 from ._focusing import check_window, focused, range_doppler_options, section_of
@@ -420,13 +420,9 @@ def load(path: PathLike) -> Scenario:
     """
     path = Path(path)
     try:
-        text = path.read_bytes().decode("utf-8")
+        text = input_paths.contents(path, "scenario file").decode("utf-8")
     except UnicodeDecodeError as exc:
         raise ValueError(f"{path}: byte {exc.start} is not UTF-8 text; a scenario is a TOML file") from None
-    except FileNotFoundError:
-        raise FileNotFoundError(f"scenario file {str(path)!r} does not exist; check the name and the folder") from None
-    except IsADirectoryError:
-        raise IsADirectoryError(f"{str(path)!r} is a folder; give the TOML file in it") from None
     return loads(text, name=str(path), folder=path.parent)
 
 

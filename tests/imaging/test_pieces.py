@@ -280,7 +280,7 @@ def test_no_room_for_the_image_is_said_in_one_line_and_the_same_call_goes_on(raw
     assert done.returncode == 2
     said = [line for line in done.stderr.splitlines() if "error" in line]
     assert len(said) == 1 and "Traceback" not in done.stderr and "ref count" not in done.stderr
-    assert "cannot write 'image.h5': File too large; the image needs 0.02 GB" in said[0]
+    assert "cannot write 'image.h5': File too large; the image needs 19.2 MB" in said[0]
     assert "give the same call again" in said[0]
     kept = flag == "--resume"
     assert names(tmp_path) == [*(["image.h5.parts"] if kept else []), "raw.h5", "wanted.h5"]
@@ -596,21 +596,20 @@ def test_a_second_run_to_the_same_image_is_refused_and_does_no_harm(raw, whole, 
 def test_a_piece_that_finds_another_run_at_its_image_leaves_its_tiles(raw, tmp_path):
     path = tmp_path / "image.h5"
     sarcl.backproject(raw, GRID, out=path, tile=(1, 2))
-    part, lock = output_paths.claim(path)
+    part = output_paths.begin(path, alone=True)
     try:
         assert sarcl.backproject(raw, GRID, out=path, tile=(2, 2)) is None
     finally:
-        part.unlink()
-        os.close(lock)
+        part.remove()
     calls = []
     sarcl.backproject(raw, GRID, out=path, progress=lambda *a: calls.append(a))
     assert calls in ([], [("backproject", 0, 0)])
 
 
-def test_the_work_file_of_a_killed_run_is_taken_over(raw, tmp_path):
-    part, lock = output_paths.claim(tmp_path / "image.h5")
-    part.write_bytes(b"half an image")
-    os.close(lock)
+def test_the_work_file_of_a_killed_run_is_removed(raw, tmp_path):
+    part = output_paths.begin(tmp_path / "image.h5", alone=True)
+    part.path.write_bytes(b"half an image")
+    part._unlock()  # as the end of a process does
     sarcl.backproject(raw, GRID, out=tmp_path / "image.h5")
     assert names(tmp_path) == ["image.h5"]
 

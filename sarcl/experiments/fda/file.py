@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...base import text, validation
+from ...io import input_paths
 from ._sweep import KEYS as SWEPT
 from ._sweep import cases
 from .case import Case
@@ -26,9 +27,7 @@ def load(path: Any) -> tuple[str, list[Case]]:
     """
     path = Path(path)
     try:
-        tables = tomllib.loads(path.read_bytes().decode("utf-8"))
-    except FileNotFoundError:
-        raise FileNotFoundError(f"experiment {str(path)!r} does not exist; check its name and folder") from None
+        tables = tomllib.loads(input_paths.contents(path, "experiment").decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
         raise ValueError(f"{path}: {exc}; this is not valid TOML") from None
     for name in tables:

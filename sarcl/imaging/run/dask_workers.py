@@ -17,6 +17,7 @@ from typing import Any
 import numpy as np
 
 from ...base.stage_timer import Clock
+from ...io import sarcl_hdf5
 from ...model.lazy_rows import Picked, Stacked
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
@@ -126,10 +127,8 @@ class InFile:
 
     def __getitem__(self, rows: slice) -> np.ndarray:
         if self._open is None:
-            import h5py
-
             try:
-                found = h5py.File(self.file, "r", locking="best-effort")[self.name]
+                found = sarcl_hdf5.open_rows(self.file, self.name)
             except (OSError, KeyError) as exc:
                 raise OSError(
                     f"{self.file!r} cannot be read here ({exc}); every worker needs it under this name"

@@ -1,0 +1,78 @@
+"""Rows of an HDF5 file whose checksums are compared when they are read. Imported late: it loads h5py."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import h5py
+import numpy as np
+
+from ._checksums import AT_ONCE, Checksums, crc_of
+
+
+class CheckedRows(h5py.Dataset):
+    """A dataset that compares the checksum of every block of rows when it is first read from.
+
+    OSError names the file and the rows of a block that is not as it was written, or cannot be read.
+    """
+
+    def __init__(self, dataset: h5py.Dataset, sums: Checksums) -> None:
+        super().__init__(dataset.id, readonly=True)
+        self._sums = sums
+        self._good = np.zeros(len(sums.blocks), bool)
+
+    def __getitem__(self, args: Any, new_dtype: Any = None) -> Any:
+        first = args[0] if isinstance(args, tuple) and args else args
+        low, high = self._touched(first)
+        step = self._sums.step
+        a, b = low // step, -(-high // step)
+        if high > low and not self._good[a:b].all():
+            start, stop = a * step, min(b * step, self.shape[0])
+            plain = args is first and new_dtype is None and isinstance(first, slice) and first.step in (None, 1)
+            row = max(1, self.nbytes // max(1, self.shape[0]))
+            if plain and (stop - start) * row <= 2 * AT_ONCE:  # one reading serves the check and the caller
+                rows = self._read(slice(start, stop))
+                self._compare(rows, a)
+                wanted = rows[low - start : high - start]
+                return wanted.copy() if 2 * len(wanted) < len(rows) else wanted  # does not hold much more than asked
+            for block in range(a, b):
+                if not self._good[block]:
+                    self._compare(self._read(slice(block * step, min((block + 1) * step, self.shape[0]))), block)
+        return self._read(args, new_dtype)
+
+    def read_direct(self, dest: Any, source_sel: Any = None, dest_sel: Any = None) -> None:
+        """As of h5py.Dataset."""
+        for start in range(0, self.shape[0], self._sums.step):
+            if not self._good[block := start // self._sums.step]:
+                self._compare(self._read(slice(start, min(start + self._sums.step, self.shape[0]))), block)
+        super().read_direct(dest, source_sel, dest_sel)
+
+    def _touched(self, first: Any) -> tuple[int, int]:
+        """First and last + 1 of the rows that an index of rows may name."""
+        n = self.shape[0]
+        if isinstance(first, slice):
+            a, b, step = first.indices(n)
+            return (a, b) if step > 0 else (0, n)
+        if isinstance(first, (int, np.integer)):
+            return (int(first) % n, int(first) % n + 1) if -n <= first < n else (0, 0)
+        return 0, n
+
+    def _read(self, args: Any, new_dtype: Any = None) -> Any:
+        try:
+            return super().__getitem__(args, new_dtype)
+        except (OSError, RuntimeError) as exc:
+            raise OSError(f"{self.file.filename!r} cannot be read ({exc}); copy it again") from exc
+
+    def _compare(self, rows: np.ndarray, block: int) -> None:
+        """Compare whole blocks of rows, from `block` on."""
+        step = self._sums.step
+        for i in range(0, len(rows), step):
+            if crc_of(rows[i : i + step]) != self._sums.blocks[block]:
+                first, last = block * step, min((block + 1) * step, self.shape[0]) - 1
+                name = self.name.strip("/")
+                raise OSError(
+                    f"{self.file.filename!r} is damaged: rows {first} to {last} of {name} are not as they were "
+                    f"written (their checksum differs); save or copy it again, or use the other rows of {name}"
+                )
+            self._good[block] = True
+            block += 1
