@@ -6,6 +6,7 @@ import functools
 import os
 from typing import Any
 
+from . import _cache_folder
 from .device import Device, DeviceChoice
 from .device_list import DeviceInfo, devices, listed, tried
 
@@ -39,7 +40,8 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
             if tried(info.index).works:
                 return _open(info.index)
     if not any(info.works for info in devices()):
-        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {REMEDY}")
+        remedy = _cache_folder.prepare() or REMEDY
+        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}")
     raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
 
 

@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.text import first_line
-from . import _after_fork, _trial_record
+from . import _after_fork, _cache_folder, _trial_record
 from ._programs import quiet
 
 
@@ -60,6 +60,7 @@ def tried_again() -> tuple[DeviceInfo, ...]:
 def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
     """Every device of every platform before its trial (works is False), with pyopencl's handle."""
     _after_fork.check()
+    _cache_folder.prepare()
     return _listed()
 
 

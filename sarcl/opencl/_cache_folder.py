@@ -1,0 +1,71 @@
+"""A cache folder that can be written: PoCL shows no device without one, and pyopencl builds no kernel."""
+
+from __future__ import annotations
+
+import functools
+import logging
+import os
+import stat
+import tempfile
+from pathlib import Path
+
+log = logging.getLogger(__name__)
+
+
+@functools.cache
+def prepare() -> str:
+    """Make XDG_CACHE_HOME of this process a folder that can be written, before any OpenCL driver is loaded.
+
+    Where the user's own can be written, nothing changes. Else a folder of this user's in the folder of temporary files
+    is taken, and the log warns of it. Returns what is wrong where neither can be written, for messages; else "".
+    """
+    import platformdirs
+
+    own = os.environ.get("POCL_CACHE_DIR") or platformdirs.user_cache_dir()
+    why = _trouble(Path(own))
+    shared = platformdirs.user_cache_dir()
+    if not why and own != shared:
+        own, why = shared, _trouble(Path(shared))
+    if not why:
+        return ""
+    try:
+        other = _temporary()
+    except OSError as exc:
+        return (
+            f"the cache folder {own!r} cannot be written ({why}), nor can {tempfile.gettempdir()!r} ({exc.strerror}), "
+            "and without one PoCL shows no device: set XDG_CACHE_HOME to a folder that you may write to"
+        )
+    log.warning(
+        "the cache folder %r cannot be written (%s): kernels are kept in %s, which a restart may clear; set "
+        "XDG_CACHE_HOME to a folder that you may write to", own, why, other,
+    )  # fmt: skip
+    os.environ["XDG_CACHE_HOME"] = other
+    if "POCL_CACHE_DIR" in os.environ:
+        os.environ["POCL_CACHE_DIR"] = os.path.join(other, "pocl")
+    return ""
+
+
+def _trouble(folder: Path) -> str:
+    """Why nothing can be written in a folder, which is made where it is missing; "" where it can."""
+    try:
+        folder.mkdir(mode=0o700, parents=True, exist_ok=True)
+        with tempfile.TemporaryFile(dir=folder) as file:
+            file.write(bytes(4096))
+            file.flush()
+    except OSError as exc:
+        return exc.strerror or str(exc)
+    return ""
+
+
+def _temporary() -> str:
+    """This user's folder of that name, if nobody else can write in it, else a new one: binaries are run from it."""
+    if hasattr(os, "getuid"):
+        path = Path(tempfile.gettempdir()) / f"sarcl-cache-{os.getuid()}"
+        try:
+            path.mkdir(mode=0o700)
+        except FileExistsError:
+            pass
+        found = os.lstat(path)
+        if stat.S_ISDIR(found.st_mode) and found.st_uid == os.getuid() and not stat.S_IMODE(found.st_mode) & 0o077:
+            return str(path)
+    return tempfile.mkdtemp(prefix="sarcl-cache-")
