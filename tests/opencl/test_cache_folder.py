@@ -17,7 +17,8 @@ def devices(tmp_path, **environment):
     """`sarcl devices` with other folders."""
     left = {k: v for k, v in os.environ.items() if k not in ("XDG_CACHE_HOME", "POCL_CACHE_DIR", "TMPDIR")}
     return subprocess.run(
-        [sys.executable, "-m", "sarcl", "devices"], env={**left, **environment}, capture_output=True, text=True, timeout=120
+        [sys.executable, "-m", "sarcl", "devices"],
+        env={**left, **environment}, capture_output=True, text=True, timeout=120,
     )  # fmt: skip
 
 
