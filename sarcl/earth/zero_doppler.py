@@ -238,7 +238,8 @@ def _angle_on(arc: _Arc, model: ElevationModel, low: np.ndarray, high: np.ndarra
         lon, lat, _ = wgs84.geodetic(arc.at(low)[at])
         raise ValueError(
             f"slant range[{at}] = {arc.ranges[at]:.9g} m meets no terrain of the elevation model: near longitude "
-            f"{lon:.4f}, latitude {lat:.4f} it ends or has no data; give a model that covers the swath, or a number"
+            f"{lon:.4f}, latitude {lat:.4f} it ends or has no data; give a model that covers "
+            "the swath, times and ranges within it (of an image: times=, ranges=), or a number"
         )
     for _ in range(60):
         middle = (first + last) / 2
