@@ -27,6 +27,9 @@ from .imaging.forecast import Forecast as Forecast
 from .imaging.forecast import plan as plan
 from .imaging.polar_format.polar_format import polar_format as polar_format
 from .imaging.range_doppler.range_doppler import range_doppler as range_doppler
+from .imaging.strip_map import EffectiveVelocity as EffectiveVelocity
+from .imaging.strip_map import doppler_centroid as doppler_centroid
+from .imaging.strip_map import effective_velocity as effective_velocity
 from .model import pointing as pointing
 from .model import radar as radar
 from .model.antenna import Antenna as Antenna

@@ -56,10 +56,10 @@ def stop_and_go_error(
           `receiver_at_arrival(...)` the result is the remaining error.
 
     flight: c tau = |T(t) - x| + |x - R(t + tau)| is solved. chirp: the echo of p(t) is p((t - tau)/(1 + tau')), whose
-    spectrum is P(f (1 + tau')). For a chirp of rate k = bandwidth/duration, P = exp(-j pi (f - fc)^2/k), that is
+    spectrum is P(f (1 + tau')). For a chirp of rate k = waveform.sweep_rate, P = exp(-j pi (f - fc)^2/k), that is
     an additional delay of tau' fc/k, and little else (docs/theory/radar.md). ValueError for pulses that are not chirps.
     """
-    if waveform.kind != "chirp":
+    if waveform.sweep_rate is None:
         raise ValueError(f"the error of stop and go is known for chirps, not for a {waveform.kind!r} waveform")
     x = validation.array("points", points, np.float64, ("n", 3))
     moving = track if receiver is None else receiver
@@ -68,7 +68,7 @@ def stop_and_go_error(
     if len(stands) != len(track):
         raise ValueError(f"used has {len(stands)} positions but track has {len(track)}; give one per pulse")
     path = _distance(track.positions[:, None], x) + _distance(stands.positions[:, None], x)
-    c, fc, rate = constants.SPEED_OF_LIGHT, waveform.center, waveform.bandwidth / waveform.duration
+    c, fc, rate = constants.SPEED_OF_LIGHT, waveform.center, waveform.sweep_rate
     flight = (c * tau - path) / 2
     return StopAndGo(
         flight=flight,
@@ -103,7 +103,7 @@ def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> 
     raw has no velocities, or no chirp.
     """
     validation.instance("raw", raw, PhaseHistory)
-    if raw.waveform is None or raw.waveform.kind != "chirp":
+    if raw.waveform is None or raw.waveform.sweep_rate is None:
         raise ValueError(
             "raw names no chirp, so its rate is unknown; set raw.waveform to the Waveform.chirp that was sent"
         )
@@ -119,10 +119,10 @@ class _Chirped(RowsOnDemand):
     """Rows times the phase of motion during the pulse, computed for the rows of a slice."""
 
     def __init__(self, raw: PhaseHistory, slope: np.ndarray, sign: float) -> None:
-        assert raw.waveform is not None
+        assert raw.waveform is not None and raw.waveform.sweep_rate is not None
         self.source, self.slope, self.sign = raw.samples, slope, sign
         self.first, self.step = raw.frequency, raw.frequency_step
-        self.center, self.rate = raw.waveform.center, raw.waveform.bandwidth / raw.waveform.duration
+        self.center, self.rate = raw.waveform.center, raw.waveform.sweep_rate
         self.shape, self.dtype = raw.samples.shape, np.dtype(raw.samples.dtype)
 
     def __getitem__(self, rows: slice) -> np.ndarray:

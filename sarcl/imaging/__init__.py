@@ -11,6 +11,8 @@ For other folders:
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
+    strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
+    unseen_pixels    pixels outside the range window of every row
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
@@ -36,5 +38,7 @@ __all__ = [
     "profile_energy",
     "range_doppler",
     "run",
+    "strip_map",
     "tiling",
+    "unseen_pixels",
 ]

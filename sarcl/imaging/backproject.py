@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
-from ..base.errors import ToleranceMissed
+from ..base.errors import ToleranceMissed, warn
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..base.types import PathLike, WritableArray
@@ -31,6 +31,7 @@ from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
 from .tiling.tiling import Run
+from .unseen_pixels import unseen_pixels
 
 if TYPE_CHECKING:
     import distributed
@@ -122,7 +123,8 @@ def backproject(
     Returns an Image. Raises ToleranceUnreachable, a ValueError, where the tolerance cannot be met; it names the best
     tolerance that can. ValueError: data not compressed, arguments that do not go together, tiles of another job in
     "PATH.parts". ToleranceMissed, a ValueError that holds the finished image: the check measured an error above the
-    tolerance. MemoryError: max_bytes too small for a single row.
+    tolerance. MemoryError: max_bytes too small for a single row. SarclWarning: 1 % of the pixels or more lie outside
+    the range window of every row; report.plan counts them.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
@@ -171,6 +173,9 @@ def backproject(
             where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
             text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
             log.warning(text, where, remedy)
+        unseen = unseen_pixels(task) if done else None
+        if unseen and unseen.warning:
+            warn(unseen.warning)
         measured = None
         exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
@@ -179,6 +184,8 @@ def backproject(
         plan = chosen.plan.describe(chosen.method)
         if kept:
             plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
+        if unseen:
+            plan["pixels outside every range window"] = unseen.describe()
         report = Report(
             plan=plan,
             tolerance=tolerance,

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, field, fields, replace
-from typing import TYPE_CHECKING, Any
+from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -29,6 +29,18 @@ PER_ROW = {
     "tx_velocity": (np.float64, (3,)),
     "rx_velocity": (np.float64, (3,)),
 }
+
+
+class RowFields(TypedDict, total=False):
+    """The optional fields of a PhaseHistory that have one entry per row."""
+
+    time: ArrayLike | None
+    tx_channel: ArrayLike | None
+    rx_channel: ArrayLike | None
+    polarization: ArrayLike | None
+    weight: ArrayLike | None
+    tx_velocity: ArrayLike | None
+    rx_velocity: ArrayLike | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,6 +186,68 @@ class PhaseHistory:
         if out.dtype.kind in "fc":
             validation.finite(name, out)
         return validation.sealed(out)
+
+    @classmethod
+    def from_time(
+        cls,
+        samples: ArrayLike | LazyRows,
+        *,
+        rate: float,
+        start: ArrayLike = 0.0,
+        carrier: ArrayLike | None = None,
+        tx: ArrayLike,
+        rx: ArrayLike | None = None,
+        kind: Literal["compressed", "dechirped", "chirped"] = "compressed",
+        bandwidth: float | None = None,
+        waveform: Waveform | None = None,
+        pulse_time: Literal["start", "middle"] = "start",
+        sweep_rate: float | None = None,
+        beat: Literal["positive", "negative"] | None = None,
+        reference_range: ArrayLike = 0.0,
+        scene_range: ArrayLike | None = None,
+        **rows: Unpack[RowFields],
+    ) -> PhaseHistory:
+        """Echoes sampled in time, (n_rows, n), as a phase history; the samples are copied.
+
+        rate      sampling rate, Hz
+        start     s, one or per row: the delay of sample 0, counted from the transmission; of dechirped samples its time
+                  after the instant at which the reference sweep passes `carrier`
+        carrier   Hz, one or per row: the frequency that was mixed to 0; of dechirped samples that of the sweep at
+                  time 0. None: waveform.center
+        tx, rx    antenna positions, m (n_rows, 3); rx None: one antenna
+        kind      "compressed": complex, a pulse of peak |a| at the delay of a point of amplitude a
+                  "chirped": complex, a pulse of modulus |a| as it was sent; the result awaits `sarcl.compress`
+                  "dechirped": the echo of a linear sweep times the sweep itself, complex or real (FMCW, stretch)
+        bandwidth      Hz, of compressed samples: the frequencies that are kept, about the carrier. None: those of the
+                       waveform, or all, `rate`
+        waveform       the Waveform that was sent; of chirped samples it must be given
+        pulse_time     of chirped samples: `start` is counted from the "start" or the "middle" of the pulse sent
+        sweep_rate     of dechirped samples: Hz/s, negative where the frequency falls
+        beat           of complex dechirped samples: the sign that the beat frequency has for echoes behind the
+                       reference, "positive" or "negative"; of real samples: None
+        reference_range  of dechirped samples: m, one or per row, half the path for which the reference sweep was
+                       delayed; 0 where the sweep that is sent is the reference itself
+        scene_range    of dechirped samples: m, one or per row, the range of the scene's middle, which becomes the
+                       reference. The residual video phase pi K (tau - tau_ref)^2 is 0 there, exactly. None: a filter
+                       removes it at all ranges, and disturbs a few times rate/sqrt(|K|) samples at either end
+        rows           time, polarization, ... : the optional fields with one entry per row
+
+        The phase of a return is exp(-j 2 pi carrier tau): give the conjugate of samples that have the other sign.
+        Carrier phases are exact before they are rounded to float64. Compressed and chirped samples get reference ranges
+        at the middle of the record. ValueError: samples, arguments or a waveform that the kind does not have, and rates
+        below the bandwidth. SarclWarning: most of the energy lies at negative ranges.
+        docs/guide/your_own_data.md has a recipe for each kind.
+        """
+        from . import _time_samples
+
+        made, pulse = _time_samples.spectra_of(
+            samples, kind, rate, start, carrier, bandwidth, waveform, pulse_time, sweep_rate, beat, reference_range,
+            scene_range,
+        )  # fmt: skip
+        return cls(
+            made.samples, made.frequency, made.step, tx, made.reference_range, rx,
+            waveform=pulse, compressed=kind != "chirped", **rows,
+        )  # fmt: skip
 
     def __repr__(self) -> str:
         low = self.frequency.min() / 1e9

@@ -82,18 +82,4 @@ def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | N
         raise ValueError(
             "raw has no waveform, so the energy of its pulse is unknown; set raw.waveform, or give nesz_db=..."
         )
-    return np.asarray(BOLTZMANN * temperature / (raw.frequency_step * peak_energy_density(pulse)))
-
-
-def peak_energy_density(waveform: Waveform) -> float:
-    """Largest |integral of p(t) exp(-j 2 pi f t) dt|^2, s^2, of the pulse p of peak modulus 1.
-
-    duration/bandwidth of a chirp (its stationary-phase spectrum), duration^2 of a tone.
-    """
-    if waveform.kind == "chirp":
-        return waveform.duration / waveform.bandwidth
-    if waveform.kind == "tone":
-        return waveform.duration**2
-    assert waveform.signal is not None and waveform.rate is not None
-    unit = waveform.signal / np.abs(waveform.signal).max()
-    return float((np.abs(np.fft.fft(unit, 8 * len(unit))).max() / waveform.rate) ** 2)
+    return np.asarray(BOLTZMANN * temperature / (raw.frequency_step * pulse.peak_energy_density))

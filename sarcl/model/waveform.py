@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
-Kind = Literal["chirp", "tone", "sampled"]
+Kind = Literal["chirp", "down-chirp", "tone", "sampled"]
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +20,7 @@ class Waveform:
     center     carrier, Hz
     bandwidth  width of the band in which echoes are sampled, Hz: [center - bandwidth/2, center + bandwidth/2]
     duration   length of the pulse, s
-    kind       "chirp", "tone" or "sampled"
+    kind       "chirp", "down-chirp" (its frequency falls), "tone" or "sampled"
     signal     complex baseband samples (n,), kind "sampled" only;  rate  their sampling rate, Hz
 
     The pulse is centred on t = 0. Raises ValueError when a value is not finite or positive, or the band reaches 0 Hz.
@@ -48,7 +48,7 @@ class Waveform:
     def __post_init__(self) -> None:
         for name in ("center", "bandwidth", "duration"):
             object.__setattr__(self, name, validation.number(f"waveform {name}", getattr(self, name), above=0))
-        validation.choice("waveform kind", self.kind, ("chirp", "tone", "sampled"))
+        validation.choice("waveform kind", self.kind, ("chirp", "down-chirp", "tone", "sampled"))
         if self.bandwidth >= 2 * self.center:
             raise ValueError(
                 f"waveform bandwidth {self.bandwidth:g} Hz about center {self.center:g} Hz reaches "
@@ -66,9 +66,19 @@ class Waveform:
             )
 
     @classmethod
-    def chirp(cls, *, center: float, bandwidth: float, duration: float) -> Waveform:
-        """Linear frequency modulation, rate bandwidth/duration; its matched spectrum is 1 in the band."""
-        return cls(center, bandwidth, duration, "chirp")
+    def chirp(cls, *, center: float, bandwidth: float, duration: float, down: bool = False) -> Waveform:
+        """Linear frequency modulation, rate bandwidth/duration; its matched spectrum is 1 in the band.
+
+        down  True: the frequency falls, at the same rate; bandwidth is positive then too
+        """
+        if not isinstance(down, (bool, np.bool_)):
+            raise TypeError(f"down is {down!r}; give True for a frequency that falls, else False")
+        if validation.number("waveform bandwidth", bandwidth) < 0:
+            raise ValueError(
+                f"waveform bandwidth is {bandwidth:g}; it must be greater than 0: for a chirp whose frequency falls "
+                f"give bandwidth={-bandwidth:g}, down=True"
+            )
+        return cls(center, bandwidth, duration, "down-chirp" if down else "chirp")
 
     @classmethod
     def tone(cls, *, center: float, duration: float, bandwidth: float | None = None) -> Waveform:
@@ -90,15 +100,37 @@ class Waveform:
         """Spectrum P of the pulse at `frequency` Hz (n,), complex128, largest modulus 1.
 
         A chirp has its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
-        band and 0 outside.
+        band and 0 outside; a down-chirp has the conjugate.
         """
         f = np.asarray(frequency, dtype=np.float64) - self.center
-        if self.kind == "chirp":
+        if self.sweep_rate is not None:
             inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
-            return np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside
+            return np.exp(-1j * np.pi * f**2 / self.sweep_rate) * inside
         if self.kind == "tone":
             return np.sinc(f * self.duration).astype(np.complex128)
         return self._sampled_spectrum(f) / self._sampled_peak()
+
+    @property
+    def sweep_rate(self) -> float | None:
+        """Rate of the frequency of a chirp, Hz/s, negative for a down-chirp; None for other waveforms."""
+        if self.kind not in ("chirp", "down-chirp"):
+            return None
+        rate = self.bandwidth / self.duration
+        return rate if self.kind == "chirp" else -rate
+
+    @property
+    def peak_energy_density(self) -> float:
+        """Largest |integral of p(t) exp(-j 2 pi f t) dt|^2, s^2, of the pulse p of peak modulus 1.
+
+        duration/bandwidth of a chirp (its stationary-phase spectrum), duration^2 of a tone.
+        """
+        if self.sweep_rate is not None:
+            return self.duration / self.bandwidth
+        if self.kind == "tone":
+            return self.duration**2
+        assert self.signal is not None and self.rate is not None
+        unit = self.signal / np.abs(self.signal).max()
+        return float((np.abs(np.fft.fft(unit, 8 * len(unit))).max() / self.rate) ** 2)
 
     def matched_spectrum(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """Spectrum W = |P|^2 after the matched filter at `frequency` Hz (n,), float64, peak 1."""

@@ -156,7 +156,15 @@ IMAGES = ("backproject", "polar_format", "range_doppler")
 def parameters(call: Call) -> dict[str, inspect.Parameter]:
     """Keys of the table that describes `call`."""
     found = inspect.signature(call).parameters
-    return {RENAMED.get(n, n): p for n, p in found.items() if n not in NOT_KEYS}
+    return {
+        RENAMED.get(n, n): p.replace(default=None) if may_be_left_out(p) else p
+        for n, p in found.items() if n not in NOT_KEYS
+    }  # fmt: skip
+
+
+def may_be_left_out(parameter: inspect.Parameter) -> bool:
+    """Whether an argument without a default may be None, which TOML cannot say: the times of a Trajectory."""
+    return parameter.default is inspect.Parameter.empty and str(parameter.annotation).endswith("| None")
 
 
 @dataclass(frozen=True)

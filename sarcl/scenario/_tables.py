@@ -31,7 +31,7 @@ def table_of(value: Any) -> Any:
     An object made from its table equals the object; meshes are written as facets, not as the file they came from.
     """
     if isinstance(value, Waveform):
-        return {value.kind: _waveform(value)}
+        return {"chirp" if value.kind == "down-chirp" else value.kind: _waveform(value)}
     if isinstance(value, Trajectory):
         table = _without_none(value, ("times", "positions", "velocities", "attitude", "accelerations"))
         return table if value.stop_and_go else {**table, "stop_and_go": False}
@@ -93,7 +93,8 @@ def _orbit(value: Orbit) -> dict[str, Any]:
 def _waveform(value: Waveform) -> dict[str, Any]:
     if value.kind == "sampled":
         return _without_none(value, ("signal", "rate", "center"))
-    return _without_none(value, ("center", "bandwidth", "duration"))
+    table = _without_none(value, ("center", "bandwidth", "duration"))
+    return {**table, "down": True} if value.kind == "down-chirp" else table
 
 
 def _antenna(value: Antenna) -> dict[str, Any]:

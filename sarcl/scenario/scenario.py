@@ -405,7 +405,8 @@ class Scenario:
             for name in ("mesh", "path", "dem", "geoid"):
                 if isinstance(given.get(name), str):
                     given[name] = self.folder / given[name]
-            return call(**given)
+            left_out = [p.name for p in inspect.signature(call).parameters.values() if _schema.may_be_left_out(p)]
+            return call(**{**dict.fromkeys(left_out), **given})
 
     def _options(self, name: str, options: Mapping[str, Any]) -> dict[str, Any]:
         """Arguments of a function. A list is a pair, or a name with its parameters: a tuple in Python."""

@@ -11,7 +11,7 @@ from scipy import stats
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.effects.noise import add_noise, cell_area, complex_gaussian
-from sarcl.model.radar import BOLTZMANN, Radar, noise_variance, peak_energy_density, spreading
+from sarcl.model.radar import BOLTZMANN, Radar, noise_variance, spreading
 
 FC, BAND, DURATION = 9.6e9, 150e6, 5e-6
 CHIRP = sarcl.Waveform.chirp(center=FC, bandwidth=BAND, duration=DURATION)
@@ -165,7 +165,7 @@ def test_thermal_noise_has_the_variance_of_a_simulated_receiver(kind):
     # a chirp's is flat but for Fresnel's ripples, which its stationary-phase spectrum leaves out
     f = np.abs(np.fft.fftfreq(2**16, 1 / rate))
     peak = np.sqrt((spectrum[f < 0.3 * BAND] ** 2).mean()) if kind == "chirp" else spectrum.max()
-    assert peak_energy_density(waveform) == pytest.approx(peak**2, rel=0.01)
+    assert waveform.peak_energy_density == pytest.approx(peak**2, rel=0.01)
     n = round(rate * period)
     random = np.random.default_rng(6)
     receiver = random.normal(size=(40, n, 2)) @ [1, 1j] * np.sqrt(BOLTZMANN * temperature * rate / 2)

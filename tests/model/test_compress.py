@@ -19,7 +19,7 @@ TOLERANCE = {
 }
 POINTS = np.array([[0.0, 0, 0], [3, -2, 1], [-4, 5, 0]])
 SCENE = sarcl.Scene.points(POINTS, [1, 0.5j, -0.7])
-TRACK = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.05, n_pulses=5)
+TRACK = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.05, n_pulses=5, prf=100.0)
 RATE = 2e8
 
 

@@ -177,7 +177,10 @@ BAD = {
     "no rate": (lambda: sampled([1, 2], rate=0), "waveform rate is 0"),
     "no signal": (lambda: sarcl.Waveform(1e9, 1e8, 1e-6, "sampled"), "waveform signal must be numbers"),
     "signal of a chirp": (lambda: sarcl.Waveform(1e9, 1e8, 1e-6, "chirp", [1, 2]), "go with kind 'sampled'"),
-    "unknown kind": (lambda: sarcl.Waveform(1e9, 1e8, 1e-6, "noise"), "'noise'; choose one of 'chirp', 'tone'"),
+    "unknown kind": (
+        lambda: sarcl.Waveform(1e9, 1e8, 1e-6, "noise"),
+        "'noise'; choose one of 'chirp', 'down-chirp', 'tone'",
+    ),
 }
 
 
@@ -186,3 +189,15 @@ def test_bad_waveforms_say_what_was_wanted(name):
     make, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_a_down_chirp_is_the_conjugate_of_a_chirp_and_a_negative_bandwidth_says_so():
+    down = sarcl.Waveform.chirp(center=CENTER, bandwidth=BAND, duration=LENGTH, down=True)
+    f = CENTER + np.linspace(-0.6, 0.6, 101) * BAND
+    assert (down.pulse_spectrum(f) == CHIRP.pulse_spectrum(f).conj()).all()
+    assert down.sweep_rate == -CHIRP.sweep_rate == -BAND / LENGTH
+    assert sarcl.Waveform.tone(center=CENTER, duration=LENGTH).sweep_rate is None
+    with pytest.raises(ValueError, match=r"bandwidth is -6e\+08; .* give bandwidth=6e\+08, down=True"):
+        sarcl.Waveform.chirp(center=CENTER, bandwidth=-BAND, duration=LENGTH)
+    scenario = sarcl.scenario.loads(sarcl.Scenario(waveform=down).dumps())
+    assert scenario.build_waveform().kind == "down-chirp"
