@@ -12,7 +12,6 @@ For other folders:
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
-    unseen_pixels    pixels outside the range window of every row
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
@@ -20,6 +19,10 @@ For other folders:
     range_doppler/   range_doppler(): FFTs along the track and in range, for near-straight tracks
     run/             the work in blocks: devices, checkpoints, output files
     tiling/          a grid in tiles, the tiles in bands: one class for each kind of grid
+
+For this folder alone:
+
+    _unseen_pixels   pixels outside the range window of every row
 """
 
 __all__ = [
@@ -40,5 +43,4 @@ __all__ = [
     "run",
     "strip_map",
     "tiling",
-    "unseen_pixels",
 ]

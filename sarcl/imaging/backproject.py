@@ -31,7 +31,7 @@ from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
 from .tiling.tiling import Run
-from .unseen_pixels import unseen_pixels
+from ._unseen_pixels import unseen_pixels
 
 if TYPE_CHECKING:
     import distributed
