@@ -22,6 +22,7 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
+from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice, choose
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
@@ -31,7 +32,6 @@ from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
 from .tiling.tiling import Run
-from ._unseen_pixels import unseen_pixels
 
 if TYPE_CHECKING:
     import distributed
