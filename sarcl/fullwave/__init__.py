@@ -2,19 +2,22 @@
 
 docs/theory/full_wave.md has the equations, the arrays and what each part hands to the next.
 
+For other folders:
+
+    fields        fields on a device and their time steps, tile by tile
+    lattice       the grid: cells, positions of field components, places in buffers
+    target        what a target is to the grid: lists of edges and faces
+
 For this folder alone:
 
     _absorber     absorbing layers (CPML)
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
-    _cut_cells    conductors that cut cells, from the intervals of grid lines inside a body
+    _cut_cells    conductors that cut cells, from the intervals of grid lines inside them
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     _far_field    echo amplitudes of currents, without the grid's own dispersion
-    _fields       fields on a device and their time steps, tile by tile
     _incident     a plane wave that enters through the faces of a box
-    _lattice      the grid: cells, positions of field components, places in buffers
     _lists        lists of cells on a device
     _pulse        the waveform of the incident wave, by its spectrum
-    _target       what a target is to the grid: lists of edges and faces
 """
 
-__all__: list[str] = []
+__all__ = ["fields", "lattice", "target"]

@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._lattice import COURANT, LANES, Lattice
+from .lattice import COURANT, LANES, Lattice
 
 ROWS = 8  # rows per work-item on a CPU
 

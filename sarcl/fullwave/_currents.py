@@ -8,13 +8,14 @@ import numpy as np
 
 from ..opencl.device import Device
 from . import _dispersion
-from ._fields import Fields
 from ._incident import PlaneWave, wave_table
-from ._lattice import Lattice
 from ._lists import BLOCK, TargetList
-from ._target import Target
+from .fields import Fields
+from .lattice import Lattice
+from .target import Target
 
 CHUNK = 128  # steps between two looks at how much of the currents is left: a multiple of BLOCK
+WEAKEST = 1e-3  # of the spectrum: float32 fields have errors of about 1e-6 of the peak
 LEFT = 1e-5  # largest residual of a block over the largest of all, below which the run ends
 
 
@@ -56,10 +57,13 @@ def currents(
     low = np.full(3, absorber + gap)
     high = np.array(lattice.shape) - absorber - gap
     centre = lattice.origin + lattice.cell * np.array(lattice.shape) / 2
+    _check_inside(lattice, target, low, high)
     table = wave_table(lattice, wave, low, high, centre)
     fields = Fields(device, lattice, target, absorber=absorber, wave=table, tile=tile)
     omega = _dispersion.grid_omega(lattice, k, wave.travel)
     lists = (fields.edges, 0.5), (fields.faces, 0.0)  # E changes between two steps, H about a step
+    spectrum = table.spectrum(omega)
+    _check_band(k, spectrum)
     sums = [device.zeros(8 * len(omega) * part.count) for part, _ in lists]
     largest, left = 0.0, 1.0
     while fields.step < most_steps and (fields.step < len(table.values) or left > LEFT):
@@ -73,12 +77,33 @@ def currents(
         now = max(float(np.abs(part.residuals(BLOCK)).max(initial=0)) for part, _ in lists)
         largest = max(largest, now)
         left = now / largest if largest else 0.0
-    spectrum = table.spectrum(omega)
     electric, magnetic = (_phasors(device, part, sum_, spectrum) for (part, _), sum_ in zip(lists, sums, strict=True))
     return Currents(
         lattice, wave, centre, np.asarray(k), omega, fields.edges.places, electric, fields.faces.places, magnetic,
         fields.step, left,
     )  # fmt: skip
+
+
+def _check_inside(lattice: Lattice, target: Target, low: np.ndarray, high: np.ndarray) -> None:
+    """ValueError where a cell of the target is not inside the box between nodes low and high."""
+    for name, at in (("an edge", target.edges), ("a face", target.faces)):
+        node = np.stack(np.unravel_index(at, (3, *lattice.shape))[1:], axis=1)
+        outside = ~((node > low) & (node < high - 1)).all(axis=1)
+        if outside.any():
+            raise ValueError(
+                f"target has {name} in cell {tuple(node[outside][0].tolist())}, outside the box of the incident wave "
+                f"from {tuple(low.tolist())} to {tuple(high.tolist())}; give the grid a larger margin"
+            )
+
+
+def _check_band(k: np.ndarray, spectrum: np.ndarray) -> None:
+    """ValueError where the pulse has less than WEAKEST of its strongest frequency at a wavenumber that is asked for."""
+    weakest = int(np.argmin(np.abs(spectrum)))
+    if not np.abs(spectrum[weakest]) > WEAKEST * np.abs(spectrum).max():
+        raise ValueError(
+            f"k[{weakest}] is {k[weakest]:.4g} rad/m, where the pulse has {np.abs(spectrum[weakest]):.2g} of its "
+            f"spectrum, {np.abs(spectrum).max():.2g} at most; give a pulse whose band holds every wavenumber"
+        )
 
 
 def _turns(lattice: Lattice, omega: np.ndarray, steps: np.ndarray) -> np.ndarray:

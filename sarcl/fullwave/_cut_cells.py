@@ -10,8 +10,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ._lattice import COURANT, Lattice
-from ._target import Target
+from .lattice import COURANT, Lattice
+from .target import Target
 
 # Smallest free area of a face, per length of its longest free edge, both relative to a whole cell. Stable from
 # COURANT^2 on; smaller areas are enlarged.

@@ -13,7 +13,7 @@ from __future__ import annotations
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
-from ._lattice import Lattice
+from .lattice import Lattice
 
 STEPS = 12  # of Newton's method, which converges quadratically from k = Omega
 

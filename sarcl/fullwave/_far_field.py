@@ -14,7 +14,7 @@ import numpy as np
 
 from . import _dispersion
 from ._currents import Currents
-from ._lattice import COURANT
+from .lattice import COURANT
 
 
 def amplitude(currents: Currents, direction: np.ndarray, polarization: np.ndarray) -> np.ndarray:

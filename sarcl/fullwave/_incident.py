@@ -14,8 +14,8 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import array, direction, sealed
 from . import _dispersion
-from ._lattice import COURANT, Lattice, PlaneOrder
 from ._pulse import SILENCE, Pulse
+from .lattice import COURANT, Lattice, PlaneOrder
 
 SPACING = 1 / 3  # of the table, in cells: six points interpolate waves of 6 cells to 1e-5
 BEFORE, AFTER = 2, 3  # points of the table before and after the cell of a position

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..opencl.device import Device
 from ._incident import Entrance, WaveTable
-from ._lattice import LANES, Lattice, PlaneOrder
+from .lattice import LANES, Lattice, PlaneOrder
 
 BLOCK = 8  # steps whose residuals are kept before they are transformed
 ENTRIES = 256  # entries per work-item on a CPU

@@ -17,7 +17,7 @@ For other folders:
     interp         interpolation of one profile
     map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation
-    mie            echoes of a conducting sphere
+    mie            echoes of a sphere
     polar_format   the image of plane waves
     quality        a point response by brute force
     range_doppler  reading of a profile along the range migration

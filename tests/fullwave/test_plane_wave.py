@@ -8,12 +8,13 @@ from helpers.devices import opened, variants
 
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import _dispersion
-from sarcl.fullwave._fields import Fields
+from sarcl.fullwave._currents import currents
 from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._lattice import COURANT, Lattice, lattice_around
 from sarcl.fullwave._lists import BLOCK
 from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave._target import Target
+from sarcl.fullwave.fields import Fields
+from sarcl.fullwave.lattice import COURANT, Lattice, lattice_around
+from sarcl.fullwave.target import Target, material_edges
 from sarcl.reference import fdtd
 
 CELL = 0.01  # m
@@ -66,6 +67,41 @@ def test_waves_that_the_grid_does_not_carry_are_refused():
         PlaneWave(np.array([0, 0, 2.0]), np.array([0, 0, 1.0]), Pulse.gaussian(1e9, 2e9))
     with pytest.raises(ValueError, match="give a multiple of 16, such as 32"):
         Lattice(CELL, (1, 1, 17), np.zeros(3))
+
+
+@pytest.mark.parametrize(
+    "cells, layers, message",
+    [
+        ((40, 40, 48), 17, "absorber is 17 cells; layers have at most 16"),
+        ((19, 40, 48), 10, "does not hold layers of 10 cells on each side; it needs at least"),
+        ((40, 40, 16), 10, "does not hold layers of 10 cells on each side; it needs at least"),
+    ],
+)
+@pytest.mark.parametrize("param", variants(names=()))
+def test_layers_that_do_not_fit_are_refused(param, cells, layers, message):
+    with pytest.raises(ValueError, match=message):
+        Fields(opened(param), Lattice(CELL, cells, np.zeros(3)), Target.nothing(), absorber=layers)
+
+
+@pytest.mark.parametrize("param", variants(names=()))
+def test_targets_outside_the_box_and_wavenumbers_outside_the_band_are_refused(param):
+    grid = Lattice(CELL, (32, 32, 32), np.zeros(3))
+    top = SPEED_OF_LIGHT / (10 * CELL)
+    wave = PlaneWave(unit((0, 0, -1)), unit((1, 0, 0)), Pulse.gaussian(0.5 * top, top))
+    k = 2 * np.pi * np.array([0.7, 0.9]) * top / SPEED_OF_LIGHT
+
+    def run(node, k):
+        at = np.ravel_multi_index((0, *node), (3, *grid.shape))
+        target = material_edges(grid, np.array([at]), np.array([2.0]), np.array([0.0]))
+        return currents(opened(param), grid, target, wave, k, absorber=8, gap=2, most_steps=0)
+
+    assert run((16, 16, 16), k).n_steps == 0
+    with pytest.raises(
+        ValueError, match=r"target has an edge in cell \(16, 10, 16\), outside the box of the incident wave"
+    ):
+        run((16, 10, 16), k)
+    with pytest.raises(ValueError, match=r"k\[1\] is 125\.7 rad/m, .* give a pulse whose band holds every wavenumber"):
+        run((16, 16, 16), k * np.array([1, 20 / 9]))
 
 
 def test_a_gaussian_pulse_has_its_band_its_length_and_no_constant_part():

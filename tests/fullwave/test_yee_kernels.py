@@ -6,12 +6,12 @@ import numpy as np
 import pytest
 from helpers.fdtd_cases import Twin, random_target
 
-from sarcl.fullwave._fields import Fields, tiles
 from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._lattice import Lattice
 from sarcl.fullwave._lists import BLOCK
 from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave._target import Target
+from sarcl.fullwave.fields import Fields, tiles
+from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd
 
 ROUNDING = 2e-6  # float32 over BLOCK steps of fields of order 1

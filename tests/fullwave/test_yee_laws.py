@@ -9,10 +9,10 @@ from helpers.fdtd_cases import sphere_intervals
 
 from sarcl.fullwave import _cut_cells
 from sarcl.fullwave._cut_cells import Intervals, conductor
-from sarcl.fullwave._fields import Fields
-from sarcl.fullwave._lattice import COURANT, Lattice
 from sarcl.fullwave._lists import BLOCK
-from sarcl.fullwave._target import VACUUM_PERMITTIVITY, Target, material_edges
+from sarcl.fullwave.fields import Fields
+from sarcl.fullwave.lattice import COURANT, Lattice
+from sarcl.fullwave.target import VACUUM_PERMITTIVITY, Target, material_edges
 from sarcl.reference import fdtd
 
 CELL = 0.01  # m

@@ -7,8 +7,8 @@ import numpy as np
 from sarcl.fullwave import _absorber
 from sarcl.fullwave._cut_cells import Intervals
 from sarcl.fullwave._incident import entrances
-from sarcl.fullwave._lattice import COURANT
-from sarcl.fullwave._target import Target
+from sarcl.fullwave.lattice import COURANT
+from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd
 
 

@@ -12,9 +12,10 @@ from sarcl.fullwave._currents import currents
 from sarcl.fullwave._cut_cells import conductor
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave
-from sarcl.fullwave._lattice import lattice_around
 from sarcl.fullwave._pulse import Pulse
-from sarcl.reference.mie import conducting_sphere
+from sarcl.fullwave.lattice import lattice_around
+from sarcl.fullwave.target import VACUUM_PERMITTIVITY, material_edges
+from sarcl.reference.mie import conducting_sphere, dielectric_sphere
 
 # RCS over pi a^2 by ka: the series itself, evaluated elsewhere
 SERIES = {
@@ -46,12 +47,25 @@ def test_bistatic_echoes_are_those_of_the_austin_benchmark(data_folder, sphere, 
     assert np.abs(20 * np.log10(np.abs(a)) - rows[:, 3]).max() < 2e-6  # dB; the files have six digits
 
 
-def sphere_run(param, ka, cells, travel, n, staircase=False):
+def test_a_dielectric_sphere_is_a_conductor_for_large_permittivity_and_a_dipole_where_it_is_small():
+    """a = sqrt(4 pi) k^2 r^3 (eps - 1)/(eps + 2) for small spheres, by the dipole that a field induces."""
+    assert np.allclose(dielectric_sphere(1.0, 2.0, 1e5 * (1 - 1j)), conducting_sphere(1.0, 2.0), rtol=0.01)
+    for eps in (1.001, 3.0, 4 - 7j):
+        wanted = np.sqrt(4 * np.pi) * 0.01**2 * (eps - 1) / (eps + 2)
+        assert np.isclose(abs(dielectric_sphere(1.0, 0.01, eps)[0]), abs(wanted), rtol=1e-3)
+
+
+def sphere_run(param, ka, cells, travel, n, staircase=False, material=None):
     """Currents of a sphere of 1 m radius at n wavenumbers up to ka, `cells` cells per shortest wavelength."""
     cell = 2 * np.pi / ka / cells
     centre = cell * np.array([0.13, 0.27, 0.41])
     grid = lattice_around(centre - 1, centre + 1, cell, 16)
-    target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase)
+    if material:  # edges whose middle is inside the sphere
+        places = np.arange(3 * np.prod(grid.shape))
+        edges = places[np.linalg.norm(grid.positions(places, magnetic=False) - centre, axis=1) < 1.0]
+        target = material_edges(grid, edges, *(np.full(len(edges), value) for value in material))
+    else:
+        target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase)
     top = ka * SPEED_OF_LIGHT / (2 * np.pi)
     wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), Pulse.gaussian(0.05 * top, top))
     k = np.linspace(0.5, ka, n)
@@ -100,3 +114,38 @@ def test_a_staircase_sphere_is_far_worse(param):
     wanted = np.array([conducting_sphere(1.0, k)[0] for k in run.k])
     got = echo(run, centre, -run.wave.travel, run.wave.polarization)
     assert 0.5 < np.sqrt(np.mean((20 * np.log10(np.abs(got / wanted))) ** 2)) < 4
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("param", variants(names=()))
+@pytest.mark.parametrize("conductivity, least", [(0.0, 0.06), (0.01, 0.03)])
+def test_a_dielectric_sphere_up_to_ka_3(param, conductivity, least):
+    """Permittivity 3, in a staircase, 20 cells per wavelength: 11 in the sphere."""
+    run, centre = sphere_run(param, 3.0, 20, (0.5, -0.3, -0.8), 11, material=(3.0, conductivity))
+    eps = 3 - 1j * conductivity / (run.omega * VACUUM_PERMITTIVITY)
+    wanted = np.array([dielectric_sphere(1.0, k, e)[0] for k, e in zip(run.k, eps, strict=True)])
+    got = echo(run, centre, -run.wave.travel, run.wave.polarization)
+    assert np.abs(got - wanted).max() < least * np.abs(wanted).max()
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("param", variants(names=()))
+def test_echoes_are_reciprocal(param):
+    """A receiver in direction u of a wave along d sees what one in direction -d sees of a wave along -u."""
+    d, u = np.array([0.36, -0.48, 0.8]), np.array([0.8, 0.6, 0.0])
+    p, q = np.array([0.8, 0.6, 0.0]), np.array([0.0, 0.0, 1.0])
+    cell, k = 0.1, np.array([4.0])
+    grid = lattice_around(np.full(3, -0.5), np.full(3, 0.5), cell, 16)
+    rng = np.random.default_rng(1)
+    blocks = rng.integers(-4, 2, (4, 3)), rng.integers(2, 5, (4, 3))  # a body without symmetry
+    solid = np.zeros(grid.shape, bool)
+    for low, size in zip(*blocks, strict=True):
+        solid[tuple(slice(n // 2 + a, n // 2 + a + b) for n, a, b in zip(grid.shape, low, size, strict=True))] = True
+    edges = np.concatenate([np.flatnonzero(solid) + a * solid.size for a in range(3)])
+    target = material_edges(grid, edges, np.full(len(edges), 5.0), np.full(len(edges), 0.02))
+    pulse = Pulse.gaussian(0.5 * 4 * SPEED_OF_LIGHT / 6.3, 1.5 * 4 * SPEED_OF_LIGHT / 6.3)
+    there = currents(opened(param), grid, target, PlaneWave(d, p, pulse), k, absorber=10, gap=3)
+    back = currents(opened(param), grid, target, PlaneWave(-u, q, pulse), k, absorber=10, gap=3)
+    a, b = amplitude(there, u, q)[0], amplitude(back, -d, p)[0]
+    assert abs(a) > 0.01
+    assert abs(a - b) < 0.01 * abs(a)

@@ -11,12 +11,13 @@ from typing import Any
 
 import numpy as np
 
+from ..base.validation import count
 from ..opencl.device import Device
 from ._absorber import ROWS, Layers, along_rows
 from ._incident import WaveTable, entrances
-from ._lattice import COURANT, LANES, Lattice
 from ._lists import BLOCK, IncidentList, TargetList
-from ._target import Target
+from .lattice import COURANT, LANES, Lattice
+from .target import Target
 
 
 def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[int, int]]]:
@@ -32,6 +33,17 @@ def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[
                 yield step, (first, last)
 
 
+def _check_layers(lattice: Lattice, thickness: int) -> None:
+    """ValueError where layers of this thickness do not fit into the grid, or into vectors at the ends of its rows."""
+    if count("absorber", thickness, least=0) > LANES:
+        raise ValueError(f"absorber is {thickness} cells; layers have at most {LANES}")
+    if thickness and (min(lattice.shape[:2]) < 2 * thickness or lattice.shape[2] < 2 * LANES):
+        raise ValueError(
+            f"shape {lattice.shape} does not hold layers of {thickness} cells on each side; it needs at least "
+            f"{(2 * thickness, 2 * thickness, 2 * LANES)}"
+        )
+
+
 class Fields:
     """E and H of a grid on a device, with everything that is not vacuum.
 
@@ -43,6 +55,7 @@ class Fields:
         self, device: Device, lattice: Lattice, target: Target, *, absorber: int = 0, wave: WaveTable | None = None,
         tile: int | None = None,
     ) -> None:  # fmt: skip
+        _check_layers(lattice, absorber)
         self.device, self.lattice, self.tile = device, lattice, tile or lattice.shape[0] + BLOCK
         self.lanes = LANES if device.info.vector_width > 1 else 1
         self.step = 0  # steps that are done

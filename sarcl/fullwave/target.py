@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
-from ._lattice import Lattice
+from .lattice import Lattice
 
 VACUUM_PERMITTIVITY = 1 / (4e-7 * np.pi * SPEED_OF_LIGHT**2)  # F/m, with the permeability 4 pi 1e-7 H/m
 
