@@ -19,12 +19,14 @@ Block = dict[str, Any]
 
 
 def page(title: str, blocks: Sequence[Block], command: str = "") -> str:
-    """The whole file; `command` is the line that made it."""
+    """The whole file; `command` is the line that made it, which the page shows with the size of the file."""
     from jinja2 import Environment, StrictUndefined
 
     source = Path(__file__).with_name("page.html.j2").read_text(encoding="utf-8")
     template = Environment(autoescape=True, undefined=StrictUndefined).from_string(source)
-    return template.render(title=title, blocks=blocks, command=command, version=__version__)
+    given = {"title": title, "blocks": blocks, "command": command, "version": __version__}
+    size = len(template.render(**given, megabytes="0.0").encode())
+    return template.render(**given, megabytes=f"{size / 1e6:.1f}" if size > 5e4 else f"{size / 1e6:.2f}")
 
 
 def heading(text: str, level: int = 2, anchor: str = "") -> Block:
@@ -68,9 +70,12 @@ def plot(
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, caption: str, *,
     floor_db: float = -40.0, box: tuple[float, float] | None = None, percentile: float = 100.0,
-    lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
+    lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB", equal: bool = False,
 ) -> Block:  # fmt: skip
-    """A figure of decibels in grey; see `plots.picture`. percentile  of the values at which the scale has white."""
+    """A figure of decibels in grey, or of values of another unit; see `plots.picture`.
+
+    percentile  of the values at which the scale has white
+    """
     db = np.asarray(db, np.float64)
     data = plots.picture(
         np.minimum(db, np.percentile(db, percentile)),
@@ -82,9 +87,13 @@ def picture(
         box=box,
         lines=lines,
         unit=unit,
+        equal=equal,
     )
     white = "the largest value" if percentile == 100 else f"the percentile {percentile:g} of the values"
-    scale = f"White: {white}; black: {-floor_db:g} {unit} below."
+    scale = f"White: {white}; black: {-floor_db:g} dB below."
+    if not unit.startswith("dB"):
+        top = float(np.percentile(db, percentile))
+        scale = f"White: {top:.2g}; black: {top + floor_db:.2g} {unit}."
     return _figure(data, f"{caption} {scale}", f"Levels over {x_name} and {y_name}")
 
 

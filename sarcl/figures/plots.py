@@ -17,7 +17,9 @@ if TYPE_CHECKING:
 
 SIZE, DPI = (5.6, 4.0), 120  # of a figure, inches; pixels per inch
 LEFT, BOTTOM, WIDTH, HEIGHT = 0.14, 0.13, 0.83, 0.83  # of the axes, relative to the figure
-GREY_WIDTH = 0.76  # of a picture with its scale
+GREY_WIDTH = 0.76  # of a picture with its scale, relative to the figure
+SCALE_SHARE, SCALE_GAP = 0.11, 0.03  # of it: scale and gap together, and the gap alone
+LOWEST, HIGHEST = 2.4, 5.4  # of a picture whose axes have equal units, inches
 LEGEND_LINE = 0.055  # height of a line of the legend above the axes, relative to the figure
 COLORS = ("#1f4e9c", "#c0392b", "#1d8348", "#8e44ad", "#b9770e", "#34495e")
 LINES: tuple[Any, ...] = ("-", "--", "-.", ":", (0, (7, 2)), (0, (4, 1, 1, 1, 1, 1)))
@@ -116,24 +118,32 @@ def decades(axis: Any) -> None:
 def picture(
     db: Any, x: tuple[float, float], y: tuple[float, float], x_name: str, y_name: str, *, floor_db: float,
     box: tuple[float, float] | None = None, lines: Sequence[tuple[str, Any, Any]] = (), unit: str = "dB",
+    equal: bool = False,
 ) -> bytes:  # fmt: skip
     """PNG of decibels (rows, columns) in grey, row 0 at the bottom: white is the largest value, black floor_db below.
 
     x, y  edges of the frame;  box: half widths along x and y of a dashed rectangle about the origin
     lines (name, x (n,), y (n,)) drawn over it, with a legend;  unit  of the values, where they are not decibels
+    equal  a unit of x is as long as a unit of y: the figure is as high as its frame needs
     """
     from matplotlib.patches import Rectangle
 
     db = np.asarray(db, np.float64)
     top = float(db.max())
-    made = figure()
-    axes = made.add_axes((LEFT, BOTTOM, GREY_WIDTH, HEIGHT))
+    wide, high = SIZE
+    if equal:
+        frame = GREY_WIDTH * (1 - SCALE_SHARE) * wide * abs((y[1] - y[0]) / (x[1] - x[0]))
+        high = float(np.clip(frame + (1 - HEIGHT) * SIZE[1], LOWEST, HIGHEST))
+    margin = SIZE[1] / high
+    made = figure((wide, high))
+    axes = made.add_axes((LEFT, BOTTOM * margin, GREY_WIDTH, 1 - (1 - HEIGHT) * margin))
     shown = axes.imshow(
-        db, cmap="gray", vmin=top + floor_db, vmax=top, origin="lower", extent=(*x, *y), aspect="auto"
+        db, cmap="gray", vmin=top + floor_db, vmax=top, origin="lower", extent=(*x, *y),
+        aspect="equal" if equal else "auto",
     )  # fmt: skip
     names(axes, x_name, y_name)
     axes.grid(visible=False)
-    made.colorbar(shown, ax=axes, label=unit, fraction=0.08, pad=0.03)
+    made.colorbar(shown, ax=axes, label=unit, fraction=SCALE_SHARE - SCALE_GAP, pad=SCALE_GAP)
     if box is not None:
         corner = -box[0], -box[1]
         axes.add_patch(Rectangle(corner, 2 * box[0], 2 * box[1], fill=False, edgecolor="#2ecc71", linestyle="--"))

@@ -11,6 +11,8 @@ from ..model.image_grid import ImageGrid
 from ..scene.scene import Scene
 from .far_radar import FarRadar
 
+TEST, SIGNIFICANT = "test of Kolmogorov and Smirnov", 0.01  # of distributions; smaller p values reject them
+
 
 class Lab:
     """Echoes and images on one device.
@@ -41,14 +43,21 @@ class Lab:
 
 
 def picture(power: np.ndarray, grid: ImageGrid, caption: str, floor_db: float = -30.0) -> html.Block:
-    """Powers (rows, columns) on a grid about the origin as a figure, white at the percentile 99.5."""
+    """Powers, m^2 (rows, columns), on a grid about the origin as a figure, white at the percentile 99.5."""
     assert grid.spacing is not None
     half = [n * s / 2 for n, s in zip(grid.shape, grid.spacing, strict=True)]
     db = 10 * np.log10(np.maximum(power, 1e-12 * power.max()))
     return html.picture(
         db, (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m", caption, floor_db=floor_db,
-        percentile=99.5,
+        percentile=99.5, unit="dB re 1 m²", equal=True,
     )  # fmt: skip
+
+
+def tested(p: float) -> str:
+    """A p value in words."""
+    if p > SIGNIFICANT:
+        return f"not rejected: p = {p:.2g}"
+    return f"rejected: p = {p:.1e}" if p > 1e-12 else "rejected: p below 1e-12"
 
 
 def histogram(values: np.ndarray, top: float, bins: int = 24) -> tuple[np.ndarray, np.ndarray]:

@@ -5,11 +5,20 @@ from __future__ import annotations
 import time
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import asdict, dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
 
 from ..figures.html import Block, heading, listed, page, table, terms, words
+
+Cause = Literal["", "error in print", "interpretation"]
+CAUSES: tuple[tuple[Cause, str], ...] = (
+    ("error in print", "Errors in print: a sign, a subscript or a number of the paper contradicts the paper itself or "
+     "physics"),
+    ("interpretation", "Differences of interpretation: nothing is misprinted; the statement depends on an "
+     "approximation of the paper, or on what is measured and how"),
+    ("", "Other differences"),
+)  # fmt: skip
 
 
 @dataclass(frozen=True)
@@ -22,6 +31,7 @@ class Row:
     holds         whether the measured value agrees with the published one
     why           where it does not: the reason; else a remark
     rule          what counts as agreement, for the page alone
+    cause         where it does not agree: a misprint, or another reading of the paper; "" where neither is known
     """
 
     item: str
@@ -32,6 +42,7 @@ class Row:
     why: str = ""
     value: Any = None
     rule: str = ""
+    cause: Cause = ""
 
 
 @dataclass
@@ -47,19 +58,20 @@ class Section:
 
     def number(
         self, item: str, source: str, published: float, measured: float, within: float, unit: str = "",
-        form: str = ".3f", why: str = "",
+        form: str = ".3f", why: str = "", cause: Cause = "",
     ) -> None:  # fmt: skip
         """A row that holds where `measured` lies within `within` of the number printed."""
         here, printed = (f"{v:{form}} {unit}".strip() for v in (measured, published))
-        holds, rule = bool(abs(measured - published) <= within), f"within {within:g} {unit}".strip()
-        self.rows.append(Row(item, source, printed, here, holds, why, plain(measured), rule))
+        holds, rule = bool(abs(measured - published) <= within), f"within {within:.3g} {unit}".strip()
+        self.rows.append(Row(item, source, printed, here, holds, why, plain(measured), rule, "" if holds else cause))
 
     def states(
         self, item: str, source: str, published: str, measured: str, holds: Any, why: str = "", value: Any = None,
-        *, rule: str,
+        *, rule: str, cause: Cause = "",
     ) -> None:  # fmt: skip
         """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
-        self.rows.append(Row(item, source, published, measured, bool(holds), why, plain(value), rule))
+        cause = "" if holds else cause
+        self.rows.append(Row(item, source, published, measured, bool(holds), why, plain(value), rule, cause))
 
     def say(self, text: str) -> None:
         """A paragraph."""
@@ -128,7 +140,7 @@ class Paper:
         blocks = [words(self.about)]
         missing = len(self.sections) - len(sections)
         if missing:
-            blocks.append(words(f"Not finished: {missing} sections follow.", True))
+            blocks.append(words(f"Not finished: {missing} section{'s follow' if missing > 1 else ' follows'}.", True))
         if quick:
             blocks.append(words(f"A quick run: {self.quick}", True))
         first = [row for item in self.main for row in rows if row.item == item]
@@ -138,10 +150,13 @@ class Paper:
             heading("Conclusion"),
             words(
                 f"{len(rows) - len(different)} of {len(rows)} published values and statements agree with what was "
-                f"measured in this run. {len(different)} differ:"
+                f"measured in this run. {len(different)} differ{':' if different else '.'}"
             ),
-            listed([_in_words(row) for row in different]),
         ]
+        for cause, meaning in CAUSES:
+            of_cause = [row for row in different if row.cause == cause]
+            if of_cause:
+                blocks += [words(f"{meaning} ({len(of_cause)})."), listed([_in_words(row) for row in of_cause])]
         if self.terms:
             blocks += [heading("Terms"), terms(self.terms)]
         for section in sections:
@@ -152,7 +167,7 @@ class Paper:
                 ["item", "published", "measured", "accepted if", "verdict"],
                 [_cells(row) for row in rows],
                 "All published values and statements. The third column was measured in this run; the fourth is the "
-                "criterion behind the verdict, ok or differs.",
+                "criterion behind the verdict: ok, or differs with its cause.",
                 text=True,
                 marked=[i for i, row in enumerate(rows) if not row.holds],
             ),
@@ -162,12 +177,12 @@ class Paper:
 
 
 def _verdict(row: Row) -> str:
-    return "ok" if row.holds else "differs"
+    return "ok" if row.holds else f"differs ({row.cause})" if row.cause else "differs"
 
 
 def _in_words(row: Row) -> str:
     """A row as a paragraph."""
-    text = f"{row.item} ({row.source}): published {row.published}; measured {row.measured}."
+    text = f"{row.item} ({row.source}). Published: {row.published}. Measured: {row.measured}."
     return f"{text} {row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") if row.why else text
 
 

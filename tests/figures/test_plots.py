@@ -75,6 +75,21 @@ def test_a_picture_shows_its_first_row_at_the_bottom_white_on_top_of_its_scale(f
     assert (box.get_xy(), box.get_width(), box.get_height()) == ((-0.5, -0.5), 1.0, 1.0)
 
 
+@pytest.mark.parametrize("x, y", [((-40.0, 40.0), (-15.0, 15.0)), ((-10.0, 10.0), (-12.0, 12.0)), ((0, 1), (0, 30))])
+def test_axes_of_equal_units_have_equal_scales(figures, x, y):
+    plots.picture(np.zeros((3, 4)), x, y, "m", "m", floor_db=-40, equal=True)
+    axes = figures[0].axes[0]
+    corners = axes.transData.transform([(x[0], y[0]), (x[1], y[1])])
+    across, up = np.diff(corners, axis=0)[0] / (x[1] - x[0], y[1] - y[0])
+    assert across == pytest.approx(up, rel=1e-6)
+
+
+def test_a_scale_that_is_not_in_decibels_gives_its_values_at_white_and_black():
+    block = html.picture([[-0.4, 0.0], [0.2, 0.4]], (0, 1), (0, 1), "x", "y", "A.", floor_db=-0.8, unit="of the peak")
+    assert block["caption"] == "A. White: 0.4; black: -0.4 of the peak."
+    assert "black: 30 dB below" in html.picture([[0, 1]], (0, 1), (0, 1), "x", "y", "A.", floor_db=-30)["caption"]
+
+
 def test_a_page_escapes_its_text_and_names_what_made_it():
     blocks = [
         html.heading("A & b", 3, "top"), html.words("<p>"), html.words("small", note=True), html.listed(["1 < 2", "x"]),
@@ -82,9 +97,13 @@ def test_a_page_escapes_its_text_and_names_what_made_it():
         html.table(["<h>", "n"], [["a & b", 1.5], ["c", "d"]], "c < d", marked=[1]),
         html.plot([("a", [0, 1], [0, 1])], "x", "y", "caption > 0"),
     ]  # fmt: skip
-    tree = ElementTree.fromstring(html.page("T <&>", blocks, "sarcl 'x'").replace("<!doctype html>", ""))
+    text = html.page("T <&>", blocks, "sarcl 'x'")
+    tree = ElementTree.fromstring(text.replace("<!doctype html>", ""))
     assert tree.find("head/title").text == tree.find("body/h1").text == "T <&>"
-    assert "".join(tree.find("body/p").itertext()) == f"Made by sarcl {sarcl.__version__}: sarcl 'x'"
+    made, size = "".join(tree.find("body/p").itertext()).split("\n")
+    assert made == f"Made by sarcl {sarcl.__version__}: sarcl 'x'"
+    assert size.startswith(f"One file of {len(text.encode()) / 1e6:.2f} MB")
+    assert not [n.tag for n in tree.iter() if n.tag in ("link", "script", "iframe", "a")] and "http" not in text
     assert tree.find(".//h3").attrib["id"] == "top" and [n.text for n in tree.findall(".//li")] == ["1 < 2", "x"]
     assert [[c.text for c in row] for row in tree.iter("tr")] == [["<h>", "n"], ["a & b", "1.5"], ["c", "d"]]
     assert (

@@ -157,8 +157,14 @@ ERR = {
 }
 ERR_OF_IMAGES = {
     "N 45, 20 MHz: places of points 2 and 2.25 m off",
-    "N 45, 20 MHz: two points told apart",
+    "N 45, 20 MHz: two points resolved",
     "N 45, 20 MHz: spatial frequencies across",
+}
+MISPRINTED = {
+    "FDA: beam (elevation, azimuth) at t' = +250 us",
+    "half a wave of the centre frequency",
+    "largest array factor, over N P",
+    "places along the track, N 45, 20 MHz",
 }
 
 
@@ -176,6 +182,7 @@ def assert_different(document, items):
 def test_figures_equal_the_known_ones_and_only_the_known_differ(short):
     assert_known(short[1], KNOWN)
     assert_different(short[1], ERR)
+    assert {item for item, row in rows_of(short[1]).items() if row["cause"] == "error in print"} == MISPRINTED
 
 
 @pytest.mark.slow
@@ -215,8 +222,10 @@ def test_the_page_has_its_conclusion_on_top_and_its_table_at_the_end(short):
     for item, row in rows.items():
         assert item in made.words and f"{row['published']} ({row['source']})" in made.words
     assert "sarcl papers farooq -o" in made.words and f"Made by sarcl {sarcl.__version__}" in made.words
+    assert "Errors in print: a sign, a subscript or a number of the paper contradicts" in made.words
+    assert made.words.index("(4).") < made.words.index("Differences of interpretation") < made.words.index("(6).")
     assert "A quick run" not in made.words and document["finished"] and not document["quick"]
-    assert len(text) < 4e6
+    assert len(text) < 4e6 and f"One file of {len(text) / 1e6:.1f} MB" in made.words
 
 
 def test_every_verdict_stands_beside_its_criterion(short):
@@ -225,7 +234,9 @@ def test_every_verdict_stands_beside_its_criterion(short):
     found = rows_of(short[1])
     assert len(rows) == len(found) and all(row[3] for row in rows)
     for item, _, measured, _, verdict in rows:
-        assert verdict.startswith("ok" if found[item]["holds"] else "differs: ") and measured == found[item]["measured"]
+        cause = found[item]["cause"]
+        assert verdict.startswith("ok" if found[item]["holds"] else f"differs ({cause}): ")
+        assert bool(cause) != found[item]["holds"] and measured == found[item]["measured"]
     assert next(row[3] for row in rows if row[0] == "period") == "within 0.001 ns"
     assert not any("rule" in row for row in found.values())
 
@@ -259,7 +270,7 @@ def test_what_is_measured_is_kept_when_a_later_section_fails(tmp_path, monkeypat
     kept = json.loads((tmp_path / "half.json").read_text())
     assert [s["key"] for s in kept["sections"]] == ["one"] and not kept["finished"]
     text = (tmp_path / "half.html").read_text()
-    assert "First &lt;&amp;&gt;" in text and "Not finished: 1 sections follow" in text
+    assert "First &lt;&amp;&gt;" in text and "Not finished: 1 section follows." in text
     Page(text)
 
 
@@ -401,4 +412,9 @@ def test_arrays_of_more_than_a_hundred_elements(tmp_path):
     apparent, own = (honest[f"N 450, 2 MHz, {kind}"] for kind in ("apparent", "channels"))
     assert apparent["points"][2]["pslr_db"] == pytest.approx(-0.13, abs=0.4)
     assert abs(own["points"][2]["error"]) < 0.005 and apparent["dips"][0]["dip_db"] == 0
+    # A deep dip between two of four peaks resolves nothing: the brightest peaks lie far from the points.
+    row, last = rows_of(large)["N 450, 2 MHz: two points resolved"], apparent["dips"][-1]
+    assert apparent["told_apart"] is None and row["value"] == [None, 0.3] and not row["holds"]
+    assert last["separation"] == 0.3 and last["dip_db"] > 20 and last["shift"] > 0.1 and last["false_db"] > -3
+    assert row["measured"].startswith("at no separation tried") and "0.133 m from their points" in row["why"]
     assert large["finished"] and not large["quick"]

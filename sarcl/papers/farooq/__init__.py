@@ -83,6 +83,6 @@ PAPER = Paper(
         "largest error of the power pattern, 30 MHz",
         "N 45, +-20 MHz: apparent length",
         "N 45, +-20 MHz: nulls",
-        "N 45, 20 MHz: two points told apart",
+        "N 45, 20 MHz: two points resolved",
     ),
 )

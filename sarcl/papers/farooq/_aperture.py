@@ -49,7 +49,8 @@ def steady(lab: Lab) -> Section:
             f"the mapping changes nothing, but the centre frequency is now {case.middle / 1e9:.2f} GHz (section "
             f"5.3.1), whose wave resolves {case.null:.3f} m over 430 m; figure 5.5 wants f0 moved as well"
         )  # fmt: skip
-        out.number(f"{name}: nulls in cross-range", f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark)
+        out.number(f"{name}: nulls in cross-range", f"figure {figure}", PRINTED, nulls[1], 0.002, "m", why=remark,
+                   cause="error in print")  # fmt: skip
         out.states(
             f"{name}: nulls before and after the mapping", f"figure {figure}", "unchanged",
             f"{nulls[0]:.4f} and {nulls[1]:.4f} m", abs(nulls[0] - nulls[1]) < 0.002, value=nulls,
@@ -157,7 +158,7 @@ def nulls(lab: Lab) -> Section:
                 abs(found["null"] - expected) < 0.003,
                 f"an aperture of this length without a gap has {uniform:.3f} m; two halves with a gap are an "
                 "interferometer, whose nulls are closer to the peak and whose side lobes are higher", value,
-                rule="within 3 mm",
+                rule="within 3 mm", cause="interpretation",
             )  # fmt: skip
         at, values = lab.cut(mapped, half=1.0, n=401)
         curves.append((name, at, decibels(values)))

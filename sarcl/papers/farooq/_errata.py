@@ -46,7 +46,7 @@ def section(lab: Lab) -> Section:
     out.parts.append(html.listed(words))
     case = system(45, 20e6)
     out.number("half a wave of the centre frequency", "section 5.4", 0.14, case.step, 1e-3, "m", ".4f",
-               "a zero is missing: 0.014 m")  # fmt: skip
+               "a zero is missing: 0.014 m", cause="error in print")  # fmt: skip
     sizes = [n * system(n, s).step for n, s in ((9, 100e6), (900, 1e6))]
     out.states(
         "size of 9 and 900 elements", "section 5.4", "0.12 and 12 m", f"{sizes[0]:.2f} and {sizes[1]:.1f} m",
@@ -73,10 +73,10 @@ def _poles(out: Section) -> None:
     printed = np.abs(tops[0] / np.sin(phase[0] / 2) * tops[1] / np.sin(swapped / 2)) / 81
     worst = float(np.nanmax(printed))
     out.states(
-        "largest array factor, over N P", "equation 4.1", "1 (equation 3.46)", f"poles as printed, {worst:.0f} "
+        "largest array factor, over N P", "equations 3.46 and 4.1", "1", f"poles as printed, {worst:.0f} "
         f"on a grid of 1 deg; {right.max():.3f} mended", worst < 1.01,
         "a denominator has kappa_y instead of kappa_z", worst,
-        rule="at most 1.01",
+        rule="at most 1.01", cause="error in print",
     )  # fmt: skip
     for what, level in (("corrected", right), ("as printed, limited to 1", np.minimum(printed, 1.0))):
         out.draw(html.picture(
@@ -105,7 +105,7 @@ def _mirror(out: Section, lab: Lab) -> None:
         "places along the track, N 45, 20 MHz", "equation 5.14", "an aperture moved in the negative direction",
         f"as printed mirrored, up to {off[0]:.0f} m off; mended the same to {1e3 * off[1]:.1g} mm", off[0] < 1.0,
         "the figures show it right: they were not made with the minus", off,
-        rule="within 1 m of the mapped positions",
+        rule="within 1 m of the mapped positions", cause="error in print",
     )  # fmt: skip
     curves = [("actual", actual[:, 1]), ("as printed", printed), ("corrected", mended)]
     out.draw(html.plot(

@@ -50,7 +50,7 @@ def delays(lab: Lab) -> Section:
         f"{peak:.2f} of {N}", peak > 0.9 * N,
         f"the phase left out is {bound / (np.pi / 4):.0f} times what equation 3.40 allows: the carriers are never in "
         "phase there", peak,
-        rule="above 0.9 N",
+        rule="above 0.9 N", cause="interpretation",
     )  # fmt: skip
     _systems(out, lab)
     out.draw(
@@ -79,7 +79,7 @@ def _systems(out: Section, lab: Lab) -> None:
             f"{1e9 * found:.4g} ns, {100 * (found / plain - 1):.1f} % more", abs(found / plain - 1) < 0.02,
             f"the delay follows with f0 + (N - 1) df; {1e3 * offset:.0f} mm of range, the resolution is 167 mm",
             found / plain,
-            rule="within 2 %",
+            rule="within 2 %", cause="interpretation",
         )  # fmt: skip
         rows.append([f"N {n}, {step / 1e6:g} MHz", f"{found / plain:.4f}", f"{wanted / plain:.4f}",
                      f"{1e3 * offset:.0f}", f"{made.max() / n:.4f}"])  # fmt: skip

@@ -53,11 +53,11 @@ def section(lab: Lab) -> Section:
             f"null {linear['null']:.3f} m, peak {linear['level_db']:.2f} dB, PSLR {linear['pslr_db']:.1f} dB", not off,
             "" if not off else f"they leave the quadratic phase of the elements, {phase:.1f} rad at the aperture's "
             "end; it must be taken out frequency by frequency", [linear["null"], linear["level_db"], linear["pslr_db"]],
-            rule="null within 2 mm of 0.167 m, peak above -0.3 dB",
+            rule="null within 2 mm of 0.167 m, peak above -0.3 dB", cause="interpretation",
         )  # fmt: skip
         table.append([name, f"{lost:.1f}", f"{phase:.2f}", f"{linear['null']:.3f}", f"{linear['level_db']:.2f}",
                       f"{linear['pslr_db']:.1f}", f"{whole['null']:.3f}", f"{whole['pslr_db']:.1f}"])  # fmt: skip
-        for quadratic, label in ((True, "corrected"), (False, "linear part alone")):
+        for quadratic, label in ((True, "corrected"), (False, "linear part")):
             at, values = lab.cut(lab.mapped(case, "corrected", quadratic=quadratic), half=0.8, n=321)
             curves.append((f"{name}, {label}", at, values))
     out.say(

@@ -73,7 +73,8 @@ class Lab:
         edges = (-HALF[1] / zoom, HALF[1] / zoom), (-HALF[0] / zoom, HALF[0] / zoom)
         square = None if box is None else (box, box)
         return html.picture(
-            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square
+            self.image(raw, zoom), *edges, "cross-range, m", "range, m", caption, floor_db=-30.0, box=square,
+            equal=True,
         )  # fmt: skip
 
     def cut(

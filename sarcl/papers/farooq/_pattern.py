@@ -89,7 +89,7 @@ def patterns(lab: Lab) -> Section:
             "(30, -60) deg", _deg(at), holds,
             "the beam of figure 3.7" if holds else "equations 3.53 and 3.54 give this too: the figure shows -250 us",
             value=at,
-            rule="that direction, on a grid of 1 deg",
+            rule="that direction, on a grid of 1 deg", cause="error in print",
         )  # fmt: skip
         figures.append(_sky(power, f"Diverse carriers at t' = {sign * 250:+d} us (figure 3.7)."))
     _over_range(out, figures, diverse, lab)
@@ -152,7 +152,7 @@ def errors(lab: Lab) -> Section:
             out.states(
                 "largest error of the power pattern, 30 MHz", "figure 3.11", "not appreciable", text, worst < 0.05,
                 "the figures show the top 3 dB; near +-90 deg the patterns differ by a fifth of the peak", worst,
-                rule="below 0.05 of the peak power",
+                rule="below 0.05 of the peak power", cause="interpretation",
             )  # fmt: skip
         else:
             out.number(
@@ -164,7 +164,7 @@ def errors(lab: Lab) -> Section:
                 "error inside +-45 deg, 150 MHz", "figure 3.14", "not significant",
                 f"{at20:.2f} at 20 deg, {float(apart[np.isclose(degrees, 45)][0]):.2f} at 45 deg", at20 < 0.1,
                 "equation 3.60 itself gives 3.5 pi/4 at 45 deg; equation 3.40 allows pi/4", at20,
-                rule="below 0.1 of the peak power at 20 deg",
+                rule="below 0.1 of the peak power at 20 deg", cause="interpretation",
             )  # fmt: skip
         figures = ("3.10", "3.11") if name == "A" else ("3.12", "3.13")
         out.draw(*(

@@ -111,7 +111,7 @@ def ambiguities(lab: Lab) -> Section:
         rule="within 5 % of nu T/B",
     )  # fmt: skip
     out.states(
-        "tones: delay of the peak, |nu| < 3 GHz", "figure 4.7", "no coupling", f"{stays:.0f} sample of {len(t)}",
+        "tones: delay of the peak, |nu| < 3 GHz", "figure 4.7", "no coupling", f"{stays:.0f} of {len(t)} samples",
         stays <= 1.01, value=stays,
         rule="at most one sample",
     )  # fmt: skip

@@ -93,14 +93,14 @@ def abstract(lab: Lab) -> Section:
         out.states(
             "collection time reduced", "abstract", "33 %", f"{saved:.0f} %", abs(saved - 33) < 1,
             f"the aperture at 2 MHz is {100 * growth:.0f} % longer; the time saved is 1 - 1/{1 + growth:.2f}", saved,
-            rule="within 1 percentage point",
+            rule="within 1 percentage point", cause="error in print",
         )  # fmt: skip
         out.states(
             "cross-range resolution, by the same system's aperture", "abstract", "4.5 dB", f"{lengths[two]:.2f} dB",
             abs(lengths[two] - 4.5) < 0.1,
             f"as a ratio of lengths, 4.5 dB is the 1 MHz case, {lengths[one]:.2f} dB, whose aperture is "
             f"{100 * (10 ** (lengths[one] / 20) - 1):.0f} % longer", [lengths[two], lengths[one]],
-            rule="within 0.1 dB",
+            rule="within 0.1 dB", cause="interpretation",
         )  # fmt: skip
         out.states(
             "cross-range resolution, by the same system's nulls", "abstract", "4.5 dB", f"{gains[two]:.2f} dB",

@@ -10,7 +10,7 @@ For this folder alone, a section or a group of sections of the page each, and wh
     _ground    material of the ground, radar for flat ground
     _patches   figure 12: patches of different materials and statistics
     _raw       figures 9 and 10, section V: raw signals, their image, run times
-    _relief    figures 10 and 13 to 17: layover, shadow, polarisation
+    _relief    figures 13 to 17: layover, shadow, polarisation
     _speckle   figures 5 to 7 and table I: speckle of homogeneous ground
 """
 
@@ -39,8 +39,12 @@ TERMS = (
      "random heights of the corners of facets."),
     ("layover, shadow", "A high point appears nearer to the radar than the ground below it; ground that it hides sends "
      "nothing back."),
-    ("p", "Probability of a deviation as large as the measured one, if the distribution were the stated one (test of "
-     "Kolmogorov and Smirnov)."),
+    ("p", "Probability of a deviation at least as large as the measured one, if the pixels had the stated distribution "
+     "(test of Kolmogorov and Smirnov). Below 0.01 the distribution is rejected here."),
+    ("geometry", "A value that the paper's figure implies but does not print: it follows from the dimensions chosen "
+     "here."),
+    ("raw signal", "Samples as received, before compression in range and in azimuth."),
+    ("lambda, R0, X", "Wavelength, slant range of the scene's centre, and width of the beam on the ground, m."),
 )  # fmt: skip
 
 PAPER = Paper(
@@ -64,7 +68,7 @@ PAPER = Paper(
         "autocorrelation at all 25 lags",
         "autocorrelation along range and the response of a point",
         "raw signal by Fourier transforms and by the sum over facets and pulses",
-        "the shadow",
+        "power in the shadow",
         "HV over HH of tilted facets of a perfect conductor",
     ),
 )

@@ -55,7 +55,7 @@ def _conductor(out: Section) -> None:
         f"up to {printed:.2f} with R_q as printed", f"{right:g} with the other sign; {measured:.1g} in sarcl",
         abs(measured - printed) < 0.05,
         "R_q has the wrong sign; the physical-optics integral of a conductor does not depend on polarisation",
-        [printed, right, measured], rule="the same within 0.05",
+        [printed, right, measured], rule="the same within 0.05", cause="error in print",
     )  # fmt: skip
 
 
@@ -75,7 +75,7 @@ def _phase_of_a_facet(out: Section) -> None:
         "phase of a triangle's integral about its centroid", "equation 3", f"{phases[1]:.2f} rad with exp(+2j k.rho)",
         f"{phases[-1]:.2f} rad with exp(-2j k.rho), the two-way delay of each point",
         abs(phases[1] - phases[-1]) < 0.05, "the sign of the exponent is wrong", list(phases.values()),
-        rule="the same phase within 0.05 rad",
+        rule="the same phase within 0.05 rad", cause="error in print",
     )  # fmt: skip
 
 
@@ -91,5 +91,5 @@ def _transfer_function(out: Section) -> None:
     change = XI**2 / (4 * A2) * (1 / (1 + EPS * BAND_EDGE / (2 * B2)) - 1)
     out.number(
         "range-azimuth coupling at the edge of the band, xi 60", "equation 27", -change, measured, 0.02, "rad",
-        why=f"both azimuth terms have the wrong sign; with the other one {change:.3f} rad"
+        why=f"both azimuth terms have the wrong sign; with the other one {change:.3f} rad", cause="error in print",
     )  # fmt: skip

@@ -11,7 +11,7 @@ from ...figures import html
 from ...scattering.physical_optics import fresnel
 from ...scene.material import Diagram, Material
 from ..far_radar import ground, speckle
-from ..lab import Lab, histogram, picture, rayleigh
+from ..lab import SIGNIFICANT, TEST, Lab, histogram, picture, rayleigh, tested
 from ..paper import Section
 from ._ground import FLAT, ROUGH, SMOOTH
 
@@ -49,7 +49,7 @@ def section(lab: Lab) -> Section:
     reflected = np.array(
         [abs(fresnel(np.ones(()), m.permittivity(radar.center))[0]) ** 2 for m in _table("cos2", electric)]
     )
-    curves, mean = [], {}
+    mean = {}
     for name, case in CASES.items():
         fine = np.repeat(np.repeat(number, case.facets[0], axis=0), case.facets[1], axis=1)
         y, x = ((-m * n / 2, m * n / 2) for m, n in zip(field, radar.null, strict=True))
@@ -64,21 +64,29 @@ def section(lab: Lab) -> Section:
         clean = np.abs(radar.focus(raw, grid, window="hamming", device=lab.device)) ** 2
         mean[name] = np.array([clean[cells].mean() for cells in inner])
         found = speckle(pixels[inner[0]])
-        speckled = found.rayleigh > 0.01 and abs(found.contrast - 1) < 0.3
+        speckled = found.rayleigh > SIGNIFICANT and abs(found.contrast - 1) < 0.3
         out.states(
-            f"case {name}, {case.words}: grey levels", "figure 12", "Rayleigh" if case.rayleigh else "not Rayleigh",
-            f"p = {found.rayleigh:.2g} that they are Rayleigh's, contrast {found.contrast:.2f}",
+            f"case {name}, {case.words}: grey levels", f"figure 12 {name}",
+            "Rayleigh" if case.rayleigh else "not Rayleigh",
+            f"Rayleigh {tested(found.rayleigh)}, contrast {found.contrast:.2f}",
             speckled == case.rayleigh, value=[found.rayleigh, found.contrast],
-            rule="Rayleigh: p above 0.01 (Kolmogorov and Smirnov) and a contrast of 0.7 to 1.3",
+            rule=f"Rayleigh: p above {SIGNIFICANT:g} ({TEST}) and a contrast of 0.7 to 1.3",
         )  # fmt: skip
         amplitude = np.abs(pixels[inner[0]])
-        curves.append((f"case {name}", *histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)))
-        out.draw(picture(clean, grid, f"Figure 12 {name}: {case.words}.", -25.0))
-    at = curves[0][1]
-    out.draw(html.plot(
-        [*curves, ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square", "density",
-        "Grey levels of the lower left patch in the four cases (figure 12).",
-    ))  # fmt: skip
+        at, density = histogram(amplitude / np.sqrt((amplitude**2).mean()), 3.0, 16)
+        out.draw(
+            picture(clean, grid, f"Figure 12 {name}: {case.words}. Hamming window.", -25.0),
+            html.plot(
+                [(f"case {name}", at, density), ("Rayleigh", at, rayleigh(at))], "amplitude over its root mean square",
+                "density", f"Grey levels of the lower left patch in case {name} (histogram of figure 12 {name}), "
+                f"{len(amplitude)} pixels, without a window.", dots=[f"case {name}"],
+            ),
+        )  # fmt: skip
+    out.say(
+        "Patches differ in permittivity (1 to 40) and conductivity (1e-4 to 1 S/m); the paper gives the ranges alone. "
+        "The patch of permittivity 1 reflects nothing and is black. Facets per resolution cell: 4 x 4, in case c 16 "
+        "along azimuth and 4 along range. The heights of a rough profile have a standard deviation of one wavelength."
+    )
     _brightness(out, mean, reflected)
     out.keep(mean=mean, reflected=reflected)
     return out
@@ -95,9 +103,9 @@ def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray
     )  # fmt: skip
     level = float(10 * np.log10(np.median(mean["d"][bright] / mean["b"][bright])))
     out.states(
-        "case d: smooth facets without statistics", "figure 12 d", "no grey-level distribution",
-        f"{level:.0f} dB of case b: a mirror, of which edges alone are seen", level < -40, value=level,
-        rule="below -40 dB of case b",
+        "case d: power of the patches without statistics", "figure 12 d", "no random grey levels",
+        f"{-level:.0f} dB below case b: flat patches reflect away from the radar, and only their edges are seen",
+        level < -40, value=level, rule="more than 40 dB below case b",
     )  # fmt: skip
 
 

@@ -1,4 +1,4 @@
-"""SARAS, section VI: layover, shadow and polarisation of solids on flat ground (figures 10 and 13 to 17)."""
+"""SARAS, section VI: layover, shadow and polarisation of solids on flat ground (figures 13 to 17)."""
 
 from __future__ import annotations
 
@@ -19,6 +19,7 @@ RADAR = FarRadar(look=np.radians(50), bandwidth=100e6, turn=0.014, n_pulses=64)
 FINE = FarRadar(look=np.radians(50), bandwidth=150e6, turn=0.02, n_pulses=100)
 COTANGENT, TANGENT = 1 / np.tan(RADAR.look), np.tan(RADAR.look)
 LOOKS = {True: 6, False: 24}
+GEOMETRY = "figure 13, geometry"
 BOX = (14.0, 36.0, 14.0)  # m along x, y, z: depth, width, height
 POLARIZATIONS = ("HH", "VV", "HV")
 
@@ -40,8 +41,9 @@ def parallelepiped(lab: Lab) -> Section:
     lit = power[(x > ends[1] + inside[1]) & (x < 42)].mean()
     level = float(10 * np.log10(power[dark].mean() / lit))
     out.states(
-        "the shadow", "figure 13", "free of speckle", f"{level:.0f} dB of the ground beside it", level < -60,
-        value=level, rule="below -60 dB; the window leaves -74 dB",
+        "power in the shadow", "figure 13", "free of speckle", f"{level:.0f} dB of the ground beside it", level < -60,
+        "side lobes of the ground around it: the image has a Taylor window of -90 dB", level,
+        rule="below -60 dB",
     )  # fmt: skip
     _edges(out, lab, raw, ends, (depth, width, height))
     return out
@@ -64,9 +66,9 @@ def _edges(
         first, last = crossings(profile, at, lit / 2)[[0, -1]]
         within = 0.5 * FINE.null[1] * scale
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number(f"shadow {name}, {plane} range", "figure 13", wanted * scale, float(found), within, "m", ".2f")
+            out.number(f"shadow {name}, {plane} range", GEOMETRY, wanted * scale, float(found), within, "m", ".2f")
         out.number(
-            f"length of the dark run, {plane} range", "figure 13", (ends[1] - ends[0]) * scale, float(last - first),
+            f"length of the dark run, {plane} range", GEOMETRY, (ends[1] - ends[0]) * scale, float(last - first),
             0.7 * FINE.null[1] * scale, "m", ".2f",
         )  # fmt: skip
         if plane == "ground":
@@ -74,29 +76,31 @@ def _edges(
             before = profile[(at > front - 15) & (at < front - 2)].mean()
             near = at < front + 3
             start = crossings(profile[near], at[near], (before + over) / 2)[-1]
-            out.number("layover begins", "figure 13", front, float(start), FINE.null[1], "m", ".2f")
+            out.number("layover begins", GEOMETRY, front, float(start), FINE.null[1], "m", ".2f")
             out.draw(html.plot(
                 [("mean over azimuth", at, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
-                "Profile across the parallelepiped: layover, then shadow.",
+                "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
+                "Hamming window fill to about -33 dB.",
             ))  # fmt: skip
     out.say(
-        "The paper gives no dimensions. Printed values are those of geometry for the dimensions chosen here: a height "
-        "h is laid over by h cot(look) on the ground and hides h tan(look) behind it; in slant range the dark run is "
-        "h / cos(look) long, less the depth that the solid covers."
+        f"The paper gives no dimensions. The solid is {2 * depth:g} m deep, {2 * width:g} m wide and {height:g} m high "
+        f"here, seen {np.degrees(FINE.look):.0f} deg off the vertical, and the values marked geometry follow from "
+        "that: an edge of height h is imaged h cot(look) nearer to the radar on the ground and hides h tan(look) "
+        "behind it. On the ground the dark run is h (tan(look) + cot(look)) long; in slant range it is h / cos(look), "
+        "whatever the depth of the solid, as long as its top is imaged beyond the foot of its front."
     )
 
 
 def cone(lab: Lab) -> Section:
-    """Figures 10 and 14 to 16."""
-    out = Section("cone", "A cone in three polarisations (figures 10 and 14 to 16)")
+    """Figures 14 to 16."""
+    out = Section("cone", "A cone in three polarisations (figures 14 to 16)")
     flat = ground((-34, 34), (-55, 50), material=ROUGH)
     scene = flat + shapes.cone(12, 12 * TANGENT, sections=120, material=ROUGH)
     grid, n = RADAR.grid((80, 90), pixels=2), LOOKS[lab.quick]
     first, mean = lab.looks(RADAR, scene, grid, n, POLARIZATIONS)
-    out.draw(picture(first[0], grid, "A cone on flat ground, HH, one look (figure 10)."))
     for name, power, one, number in zip(POLARIZATIONS, mean, first, (14, 15, 16), strict=True):
-        out.draw(picture(power, grid, f"The cone in {name}, mean of {n} looks (figure {number})."))
-        out.draw(picture(one, grid, f"The cone in {name}, one look."))
+        out.draw(picture(power, grid, f"The cone in {name}, mean of {n} looks (figure {number}, without speckle)."))
+        out.draw(picture(one, grid, f"The cone in {name}, one look: with speckle."))
     y = np.abs(grid.positions[:, 0, 1])
     middle, side = y < 0.5, (y > 5) & (y < 9)
     bright = [float(p[middle].mean(axis=0).max() / p[side].mean(axis=0).max()) for p in mean]
@@ -153,7 +157,7 @@ def composite(lab: Lab) -> Section:
     end = -7 + 20 * TANGENT  # the shadow of the rear edge of the parallelepiped, 20 m high
     lit = profile[(x > end + 4) & (x < 44)].mean()
     found = float(crossings(profile, x, lit / 2)[-1])
-    out.number("end of the parallelepiped's shadow", "figure 17", end, found, RADAR.null[1], "m", ".2f")
+    out.number("end of the parallelepiped's shadow", "figure 17, geometry", end, found, RADAR.null[1], "m", ".2f")
     return out
 
 
