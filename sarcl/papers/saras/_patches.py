@@ -8,15 +8,18 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
+from ...model.phase_history import PhaseHistory
 from ...scattering.physical_optics import fresnel
 from ...scene.material import Diagram, Material
-from ..far_radar import ground, speckle
+from ..far_radar import FarRadar, ground, speckle
 from ..lab import SIGNIFICANT, TEST, Lab, histogram, picture, rayleigh, tested
 from ..paper import Section
 from ._ground import FLAT, ROUGH, SMOOTH
 
 ROWS = ((0, 5), (5, 6), (11, 5), (16, 6))  # first patch and number of patches of each row, from below
-FIELD = {True: (72, 108), False: (256, 384)}  # resolution cells along azimuth and range
+# Resolution cells along azimuth and range; in full those of 512 x 512 pixels of the size that table I implies
+FIELD = {True: (72, 108), False: (304, 228)}
+STRIPS = {True: 1, False: 4}  # parts of the field along azimuth, whose echoes are computed one after the other
 MARGIN = 3  # cells: those so near to another patch are left out
 
 
@@ -51,15 +54,9 @@ def section(lab: Lab) -> Section:
     )
     mean = {}
     for name, case in CASES.items():
-        fine = np.repeat(np.repeat(number, case.facets[0], axis=0), case.facets[1], axis=1)
-        y, x = ((-m * n / 2, m * n / 2) for m, n in zip(field, radar.null, strict=True))
-        scene = ground(
-            y, x, fine.shape, material=fine, materials=_table(case.material.diagram, electric),
-            point_roughness=case.sigma * SPEED_OF_LIGHT / radar.center,
-        )  # fmt: skip
         # pixels are the middles of cells
         grid = radar.grid(field, center=(radar.null[1] / 2, radar.null[0] / 2, 0))
-        raw = radar.echo(scene, seed=1, device=lab.device)
+        raw = _echoes(lab, radar, case, number, _table(case.material.diagram, electric))
         pixels = radar.focus(raw, grid, device=lab.device)
         clean = np.abs(radar.focus(raw, grid, window="hamming", device=lab.device)) ** 2
         mean[name] = np.array([clean[cells].mean() for cells in inner])
@@ -90,6 +87,29 @@ def section(lab: Lab) -> Section:
     _brightness(out, mean, reflected)
     out.keep(mean=mean, reflected=reflected)
     return out
+
+
+def _echoes(lab: Lab, radar: FarRadar, case: Case, number: np.ndarray, materials: list[Material]) -> PhaseHistory:
+    """Echoes of patches `number` (rows, columns of cells): the sum over strips, each with random numbers of its own."""
+    half = [m * n / 2 for m, n in zip(number.shape, radar.null, strict=True)]
+    deep = 1.1 * (half[0] * radar.turn / 2 + half[1]) * float(np.sin(radar.look)) + case.sigma
+    strips = np.array_split(number, STRIPS[lab.quick])
+    total: PhaseHistory | None = None
+    first = 0
+    for seed, strip in enumerate(strips, 1):
+        fine = np.repeat(np.repeat(strip, case.facets[0], axis=0), case.facets[1], axis=1)
+        y = radar.null[0] * first - half[0], radar.null[0] * (first + len(strip)) - half[0]
+        scene = ground(
+            y, (-half[1], half[1]), fine.shape, material=fine, materials=materials,
+            point_roughness=case.sigma * SPEED_OF_LIGHT / radar.center,
+        )  # fmt: skip
+        raw = radar.echo(
+            scene, seed=seed, reference=(0, 0, 0), range_window=(-deep, deep), device=lab.device
+        )  # fmt: skip
+        total = raw if total is None else replace(raw, samples=np.asarray(raw.samples) + np.asarray(total.samples))
+        first += len(strip)
+    assert total is not None
+    return total
 
 
 def _brightness(out: Section, mean: dict[str, np.ndarray], reflected: np.ndarray) -> None:

@@ -63,20 +63,20 @@ def _edges(
         profile = power[np.abs(grid.positions[:, 0, 1]) < width - 4].mean(axis=0)
         at = (np.arange(240) - 120) * FINE.null[1] * scale / 4
         lit = profile[at > ends[1] * scale + 4].mean()
-        first, last = crossings(profile, at, lit / 2)[[0, -1]]
+        first, last = crossings(profile, at, lit / 2)
         within = 0.5 * FINE.null[1] * scale
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number(f"shadow {name}, {plane} range", GEOMETRY, wanted * scale, float(found), within, "m", ".2f")
+            out.number(f"shadow {name}, {plane} range", GEOMETRY, wanted * scale, found, within, "m", ".2f")
         out.number(
-            f"length of the dark run, {plane} range", GEOMETRY, (ends[1] - ends[0]) * scale, float(last - first),
+            f"length of the dark run, {plane} range", GEOMETRY, (ends[1] - ends[0]) * scale, last - first,
             0.7 * FINE.null[1] * scale, "m", ".2f",
         )  # fmt: skip
         if plane == "ground":
             over = profile[(at > front + 2) & (at < -depth - 2)].mean()
             before = profile[(at > front - 15) & (at < front - 2)].mean()
             near = at < front + 3
-            start = crossings(profile[near], at[near], (before + over) / 2)[-1]
-            out.number("layover begins", GEOMETRY, front, float(start), FINE.null[1], "m", ".2f")
+            start = crossings(profile[near], at[near], (before + over) / 2)[1]
+            out.number("layover begins", GEOMETRY, front, start, FINE.null[1], "m", ".2f")
             out.draw(html.plot(
                 [("mean over azimuth", at, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
                 "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
@@ -156,13 +156,17 @@ def composite(lab: Lab) -> Section:
     profile = mean[0][np.abs(y + 12) < 4].mean(axis=0)
     end = -7 + 20 * TANGENT  # the shadow of the rear edge of the parallelepiped, 20 m high
     lit = profile[(x > end + 4) & (x < 44)].mean()
-    found = float(crossings(profile, x, lit / 2)[-1])
+    found = crossings(profile, x, lit / 2)[1]
     out.number("end of the parallelepiped's shadow", "figure 17, geometry", end, found, RADAR.null[1], "m", ".2f")
     return out
 
 
-def crossings(profile: np.ndarray, at: np.ndarray, level: float) -> np.ndarray:
-    """Where a profile (n,) at places, m (n,), falls below and rises above `level`: places between samples."""
+def crossings(profile: np.ndarray, at: np.ndarray, level: float) -> tuple[float, float]:
+    """First and last place between samples where a profile (n,) at places, m (n,), crosses `level`; NaN: nowhere."""
     below = profile < level
     i = np.flatnonzero(below[1:] != below[:-1])
-    return np.asarray(at[i] + (at[i + 1] - at[i]) * (level - profile[i]) / (profile[i + 1] - profile[i]))
+    if len(i) == 0:
+        return np.nan, np.nan
+    i = i[[0, -1]]
+    places = at[i] + (at[i + 1] - at[i]) * (level - profile[i]) / (profile[i + 1] - profile[i])
+    return float(places[0]), float(places[1])
