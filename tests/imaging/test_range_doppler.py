@@ -363,6 +363,31 @@ def test_squinted_orbits_have_doppler_frequencies_of_the_effective_velocity(side
     assert float(image.report.plan["Doppler centroid"].split()[0]) == pytest.approx(wanted, abs=8)  # 3 ms of echo delay
 
 
+@pytest.mark.parametrize("share", [0.25, 0.65])  # between two of nine even ranges
+def test_a_narrow_ridge_anywhere_in_the_swath_counts_in_the_predicted_error(share):
+    n, prf = 300, 1000.0
+    near, middle, far = ORBIT.geolocate(n / prf / 2, [995e3, 1000e3, 1005e3], side="right")
+    chirp = sarcl.Waveform.chirp(center=5.4e9, bandwidth=5e6, duration=10e-6)
+    track = ORBIT.trajectory(start=0.0, prf=prf, n_pulses=n)
+    raw = sarcl.echo(sarcl.Scene.points([middle]), chirp, track, range_window=(-6e3, 6e3), check=False)
+    (lon, far_lon), (lat, far_lat) = np.transpose([sarcl.wgs84.geodetic(x)[:2] for x in (near, far)])
+    x, y = np.meshgrid(
+        np.linspace(-0.5, 1.5, 401), np.linspace(-0.5, 1.5, 5)
+    )  # shares of the swath, and along the track
+    longitude = lon + (far_lon - lon) * x - (far_lat - lat) * (y - 0.5) * 2
+    latitude = lat + (far_lat - lat) * x + (far_lon - lon) * (y - 0.5) * 2
+    height = 300 * np.exp(-(((x - share) / 0.02) ** 2))
+    height[0, 0] = -300.0  # the hyperbolas are those of the mean of the lowest and the highest point
+    options = {"side": "right", "ranges": (996e3, 1004e3), "times": (0.14, 0.16), "tolerance": 0.1}
+    errors = []
+    for z in (0 * height, height):
+        model = sarcl.ElevationModel(longitude, latitude, z)
+        plan = plan_range_doppler(raw, heights=model, **options).plan
+        errors.append(float(str(plan["error, hyperbolic ranges"])))
+
+    assert errors[1] > 100 * errors[0]
+
+
 def test_the_needed_pulse_rate_of_an_orbit_is_that_of_its_doppler_rate():
     raw, place = seen_from_orbit(n=200, prf=600.0, width=200.0)
     rate = abs(ORBIT.view(1 / 6, place).doppler_rate(5.4e9))

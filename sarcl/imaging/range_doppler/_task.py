@@ -11,6 +11,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.validation import array, instance, number
 from ...base.validation import tolerance as allowed_error
+from ...earth.elevation import ElevationModel
 from ...model.phase_history import PhaseHistory
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
@@ -25,6 +26,7 @@ from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
 from ._velocity import Hyperbolas, effective_speed, factor_of_rate, hyperbolas, phase_error, rate_of
 
+TRIED, TRIED_ON_TERRAIN = (3, 9), (9, 65)  # times and ranges at which hyperbolas are compared: mountains are narrow
 EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 
 
@@ -116,8 +118,9 @@ def make_task(
         raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
         extent.rows_of(extent.middle_time),
     )  # fmt: skip
-    ends = np.linspace(extent.times[0], extent.times[-1], 3)
-    model_error, worst = phase_error(raw, track, ground.positions, fit, ends, extent.rows_of)
+    n_times, n_ranges = TRIED_ON_TERRAIN if isinstance(heights, ElevationModel) else TRIED
+    some = np.linspace(extent.times[0], extent.times[-1], n_times)
+    model_error, worst = phase_error(raw, track, ground.positions, fit, some, extent.rows_of, n_ranges)
     known = fit
     if doppler_rate == "data":
         looks = TwoLooks(opened, raw, track, extent, fit, (sample_weight, row_weight), budget, wavelength)

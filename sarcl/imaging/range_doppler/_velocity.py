@@ -130,12 +130,13 @@ def phase_error(
     fit: Hyperbolas,
     u: np.ndarray,
     rows_of: Callable[[float], np.ndarray],
+    n_ranges: int,
 ) -> tuple[float, float]:
-    """Root mean square and largest phase error, rad, of hyperbolas at zero-Doppler times u, s (n,).
+    """Root mean square and largest phase error, rad, of hyperbolas at zero-Doppler times u, s (n,), and some ranges.
 
     rows_of(u)  the rows that points at a zero-Doppler time are focused from
     """
-    ranges = np.linspace(fit.near, fit.far, 9)
+    ranges = np.linspace(fit.near, fit.far, n_ranges)
     wavenumber = 4 * np.pi / SPEED_OF_LIGHT * float(raw.center_frequency.max())
     worst, mean = 0.0, []
     for one in u:
