@@ -102,15 +102,15 @@ def make_task(
     speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
     wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
     expected = centroid = centroid_of_geometry(raw, track.step, speed)
-    if doppler == "data":
+    if isinstance(doppler, str) and doppler == "data":
         centroid = centroid_of_data(raw, track.step, speed, expected)
-    elif doppler != "geometry":
+    elif not (isinstance(doppler, str) and doppler == "geometry"):
         centroid = _number("doppler", doppler, "Hz") * wavelength / (2 * speed)
     opened = open_device(device)
     budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
 
     extent = choose_extent(
-        raw, track, smooth, speed, centroid, None if beam is None else number("beam", beam, above=0),
+        raw, track, smooth, speed, centroid, None if beam is None else _beam(beam),
         _pair("times", times), _pair("ranges", ranges), spacing, least,
         EDGES * tolerance,
     )  # fmt: skip
@@ -122,10 +122,10 @@ def make_task(
     some = np.linspace(extent.times[0], extent.times[-1], n_times)
     model_error, worst = phase_error(raw, track, ground.positions, fit, some, extent.rows_of, n_ranges)
     known = fit
-    if doppler_rate == "data":
+    if isinstance(doppler_rate, str) and doppler_rate == "data":
         looks = TwoLooks(opened, raw, track, extent, fit, (sample_weight, row_weight), budget, wavelength)
         fit = fit.scaled(converged(looks.focused))
-    elif doppler_rate != "geometry":
+    elif not (isinstance(doppler_rate, str) and doppler_rate == "geometry"):
         wanted, middle = _number("doppler_rate", doppler_rate, "Hz/s"), float(extent.ranges.mean())
         fit = fit.scaled(factor_of_rate(wanted, fit, middle, centroid * speed, wavelength))
     plan = make_plan(raw, track, extent, fit, model_error, tolerance)
@@ -133,6 +133,13 @@ def make_task(
         tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, (expected, centroid),
         known, wavelength, worst,
     )  # fmt: skip
+
+
+def _beam(value: Any) -> float:
+    beam = number("beam", value, above=0)
+    if beam >= np.pi:
+        raise ValueError(f"beam is {beam:g} rad, which looks backwards too; give less than pi: was it in degrees?")
+    return beam
 
 
 def _number(name: str, value: Any, unit: str) -> float:
