@@ -13,6 +13,7 @@ from ..base.errors import warn
 from ..model.antenna_array import AntennaArray
 from ..model.waveform import Waveform
 
+LEAST_CUT = 1e-9  # share of a spectrum's norm below which nothing counts as left out
 EVEN = 1e-9  # of the carriers' total span: carriers no farther from multiples of their spacing are evenly spaced
 
 
@@ -133,6 +134,29 @@ def sampling(carriers: np.ndarray, waveform: Waveform, near: float, far: float, 
     width = max(1, int(np.ceil(own / step * (1 - 1e-9))))
     width += 1 - width % 2
     return Sampling(low - (width - 1) / 2 * step, step, round((high - low) / step) + width, width)
+
+
+def cut_of(grid: Sampling, waveform: Waveform, carriers: np.ndarray, compressed: bool) -> float:
+    """Share of a tone's spectrum, in norm, that is left out: what its own samples, up to half-way to its neighbours,
+    leave of all samples in its bandwidth. 0 for other waveforms, and for carriers that are not evenly spaced.
+
+    For tones shorter than 1/spacing: warn of it. Source: docs/theory/fda.md, "Tones between carriers".
+    """
+    apart = spacing(carriers)
+    if waveform.kind != "tone" or apart is None:
+        return 0.0
+    most = int(waveform.bandwidth / 2 / grid.step * (1 + 1e-9))
+    spectrum = np.sinc(np.arange(-most, most + 1) * grid.step * waveform.duration) ** (2 if compressed else 1)
+    power = spectrum**2
+    own = np.abs(np.arange(-most, most + 1)) <= grid.width // 2
+    cut = float(np.sqrt(power[~own].sum() / power.sum()))
+    if waveform.duration * apart < 1 - 1e-9 and cut > LEAST_CUT:
+        warn(
+            f"the pulse of {waveform.duration:.4g} s is shorter than 1/|df| = {1 / apart:.4g} s: each channel is "
+            f"sampled up to half-way to the next carriers, which leaves out {100 * cut:.2g} % of its spectrum's norm; "
+            f"take a pulse of {1 / apart:.4g} s, or carriers {1 / waveform.duration:.4g} Hz apart"
+        )
+    return cut
 
 
 def warn_of(array: AntennaArray, waveform: Waveform, carriers: np.ndarray) -> None:

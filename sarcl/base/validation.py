@@ -53,6 +53,24 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
         raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({exc})") from None
 
 
+def unmasked(name: str, value: Any, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
+    """`value` without an empty mask; ValueError where values of a masked array are masked: they are no numbers.
+
+    first_row  rows are counted from it
+    """
+    if not isinstance(value, np.ma.MaskedArray):
+        return value
+    mask = np.ma.getmaskarray(value)
+    if mask.any():
+        at = [int(i) for i in np.unravel_index(int(np.argmax(mask)), mask.shape)]
+        at[:1] = [at[0] + first_row] if at else []
+        raise ValueError(
+            f"{name} has {int(mask.sum())} masked values, the first at {at}, which are no measurements; {remedy}: "
+            f"{name}.filled(0)"
+        )
+    return value.data
+
+
 def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
     """Raise ValueError naming the first NaN or Inf in `value`; rows are counted from `first_row`."""
     good = np.isfinite(value)

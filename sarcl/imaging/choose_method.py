@@ -86,7 +86,8 @@ class _Float32:
     """Plans in complex64 for one task and tolerance. ValueError where samples are too small for complex64.
 
     Errors of interpolation and rounding are proportional to the energy of the range profiles, the tolerance to the
-    energy at the pixels: `inner` is the tolerance that is left for a plan.
+    energy at the pixels: `inner` is the tolerance that is left for a plan. `coordinates` is the error of planes far
+    from the origin, which adds to the others in squares: it is independent from pixel to pixel.
     """
 
     def __init__(self, task: FocusingTask, tolerance: float) -> None:
@@ -101,7 +102,12 @@ class _Float32:
         self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
             self.energy.whole_profile - self.near, 0.0
         )
-        self.inner = (tolerance - self.rounding) / self.near
+        self.coordinates = 0.0
+        if task.grid.is_plane:  # listed points are taken as they are
+            farthest = float(np.abs(task.grid.bounds).max())
+            self.coordinates = error_bounds.coordinate_rounding(farthest, task.highest)
+        left = np.sqrt(max(tolerance**2 - self.coordinates**2, 0.0))
+        self.inner = float(left - self.rounding) / self.near
 
     def direct(self, lanes: bool) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
@@ -127,16 +133,23 @@ class _Float32:
             LEAST_TOLERANCE,
             numerics_plan.least(self.task.raw.n_samples, tile_kernels.CHUNK) * self.near + self.rounding,
         )
-        return rounded_up(max(least, self.rounding / ROUNDING) * (1 + 1e-9))
+        least = max(np.hypot(least, self.coordinates), self.rounding / ROUNDING, self.coordinates / ROUNDING)
+        return rounded_up(float(least) * (1 + 1e-9))
 
     def _must_round_less(self, how: str, best: float | None) -> None:
+        if self.coordinates > ROUNDING * self.tolerance:
+            raise ToleranceUnreachable(
+                self.tolerance, best, "float64 coordinates of a plane's pixels", "put the origin near the scene",
+                how=f"{how}: coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
+            )  # fmt: skip
         if self.rounding > ROUNDING * self.tolerance:
             ratio = 20 * np.log10(self.energy.whole_profile)
             dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
             raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
 
     def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
-        error = min(self.near * made[0].predicted_error + self.rounding, self.tolerance)
+        error = float(np.hypot(self.near * made[0].predicted_error + self.rounding, self.coordinates))
+        error = min(error, self.tolerance)
         return MethodChoice(name, *made, engine, error, made[0].cost)
 
 

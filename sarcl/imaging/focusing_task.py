@@ -111,7 +111,8 @@ def make_task(
     check_polarizations(raw, sum_polarizations)
     skips = known_skips(skip, SKIPS)
     sample_weight, row_weight = weigh(raw, window, weights)
-    toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0))
+    # of a plane the pixel at `center`: with an even number of pixels the middle of the bounds is half a pixel off
+    toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0) if grid.center is None else grid.center)
     if "zero weight" in skips and not row_weight.all():
         used = np.flatnonzero(row_weight)
         raw, row_weight = raw[used], row_weight[used]

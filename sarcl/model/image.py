@@ -57,6 +57,7 @@ class Image:
     def __post_init__(self) -> None:
         if isinstance(self.data, (list, tuple)):
             object.__setattr__(self, "data", np.asarray(self.data))
+        object.__setattr__(self, "data", validation.unmasked("image data", self.data))
         if tuple(np.shape(self.data)) != tuple(self.grid.shape):
             raise ValueError(
                 f"image data has shape {tuple(np.shape(self.data))} but its grid {tuple(self.grid.shape)}; "

@@ -108,7 +108,7 @@ class PhaseHistory:
         ) -> None: ...
 
     def __post_init__(self) -> None:
-        samples = self.samples
+        samples = validation.unmasked("samples", self.samples)
         if isinstance(samples, (list, tuple)) or (in_memory(samples) and samples.dtype.kind in "iuf"):
             samples = validation.sealed(validation.converted("samples", samples, np.complex128))
         if len(np.shape(samples)) != 2 or 0 in samples.shape:
@@ -292,7 +292,7 @@ class PhaseHistory:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
         if not 0 <= start <= stop <= self.n_rows:
             raise IndexError(f"rows {start} to {stop} were requested, but there are {self.n_rows}")
-        block = np.asarray(self.samples[start:stop])
+        block = np.asarray(validation.unmasked("samples", self.samples[start:stop], first_row=start))
         if block.shape != (stop - start, self.n_samples):
             raise ValueError(
                 f"samples[{start}:{stop}] gave shape {block.shape}, wanted {(stop - start, self.n_samples)}: "

@@ -48,6 +48,15 @@ def phase_rounding(radius: float, frequency: float, wide: bool = False, number: 
     return (0.0 if wide else 2 * np.pi * cycles * number.roundings * number.unit) + number.angle
 
 
+def coordinate_rounding(farthest: float, frequency: float) -> float:
+    """Phase error, rad, root mean square over pixels, of a plane whose coordinates reach `farthest`, m.
+
+    A pixel's position and its tile's reference are each the sum of three float64 numbers: four roundings per
+    coordinate, of spacing/sqrt(12) each. The kernels add exact offsets to the reference.
+    """
+    return float(4 * np.pi * frequency / SPEED_OF_LIGHT * np.spacing(farthest) / np.sqrt(3))
+
+
 def position_rounding(radius: float, bandwidth: float, wide: bool) -> float:
     """Phase error, rad, at the band's edge from rounding positions among samples in float32; as `phase_rounding`."""
     cycles = bandwidth / SPEED_OF_LIGHT * radius

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ...arrays.channels import channels_of, sampling, warn_of
+from ...arrays.channels import LEAST_CUT, channels_of, cut_of, sampling, warn_of
 from ...base.errors import ToleranceMissed, ToleranceUnreachable
 from ...base.report import Report
 from ...base.validation import choice
@@ -55,6 +55,7 @@ def array_echo(
     reference_range = rows.track.half_path(point)
     near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, range_window)
     grid = sampling(carriers, waveform, near, far, compressed)
+    cut = cut_of(grid, waveform, carriers, compressed)
     whole = band_of(waveform, grid.frequency + (grid.n - 1) / 2 * grid.step, grid.n * grid.step)
     layout = ChannelLayout(rows, sent, grid, (near, far), waveform, compressed)
     geometry = layout.geometry(tx, rx, reference_range, layout.frequencies)
@@ -80,6 +81,8 @@ def array_echo(
             | method.describe()
             | motion
         )
+        if cut > LEAST_CUT:
+            how["tone spectra"] = f"cut half-way to the next carriers: {100 * cut:.2g} % of their norm is left out"
         raw = output.finish(
             **rows.fields(waveform.center, grid, track, receiver or track),
             waveform=waveform, array=array, compressed=compressed,
