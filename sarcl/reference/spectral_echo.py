@@ -59,3 +59,17 @@ def beam_edge(
     seen = side * (np.arange(len(places))[:, None] - first) >= 0
     wave = np.exp(-2j * wavenumber * (distance - middle_range)) * weight((lag / distance).ravel()).reshape(lag.shape)
     return np.asarray((wave * seen) @ amplitudes)
+
+
+def saras_transfer(
+    xi: np.ndarray, eta: np.ndarray, a2: float, b2: float, eps: float, gamma2: float, beta_r: float, chi: float,
+    pattern: Callable[[np.ndarray], np.ndarray],
+) -> np.ndarray:  # fmt: skip
+    """G of SARAS, equations (26) and (27), with d = 1; the azimuth terms have the sign of a numerical transform.
+
+    Variables are normalised as in (28) to (30): chi is the Doppler centroid over 2 a^2, pattern is w^2.
+    """
+    coupling = 1 + eps * eta / (2 * b2)
+    root = np.sqrt(coupling - 1.5 * gamma2 * xi**2 / (4 * a2**2))
+    phase = -(eta**2) / (4 * b2) + chi * xi + xi**2 * (1 + beta_r) / (4 * a2 * coupling)
+    return np.asarray(pattern(-(2 * chi * a2 + xi) / (2 * a2)) * np.sqrt(1 + beta_r) / root * np.exp(1j * phase))

@@ -18,6 +18,7 @@ For this folder alone:
     _map_plan               grid of the map, and the range wavenumbers at which its spectrum is read
     _map_spectrum           the map's spectrum at the range wavenumbers of every frequency
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
+    _scratch                complex arrays in memory or in temporary files
     _spectral_part          points or facets: plan, and spectra along the track
     _spectral_samples       from spectra along the track to samples
     _stationary_phase       the transfer function of SARAS, by stationary phase

@@ -81,7 +81,7 @@ def check_doppler(track: StraightTrack, highest: float, main: tuple[float, float
         of = "the beam (between its half-power directions)" if has_beam else "the scene as this track sees it"
         raise NotApplicable(
             f"the track has {track.prf:.6g} pulses per second, below the Doppler bandwidth of {of}, {needed:.6g} Hz; "
-            f"give prf={needed:.4g} or more, or use echo, which computes aliased echoes too"
+            f"give prf={1.001 * needed:.4g} or more, or use echo, which computes aliased echoes too"
         )
 
 

@@ -2,8 +2,9 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from pathlib import Path
 
 import numpy as np
 
@@ -12,6 +13,7 @@ from ._aspect_window import DopplerGrid
 from ._azimuth_transfer import AzimuthTransfer
 from ._map_plan import MapPlan, RangeWavenumbers
 from ._map_spectrum import ReflectivityMap
+from ._scratch import Scratch
 
 
 @dataclass(frozen=True, eq=False)
@@ -42,28 +44,39 @@ class MapPart:
         """Number of tables, for each of which the map is made anew."""
         return self.transfer.tables.shape[1]
 
-    def bytes(self) -> tuple[float, float]:
-        """Bytes per wavenumber along track of the map's transform, and per frequency of a spectrum."""
-        return 8.0 * self.map.n_rows, 8.0 * self.grid.count
-
     def on_device(self, device: Device) -> ReflectivityMap:
         """The scatterers, sorted for the kernels."""
         return ReflectivityMap(device, self.map, self.numbers, self.grid, self.azimuth, self.slant_range)
 
     def add(
-        self, held: ReflectivityMap, factors: np.ndarray, term: int, frequencies: np.ndarray, out: np.ndarray,
-        budget: float,
+        self, held: ReflectivityMap, factors: np.ndarray, term: int, frequencies: np.ndarray, out: Sequence[Scratch],
+        budget: float, folder: Path | None,
     ) -> None:  # fmt: skip
-        """Add the spectra of one term at frequencies, Hz (n_f,), to out (n_polarizations, n_u, n_f).
+        """Add the spectra of one term at frequencies, Hz (n_f,), to out, (n_u, n_f) for each polarisation.
 
-        factors  of the part's scatterers in this term, complex64 (n, n_polarizations);  budget  bytes for the map
+        factors  of the part's scatterers in this term, complex64 (n, n_polarizations)
+        budget   bytes;  folder  of temporary files: the map's transform is written to one where it takes over a sixth
         """
-        at_once = max(1, int(budget / self.bytes()[0]))
-        parts = [slice(i, min(i + at_once, self.grid.count)) for i in range(0, self.grid.count, at_once)]
+        n_u, room = self.grid.count, budget / 6
         for tables, share in zip(self.transfer.tables[term], self.shares(), strict=True):
             share = share.astype(np.complex64 if np.iscomplexobj(share) else np.float32)
             for n, spectra in enumerate(out):
-                amplitudes = factors[self.picked, n] * share
-                for some in parts:
-                    made = held.over_azimuth(amplitudes, some, budget)
-                    held.add(made, some, tables, self.transfer, frequencies, spectra[some])
+                bands = held.over_azimuth(factors[self.picked, n] * share, budget)
+                whole, size = None, 0
+                for rows, made in bands:
+                    if whole is None:  # bands one after the other, each with all wavenumbers
+                        size = made.shape[1]
+                        whole = Scratch((-(-self.map.n_rows // size) * n_u, size), room, folder)
+                    if made.shape[1] < size:
+                        made = np.pad(made, ((0, 0), (0, size - made.shape[1])))
+                    whole.put(rows.start // size * n_u, made)
+                assert whole is not None
+                at_once = max(1, int(room / (8 * (self.map.n_rows + size + len(frequencies)))))
+                for first in range(0, n_u, at_once):
+                    stop = min(first + at_once, n_u)
+                    starts = range(0, whole.shape[0], n_u)
+                    parts = [whole.rows(start + first, start + stop) for start in starts]
+                    over = np.concatenate(parts, axis=1)[:, : self.map.n_rows] if len(parts) > 1 else parts[0]
+                    sums = spectra.rows(first, stop)
+                    held.add(over, slice(first, stop), tables, self.transfer, frequencies, sums, budget)
+                    spectra.put(first, sums)

@@ -26,6 +26,7 @@ from ._azimuth_transfer import AzimuthTransfer
 from ._map_plan import MapPlan, RangeWavenumbers
 
 AT_ONCE = 2**17  # pairs of wavenumber and frequency per block: their coordinates stay in a cache
+PAIR = 80  # bytes per pair, of its coordinates and spectra
 FLAT = 9  # coefficients of 1/transform of the interpolation kernel
 
 
@@ -64,28 +65,27 @@ class ReflectivityMap:
         self.table = device.upload(plan.kernel.table)
         self.flat = device.upload(_flat(plan.kernel))
 
-    def over_azimuth(self, amplitudes: np.ndarray, wavenumbers: slice, budget: float) -> np.ndarray:
-        """Transform over azimuth of amplitudes (n,), at some of the wavenumbers: complex64 (n_u, n_rows).
+    def over_azimuth(self, amplitudes: np.ndarray, budget: float) -> Iterator[tuple[slice, np.ndarray]]:
+        """Transform over azimuth of amplitudes (n,), band of rows by band: the rows, and complex64 (n_u, n rows).
 
-        budget  bytes: the grid is made in bands of rows that keep to it
+        budget  bytes, of which a band and its transform take up to a fourth
         """
         plan, device, grid = self.plan, self.device, self.grid
         values = device.upload((amplitudes * self.wave).astype(np.complex64)[self.order])
         n_tiles = plan.n_columns // plan.tile
         a_band = 8 * plan.tile * plan.n_columns
-        most = min(budget / 2, device.info.max_alloc)
+        most = min(budget / 6, device.info.max_alloc)
         if a_band > most:
             raise MemoryError(
                 f"max_bytes leaves {size_text(most)} for a band of the reflectivity map, which needs "
-                f"{size_text(a_band)}; raise max_bytes"
+                f"{size_text(a_band)}; raise max_bytes to {6.1 * a_band:.2g} or more"
             )
-        at_once = max(1, int(most / a_band))
-        index = grid.indices[wavenumbers] - int(np.rint(self.numbers.u_c * grid.period / (2 * np.pi)))
+        at_once = max(1, int(min(budget / 16, device.info.max_alloc) / a_band))
+        index = grid.indices - int(np.rint(self.numbers.u_c * grid.period / (2 * np.pi)))
         flat = (1 / plan.kernel.transform(index / plan.n_columns)).astype(np.float32)
         row = (np.arange(plan.n_rows) - plan.origin) / plan.n_range
         flat_rows = (1 / plan.kernel.transform(row)).astype(np.float32)
         index %= plan.n_columns
-        out = np.empty((len(index), plan.n_rows), np.complex64)
         for first in range(0, plan.n_rows // plan.tile, at_once):
             n = min(at_once, plan.n_rows // plan.tile - first)
             made = device.empty(n * a_band)
@@ -97,25 +97,27 @@ class ReflectivityMap:
             wave = fft.rows(device, rows)
             part = slice(first * plan.tile, (first + n) * plan.tile)
             wave *= flat_rows[part, None]
+            out = np.empty((len(index), n * plan.tile), np.complex64)
             for start in range(0, len(index), 256):  # transposed a few columns at a time, for the cache
                 some = slice(start, start + 256)
-                out[some, part] = wave[:, index[some]].T
-        out *= flat[:, None]
-        return out
+                out[some] = wave[:, index[some]].T
+            out *= flat[:, None]
+            yield part, out
 
     def add(
         self, over_azimuth: np.ndarray, wavenumbers: slice, tables: np.ndarray, transfer: AzimuthTransfer,
-        frequencies: np.ndarray, out: np.ndarray,
+        frequencies: np.ndarray, out: np.ndarray, budget: float,
     ) -> None:  # fmt: skip
         """Add y(u, f) at some wavenumbers to out, complex64 (n_u, n_f).
 
-        over_azimuth  of the amplitudes;  tables  complex (M, n): A at the transfer's frequencies, for these amplitudes
+        over_azimuth  of the amplitudes, at these wavenumbers (n_u, n_rows);  budget  bytes
+        tables        complex (M, n): A at the transfer's frequencies, for these amplitudes
         """
         device, plan = self.device, self.plan
         kernel = device.kernel("spectral_echo.cl", "migrate", **self.macros, NODES=len(tables))
         held = device.upload(np.ascontiguousarray(tables, np.complex64))
         basis = device.upload(transfer.basis(frequencies).astype(np.float32))
-        for part, coordinates in self.coordinates(transfer, frequencies, wavenumbers):
+        for part, coordinates in self.coordinates(transfer, frequencies, wavenumbers, budget):
             padded = np.zeros((part.stop - part.start, plan.n_range), np.complex64)
             padded[:, : plan.n_rows - plan.origin] = over_azimuth[part, plan.origin :]
             padded[:, plan.n_range - plan.origin :] = over_azimuth[part, : plan.origin]
@@ -131,11 +133,15 @@ class ReflectivityMap:
             out[part] += device.download(buffer, made)
 
     def coordinates(
-        self, transfer: AzimuthTransfer, frequencies: np.ndarray, wavenumbers: slice
+        self, transfer: AzimuthTransfer, frequencies: np.ndarray, wavenumbers: slice, budget: float
     ) -> Iterator[tuple[slice, tuple[Any, ...]]]:
-        """Blocks of wavenumbers, and the kernel's coordinates of each: first tap, rest, cycles, cell, its rest."""
+        """Blocks of wavenumbers, and the kernel's coordinates of each: first tap, rest, cycles, cell, its rest.
+
+        budget  bytes, of which a block takes up to a sixth
+        """
         plan, u, k = self.plan, self.grid.wavenumbers[wavenumbers], wavenumber(frequencies)
-        at_once = max(1, AT_ONCE // len(k))
+        a_wavenumber = 16 * plan.n_range + PAIR * len(k)
+        at_once = max(1, min(AT_ONCE // len(k), int(budget / 6 / a_wavenumber)))
         scale = plan.spacing * plan.n_range / (2 * np.pi)
         for start in range(0, len(u), at_once):
             part = slice(start, min(start + at_once, len(u)))

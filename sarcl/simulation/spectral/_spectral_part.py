@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -23,6 +24,7 @@ from ._map_part import MapPart
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
 from ._map_spectrum import ReflectivityMap
 from ._scatterer_amplitudes import ScattererAmplitudes
+from ._scratch import Scratch
 from ._stationary_phase import stationary_tables
 from ._straight_track import StraightTrack, tangent
 
@@ -54,11 +56,6 @@ class SpectralPart:
         of_maps = float(np.sqrt(sum(one.error**2 for one in self.maps)))
         return self.expansion.error + self.outside + of_maps
 
-    @property
-    def bytes_per_frequency(self) -> float:
-        """Bytes of the spectra of all maps at one frequency."""
-        return sum(one.bytes()[1] for one in self.maps)
-
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
         main = self.maps[0]
@@ -84,16 +81,18 @@ class SpectralPart:
         return PartOnDevice([one.on_device(device) for one in self.maps], factors)
 
     def add(
-        self, held: PartOnDevice, frequencies: np.ndarray, out: Sequence[np.ndarray], budget: float,
-        on_progress: Callable[[float], None],
+        self, held: PartOnDevice, frequencies: np.ndarray, out: Sequence[Sequence[Scratch]], budget: float,
+        folder: Path | None, on_progress: Callable[[float], None],
     ) -> None:  # fmt: skip
-        """Add the spectra of every map at frequencies, Hz (n_f,), to out, (n_polarizations, n_u, n_f) each; budget
-        bytes for the map."""
+        """Add the spectra of every map at frequencies, Hz (n_f,), to out: for each map and polarisation (n_u, n_f).
+
+        budget  bytes;  folder  of temporary files
+        """
         expansion = self.expansion
         for j in range(len(expansion)):
             factors = held.factors(float(expansion.sines[j]), float(expansion.frequencies[j]))
             for one, on_device, spectra in zip(self.maps, held.maps, out, strict=True):
-                one.add(on_device, factors, j, frequencies, spectra, budget)
+                one.add(on_device, factors, j, frequencies, spectra, budget, folder)
             on_progress((j + 1) / len(expansion))
 
 

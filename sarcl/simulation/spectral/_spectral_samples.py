@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from pathlib import Path
 
 import numpy as np
 
@@ -11,6 +12,7 @@ from ...opencl import fft
 from ..echo_output import EchoOutput
 from ..scene_echoes import EchoRequest
 from ._map_part import MapPart
+from ._scratch import Scratch
 from ._spectral_part import SpectralPart
 from ._straight_track import StraightTrack
 
@@ -20,37 +22,53 @@ class SpectralSamples:
 
     def __init__(
         self, request: EchoRequest, parts: Sequence[SpectralPart], line: StraightTrack,
-        reference_range: np.ndarray, frequencies: np.ndarray, spectrum: np.ndarray,
+        reference_range: np.ndarray, frequencies: np.ndarray, spectrum: np.ndarray, folder: Path | None,
     ) -> None:  # fmt: skip
-        """spectrum  complex (n_f,), by which all samples are multiplied"""
+        """spectrum  complex (n_f,), by which all samples are multiplied;  folder  of temporary files, or None"""
         self.device, self.request, self.parts, self.line = request.device, request, parts, line
         self.reference_range, self.frequencies, self.spectrum = reference_range, frequencies, spectrum
+        self.folder = folder
 
     def compute(self, output: EchoOutput) -> None:
         """Write the samples of all pulses to an output."""
         request, n_polarizations = self.request, len(self.request.polarizations)
         held = [part.on_device(request.device, request.budget) for part in self.parts]
         request.clock.lap("map")
-        a_frequency = max(part.bytes_per_frequency for part in self.parts) + 16.0 * self.line.n_pulses
-        at_once = int(np.clip(request.budget / 3 / (n_polarizations * a_frequency), 1, len(self.frequencies)))
-        n_steps = -(-len(self.frequencies) // at_once) * len(held)
-        for i, start in enumerate(range(0, len(self.frequencies), at_once)):
-            some = slice(start, min(start + at_once, len(self.frequencies)))
+        maps = [one for part in self.parts for one in part.maps]
+        room = request.budget / 6 / (len(maps) * n_polarizations)
+        spectra = [
+            [
+                [Scratch((one.grid.count, len(self.frequencies)), room, self.folder) for _ in range(n_polarizations)]
+                for one in part.maps
+            ]
+            for part in self.parts
+        ]
+        for i, (part, on_device, out) in enumerate(zip(self.parts, held, spectra, strict=True)):
+
+            def on_progress(done: float, step: int = i) -> None:
+                request.report("echo", round(900 * (step + done) / len(held)), 1000)
+
+            part.add(on_device, self.frequencies, out, request.budget, self.folder, on_progress)
+        whole = [made for out in spectra for made in out]
+        n_frequencies, at_once = len(self.frequencies), self._at_once(maps, n_polarizations)
+        for start in range(0, n_frequencies, at_once):
+            some = slice(start, min(start + at_once, n_frequencies))
             block = np.zeros((self.line.n_pulses, n_polarizations, some.stop - start), np.complex64)
-            for m, (part, on_device) in enumerate(zip(self.parts, held, strict=True)):
-
-                def on_progress(done: float, step: int = i * len(held) + m) -> None:
-                    request.report("echo", round(1000 * (step + done) / n_steps), 1000)
-
-                shape = some.stop - start
-                spectra = [np.zeros((n_polarizations, one.grid.count, shape), np.complex64) for one in part.maps]
-                part.add(on_device, self.frequencies[some], spectra, request.budget / 3, on_progress)
-                for one, made in zip(part.maps, spectra, strict=True):
-                    for n in range(n_polarizations):
-                        block[:, n] += self._along_track(one, made[n], self.frequencies[some])
+            for one, made in zip(maps, whole, strict=True):
+                for n in range(n_polarizations):
+                    columns = made[n].columns(start, some.stop, request.budget / 16)
+                    block[:, n] += self._along_track(one, columns, self.frequencies[some])
             block *= self._reference(some)[:, None]
             output.keep_frequencies(start, block)
+            request.report("echo", 900 + round(100 * some.stop / n_frequencies), 1000)
         request.clock.lap("echo")
+
+    def _at_once(self, maps: Sequence[MapPart], n_polarizations: int) -> int:
+        """Frequencies per block, whose spectra, samples and factors take up to a third of the budget."""
+        n_pulses = self.line.n_pulses
+        of_spectra = max(16.0 * one.grid.count + 16.0 * one.grid.n_lags for one in maps) + 16.0 * n_pulses
+        bytes_per_frequency = max(of_spectra, 40.0 * n_pulses) + 8.0 * n_polarizations * n_pulses
+        return int(np.clip(self.request.budget / 3 / bytes_per_frequency, 1, len(self.frequencies)))
 
     def _along_track(self, part: MapPart, spectra: np.ndarray, frequencies: np.ndarray) -> np.ndarray:
         """Samples (n_pulses, n_f) from spectra over the wavenumbers along the track (n_u, n_f)."""

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...model.trajectory import Trajectory
 
@@ -68,14 +69,22 @@ def straight_track(track: Trajectory, frequency: float, allowed: float) -> Strai
     step = (track.positions[-1] - track.positions[0]) / (n - 1)
     spacing = float(np.linalg.norm(step))
     line = track.positions[0] + np.arange(n)[:, None] * step
-    away = np.linalg.norm(track.positions - line, axis=1)
-    worst = int(np.argmax(away))
-    most = allowed * 299792458.0 / (4 * np.pi * frequency)
-    if spacing == 0 or away[worst] > most:
+    if spacing == 0:
         raise NotApplicable(
-            f"the track is not a straight line of evenly spaced pulses: pulse {worst} is {away[worst]:.3g} m from its "
-            f"place on the line from the first to the last, where this tolerance allows {most:.2g} m; use echo, which "
-            "takes any track, or Trajectory.line"
+            "the track ends where it begins, which gives no line of pulses; use echo, which takes any track"
+        )
+    off = track.positions - line
+    away = np.linalg.norm(off, axis=1)
+    worst = int(np.argmax(away))
+    most = allowed * SPEED_OF_LIGHT / (4 * np.pi * frequency)
+    if away[worst] > most:
+        along = off @ (step / spacing)
+        beside = float(np.sqrt(max(away[worst] ** 2 - along[worst] ** 2, 0.0)))
+        what = "straight" if beside > abs(along[worst]) else "evenly spaced"
+        raise NotApplicable(
+            f"the pulses of the track are not {what}: pulse {worst} lies {beside:.3g} m beside the line from the first "
+            f"to the last and {along[worst]:+.3g} m along it from its place among evenly spaced pulses, where this "
+            f"tolerance allows {most:.2g} m; use echo, which takes any track, or Trajectory.line"
         )
     prf = (n - 1) / float(track.known_times[-1] - track.known_times[0])
     if track.attitude is not None:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Collection, Sequence
+from pathlib import Path
 from typing import Any, Literal
 
 import numpy as np
@@ -76,7 +77,8 @@ def spectral_echo(
     range_window      must hold every scatterer at every pulse that sees it
     ripple      multiply by the Fresnel ripples of the spectrum of a rectangular chirp (SARAS's function d), which
                 `echo` leaves out
-    max_bytes   memory for blocks of the map and its spectra; smaller blocks take longer
+    max_bytes   memory for blocks of the map and its spectra. What it does not hold goes to temporary files: beside
+                `out`, or where the system has temporary files
     tolerance   L2 error of the samples, as in `echo`
     check       recompute samples at 16 random pulses exactly, fewer above 20 000 facets: report.measured_error; None:
                 where that takes about a second at most
@@ -107,7 +109,8 @@ def spectral_echo(
         if ripple:
             spectrum = spectrum * chirp_ripple(waveform, frequencies)
         reference_range = task.antennas.reference_range
-        samples = SpectralSamples(request, parts, task.line, reference_range, frequencies, spectrum)
+        folder = None if out is None else Path(out).parent
+        samples = SpectralSamples(request, parts, task.line, reference_range, frequencies, spectrum, folder)
         samples.compute(output)
         measured = None
         if check if check is not None else seconds_to_check(prepared) <= QUICK_CHECK:

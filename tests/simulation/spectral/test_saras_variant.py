@@ -8,6 +8,7 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl import pointing
+from sarcl.reference import spectral_echo as twin
 from sarcl.simulation.spectral._aspect_window import KnownPhase
 from sarcl.simulation.spectral._stationary_phase import chirp_ripple
 
@@ -52,6 +53,51 @@ def test_the_printed_sign_of_the_azimuth_terms_is_wrong():
     exact, paraxial = KnownPhase(8e3), KnownPhase(8e3, 200.0)
     assert paraxial.at_middle(u, k) == pytest.approx(exact.at_middle(u, k), rel=1e-4) and exact.at_middle(u, k) > 0
     assert paraxial.kappa(u, k) == pytest.approx(exact.kappa(u, k), rel=1e-9)
+
+
+@pytest.mark.parametrize("chi", [0.0, -0.35])
+@pytest.mark.parametrize("t", [0.0, 0.99, -0.99])
+def test_the_centroid_chi_is_a_linear_phase_and_a_shift_of_the_pattern(chi, t):
+    # (21), (22): w^2(p) exp(-j a^2 P + j b^2 (q - mu P)^2), P = p^2 + 2 chi p of a surface or an antenna that moves
+    # along the line of sight, mu = a^2 eps/2b^2; its transform over q at eta is that of a chirp at q - mu P
+    a2, b2, eps, xi = 150.0, 200.0, 0.05, 60.0 - 300.0 * chi
+    p = np.linspace(-1.5, 1.5, 400_001)
+    eta, mu = 2 * b2 * t, a2 * eps / (2 * b2)
+    path = p**2 + 2 * chi * p
+
+    def pattern(p):
+        return np.exp(-8 * np.log(2) * p**2)
+
+    numerical = np.sum(pattern(p) * np.exp(-1j * ((a2 + eta * mu) * path + xi * p))) * (p[1] - p[0])
+    numerical *= np.exp(-1j * eta**2 / (4 * b2))
+    found = twin.saras_transfer(np.array(xi), np.array(eta), a2, b2, eps, 0.0, 0.0, chi, pattern)
+    # what the paper calls inessential: sqrt(pi/a^2) exp(-j pi/4), and the phase a^2 chi^2 (1 + eps eta/2b^2)
+    found = found * np.sqrt(np.pi / a2) * np.exp(1j * (a2 * chi**2 * (1 + eps * t) - np.pi / 4))
+    assert abs(np.angle(found / numerical)) < 0.03 and abs(found / numerical) == pytest.approx(1, abs=0.08)
+    if chi == 0 and t == 0.99:
+        # the printed sign is opposite: between t = 0.99 and the centre a numerical transform gives -0.29, (27) +0.28
+        center = np.sum(pattern(p) * np.exp(-1j * (a2 * path + xi * p))) * (p[1] - p[0])
+        change = np.angle(numerical * np.exp(1j * eta**2 / (4 * b2)) / center)
+        assert change == pytest.approx(-0.291, abs=0.01)
+        assert xi**2 / (4 * a2) * (1 / (1 + eps * t) - 1) == pytest.approx(-0.283, abs=1e-3)
+
+
+@pytest.mark.parametrize("squint", [0.0, 0.01])
+def test_the_doppler_centroid_is_that_of_the_antennas_pointing(squint, device):
+    # chi = -R_0/X tan(squint): 2 a^2 chi, over X, is the wavenumber -2 k tan(squint), 2 v sin(squint)/lambda in Hz
+    line = sarcl.Trajectory.line(start=(0, -60 - squint * 1e4, 6e3), velocity=(0, 100, 0), prf=300, n_pulses=360)
+    aimed = pointing.stripmap(line, look=float(np.arctan2(8e3, 6e3)), side="right", squint=squint)
+    antenna = sarcl.Antenna.gaussian(width=(0.008, 0.1))
+    scene = sarcl.Scene.points([(8e3, 0, 0)], [1.0])
+    options = {"antenna": antenna, "check": True, "reference": (8e3, 0, 0), "device": device}
+    raw = sarcl.spectral_echo(scene, CHIRP, aimed, variant="saras", tolerance=6e-2, **options)
+    assert raw.report.measured_error <= raw.report.predicted_error <= 6e-2
+    phase = np.exp(-4j * np.pi / 299792458.0 * np.outer(raw.reference_range, [CHIRP.center]))  # that was taken out
+    middle = raw.samples[:, [raw.n_samples // 2]] * phase
+    steps = np.sum(middle[1:] * middle[:-1].conj())
+    centroid = np.angle(steps) / (2 * np.pi) * 300
+    wanted = 2 * 100 * np.sin(squint) * CHIRP.center / 299792458.0
+    assert (centroid - wanted + 150) % 300 - 150 == pytest.approx(0, abs=3)
 
 
 def test_ripples_are_those_of_a_rectangular_chirp(device):

@@ -121,7 +121,7 @@ def test_blocks_of_memory_change_nothing(device, tmp_path):
     assert np.linalg.norm(small.samples - raw.samples) <= 1e-6 * np.linalg.norm(raw.samples)
     kept = sarcl.spectral_echo(points(), CHIRP, TRACK, tolerance=1e-3, out=tmp_path / "raw.h5", device=device)
     assert np.array_equal(kept.read(0, kept.n_rows), raw.samples)
-    with pytest.raises(MemoryError, match="raise max_bytes"):
+    with pytest.raises(MemoryError, match="raise max_bytes to"):
         sarcl.spectral_echo(points(), CHIRP, TRACK, max_bytes=1e6, device=device)
 
 
@@ -137,6 +137,16 @@ def test_the_echoes_focus_as_they_are(device):
 LINE = {"start": (0, -60, 6e3), "velocity": (0, 100, 0), "n_pulses": 300}
 
 
+def _uneven():
+    track = sarcl.Trajectory.line(prf=250, **LINE)
+    return sarcl.Trajectory(track.times, track.positions + np.linspace(0, 1, 300)[:, None] ** 2 * (0, 1e-2, 0))
+
+
+def _standing():
+    track = sarcl.Trajectory.line(prf=250, **LINE)
+    return sarcl.Trajectory(track.times, np.repeat(track.positions[:1], 300, axis=0))
+
+
 def _bent():
     track = sarcl.Trajectory.line(prf=250, **LINE)
     return sarcl.Trajectory(track.times, track.positions + np.linspace(0, 0.01, 300)[:, None] ** 2 * (1e4, 0, 0))
@@ -145,8 +155,14 @@ def _bent():
 @pytest.mark.parametrize(
     ("track", "options", "message"),
     [
-        (sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100), {}, r"not a straight line.*use echo"),
-        (_bent(), {}, r"pulse 1\d\d is 0.\d+ m from its place.*use echo"),
+        (
+            sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100),
+            {},
+            r"not straight: pulse.*use echo",
+        ),
+        (_uneven(), {}, r"not evenly spaced: pulse 1\d\d lies .* and -0.0025 m along.*use echo"),
+        (_standing(), {}, r"ends where it begins.*use echo"),
+        (_bent(), {}, r"not straight: pulse 1\d\d lies 0.\d+ m beside the line.*use echo"),
         (sarcl.Trajectory.line(prf=20, **LINE), {}, r"20 pulses per second, below the Doppler.*give prf=\d+.*use echo"),
         (TRACK.picked(slice(0, 1)), {}, "one pulse"),
         (replace(TRACK, accelerations=np.zeros((300, 3)), stop_and_go=False), {}, r"of an orbit.*use echo"),
@@ -162,6 +178,16 @@ def _bent():
 def test_what_it_cannot_compute_is_refused_by_name(track, options, message, device):
     with pytest.raises(ValueError, match=message):
         sarcl.spectral_echo(points(), CHIRP, track, **{"device": device, **options})
+
+
+def test_the_pulse_rate_that_a_refusal_gives_is_enough(device):
+    def track(prf):
+        return sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=prf, n_pulses=int(1.2 * prf) + 1)
+
+    with pytest.raises(ValueError, match=r"give prf=") as refused:
+        sarcl.spectral_echo(points(), CHIRP, track(20.0), device=device)
+    needed = float(str(refused.value).split("prf=")[1].split()[0])
+    assert sarcl.spectral_echo(points(), CHIRP, track(needed), check=True, device=device).report.measured_error < 1e-2
 
 
 def test_an_empty_scene_and_one_out_of_the_beam(device):
@@ -180,5 +206,5 @@ def test_the_forecast_of_echo_says_what_this_would_take(device):
     assert str(forecast).splitlines()[1].startswith("spectral_echo: about ")
     circle = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100)
     refused = sarcl.plan_echo(points(ground=0), CHIRP, circle, **options)
-    assert refused.spectral_seconds is None and "not a straight line" in refused.spectral_refusal
+    assert refused.spectral_seconds is None and "are not straight" in refused.spectral_refusal
     assert "spectral" not in str(refused)
