@@ -1,4 +1,4 @@
-"""Absorbing layers (CPML): coefficients, and the corrections on a device."""
+"""Absorbing layers (CPML): their coefficients, and their memory on a device."""
 
 from __future__ import annotations
 
@@ -6,10 +6,9 @@ from typing import Any
 
 import numpy as np
 
+from ..base.validation import count
 from ..opencl.device import Device
 from .lattice import COURANT, LANES, Lattice
-
-ROWS = 8  # rows per work-item on a CPU
 
 ORDER = 3  # the conductivity grows with this power of the depth
 STRENGTH = 0.8  # largest conductivity over (ORDER + 1)/(377 ohm dx), as Roden and Gedney (2000) recommend
@@ -35,55 +34,35 @@ def _at(depth: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     return beta.astype(np.float32), gamma.astype(np.float32)
 
 
-class Layers:
-    """The layers at both ends of x (axis 0) or y (1) on a device, with the memory of both fields."""
+def layers(device: Device, lattice: Lattice, thickness: int) -> tuple[tuple[Any, Any], ...]:
+    """Memory and coefficients of the layers on all sides, for E and for H: arguments of kernels/fdtd_vacuum.cl.
 
-    def __init__(self, device: Device, lattice: Lattice, axis: int, thickness: int, lanes: int) -> None:
-        self.device, self.lattice, self.axis, self.thickness = device, lattice, axis, thickness
-        self._kernel = device.kernel("fdtd_absorb.cl", "absorb", LANES=lanes)
-        held = list(lattice.shape)
-        held[axis] = 2 * thickness
-        self._size, self._rows, self._vectors = int(np.prod(held)), held[1], held[2] // lanes
-        self._coefficients = [[device.copied(part) for part in pair] for pair in coefficients(thickness)]
-        self._memory = [device.zeros(8 * self._size) for _ in range(2)]
-
-    def correct(self, to: Any, source: Any, magnetic: bool, first: int, last: int) -> None:
-        """Correct the planes from `first` to `last` of E from H, or of H from E."""
-        if self.axis:
-            self._run(to, source, magnetic, first, last, first)
-            return
-        n, thick = self.lattice.shape[0], self.thickness
-        self._run(to, source, magnetic, first, min(last, thick), first)
-        self._run(to, source, magnetic, max(first, n - thick), last, max(first, n - thick) - n + 2 * thick)
-
-    def _run(self, to: Any, source: Any, magnetic: bool, first: int, last: int, layer: int) -> None:
-        if first >= last:
-            return
-        grid, cpu = self.lattice, self.device.is_cpu
-        each, step = ROWS if cpu else 1, (grid.plane, grid.row)[self.axis]
-        split, jump = (self.thickness, grid.shape[1] - self._rows) if self.axis else (self._rows, 0)
-        self.device.run(
-            self._kernel, (1 if cpu else self._vectors, -(-self._rows // each), last - first), None, to, source,
-            self._memory[magnetic], *self._coefficients[magnetic], self.axis, (self.axis + 1) * grid.component,
-            (self.axis + 2) % 3 * grid.component, step if magnetic else 0, 0 if magnetic else -step, self._size,
-            grid.start, grid.plane, grid.row, self._rows, split, jump, self._vectors, each,
-            np.float32(-COURANT if magnetic else COURANT), first, layer,
-        )  # fmt: skip
-
-
-def along_rows(device: Device, lattice: Lattice, thickness: int) -> tuple[tuple[Any, Any, Any], ...]:
-    """Memory, beta and gamma of the layers along z, for E and for H: arguments of kernels/fdtd_vacuum.cl.
-
-    They have LANES cells at each end of a row; the cells inside of the layers have gamma 0. Thickness 0: none.
+    Along z the memory has LANES cells at each end of a row; those inside of the layers have gamma 0. ValueError where
+    layers do not fit into the grid, or into these cells.
     """
-    size = 16 * LANES * lattice.shape[0] * lattice.shape[1] if thickness else 16
-    return tuple(
-        (device.zeros(size), *(device.copied(_in_rows(part)) for part in pair)) for pair in coefficients(thickness)
-    )
+    if count("absorber", thickness, least=0) > LANES:
+        raise ValueError(f"absorber is {thickness} cells; layers have at most {LANES}")
+    nx, ny, nz = lattice.shape
+    if thickness and (min(nx, ny) < 2 * thickness or nz < 2 * LANES):
+        raise ValueError(
+            f"shape {lattice.shape} does not hold layers of {thickness} cells on each side; it needs at least "
+            f"{(2 * thickness, 2 * thickness, 2 * LANES)}"
+        )
+    cells = 2 * thickness * (nx + ny) * nz + 2 * LANES * nx * ny if thickness else 1
+    if 2 * cells >= 2**31:
+        raise ValueError(
+            f"layers of {thickness} cells need {2 * cells} numbers per field, kernels count to {2**31 - 1}: use fewer "
+            "or larger cells"
+        )
+    made = []
+    for beta, gamma in coefficients(thickness):
+        parts = [beta, gamma, *(_in_rows(part) for part in (beta, gamma))]
+        made.append((device.zeros(8 * cells), device.copied(np.concatenate(parts))))
+    return tuple(made)
 
 
-def _in_rows(layers: np.ndarray) -> np.ndarray:
+def _in_rows(along: np.ndarray) -> np.ndarray:
     """Coefficients (2 thickness,) in the outer cells of two vectors of LANES cells, 0 between."""
-    out, half = np.zeros(2 * LANES, np.float32), len(layers) // 2
-    out[:half], out[2 * LANES - half :] = layers[:half], layers[half:]
+    out, half = np.zeros(2 * LANES, np.float32), len(along) // 2
+    out[:half], out[2 * LANES - half :] = along[:half], along[half:]
     return out

@@ -1,4 +1,4 @@
-"""Fields on a device, and their time steps: the vacuum update, then the corrections of absorbing layers and lists.
+"""Fields on a device, and their time steps: the vacuum update with absorbing layers, then the corrections of lists.
 
 Step n takes H from n - 1/2 to n + 1/2, and E from n to n + 1. Every update and every correction of a plane needs that
 plane and its neighbours alone, so that a block of steps can be done tile by tile: the result is the same, bit by bit.
@@ -11,13 +11,14 @@ from typing import Any
 
 import numpy as np
 
-from ..base.validation import count
 from ..opencl.device import Device
-from ._absorber import ROWS, Layers, along_rows
+from ._absorber import layers
 from ._incident import WaveTable, entrances
 from ._lists import BLOCK, IncidentList, TargetList
 from .lattice import COURANT, LANES, Lattice
 from .target import Target
+
+ROWS = 8  # rows per work-item on a CPU
 
 
 def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[int, int]]]:
@@ -33,17 +34,6 @@ def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[
                 yield step, (first, last)
 
 
-def _check_layers(lattice: Lattice, thickness: int) -> None:
-    """ValueError where layers of this thickness do not fit into the grid, or into vectors at the ends of its rows."""
-    if count("absorber", thickness, least=0) > LANES:
-        raise ValueError(f"absorber is {thickness} cells; layers have at most {LANES}")
-    if thickness and (min(lattice.shape[:2]) < 2 * thickness or lattice.shape[2] < 2 * LANES):
-        raise ValueError(
-            f"shape {lattice.shape} does not hold layers of {thickness} cells on each side; it needs at least "
-            f"{(2 * thickness, 2 * thickness, 2 * LANES)}"
-        )
-
-
 class Fields:
     """E and H of a grid on a device, with everything that is not vacuum.
 
@@ -55,7 +45,6 @@ class Fields:
         self, device: Device, lattice: Lattice, target: Target, *, absorber: int = 0, wave: WaveTable | None = None,
         tile: int | None = None,
     ) -> None:  # fmt: skip
-        _check_layers(lattice, absorber)
         self.device, self.lattice, self.tile = device, lattice, tile or lattice.shape[0] + BLOCK
         self.lanes = LANES if device.info.vector_width > 1 else 1
         self.step = 0  # steps that are done
@@ -69,8 +58,7 @@ class Fields:
         self.e, self.h = (device.zeros(12 * lattice.component) for _ in range(2))
         self.edges = TargetList(device, lattice, target.edges, target.share)
         self.faces = TargetList(device, lattice, target.faces, target.weight)
-        self._layers = [Layers(device, lattice, axis, absorber, self.lanes) for axis in range(2 if absorber else 0)]
-        self._along_rows = along_rows(device, lattice, absorber)
+        self._thickness, self._layers = absorber, layers(device, lattice, absorber)
         self._wave, self._wave_steps, self._wave_values = None, 0, 0
         self._entrances: tuple[list[IncidentList], list[IncidentList]] = [], []
         if wave is not None:
@@ -98,21 +86,18 @@ class Fields:
         self.step += n_steps
 
     def _vacuum_step(self, step: int, planes: tuple[int, int], magnetic: bool) -> None:
-        """The vacuum update of one field, its absorbing layers and its incident wave."""
+        """The vacuum update of one field, with its absorbing layers, and its incident wave."""
         grid, vectors = self.lattice, self.lattice.shape[2] // self.lanes
         each, columns = (ROWS, 1) if self.device.is_cpu else (1, vectors)
         self.device.run(
             self._update[magnetic], (columns, -(-grid.shape[1] // each), planes[1] - planes[0]), None, self.e, self.h,
-            *self._along_rows[magnetic], grid.component, grid.start, grid.plane, grid.row, grid.shape[0], grid.shape[1],
+            *self._layers[magnetic], self._thickness, grid.component, grid.start, grid.plane, grid.row, *grid.shape[:2],
             vectors, each, np.float32(COURANT), planes[0],
         )  # fmt: skip
-        to, source = (self.h, self.e) if magnetic else (self.e, self.h)
-        for layers in self._layers:
-            layers.correct(to, source, magnetic, *planes)
         if self.step + step < self._wave_steps:
             at = (self.step + step) * self._wave_values
             for part in self._entrances[magnetic]:
-                part.correct(self._incident, to, self._wave, at, planes)
+                part.correct(self._incident, self.h if magnetic else self.e, self._wave, at, planes)
 
     def transform(self, part: TargetList, phase: Any, sums: Any, first: int, n_steps: int, n_frequencies: int) -> None:
         """Add the residuals of the last steps to their sums over time; see kernels/fdtd_lists.cl."""

@@ -1,4 +1,4 @@
-"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl, fdtd_absorb.cl and fdtd_lists.cl.
+"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl and fdtd_lists.cl.
 
 Fields are float64 (3, nx, ny, nz): component a of E stands at half a cell along axis a, of H at half a cell along the
 other two. H is the magnetic field times the impedance of vacuum. Fields, `old` and `psi` are changed in place. Cells of
