@@ -4,6 +4,7 @@ For other folders:
 
     backproject      backproject(): an image to a stated tolerance
     choose_method    the cheapest method that meets the tolerance
+    collection       what an image keeps of the data that it was made from
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
     engine           what every method offers: a plan, and an engine that makes bands on one device
@@ -28,6 +29,7 @@ For this folder alone:
 __all__ = [
     "backproject",
     "choose_method",
+    "collection",
     "compress",
     "default_grid",
     "direct",

@@ -24,6 +24,7 @@ from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
 from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice, choose
+from .collection import collection
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip
@@ -201,14 +202,12 @@ def backproject(
             seconds=clock.seconds,
             device=" + ".join(workers.names),
         )
-        middle = task.raw.n_rows // 2
         image = output.image(
             job=checkpoint.mark if checkpoint and checkpoint.tiles else None,
             gain=float(task.row_weight.sum() * task.sample_weight.sum()),
             frequency=float(np.median(task.antennas.frequency)),
-            tx=task.raw.tx[middle],
-            rx=task.raw.rx[middle],
             report=report,
+            **collection(task.raw, grid, window),
         )
         if checkpoint:
             checkpoint.done()

@@ -16,14 +16,26 @@ from ..io import formats, hdf5
 from .image_grid import ImageGrid, pair
 
 if TYPE_CHECKING:
+    from types import EllipsisType
+
     import PIL.Image
 
     from ..base.types import LazyRows, PathLike
 
+FRAMES = ("local", "earth-fixed")
+# all fields but data and grid, as files hold them
+FIELDS = (
+    "gain", "frequency", "tx", "rx", "report", "tx_velocity", "rx_velocity", "time", "band", "window", "polarization",
+    "frame",
+)  # fmt: skip
+
 
 @dataclass(frozen=True, eq=False)
-class Image:
+class Image(np.lib.mixins.NDArrayOperatorsMixin):
     """An image on a grid.
+
+    NumPy takes it for the array of its pixels: np.asarray(image), np.abs(image), 2 * image and image_a - image_b are
+    arrays. image[10:20, ::2] is an Image of those pixels; any other index gives their values.
 
     data       complex, of grid.shape; real if it is intensity (after `multilook`). It may be a dataset of a file
     grid       positions of the pixels
@@ -31,6 +43,15 @@ class Image:
     frequency  centre frequency, Hz, and
     tx, rx     antenna positions at mid-aperture, m (3,): the image's local carrier follows from them
     report     how the image was made
+
+    Of the data that it was made from, where they are known:
+
+    tx_velocity, rx_velocity   of the antennas at mid-aperture, m/s (3,)
+    time          of the first and the last pulse, s (2,)
+    band          lowest and highest frequency, Hz (2,)
+    window        the window that it was made with, in words
+    polarization  "HH", ..., or the several that were summed: "HH+VV"
+    frame         of positions: "earth-fixed" where the grid lies within 32 km of the ellipsoid, or "local"
     """
 
     data: Any
@@ -40,6 +61,13 @@ class Image:
     tx: NDArray[np.float64] | None = None
     rx: NDArray[np.float64] | None = None
     report: Report | None = None
+    tx_velocity: NDArray[np.float64] | None = None
+    rx_velocity: NDArray[np.float64] | None = None
+    time: NDArray[np.float64] | None = None
+    band: NDArray[np.float64] | None = None
+    window: str | None = None
+    polarization: str | None = None
+    frame: str | None = None
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -52,6 +80,13 @@ class Image:
             tx: ArrayLike | None = None,
             rx: ArrayLike | None = None,
             report: Report | None = None,
+            tx_velocity: ArrayLike | None = None,
+            rx_velocity: ArrayLike | None = None,
+            time: ArrayLike | None = None,
+            band: ArrayLike | None = None,
+            window: str | None = None,
+            polarization: str | None = None,
+            frame: str | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -68,9 +103,40 @@ class Image:
         if self.frequency is not None:
             object.__setattr__(self, "frequency", validation.number("image frequency", self.frequency, above=0))
         object.__setattr__(self, "gain", validation.number("image gain", self.gain, above=0))
-        for name in ("tx", "rx"):
+        for name, length in (("tx", 3), ("rx", 3), ("tx_velocity", 3), ("rx_velocity", 3), ("time", 2), ("band", 2)):
             if getattr(self, name) is not None:
-                object.__setattr__(self, name, validation.array(name, getattr(self, name), np.float64, (3,)))
+                object.__setattr__(self, name, validation.array(name, getattr(self, name), np.float64, (length,)))
+        if self.frame is not None:
+            validation.choice("image frame", self.frame, FRAMES)
+
+    __eq__ = object.__eq__  # images are equal where they are one: their pixels are compared as np.asarray(image)
+    __ne__ = object.__ne__
+    __hash__ = object.__hash__
+
+    def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:
+        made = np.asarray(self.data, dtype)
+        return np.array(made) if copy else made
+
+    def __array_ufunc__(self, ufunc: Any, method: str, *inputs: Any, **options: Any) -> Any:
+        return getattr(ufunc, method)(*(np.asarray(i) if isinstance(i, Image) else i for i in inputs), **options)
+
+    def __len__(self) -> int:
+        return int(self.grid.shape[0])
+
+    def __getitem__(self, index: slice | int | np.ndarray | tuple[slice | int | EllipsisType, ...]) -> Any:
+        """Pixels: an Image on their part of the grid where every axis has a slice (or none), else their values."""
+        slices = index if isinstance(index, tuple) else (index,)
+        if len(slices) <= len(self.grid.shape) and all(isinstance(one, slice) for one in slices):
+            return replace(self, data=self.data[slices], grid=self.grid.part(*slices))
+        return self.data[index] if isinstance(self.data, np.ndarray) else np.asarray(self)[index]
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Edges of the pixels of a plane, m: (left, right, bottom, top), as Matplotlib's imshow(extent=) takes them.
+
+        Give it origin="lower" too: row 0 is drawn at the bottom.
+        """
+        return self.grid.extent
 
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.grid.shape))
@@ -215,4 +281,4 @@ def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:
 
 def image_fields(image: Image) -> dict[str, Any]:
     """All fields except data and grid, by name, as sarcl's files hold them."""
-    return {name: getattr(image, name) for name in ("gain", "frequency", "tx", "rx", "report")}
+    return {name: getattr(image, name) for name in FIELDS}

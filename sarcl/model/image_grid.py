@@ -203,6 +203,57 @@ class ImageGrid:
         part.__dict__["_middle"] = self._middle - start
         return part
 
+    def part(self, *slices: slice) -> ImageGrid:
+        """The grid of some of the pixels: a slice for each of the first axes, with positive steps.
+
+        IndexError where a step is not positive or nothing is left.
+        """
+        taken = []
+        for axis, (n, one) in enumerate(zip(self.shape, (*slices, *[slice(None)] * len(self.shape)), strict=False)):
+            found = range(*one.indices(n))
+            if found.step < 0:
+                raise IndexError(f"axis {axis} of a grid is sliced with a step of {found.step}; steps are positive")
+            if len(found) == 0:
+                raise IndexError(f"no pixel is left of the {n} of axis {axis}; choose at least one")
+            taken.append(found)
+        shape = tuple(map(len, taken))
+        if self.spacing is not None:
+            rows, columns = taken
+            center = self.at(rows.start + rows.step * (shape[0] // 2), columns.start + columns.step * (shape[1] // 2))
+            spacing = self.spacing[0] * rows.step, self.spacing[1] * columns.step
+            return replace(self, shape=shape, center=validation.sealed(center), spacing=spacing)
+        assert self.listed is not None
+        listed = self.listed[tuple(slice(r.start, r.stop, r.step) for r in taken)]
+        if self.times is not None and self.ranges is not None:
+            return ImageGrid.zero_doppler(self.times[list(taken[0])], self.ranges[list(taken[1])], listed)
+        return ImageGrid.points(listed)
+
+    @property
+    def x(self) -> NDArray[np.float64]:
+        """Coordinates of a plane's columns along its x_axis, m (columns,)."""
+        return self._along(1)
+
+    @property
+    def y(self) -> NDArray[np.float64]:
+        """Coordinates of a plane's rows along its y_axis, m (rows,)."""
+        return self._along(0)
+
+    @property
+    def extent(self) -> tuple[float, float, float, float]:
+        """Edges of a plane's pixels along x_axis and y_axis, m: (left, right, bottom, top)."""
+        x, y = self.x, self.y
+        assert self.spacing is not None
+        dy, dx = self.spacing[0] / 2, self.spacing[1] / 2
+        return float(x[0] - dx), float(x[-1] + dx), float(y[0] - dy), float(y[-1] + dy)
+
+    def _along(self, axis: int) -> NDArray[np.float64]:
+        self._need_plane("x, y or extent")
+        assert self.center is not None and self.spacing is not None
+        along = (self.y_axis, self.x_axis)[axis]
+        middle = (self.shape[0] // 2, self._middle)[axis]
+        assert along is not None
+        return np.asarray(self.center @ along + (np.arange(self.shape[axis]) - middle) * self.spacing[axis])
+
     def filled(self) -> ImageGrid:
         """The grid with some position of another cell in every empty cell; itself where no cell is empty."""
         if self.empty is None or self.listed is None:

@@ -15,7 +15,7 @@ import numpy as np
 
 from ..io import formats, sarcl_hdf5
 from .antenna_array import AntennaArray
-from .image import Image, image_fields
+from .image import FIELDS, Image, image_fields
 from .image_grid import ImageGrid
 from .phase_history import PER_ROW, PhaseHistory, concatenate, phase_history_fields
 from .waveform import Waveform
@@ -24,17 +24,15 @@ if TYPE_CHECKING:
     from ..base.types import PathLike
 
 
-def finish_image(
-    writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, *, gain: float = 1.0, frequency: Any = None, tx: Any = None,
-    rx: Any = None, report: Any = None,
-) -> Image:  # fmt: skip
+def finish_image(writer: sarcl_hdf5.ImageWriter, grid: ImageGrid, **fields: Any) -> Image:
     """Complete an image file, move it to its path and return the Image, which reads it when needed.
 
+    fields  of the Image, but data and grid
     ValueError names a wrong field; then the file is abandoned.
     """
     writer.check_open()
     try:
-        image = Image(writer.data, grid, gain=gain, frequency=frequency, tx=tx, rx=rx, report=report)
+        image = Image(writer.data, grid, **fields)
     except BaseException:
         writer.abandon()
         raise
@@ -107,5 +105,5 @@ def _image(stored: Mapping[str, Any]) -> Image:
     for value in grid.values():
         if isinstance(value, np.ndarray):
             value.flags.writeable = False
-    others: dict[str, Any] = {name: stored.get(name) for name in ("gain", "frequency", "tx", "rx", "report")}
+    others: dict[str, Any] = {name: stored.get(name) for name in FIELDS}
     return Image(stored["data"], ImageGrid(**grid), **others)

@@ -249,3 +249,90 @@ def test_bad_images_say_what_was_wanted(name):
     make, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def plane_image(shape=(6, 9), spacing=(0.5, 0.25)):
+    grid = sarcl.ImageGrid.plane(center=(3, -2, 1), shape=shape, spacing=spacing)
+    random = np.random.default_rng(3)
+    data = (random.standard_normal((*shape, 2)) @ (1, 1j)).astype(np.complex64)
+    return sarcl.Image(data, grid, gain=2.0, window="hamming", time=(0.0, 2.0))
+
+
+def test_numpy_takes_an_image_for_its_pixels():
+    image = plane_image()
+    data = image.data
+    assert np.asarray(image) is data and np.array(image) is not data and np.asarray(image, np.complex128).dtype == "c16"
+    for made, wanted in (
+        (np.abs(image), np.abs(data)), (2 * image, 2 * data), (image - image, 0 * data), (image / data, data / data),
+        (np.add(data, image), 2 * data), (-image, -data), (np.mean(image), np.mean(data)), (image**2, data**2),
+        (np.fft.fft(image), np.fft.fft(data)), (np.abs(image) > 1, np.abs(data) > 1),
+    ):  # fmt: skip
+        assert isinstance(made, (np.ndarray, np.generic)) and np.array_equal(made, wanted)
+    assert image == image and image != plane_image() and len({image, image}) == 1 and len(image) == 6
+
+
+def test_slices_of_an_image_lie_on_their_part_of_the_grid():
+    image = plane_image()
+    for rows, columns in (
+        (slice(1, 5), slice(2, 9, 3)),
+        (slice(None, None, 2), slice(-4, None)),
+        (slice(3, 4), slice(7, 8)),
+    ):
+        part = image[rows, columns]
+        assert isinstance(part, sarcl.Image) and np.array_equal(part.data, image.data[rows, columns])
+        assert np.abs(part.grid.positions - image.grid.positions[rows, columns]).max() <= 1e-14
+        assert part.gain == 2.0 and part.window == "hamming" and (part.time == [0, 2]).all()
+    assert image[2:].grid.shape == (4, 9)
+    assert image[2, 3] == image.data[2, 3] and (image[1] == image.data[1]).all()
+    assert (image[np.abs(image) > 1] == image.data[np.abs(image.data) > 1]).all()
+    with pytest.raises(IndexError, match="step of -1; steps are positive"):
+        image[::-1]
+    with pytest.raises(IndexError, match="no pixel is left of the 6 of axis 0"):
+        image[7:]
+
+
+def test_slices_of_listed_points_and_of_files_keep_their_positions(tmp_path):
+    image = plane_image()
+    listed = sarcl.Image(image.data, sarcl.ImageGrid.points(image.grid.positions))
+    assert (listed[1:4, ::2].grid.positions == image.grid.positions[1:4, ::2]).all()
+    times, ranges = np.arange(6.0), 100 + np.arange(9.0)
+    made = sarcl.Image(image.data, sarcl.ImageGrid.zero_doppler(times, ranges, image.grid.positions))[2:, 1:5]
+    assert (made.grid.times == times[2:]).all() and (made.grid.ranges == ranges[1:5]).all()
+    image.save(tmp_path / "a.h5")
+    stored = sarcl.read(tmp_path / "a.h5")
+    assert (np.asarray(stored) == image.data).all() and (stored[1:3, 2:4].data == image.data[1:3, 2:4]).all()
+    assert (2 * stored == 2 * image.data).all() and stored[2, 3] == image.data[2, 3]
+
+
+def test_axes_and_extent_of_a_plane():
+    grid = plane_image().grid
+    assert (grid.x == grid.positions[0, :, 0]).all() and (grid.y == grid.positions[:, 0, 1]).all()
+    left, right, bottom, top = plane_image().extent
+    assert (left, right) == (grid.x[0] - 0.125, grid.x[-1] + 0.125) and (bottom, top) == (
+        grid.y[0] - 0.25,
+        grid.y[-1] + 0.25,
+    )
+    with pytest.raises(ValueError, match="x, y or extent is for planes"):
+        print(sarcl.ImageGrid.points(grid.positions).extent)
+
+
+def test_an_image_keeps_what_products_need_of_its_data(tmp_path):
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=100e6, duration=1e-6)
+    track = sarcl.Trajectory.line(start=(-3e3, -8, 3e3), velocity=(0, 100, 0), prf=100.0, n_pulses=17)
+    raw = sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), chirp, track)
+    grid = sarcl.ImageGrid.plane(shape=(8, 8), spacing=1.0)
+    for made in (
+        sarcl.backproject(raw, grid, window=("taylor", 35, 5)),
+        sarcl.backproject(raw, grid, window=("taylor", 35, 5), out=tmp_path / "a.h5"),
+        sarcl.polar_format(raw, grid, window=("taylor", 35, 5), tolerance=1e-1),
+    ):
+        assert (made.tx_velocity == [0, 100, 0]).all() and (made.rx_velocity == [0, 100, 0]).all()
+        assert made.time == pytest.approx([0, 0.16]) and made.band == pytest.approx([9.55e9, 9.65e9])
+        assert (made.window, made.polarization, made.frame) == ("taylor 35 5", "HH", "local")
+        made.save(tmp_path / "b.h5")
+        again = sarcl.read(tmp_path / "b.h5")
+        for name in ("tx", "tx_velocity", "rx_velocity", "time", "band"):
+            assert (getattr(again, name) == getattr(made, name)).all()
+        assert (again.window, again.polarization, again.frame) == (made.window, made.polarization, made.frame)
+    with pytest.raises(ValueError, match="image frame is 'moon'; choose one of 'local', 'earth-fixed'"):
+        sarcl.Image(np.ones((8, 8)), grid, frame="moon")

@@ -25,6 +25,7 @@ from ...numerics.windows import Window
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import DeviceChoice
+from ..collection import collection
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import Forecast, speed
 from ._wavefront import Curvature, Waves, curvature, waves_about
@@ -96,14 +97,12 @@ def polar_format(
     if check or (check is None and exact_seconds < 0.02 * clock.seconds["gridding"]):
         measured = _measure_error(task, grid, waves, data)
         clock.lap("check")
-    middle = task.raw.n_rows // 2
     image = Image(
         data,
         grid,
         gain=float(task.row_weight.sum() * task.sample_weight.sum()),
         frequency=float(np.median(task.antennas.frequency)),
-        tx=task.raw.tx[middle],
-        rx=task.raw.rx[middle],
+        **collection(task.raw, grid, window),
         report=Report(
             plan=details,
             tolerance=tolerance,
