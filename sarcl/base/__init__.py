@@ -7,6 +7,7 @@ For other folders:
     counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
     errors        warnings and errors of the library; a warning points to the user's line that called it
     float_pairs   float64 as pairs of float32, for kernels on devices without float64
+    host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb
@@ -28,6 +29,7 @@ __all__ = [
     "counter_rng",
     "errors",
     "float_pairs",
+    "host_memory",
     "morton",
     "progress",
     "report",

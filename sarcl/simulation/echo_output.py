@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import host_memory
 from ..base.text import size_text
 from ..base.validation import sealed
 from ..io import formats
@@ -36,7 +37,7 @@ class EchoOutput:
         nbytes = 8.0 * n_rows * shape[-1]
         text = f"{n_rows} rows of {shape[-1]} samples: {size_text(nbytes)}"
         log.info("echoes of %d pulses, %s", shape[0], text + f", and {size_text(n_rows * ROW_BYTES)} of geometry")
-        geometry, room = float(COPIES * n_rows * ROW_BYTES), _memory()
+        geometry, room = float(COPIES * n_rows * ROW_BYTES), host_memory.installed()
         if geometry > room:
             raise MemoryError(
                 f"echoes of {shape[0]} pulses are {n_rows} rows, whose geometry alone takes {size_text(geometry)} of "
@@ -99,11 +100,3 @@ class EchoOutput:
     def __exit__(self, *exc: object) -> None:
         if self.writer is not None:
             self.writer.abandon()
-
-
-def _memory() -> float:
-    """Bytes of memory of this machine, inf where it is not known."""
-    try:
-        return float(os.sysconf("SC_PAGE_SIZE")) * os.sysconf("SC_PHYS_PAGES")
-    except (AttributeError, OSError, ValueError):
-        return float("inf")

@@ -11,6 +11,7 @@ from helpers.cases import image_error, noise_on
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.imaging.range_doppler import _focus
 from sarcl.imaging.range_doppler._focus import _Bins
 from sarcl.imaging.range_doppler._plan import curved
 from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
@@ -280,8 +281,25 @@ def test_bytes_do_not_change_the_image_and_too_few_are_refused():
     whole = sarcl.range_doppler(raw, check=False, **cut)
     less = sarcl.range_doppler(raw, check=False, max_bytes=1.2e6, **cut)
     assert np.linalg.norm(whole.data - less.data) <= 1e-6 * np.linalg.norm(whole.data)
+    assert np.array_equal(whole.data, sarcl.range_doppler(raw, check=False, max_bytes=5e7, **cut).data)
     with pytest.raises(MemoryError, match="raise max_bytes"):
         sarcl.range_doppler(noise(n=20, n_samples=200000, aperture=6.0), max_bytes=1e6, **cut)
+
+
+def test_large_arrays_go_to_files_and_change_nothing(monkeypatch):
+    raw = noise(n_samples=300)
+    whole = sarcl.range_doppler(raw, check=False)
+    made, real = [], _focus.host_memory.zeros
+    monkeypatch.setattr(_focus.host_memory, "zeros", lambda *given: made.append(real(*given)) or made[-1])
+    spilled = sarcl.range_doppler(raw, check=False, max_bytes=1e6)
+    assert len(made) == 3 and all(isinstance(array, np.memmap) for array in made)
+    assert np.linalg.norm(whole.data - spilled.data) <= 1e-6 * np.linalg.norm(whole.data)
+
+
+def test_an_image_that_memory_does_not_hold_is_refused_with_the_size_that_it_does(monkeypatch):
+    monkeypatch.setattr(_focus.host_memory, "installed", lambda: 56e3)
+    with pytest.raises(MemoryError, match=r"this machine has 56 kB; give times=, .* of at most 1,000 pixels"):
+        sarcl.range_doppler(noise())
 
 
 def test_progress_of_range_doppler_is_reported_up_to_its_end():

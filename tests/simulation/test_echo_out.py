@@ -83,7 +83,7 @@ def test_out_is_a_name():
 
 
 def test_geometry_of_more_rows_than_memory_holds_is_refused(monkeypatch, tmp_path):
-    monkeypatch.setattr(echo_output, "_memory", lambda: 1e5)
+    monkeypatch.setattr(echo_output.host_memory, "installed", lambda: 1e5)
     with pytest.raises(MemoryError, match=r"1000 rows, whose geometry alone takes .*'simultaneous'"):
         sarcl.echo(
             SCENE, TONE, passing(40), array=line(5), channels="separated", receive="all", range_window=WINDOW,

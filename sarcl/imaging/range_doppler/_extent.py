@@ -6,8 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import warn
+from ...base.text import size_text
 from ...base.validation import number
 from ...model.image_grid import pair
 from ...model.phase_history import PhaseHistory
@@ -19,6 +21,7 @@ from ._velocity import Positions
 FILLED = 0.8  # of the sampling rate along rows and columns that the spectrum of a pixel fills, by default
 HELD = 0.6  # of the slant ranges that the range window holds at one time: default times leave as many
 MOST_PIXELS = 2**31
+PIXEL_BYTES = 8 + 2 * 24  # a pixel, and its position while a grid is made
 
 
 @dataclass(frozen=True, eq=False)
@@ -93,6 +96,13 @@ def choose_extent(
         raise MemoryError(
             f"an image of {n_times} x {n_ranges} pixels is larger than range_doppler makes; give times=, ranges= of a "
             "part of it, or a wider spacing="
+        )
+    room = host_memory.installed()
+    if PIXEL_BYTES * n_times * n_ranges > room:
+        raise MemoryError(
+            f"an image of {n_times} x {n_ranges} pixels needs {size_text(PIXEL_BYTES * n_times * n_ranges)} with its "
+            f"positions, and this machine has {size_text(room)}; give times=, ranges= of a part of at most "
+            f"{int(room / PIXEL_BYTES):,} pixels, or a wider spacing="
         )
     u, r = times[0] + track.step / finer * np.arange(n_times), ranges[0] + column * np.arange(n_ranges)
     corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)

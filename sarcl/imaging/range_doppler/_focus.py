@@ -12,10 +12,12 @@ some slant ranges (secondary range compression).
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
+from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
 
+from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
 from ...base.text import size_text
@@ -28,20 +30,32 @@ from ._plan import SEGMENT, FocusPlan, band_frequencies
 from ._track import Track
 
 PIECE = 64  # rows that are transposed at a time, for the cache
+ARRAYS = 3  # large arrays that share the memory of the host: rows, spectra, compressed bins
+
+
+@dataclass(frozen=True)
+class Budget:
+    """Bytes for blocks on the device, and for large arrays in the memory of the host; beyond, these go to files."""
+
+    device: float
+    host: float
 
 
 def focus(
     device: Device, plan: FocusPlan, raw: PhaseHistory, track: Track, weights: tuple[np.ndarray, np.ndarray],
-    budget: float, clock: Clock, on_progress: Callable[[float], None],
+    budget: Budget, clock: Clock, on_progress: Callable[[float], None],
 ) -> np.ndarray:  # fmt: skip
-    """The image complex64 (times, ranges), from the rows times weights of samples and of rows."""
-    spectra = _azimuth_spectra(device, plan, raw, weights, clock)
+    """The image complex64 (times, ranges), from the rows times weights of samples and of rows.
+
+    MemoryError where neither memory nor temporary files hold the rows, their spectra or the compressed bins.
+    """
+    spectra = _azimuth_spectra(device, plan, raw, weights, budget, clock)
     on_progress(0.3)
     bins = _Bins(device, plan, raw, track)
     n_times, n_ranges = len(plan.times), len(plan.ranges)
     period = plan.length * plan.finer
-    folded = np.zeros((period, n_ranges), np.complex64)
-    at_once = bins.at_once(budget)
+    folded = host_memory.zeros((period, n_ranges), budget.host / ARRAYS, "Doppler bins of the columns")
+    at_once = bins.at_once(budget.device)
     for start in range(0, len(plan.bins), at_once):
         numbers = plan.bins[start : start + at_once]
         chosen = spectra[numbers % plan.length]
@@ -53,13 +67,19 @@ def focus(
     del spectra
     image = np.empty((n_times, n_ranges), np.complex64)
     level = bins.level(plan.ranges).astype(np.complex64)
-    for start in range(0, n_ranges, PIECE):
-        columns = slice(start, start + PIECE)
+    width = _columns(folded, budget)
+    for start in range(0, n_ranges, width):
+        columns = slice(start, start + width)
         made = fft.rows(device, np.ascontiguousarray(folded[:, columns].T), inverse=True)
         image[:, columns] = made[:, :n_times].T * level[columns]
     clock.lap("fft")
     on_progress(1.0)
     return image
+
+
+def _columns(held: np.ndarray, budget: Budget) -> int:
+    """Columns that are transformed at a time: few for the cache, more where each pass reads a file again."""
+    return max(PIECE, int(budget.host / (32 * len(held)))) if isinstance(held, np.memmap) else PIECE
 
 
 def _pieces(numbers: np.ndarray, period: int) -> list[tuple[int, int]]:
@@ -70,19 +90,21 @@ def _pieces(numbers: np.ndarray, period: int) -> list[tuple[int, int]]:
 
 
 def _azimuth_spectra(
-    device: Device, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], clock: Clock
-) -> np.ndarray:
+    device: Device, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], budget: Budget,
+    clock: Clock,
+) -> np.ndarray:  # fmt: skip
     """FFT of the rows along the track, all with the reference range plan.center: complex64 (length, n_samples).
 
     A track longer than the FFT is folded: the plan's length keeps what is folded out of the pixels' Doppler band.
     """
-    rows = np.empty((raw.n_rows, raw.n_samples), np.complex64)
+    rows = host_memory.zeros((raw.n_rows, raw.n_samples), budget.host / ARRAYS, "rows of samples")
     for start in range(0, raw.n_rows, PIECE):
         rows[start : start + PIECE] = _referenced(raw, start, min(start + PIECE, raw.n_rows), plan.center, weights)
     clock.lap("samples")
-    out = np.empty((plan.length, raw.n_samples), np.complex64)
-    for start in range(0, raw.n_samples, PIECE):
-        columns = slice(start, start + PIECE)
+    out = host_memory.zeros((plan.length, raw.n_samples), budget.host / ARRAYS, "spectra along the track")
+    width = _columns(out, budget)
+    for start in range(0, raw.n_samples, width):
+        columns = slice(start, start + width)
         part = np.zeros((len(rows[0, columns]), plan.length), np.complex64)
         for first in range(0, raw.n_rows, plan.length):
             piece = rows[first : first + plan.length, columns].T

@@ -15,7 +15,7 @@ from ...model.phase_history import PhaseHistory
 from ...opencl.device import Device
 from ._doppler import sine
 from ._extent import Extent
-from ._focus import focus
+from ._focus import Budget, focus
 from ._map_drift import Looks
 from ._plan import FocusPlan, make_plan
 from ._track import Track
@@ -29,7 +29,7 @@ MOST_PIXELS = 2048, 512  # rows and columns of the looks, from the middle of the
 class TwoLooks:
     """The looks of echoes in the extent of an image, for hyperbolas whose Doppler rates are scaled.
 
-    weights  of samples (n_samples,) and rows (n_rows,);  budget  bytes on the device;  wavelength  m
+    weights  of samples (n_samples,) and rows (n_rows,);  wavelength  m
     """
 
     device: Device
@@ -38,7 +38,7 @@ class TwoLooks:
     extent: Extent
     fit: Hyperbolas
     weights: tuple[np.ndarray, np.ndarray]
-    budget: float
+    budget: Budget
     wavelength: float
 
     def focused(self, factor: float) -> Looks:

@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.validation import array, instance, number
 from ...base.validation import tolerance as allowed_error
@@ -19,6 +20,7 @@ from ...opencl.device import Device
 from ..focusing_task import weigh
 from ._doppler import centroid_of_data, centroid_of_geometry
 from ._extent import Extent, choose_extent
+from ._focus import Budget
 from ._ground import Ground
 from ._looks import TwoLooks
 from ._map_drift import converged
@@ -34,7 +36,7 @@ EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 class RangeDopplerTask:
     """What is to be focused, and how.
 
-    sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes for blocks on the device
+    sample_weight, row_weight   of samples (n_samples,) and rows (n_rows,);  budget  bytes
     speed      effective velocity, m/s, to which the centroids refer;  wavelength  of sample n_samples//2, m
     centroids  sines of the squint angles of the Doppler centroid: of the geometry, and used
     known      hyperbolas of the geometry, those of the plan unless the Doppler rate is another
@@ -49,7 +51,7 @@ class RangeDopplerTask:
     sample_weight: np.ndarray
     row_weight: np.ndarray
     device: Device
-    budget: float
+    budget: Budget
     speed: float
     centroids: tuple[float, float]
     known: Hyperbolas
@@ -107,7 +109,10 @@ def make_task(
     elif not (isinstance(doppler, str) and doppler == "geometry"):
         centroid = _number("doppler", doppler, "Hz") * wavelength / (2 * speed)
     opened = open_device(device)
-    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
+    budget = Budget(
+        min(memory_budget.budget(opened, max_bytes), opened.info.memory),
+        host_memory.installed() / 2 if max_bytes is None else float(max_bytes),
+    )
 
     extent = choose_extent(
         raw, track, smooth, speed, centroid, None if beam is None else _beam(beam),

@@ -55,7 +55,9 @@ def range_doppler(
     side       "left" or "right" of the track, seen from above; None: where the origin is, if the echoes contain it
     tolerance  L2 error allowed against `backproject` at the same positions, relative to the larger of the norm of the
                image and the norm of the same contributions with random phases
-    window, weights, max_bytes   as `backproject` takes them
+    window, weights   as `backproject` takes them
+    max_bytes  for blocks on the device, as `backproject` takes it; arrays of all pulses or Doppler bins that are larger
+               than a third of it, or of half the machine's memory, are temporary files
     times      (first, last) zero-Doppler time, s; None: those of the rows, less where a pixel's Doppler band and the
                image's exceed the pulse rate
     ranges     (near, far) slant range, m; None: the ranges that the range window holds in every row
