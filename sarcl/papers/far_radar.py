@@ -72,12 +72,14 @@ def ground(y: tuple[float, float], x: tuple[float, float], cells: Sequence[int] 
 
 @dataclass(frozen=True)
 class Speckle:
-    """Statistics of pixels: p values of Rayleigh amplitudes and uniform phases (Kolmogorov and Smirnov), and the
-    standard deviation of the intensity over its mean, 1 for fully developed speckle."""
+    """Statistics of pixels: p values of Rayleigh amplitudes and uniform phases (Kolmogorov and Smirnov), the standard
+    deviation of the intensity over its mean, 1 for fully developed speckle, and the largest difference between the
+    distribution functions of the amplitudes and Rayleigh's."""
 
     rayleigh: float
     uniform: float
     contrast: float
+    difference: float
 
 
 def speckle(pixels: np.ndarray) -> Speckle:
@@ -86,6 +88,7 @@ def speckle(pixels: np.ndarray) -> Speckle:
 
     power = np.abs(pixels.ravel()) ** 2
     amplitude = np.sqrt(power / power.mean())
-    rayleigh = stats.kstest(amplitude, "rayleigh", args=(0, np.sqrt(0.5))).pvalue
+    rayleigh = stats.kstest(amplitude, "rayleigh", args=(0, np.sqrt(0.5)))
     uniform = stats.kstest(np.angle(pixels.ravel()), "uniform", args=(-np.pi, 2 * np.pi)).pvalue
-    return Speckle(float(rayleigh), float(uniform), float(power.std() / power.mean()))
+    contrast = float(power.std() / power.mean())
+    return Speckle(float(rayleigh.pvalue), float(uniform), contrast, float(rayleigh.statistic))

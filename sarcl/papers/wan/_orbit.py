@@ -79,8 +79,9 @@ def section(lab: Lab) -> Section:
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
+    along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
     out.draw(html.picture(
-        _db(image), (-half[1], half[1]), (-half[0], half[0]), "ground range of the slant range, m", "azimuth, m",
+        _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
         "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5,
     ))  # fmt: skip
     return out

@@ -14,6 +14,8 @@ from ._radar import l_band
 ROUGHNESS, EPS = 0.15, 3.0  # m (no unit is printed), section 6.1
 SIDES = (0.5, 0.75)  # m, of the squares of two facets: 226 and 100 facets per resolution cell
 CELLS = {True: 40, False: 96}
+CHANCE = 1.63  # over the root of the number of pixels: exceeded by chance once in 100 (Kolmogorov and Smirnov)
+FINITE = 0.01  # difference of distribution functions that a finite number of facets per cell may cause
 
 
 def section(lab: Lab) -> Section:
@@ -36,15 +38,17 @@ def section(lab: Lab) -> Section:
         at, density = histogram(np.angle(pixels) + np.pi, 2 * np.pi, 16)
         phases.append((f"{facets} facets per cell", at - np.pi, density))
     many, few = found
-    rule = "p above 0.01 in the test of Kolmogorov and Smirnov"
+    most = FINITE + CHANCE / np.sqrt(len(pixels))
     out.states(
-        "amplitudes", "figure 3 a", "Rayleigh", f"p = {many.rayleigh:.2f} that they are", many.rayleigh > 0.01,
-        value=many.rayleigh, rule=rule,
+        "amplitudes", "figure 3 a", "Rayleigh", f"distribution differs by {many.difference:.3f}",
+        many.difference < most, value=many.difference,
+        rule=f"largest difference of distribution functions below {most:.3f}: {FINITE:g}, and what chance allows",
     )  # fmt: skip
     out.states(
         "phases", "figure 3 b", "uniform", f"p = {many.uniform:.2f} that they are", many.uniform > 0.01,
-        value=many.uniform, rule=rule,
+        value=many.uniform, rule="p above 0.01 in the test of Kolmogorov and Smirnov",
     )  # fmt: skip
+    out.keep(contrast=many.contrast, contrast_of_few=few.contrast, difference_of_few=few.difference)
     at = curves[0][1]
     out.draw(
         html.plot(
@@ -58,7 +62,8 @@ def section(lab: Lab) -> Section:
     )  # fmt: skip
     out.say(
         f"Few of the smooth facets face the radar, so that many facets per cell are needed: with {curves[1][0]} the "
-        f"contrast is {few.contrast:.2f} instead of 1, and amplitudes are not Rayleigh's (p = {few.rayleigh:.1g}), "
-        "while phases are uniform."
+        f"contrast is {few.contrast:.2f} instead of 1, with {curves[0][0]} {many.contrast:.2f}. The distribution of "
+        f"amplitudes differs from Rayleigh's by {few.difference:.3f} and {many.difference:.3f}. Phases are uniform "
+        "with both."
     )
     return out
