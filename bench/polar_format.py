@@ -6,13 +6,17 @@ White noise, as many pulses, samples and pixels a side as --size, X band, pixels
 at 1024 and in proportion, an aperture of 0.04 of the distance, 10 and 1000 km.
 Errors are relative L2 at 100 random pixels: of each against its own exact sum, and of the polar format image against
 the exact sum of backprojection. Runs alternate; the shortest of three counts.
+Points at some distances from the centre, along and across the line of sight, give the larger differences of place (of
+the peak), phase (at the point's own place) and level (of the peak) from backprojection.
 """
 
 from __future__ import annotations
 
 import argparse
+import dataclasses
 import time
 import warnings
+from typing import Any
 
 import numpy as np
 
@@ -71,6 +75,42 @@ def main() -> None:
             )
         words = ("plane-wave phase error", "defocusing phase error", "displaced by", "sharp within")
         print(", ".join(f"{word} {fast.report.plan[word]}" for word in words))
+        print("\n| from the centre, m | place, m | neglected phase, rad | phase, modulo 2 pi | peak, dB |")
+        print("|---|---|---|---|---|")
+        for away in (1.0, 3.0, 10.0, 30.0, 50.0):
+            if away < 0.4 * n * 0.25:
+                place, neglected, phase, level = of_points(raw, grid, away, asked.device)
+                print(f"| {away:g} | {place:.2g} | {neglected:.2g} | {phase:.2g} | {level:+.2f} |")
+
+
+def of_points(raw: Any, grid: Any, away: float, device: Any) -> tuple[float, ...]:
+    """Of points so many m from the centre: largest difference of place, m, phase neglected in the middle of band and
+    rows, and measured phase, rad, and lowest level, dB."""
+    import sarcl
+    from sarcl.reference.backproject import backproject as exact
+
+    f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
+    middle = np.array(grid.shape) // 2
+    found = []
+    for i, j in middle + np.array([[0, 1], [1, 0]]) * round(away / 0.25):
+        place = grid.at(i, j)
+        path = np.linalg.norm(raw.tx - place, axis=1) - raw.reference_range
+        samples = np.exp(-4j * np.pi / 299_792_458.0 * np.outer(path, f)).astype(np.complex64)
+        bright = dataclasses.replace(raw, samples=samples)
+        image = sarcl.polar_format(bright, grid, tolerance=1e-4, check=False, device=device)
+        peak = np.unravel_index(int(np.argmax(np.abs(image.data))), grid.shape)
+        seen = sarcl.measure(image, near=grid.at(*peak))
+        wanted = exact(bright, place[None])[0][0]
+        end = raw.tx[raw.n_rows // 2]
+        bent = np.linalg.norm(end - place) - np.linalg.norm(end) + end @ place / np.linalg.norm(end)
+        found.append([
+            float(np.linalg.norm(seen.position - place)),
+            4 * np.pi * f.mean() / 299_792_458.0 * bent,
+            abs(float(np.angle(image.data[i, j] / wanted))),
+            -20 * np.log10(abs(seen.peak) / abs(wanted)),
+        ])  # fmt: skip
+    apart, bent, turned, lost = np.max(found, axis=0)
+    return apart, bent, turned, -lost
 
 
 if __name__ == "__main__":

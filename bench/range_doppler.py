@@ -4,7 +4,8 @@
 
 As many pulses as --size, half as many samples. Broadside and squinted by 30 degrees: X band, 300 MHz, 10 km; orbit:
 C band, 60 MHz, 1000 km. White noise gives the error, relative L2 at 100 random pixels against the exact sum; nine
-points give the largest differences of position and phase between both images. Backprojection focuses as many pixels, of
+points give the largest differences of position, phase, width at half power (of both axes, relative) and highest side
+lobe between both images. bench/spaceborne.py compares them with theory. Backprojection focuses as many pixels, of
 about the same size, on a plane. CPU seconds are those of the process, user and system, the shorter of two runs.
 """
 
@@ -62,8 +63,8 @@ def main() -> None:
     }
     n, random = asked.size, np.random.default_rng(0)
     print("| case, tolerance | pixels | achieved | predicted | CPU seconds | backproject achieved | CPU seconds | "
-          "position | phase |")  # fmt: skip
-    print("|---|---|---|---|---|---|---|---|---|")
+          "position | phase | IRW | PSLR |")  # fmt: skip
+    print("|---|---|---|---|---|---|---|---|---|---|---|")
     for name in asked.case:
         tx, rx, when, points, axes, center, bandwidth, options = cases[name](n)
         step = 2 * bandwidth / n
@@ -107,18 +108,20 @@ def main() -> None:
                 wanted, norm = exact(noise, places)
                 errors.append(np.linalg.norm(made.data[index] - wanted) / max(norm, np.linalg.norm(wanted)))
             seen = fast(bright)
-            away, turned = 0.0, 0.0
+            away, turned, width, lobe = 0.0, 0.0, 0.0, 0.0
             for x in points:
                 part = sarcl.ImageGrid.plane(center=x, shape=(96, 96), spacing=min(spacing), normal=axes[2])
                 truth = sarcl.measure(sarcl.backproject(bright, part, tolerance=1e-5, check=False), near=x)
                 here = sarcl.measure(seen, near=x)
                 at = np.array([here.position])
                 away = max(away, float(np.linalg.norm(here.position - truth.position)))
+                width = max(width, *(abs(a / b - 1) for a, b in zip(here.irw, truth.irw, strict=True)))
+                lobe = max(lobe, *(abs(a - b) for a, b in zip(here.pslr, truth.pslr, strict=True)))
                 turned = max(turned, float(abs(np.angle(here.peak / exact(bright, at)[0][0]))))
             print(
                 f"| {name}, {tolerance:.0e} | {shape[0]} x {shape[1]} | {errors[0]:.1e} | "
                 f"{image.report.predicted_error:.1e} | {quick:.2f} | {errors[1]:.1e} | {careful:.2f} | "
-                f"{away * 1e3:.2g} mm | {turned:.1e} rad |",
+                f"{away * 1e3:.2g} mm | {turned:.1e} rad | {width:.1e} | {lobe:.2g} dB |",
                 flush=True,
             )
 
