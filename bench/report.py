@@ -9,6 +9,7 @@ from typing import Any
 
 import channels_page
 import echo_page
+import spaceborne_page
 
 from sarcl.bench import pareto, ratios, tables
 from sarcl.bench.backproject import FORMAT
@@ -20,7 +21,8 @@ INTRODUCTION = """# Results
 figures are measured: [benchmarks](../developers/benchmarks.md).
 
 """
-OTHER = {"echo": echo_page.section, "channels": channels_page.section}  # documents that are not about images
+# Documents that are not about run times of images
+OTHER = {"echo": echo_page.section, "channels": channels_page.section, "spaceborne": spaceborne_page.section}
 README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "share in kernels"]
 
 

@@ -449,3 +449,46 @@ def test_documents_of_channels_become_tables(tmp_path):
     assert "| points | 45 | one call, 3 positions | 2.0e-05 | 8.0e-04 | 2 | 3 | 4.5 | 1.00 |" in text
     assert "| points | 45 | one call per channel | 2.0e-05 | 8.0e-04 | 7 | 8 | 1.29 | 3.50 |" in text
     assert "Carriers of 900 MHz in all x 101 pulses" in text and "One carrier" not in text
+
+
+def test_documents_of_a_spaceborne_pass_become_tables(tmp_path):
+    """A document of bench/spaceborne.py: cost of the stages, theory beside both images."""
+    from sarcl.bench import backproject
+
+    rows = [
+        {"item": "width", "unit": "m", "theory": 2.2, "fast": 2.21, "slow": 2.19, "digits": ".2f"},
+        {"item": "rate", "unit": "", "theory": -1848.0, "fast": -1848.3, "slow": None, "digits": ".1f"},
+    ]
+    document = backproject.header([]) | {
+        "kind": "spaceborne", "swath": [5000.0, 1500.0], "pulses": 1500, "samples": 7, "facets": 2_400_000,
+        "incidence_deg": 38.7, "slant_km": 980.0, "rows": rows, "cpu": {"raw data": 155.4, "backprojection": 17.0},
+        "errors": {"raw data": 2.3e-3, "backprojection": None}, "pixels": {"fast": [4, 5], "slow": [6, 7]},
+    }  # fmt: skip
+    (tmp_path / "results").mkdir()
+    backproject.write(document, tmp_path / "results" / "5-spaceborne.json")
+    page.write(tmp_path / "results", tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "5 x 1.5 km of ground in 2,400,000 facets" in text and "4 x 5 pixels by range-Doppler and 6 x 7" in text
+    assert "| raw data | 155.4 | 2.3e-03 |" in text and "| backprojection | 17.0 |  |" in text
+    assert "| width, m | 2.20 | 2.21 | 2.19 |" in text and "| rate | -1848.0 | -1848.3 |  |" in text
+
+
+@pytest.mark.slow
+def test_a_spaceborne_pass_is_as_theory_says():
+    """Raw data of facets and reflectors from an orbit, range-Doppler and backprojection: the quick pass."""
+    import spaceborne
+
+    rows = {row["item"]: row for row in spaceborne.Run(spaceborne.QUICK, None).document()["rows"]}
+    for words, allowed in (
+        ("Doppler centroid, from the track", 1.0), ("Doppler centroid, from the data", 20.0),
+        ("Doppler rate, from the track", 1.0), ("Doppler rate, from the data", 2.0),
+        ("reflectors alone: IRW in slant range, mean", 0.02), ("reflectors alone: IRW in azimuth, mean", 0.02),
+        ("reflectors alone: PSLR in azimuth, mean", 0.2), ("reflectors alone: largest error of position", 0.06),
+        ("reflectors alone: largest error of phase", 0.02), ("reflectors in the scene: cross section, mean", 0.2),
+        ("layover of the reflector on a mast of 80 m", 0.3), ("level ground, sigma0", 1.0),
+        ("frustum, shadow ends", 12.0), ("cuboid, shadow ends", 12.0), ("cylinder, shadow ends", 12.0),
+    ):  # fmt: skip
+        row = rows[words]
+        for key in ("fast", "slow"):
+            if row[key] is not None:
+                assert row[key] == pytest.approx(row["theory"], abs=allowed), words
