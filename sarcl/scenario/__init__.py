@@ -6,6 +6,7 @@ For other folders:
 
 For this folder alone:
 
+    _building  objects that the tables describe
     _earth     local coordinates of a place on the Earth, passes of orbits
     _focusing  the function that makes the image, and its arguments
     _schema    tables and keys that a scenario may hold

@@ -3,12 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Mapping
+from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
 from . import _schema
+from ._building import Builder
 from ._earth import side_of, time_over
 
 if TYPE_CHECKING:
+    from ..imaging.forecast import Forecast
+    from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
     from .scenario import Scenario
@@ -19,7 +23,60 @@ def section_of(scenario: Scenario) -> str:
     return next((s for s in _schema.IMAGES if getattr(scenario, s) is not None), "backproject")
 
 
-def focused(
+def image_text(scenario: Scenario) -> str:
+    """The function that makes the image, and its grid, in words."""
+    section = section_of(scenario)
+    if not scenario.needs_grid:
+        given = _range_doppler_options(scenario, {})
+        told = ", ".join(f"{k} {v:g}" if isinstance(v, float) else f"{k} {v}" for k, v in given.items())
+        return f"range_doppler, {told}" if told else "range_doppler"
+    if scenario.grid is None:
+        return f"{section}, on a grid chosen from the echoes"
+    return f"{section}, {' x '.join(map(str, scenario.build_grid().shape))} pixels"
+
+
+def focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Image:
+    """See `Scenario.focus`."""
+    section = section_of(scenario)
+    if section == "backproject":
+        from ..imaging.backproject import backproject
+
+        return _focused(scenario, backproject, raw, grid, options, Builder(scenario).options(section, options))
+    given = dict(options)
+    out = given.pop("out", None)
+    if section == "polar_format":
+        from ..imaging.polar_format.polar_format import polar_format
+
+        image = _focused(scenario, polar_format, raw, grid, given, Builder(scenario).options(section, given))
+    else:
+        from ..imaging.range_doppler.range_doppler import range_doppler
+
+        image = _focused(scenario, range_doppler, raw, grid, given, _range_doppler_options(scenario, given))
+    if out is not None:
+        image.save(out)
+    return image
+
+
+def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Forecast:
+    """See `Scenario.plan_focus`."""
+    section = section_of(scenario)
+    if section == "range_doppler":
+        from ..imaging.range_doppler.range_doppler import plan_range_doppler
+
+        return _focused(scenario, plan_range_doppler, raw, grid, options, _range_doppler_options(scenario, options))
+    given = Builder(scenario).options(section, options)
+    if section == "polar_format":
+        from ..imaging.polar_format.polar_format import plan_polar_format
+
+        return _focused(scenario, plan_polar_format, raw, grid, options, given)
+    from ..imaging.focus_options import FocusOptions
+    from ..imaging.forecast import plan
+
+    known = {f.name for f in fields(FocusOptions)}
+    return _focused(scenario, plan, raw, grid, options, {k: v for k, v in given.items() if k in known})
+
+
+def _focused(
     scenario: Scenario, verb: Callable[..., Any], raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any],
     given: Mapping[str, Any],
 ) -> Any:  # fmt: skip
@@ -37,15 +94,15 @@ def focused(
         return verb(*pieces, **given)
 
 
-def range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:
+def _range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:
     """Arguments of range_doppler; with [place], its height and its side of the orbit's track are the defaults."""
-    given = scenario._options("range_doppler", options)
+    given = Builder(scenario).options("range_doppler", options)
     heights = given.get("heights")
     if isinstance(heights, (str, Mapping)):
         from ..earth.elevation import ElevationModel
 
         table = {"file": heights} if isinstance(heights, str) else heights
-        given["heights"] = scenario._call(("range_doppler", "heights"), table, ElevationModel.read)
+        given["heights"] = Builder(scenario).call(("range_doppler", "heights"), table, ElevationModel.read)
     place = scenario.build_place()
     if place is not None:
         given.setdefault("heights", place.height)
@@ -60,6 +117,6 @@ def check_window(scenario: Scenario) -> None:
     from ..numerics.windows import weights
 
     section = section_of(scenario)
-    given = scenario._options(section, {})
+    given = Builder(scenario).options(section, {})
     with scenario.where.blame((section,), given, always=False):
         weights(given.get("window"), 8)

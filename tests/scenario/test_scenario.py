@@ -155,7 +155,7 @@ MISTAKES = [
     ("n_pulses = 64", "n_pulses = 64.5", 11, "n_pulses is 64.5, wanted a whole number"),
     ("n_pulses = 64", "n_pulses = true", 11, "n_pulses is true, wanted a whole number"),
     ("n_pulses = 64", "n_pulses = inf", 11, "n_pulses is inf, wanted a whole number"),
-    ("arc = 0.07", "arc = 1979-05-27", 10, "arc is 1979-05-27, wanted a number"),
+    ("arc = 0.07", "arc = 1979-05-27", 10, "arc is '1979-05-27' (a string), wanted a number"),
     ("spacing = [0.1, 0.2]", "spacing = {dy = 1}", 25, "spacing is a table, wanted"),
     (
         "radius = 7e3\n",
