@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..base import wgs84
+from ..base import validation, wgs84
 from .rotation import GM, J2, RATE, to_earth_fixed
 
 
@@ -29,6 +29,28 @@ class KeplerElements:
     anomaly: float
     greenwich: float
     with_j2: bool
+
+    @classmethod
+    def checked(
+        cls, semi_major_axis: float, eccentricity: float, inclination: float, node: float, argument_of_perigee: float,
+        mean_anomaly: float, *, greenwich: float, j2: bool,
+    ) -> KeplerElements:  # fmt: skip
+        """Elements that are a user's arguments. ValueError for those that are no ellipse above the Earth's surface."""
+        a = validation.number("semi_major_axis", semi_major_axis, above=0)
+        e = validation.number("eccentricity", eccentricity, least=0)
+        if e >= 1:
+            raise ValueError(f"eccentricity is {e:g}; an ellipse has less than 1")
+        if a * (1 - e) < wgs84.SEMI_MAJOR * (1 - wgs84.FLATTENING):
+            raise ValueError(
+                f"the perigee is {a * (1 - e):.7g} m from the Earth's centre, below its surface; give a larger "
+                "semi_major_axis (m, from the centre), or a smaller eccentricity"
+            )
+        names = ("inclination", "node", "argument_of_perigee", "mean_anomaly")
+        given = (inclination, node, argument_of_perigee, mean_anomaly)
+        angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
+        if not 0 <= angles[0] <= np.pi:
+            raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
+        return cls(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, bool(j2))
 
     @property
     def mean_motion(self) -> float:

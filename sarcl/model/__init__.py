@@ -21,6 +21,7 @@ For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
     _listed_surface   positions between the points of a listed grid, and indices of positions
+    _orbit_arguments  arguments of Orbit: positions, spans of time
     _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
     _time_samples     samples in time as samples over frequency, for PhaseHistory.from_time
 """

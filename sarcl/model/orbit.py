@@ -11,13 +11,14 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation, wgs84
+from ..base import validation
 from ..earth import rotation, viewing, zero_doppler
 from ..earth.elevation import ElevationModel
 from ..earth.kepler import KeplerElements
 from ..earth.state_vectors import StateVectors
 from ..earth.two_line import TwoLineElements
 from ..io import orbit_files
+from ._orbit_arguments import places, span_of, together
 from ._orbit_attitude import Attitude, axes_of, ellipse
 from .dates import Date, date, seconds
 from .trajectory import Trajectory
@@ -27,7 +28,6 @@ if TYPE_CHECKING:
 
 LINES_DAYS = 1.0  # about the epoch of two-line elements; their error grows by kilometres per day
 ROUNDING = 1e-9  # s: a time outside the span by less counts as its end
-DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
 DIFFERENCE = 0.5  # s: of velocities to accelerations, accurate to 1e-6 m/s^2
 
 
@@ -84,25 +84,13 @@ class Orbit:
 
         ValueError for an eccentricity outside [0, 1), and a perigee below the Earth's surface.
         """
-        a = validation.number("semi_major_axis", semi_major_axis, above=0)
-        e = validation.number("eccentricity", eccentricity, least=0)
-        if e >= 1:
-            raise ValueError(f"eccentricity is {e:g}; an ellipse has less than 1")
-        if a * (1 - e) < wgs84.SEMI_MAJOR * (1 - wgs84.FLATTENING):
-            raise ValueError(
-                f"the perigee is {a * (1 - e):.7g} m from the Earth's centre, below its surface; give a larger "
-                "semi_major_axis (m, from the centre), or a smaller eccentricity"
-            )
-        names = ("inclination", "node", "argument_of_perigee", "mean_anomaly")
-        given = (inclination, node, argument_of_perigee, mean_anomaly)
-        angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
-        if not 0 <= angles[0] <= np.pi:
-            raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
         zero = None if epoch is None else date(epoch)
-        greenwich = 0.0 if zero is None else rotation.sidereal_time(zero)
-        path = KeplerElements(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, bool(j2))
+        path = KeplerElements.checked(
+            semi_major_axis, eccentricity, inclination, node, argument_of_perigee, mean_anomaly,
+            greenwich=0.0 if zero is None else rotation.sidereal_time(zero), j2=j2,
+        )  # fmt: skip
         half = np.pi / path.mean_motion
-        return cls(path, (-half, half) if span is None else _span(span), zero)
+        return cls(path, (-half, half) if span is None else span_of(span), zero)
 
     @classmethod
     def tle(cls, line1: str, line2: str, *, span: Sequence[float] | None = None) -> Orbit:
@@ -114,7 +102,7 @@ class Orbit:
         """
         path = TwoLineElements.parsed(line1, line2)
         seconds = LINES_DAYS * rotation.DAY
-        return cls(path, (-seconds, seconds) if span is None else _span(span), path.epoch)
+        return cls(path, (-seconds, seconds) if span is None else span_of(span), path.epoch)
 
     @classmethod
     def read(cls, path: PathLike) -> Orbit:
@@ -212,8 +200,8 @@ class Orbit:
         span  (first, last) time to search, s, default the orbit's. Of several passes the closest counts.
         ValueError names the first position that the satellite never sees.
         """
-        x = _places(positions)
-        within = self.span if span is None else _span(span)
+        x = places(positions)
+        within = self.span if span is None else span_of(span)
         self._times(np.array(within))
         t, r = zero_doppler.locate(self._at, within, x.reshape(-1, 3))
         return t.reshape(x.shape[:-1]), r.reshape(x.shape[:-1])
@@ -243,15 +231,15 @@ class Orbit:
         model = heights if isinstance(heights, ElevationModel) else None
         levels = np.zeros(()) if model is not None else validation.converted("heights", heights, np.float64)
         validation.finite("heights", levels)
-        times, ranges, levels = _broadcast(t=times, r=ranges, heights=levels)
+        times, ranges, levels = together(t=times, r=ranges, heights=levels)
         p, v = self._at(times.ravel())
         found = zero_doppler.geolocate(p, v, ranges.ravel(), levels.ravel() if model is None else model, sign)
         return found.reshape(*times.shape, 3)
 
     def view(self, t: ArrayLike, positions: ArrayLike) -> viewing.View:
         """How the satellite at times, s (...), sees Earth-fixed positions, m (..., 3): angles, ranges, Doppler."""
-        x = _places(positions)
-        times, _ = _broadcast(t=self._times(t), positions=x[..., 0])
+        x = places(positions)
+        times, _ = together(t=self._times(t), positions=x[..., 0])
         p, v = self._states(times)
         x = np.broadcast_to(x, p.shape)
         if (p == x).all(axis=-1).any():
@@ -331,36 +319,3 @@ class Orbit:
     def _at(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions and velocities (n, 3) at times (n,) within the span."""
         return self.path.at(times)
-
-
-def _places(positions: ArrayLike) -> NDArray[np.float64]:
-    """Earth-fixed positions, m (..., 3). ValueError for positions deep inside the Earth."""
-    x = validation.converted("positions", positions, np.float64)
-    if x.shape[-1:] != (3,):
-        raise ValueError(f"positions has shape {x.shape}, wanted (..., 3): Earth-fixed, m")
-    validation.finite("positions", x)
-    height = wgs84.geodetic(x)[2]
-    if (height < DEEPEST).any():
-        at = np.unravel_index(int(np.argmin(height)), height.shape)
-        where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
-        raise ValueError(
-            f"positions{where} is {-height[at]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
-            "(local ones: see sarcl.wgs84.ecef and local_axes)"
-        )
-    return x
-
-
-def _broadcast(**arrays: NDArray[np.float64]) -> list[NDArray[np.float64]]:
-    """Arrays of one shape; ValueError names those whose shapes do not fit together."""
-    try:
-        return list(np.broadcast_arrays(*arrays.values()))
-    except ValueError:
-        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
-        raise ValueError(f"shapes do not fit together: {shapes}; give equal shapes, or axes of length 1") from None
-
-
-def _span(value: Sequence[float]) -> tuple[float, float]:
-    pair = validation.array("span", value, np.float64, (2,))
-    if not pair[0] < pair[1]:
-        raise ValueError(f"span is ({pair[0]:g}, {pair[1]:g}); the first time must be before the last")
-    return float(pair[0]), float(pair[1])

@@ -1,0 +1,46 @@
+"""Arguments of Orbit: positions on the Earth, spans of time, arrays of one shape."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from ..base import validation, wgs84
+
+DEEPEST = -20e3  # m: positions farther below the ellipsoid are refused
+
+
+def places(positions: ArrayLike) -> NDArray[np.float64]:
+    """Earth-fixed positions, m (..., 3). ValueError for positions deep inside the Earth."""
+    x = validation.converted("positions", positions, np.float64)
+    if x.shape[-1:] != (3,):
+        raise ValueError(f"positions has shape {x.shape}, wanted (..., 3): Earth-fixed, m")
+    validation.finite("positions", x)
+    height = wgs84.geodetic(x)[2]
+    if (height < DEEPEST).any():
+        at = np.unravel_index(int(np.argmin(height)), height.shape)
+        where = f"[{', '.join(str(int(i)) for i in at)}]" if at else ""
+        raise ValueError(
+            f"positions{where} is {-height[at]:.4g} m under the ellipsoid; wanted Earth-fixed positions in m "
+            "(local ones: see sarcl.wgs84.ecef and local_axes)"
+        )
+    return x
+
+
+def together(**arrays: NDArray[np.float64]) -> list[NDArray[np.float64]]:
+    """Arrays of one shape; ValueError names those whose shapes do not fit together."""
+    try:
+        return list(np.broadcast_arrays(*arrays.values()))
+    except ValueError:
+        shapes = ", ".join(f"{name} {array.shape}" for name, array in arrays.items())
+        raise ValueError(f"shapes do not fit together: {shapes}; give equal shapes, or axes of length 1") from None
+
+
+def span_of(value: Sequence[float]) -> tuple[float, float]:
+    """(first, last) time, s. ValueError where they are not in this order."""
+    pair = validation.array("span", value, np.float64, (2,))
+    if not pair[0] < pair[1]:
+        raise ValueError(f"span is ({pair[0]:g}, {pair[1]:g}); the first time must be before the last")
+    return float(pair[0]), float(pair[1])
