@@ -2,9 +2,12 @@
 
 from __future__ import annotations
 
-from typing import Any
+from typing import Any, SupportsComplex, SupportsFloat, SupportsIndex
 
 import numpy as np
+
+from .host_memory import installed
+from .text import size_text
 
 LARGEST_TOLERANCE = 0.3  # relative error; noise of a tenth of the signal's power
 LEAST_TOLERANCE = 1e-11  # relative error; a range of 1 km at 10 GHz, rounded to float64, has a phase error of 2e-11 rad
@@ -26,6 +29,28 @@ def array(name: str, value: Any, dtype: Any, shape: tuple[int | str, ...]) -> np
     return sealed(out)
 
 
+def ndim(name: str, value: Any) -> int:
+    """Number of axes of a value; ValueError where it is a list of lists of different lengths."""
+    try:
+        return int(np.ndim(value))
+    except ValueError:
+        shown = " ".join(repr(value).split())
+        raise ValueError(f"{name} is {shown:.60}, whose rows differ in length; give rows of equal length") from None
+
+
+def flag(name: str, value: Any) -> bool:
+    """`value` as True or False; TypeError for anything but these, 1 and 0."""
+    if not isinstance(value, (bool, np.bool_, int, np.integer)) or value not in (0, 1):
+        raise TypeError(f"{name} is {' '.join(repr(value).split()):.60}; give True or False")
+    return bool(value)
+
+
+def room(what: str, n_bytes: float, remedy: str) -> None:
+    """MemoryError where more bytes are needed than the machine has; remedy  what to give instead."""
+    if n_bytes > installed():
+        raise MemoryError(f"{what} needs {size_text(n_bytes)}, this machine has {size_text(installed())}; {remedy}")
+
+
 def sealed(made: np.ndarray) -> np.ndarray:
     """`made` itself, made read-only: for arrays that only the caller holds, so that PhaseHistory need not copy them."""
     made.flags.writeable = False
@@ -35,12 +60,17 @@ def sealed(made: np.ndarray) -> np.ndarray:
 def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
     """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
     wanted = np.dtype(dtype)
+    ndim(name, value)
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "biufcO":
             raise TypeError(f"type {given.dtype}")
-        if given.dtype.kind == "O" and any(v is None for v in given.flat):
-            raise TypeError("None is no number")
+        if given.dtype.kind == "O":
+            none = [
+                v for v in given.flat if v is None or not isinstance(v, SupportsComplex | SupportsFloat | SupportsIndex)
+            ]
+            if none:
+                raise TypeError(f"{'None' if none[0] is None else 'a ' + type(none[0]).__name__} is no number")
         if given.dtype.kind == "c" and wanted.kind != "c":
             raise TypeError(f"type {given.dtype}: take the real part or the modulus")
         if np.ma.is_masked(value):
@@ -147,6 +177,8 @@ def instance(name: str, value: Any, kind: type) -> None:
 
 def choice(name: str, value: Any, allowed: tuple[str, ...]) -> str:
     """Return `value` if it is one of `allowed`."""
-    if value not in allowed:
-        raise ValueError(f"{name} is {value!r}; choose one of {', '.join(map(repr, allowed))}")
+    if not isinstance(value, str) or value not in allowed:
+        raise ValueError(
+            f"{name} is {' '.join(repr(value).split()):.60}; choose one of {', '.join(map(repr, allowed))}"
+        )
     return str(value)

@@ -15,7 +15,7 @@ from ..base.errors import ToleranceMissed, warn
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..base.types import PathLike, WritableArray
-from ..base.validation import count, instance
+from ..base.validation import count, flag, instance
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
@@ -132,6 +132,8 @@ def backproject(
     options = FocusOptions(
         tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
     )
+    if check is not None:
+        flag("check", check)
     tolerance = options.tolerance
     piece = _piece(tile, resume, out)
     raw, task = options.task(raw, grid)
@@ -221,16 +223,17 @@ def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
     if resume is not None:
         instance("resume", resume, bool)
     if (tile is not None or resume) and not is_path(out):
-        name = "tile" if tile is not None else "resume"
+        name, given = ("tile", tile) if tile is not None else ("resume", resume)
         raise ValueError(
-            f'{name} is {tile or resume!r} but out is no path; give out="image.h5": tiles are kept beside it'
+            f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are kept '
+            "beside it"
         )
     if tile is None:
         return None
     if resume is False:
         raise ValueError("tile and resume=False do not go together: a piece would delete the tiles of the other pieces")
-    if np.shape(tile) != (2,):
-        raise ValueError(f"tile is {tile!r}; wanted (i, n): piece i of n")
+    if not isinstance(tile, (tuple, list)) or len(tile) != 2:
+        raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
     i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
     if i > n:
         raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")

@@ -9,7 +9,7 @@ from typing import Literal, TypedDict
 from numpy.typing import ArrayLike
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
-from ..base.validation import choice, instance
+from ..base.validation import choice, flag, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
@@ -54,6 +54,7 @@ class FocusOptions:
 
     def __post_init__(self) -> None:
         choice("method", self.method, METHODS)
+        flag("wrap", self.wrap)
         object.__setattr__(self, "tolerance", allowed_error(self.tolerance))
 
     def task(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[PhaseHistory, FocusingTask]:
@@ -61,6 +62,10 @@ class FocusOptions:
         instance("raw", raw, PhaseHistory)
         instance("grid", grid, ImageGrid)
         if self.mapping is not None:
+            if isinstance(self.mapping, dict) and "mapping" not in self.mapping:
+                raise ValueError(
+                    f"mapping is {self.mapping!r:.60}; a dict names the kind too: {{'mapping': 'apparent'}}"
+                )
             raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
         return raw, make_task(
             raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam, self.sum_polarizations

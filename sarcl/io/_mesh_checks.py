@@ -63,8 +63,10 @@ def check_indices(vertices: np.ndarray, faces: np.ndarray, what: str) -> None:
         raise ValueError(f"{what}: face {at} names vertex {faces[at][wrong[at]][0]} of {len(vertices)}: {TAKE}")
 
 
-def _of_stl(path: Path, head: bytes, what: str) -> int:
+def _of_stl(path: Path, head: bytes, what: str) -> int | None:
     size = path.stat().st_size
+    if not size:
+        return None
     n = int.from_bytes(head[80:84], "little")
     if len(head) >= 84 and size == 84 + 50 * n:
         return n

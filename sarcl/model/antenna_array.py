@@ -112,6 +112,7 @@ class AntennaArray:
 
         shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz.
         """
+        validation.ndim("shape", shape)
         if np.shape(shape) != (2,) or np.shape(cast(Any, axes)) != (2, 3):
             raise ValueError(f"shape is {shape!r:.40} and axes {axes!r:.60}; give (N, P), and two directions (2, 3)")
         rows, columns = (_size(f"shape[{i}]", shape[i]) for i in range(2))

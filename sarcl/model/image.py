@@ -91,6 +91,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __post_init__(self) -> None:
         if isinstance(self.data, (list, tuple)):
+            validation.ndim("image data", self.data)
             object.__setattr__(self, "data", np.asarray(self.data))
         object.__setattr__(self, "data", validation.unmasked("image data", self.data))
         if tuple(np.shape(self.data)) != tuple(self.grid.shape):

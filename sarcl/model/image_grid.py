@@ -19,6 +19,7 @@ if TYPE_CHECKING:
     from ..earth.elevation import ElevationModel, Geoid
 
 FARTHEST = 1e150  # m: squares of coordinates stay finite
+LONGEST = 2**53  # pixels along a side of a plane: indices are float64 in places
 MOST_NUMBERED = 2**63 - 1  # largest number of pixels that int64 can count
 
 
@@ -83,7 +84,7 @@ class ImageGrid:
             raise ValueError(f"x_axis {_text(x_axis)} is along the normal {_text(n)}; give one that lies in the plane")
         x /= np.linalg.norm(x)
         made = cls(
-            shape=(validation.count("shape[0]", rows), validation.count("shape[1]", columns)),
+            shape=(_side("shape[0]", rows), _side("shape[1]", columns)),
             center=center,
             spacing=(validation.number("spacing[0]", dy, above=0), validation.number("spacing[1]", dx, above=0)),
             x_axis=x,
@@ -306,9 +307,11 @@ class ImageGrid:
 
     @property
     def positions(self) -> NDArray[np.float64]:
-        """All pixel positions, m, float64 shape + (3,); NaN where a cell is empty."""
+        """All pixel positions, m, float64 shape + (3,); NaN where a cell is empty. MemoryError: too many."""
         if self.listed is not None:
             return self.listed
+        shape = " x ".join(map(str, self.shape))
+        validation.room(f"positions of {shape} pixels", 24.0 * self.size, "take rows of them: grid.at(row, column)")
         return self.at(np.arange(self.shape[0])[:, None], np.arange(self.shape[1]))
 
     @property
@@ -348,6 +351,14 @@ class ImageGrid:
             raise ValueError(f"{what} is for planes; this grid lists its points: use ImageGrid.plane")
 
 
+def _side(name: str, value: Any) -> int:
+    """Number of pixels along a side of a plane; indices are int64 in places and float64 in others."""
+    out = validation.count(name, value)
+    if out > LONGEST:
+        raise ValueError(f"{name} is {out:.3g}; a side has at most {LONGEST:,} pixels: give fewer")
+    return out
+
+
 def _cells(positions: np.ndarray) -> np.ndarray:
     """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor the three NaN of an empty
     cell."""
@@ -373,7 +384,7 @@ def _text(vector: Any) -> str:
 
 def pair(name: str, value: Any) -> tuple[Any, Any]:
     """A (row, column) pair, from a pair or one number for both."""
-    if np.ndim(value) == 0:
+    if validation.ndim(name, value) == 0:
         return value, value
     if np.shape(value) != (2,):
         raise ValueError(f"{name} is {value!r}; wanted (row, column) or one number for both")

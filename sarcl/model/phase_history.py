@@ -156,6 +156,7 @@ class PhaseHistory:
         are then taken for an axis, unless the rows name channels.
         """
         n_rows, n_samples = self.samples.shape
+        validation.ndim("frequency", self.frequency)
         given = np.asarray(self.frequency)
         if given.shape != (n_samples,) or n_samples < 2 or self.tx_channel is not None or self.rx_channel is not None:
             return
@@ -176,7 +177,7 @@ class PhaseHistory:
     def _rows(self, name: str, value: Any, dtype: Any, tail: tuple[int, ...], spread: bool = False) -> np.ndarray:
         """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
         n = self.samples.shape[0]
-        if spread and np.ndim(value) == 0:
+        if validation.ndim(name, value) == 0 and spread:
             value = np.full(n, value)
         out = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
         if out.ndim != 1 + len(tail) or out.shape[1:] != tail:

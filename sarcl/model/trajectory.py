@@ -10,6 +10,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 
+BYTES_PER_PULSE = 80  # time, position and velocity, and what they are made of
+
 
 @dataclass(frozen=True, eq=False)
 class Trajectory:
@@ -102,6 +104,7 @@ class Trajectory:
         velocity = validation.array("velocity", velocity, np.float64, (3,))
         prf = validation.number("prf", prf, above=0)
         n = validation.count("n_pulses", n_pulses)
+        validation.room(f"a track of {n:.3g} pulses", BYTES_PER_PULSE * float(n), "give fewer pulses")
         if n > 1 and not velocity.any():
             raise ValueError("velocity is (0, 0, 0); the positions of several pulses must differ")
         times = np.arange(n) / prf
@@ -131,6 +134,7 @@ class Trajectory:
         start = validation.number("start", start)
         arc = validation.number("arc", arc)
         n = validation.count("n_pulses", n_pulses)
+        validation.room(f"a track of {n:.3g} pulses", BYTES_PER_PULSE * float(n), "give fewer pulses")
         center = validation.array("center", center, np.float64, (3,))
         if n > 1 and arc == 0:
             raise ValueError("arc is 0; the positions of several pulses must differ")

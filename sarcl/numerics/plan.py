@@ -130,9 +130,10 @@ def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
 
 def skips(skip: Any, known: tuple[str, ...]) -> set[str]:
     """The reasons to skip that True, False or a set of names stands for; ValueError lists the known."""
-    if isinstance(skip, bool):
+    if isinstance(skip, (bool, np.bool_)):
         return set(known) if skip else set()
-    unknown = {skip} - set(known) if isinstance(skip, str) else set(skip) - set(known)
-    if unknown or isinstance(skip, str):
-        raise ValueError(f"skip is {skip!r}; give True, False or a set of {', '.join(map(repr, known))}")
-    return set(skip)
+    names: list[Any] = list(skip) if isinstance(skip, (list, tuple, set, frozenset)) else [None]
+    if not all(isinstance(name, str) and name in known for name in names):
+        shown = " ".join(repr(skip).split())
+        raise ValueError(f"skip is {shown:.60}; give True, False or a set of {', '.join(map(repr, known))}")
+    return set(names)

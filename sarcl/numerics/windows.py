@@ -51,11 +51,11 @@ def _name(window: Any) -> tuple[str, tuple[float, ...]]:
     """Checked (name, parameters) of any window."""
     if window is None:
         return "none", ()
-    name, *rest = (window,) if isinstance(window, str) or np.ndim(window) == 0 else tuple(window) or ("",)
-    if name == "hamming" and not rest:
+    name, *rest = tuple(window) if isinstance(window, (list, tuple)) and window else (window,)
+    if not isinstance(name, str) or (name, len(rest)) not in (("hamming", 0), ("taylor", 2)):
+        raise ValueError(f"window is {' '.join(repr(window).split()):.60}; known are {KNOWN}")
+    if name == "hamming":
         return "hamming", ()
-    if name != "taylor" or len(rest) != 2:
-        raise ValueError(f"window is {window!r}; known are {KNOWN}")
     level = validation.number("taylor sidelobe_db", rest[0], above=0)
     return "taylor", (level, validation.count("taylor nbar", rest[1]))
 

@@ -244,6 +244,7 @@ def _array(material: Any) -> np.ndarray:
         out = np.empty((), object)
         out[()] = material
         return out
+    validation.ndim("material", material)
     out = np.asarray(material)
     # NumPy would make strings of the numbers in a list of strings and numbers
     mixed = out.dtype.kind == "U" and not isinstance(material, (str, np.ndarray, np.generic))

@@ -109,7 +109,7 @@ class Scene:
     def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0) -> Scene:
         """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
         positions = validation.array("positions", positions, np.float64, ("n", 3))
-        if np.ndim(amplitudes) == 0:
+        if validation.ndim("amplitudes", amplitudes) == 0:
             amplitudes = [cast(complex, amplitudes)] * len(positions)
         amplitudes = validation.array("amplitudes", amplitudes, np.complex128, (len(positions),))
         return cls(positions, amplitudes, np.zeros((0, 3, 3)), np.zeros(0), np.zeros(0), np.zeros(0, bool))

@@ -84,7 +84,7 @@ def surface(
 
 def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
     """`value` for every facet, cell or point: one number for all, or an array of `shape`; read-only."""
-    if np.ndim(value) == 0:
+    if validation.ndim(name, value) == 0:
         return np.broadcast_to(validation.array(name, value, dtype, ()), shape)
     return validation.array(name, value, dtype, shape)
 

@@ -60,7 +60,7 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
         "take a smaller scene, a larger max_edge or a coarser resolution"
     )
     # no facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory
-    if areas(triangles).sum() > max_facets * np.sqrt(3) / 4 * max_edge**2:
+    if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
         raise MemoryError(too_many)
     row = np.arange(len(triangles))
     done: list[tuple[np.ndarray, np.ndarray]] = []

@@ -14,7 +14,7 @@ from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.types import PathLike
 from ..base.validation import array as numbers
-from ..base.validation import choice, count, direction, instance
+from ..base.validation import choice, count, direction, flag, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
@@ -146,6 +146,8 @@ def echo(
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
+    if check is not None:
+        flag("check", check)
     request = echo_request(
         scene, SKIPS, polarization=polarization, vertical=vertical, shadows=shadows, seed=seed, skip=skip,
         max_edge=max_edge, max_bytes=max_bytes, tolerance=tolerance, device=device, progress=progress,
@@ -247,10 +249,10 @@ def _polarizations(asked: Any) -> tuple[str, ...]:
     if isinstance(asked, str):
         asked = POLARIZATIONS if asked == "all" else (asked,)
     names = tuple(asked) if isinstance(asked, Sequence) else ()
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"polarization is {asked!r}; give at least one, and each once")
     for name in names:
         choice("polarization", name, POLARIZATIONS)
+    if not names or len(set(names)) < len(names):
+        raise ValueError(f"polarization is {asked!r:.60}; give at least one, and each once")
     return names
 
 

@@ -10,7 +10,7 @@ import numpy as np
 from ..base import wgs84
 from ..base.boxes import corners
 from ..base.constants import SPEED_OF_LIGHT
-from ..base.validation import finite, instance
+from ..base.validation import converted, finite, instance
 from ..earth.light_time import antennas_in_flight, receivers, transmitters
 from ..earth.viewing import hidden
 from ..model.trajectory import Trajectory
@@ -100,7 +100,7 @@ def window(
 ) -> tuple[float, float]:
     """The range gate (near, far) about the reference, m: as asked, or that which holds the scene's box plus 10 %."""
     if asked is not None:
-        pair = np.asarray(asked, np.float64)
+        pair = converted("range_window", asked, np.float64)
         if pair.shape != (2,):
             raise ValueError(f"range_window is {asked!r}; give (near, far) in metres about the reference")
         finite("range_window", pair)

@@ -157,7 +157,7 @@ BAD = {
     "one position": (lambda: points([0, 0, 0]), r"positions has shape \(3,\), wanted \(\.\.\., 3\)"),
     "positions of two coordinates": (lambda: points(np.zeros((4, 2))), r"positions has shape \(4, 2\)"),
     "no positions": (lambda: points(np.zeros((0, 3))), r"positions has shape \(0, 3\), wanted"),
-    "ragged positions": (lambda: points([[0, 0, 0], [1, 2]]), "positions must be numbers"),
+    "ragged positions": (lambda: points([[0, 0, 0], [1, 2]]), "positions is .* whose rows differ in length"),
     "positions not finite": (lambda: points([[[0, 0, 0], [0, 0, np.nan]]]), r"positions\[0, 1, 2\] is nan"),
     "neither": (lambda: sarcl.ImageGrid((4, 4)), "ImageGrid.plane or ImageGrid.points"),
     "normal of points": (lambda: points(np.zeros((1, 3))).normal, "normal is for planes"),

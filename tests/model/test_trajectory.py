@@ -124,7 +124,7 @@ BAD = {
     ),
     "complex positions": (lambda: track(positions=np.zeros((3, 3)) + 1j), "must be numbers that fit float64"),
     "words": (lambda: track(positions=[["1", "2", "3"]] * 3), "must be numbers"),
-    "ragged": (lambda: track(positions=[[1, 2, 3], [1, 2], [3]]), "must be numbers"),
+    "ragged": (lambda: track(positions=[[1, 2, 3], [1, 2], [3]]), "positions is .* whose rows differ in length"),
     "huge": (lambda: track(positions=[[10**400, 0, 0]] * 3), "must be numbers that fit float64"),
     "empty": (lambda: track([], np.zeros((0, 3))), "trajectory positions is empty"),
     "velocities of other length": (
