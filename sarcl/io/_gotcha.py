@@ -39,6 +39,7 @@ from typing import Any
 import numpy as np
 
 from ..base import constants, validation
+from . import _mat5_checks
 from .formats import Make
 
 
@@ -94,6 +95,8 @@ def _struct(path: Path) -> np.void:
 
     with open(path, "rb") as file:
         try:
+            _mat5_checks.check(file.read())
+            file.seek(0)
             found = loadmat(file, variable_names=["data"])
         except NotImplementedError:
             raise ValueError(f"{path.name} is a MATLAB 7.3 file, wanted MATLAB 5; save it again with -v7") from None

@@ -113,7 +113,10 @@ class Orbit:
         """
         path = Path(path)
         epoch, times, positions, velocities = orbit_files.load(path)
-        return cls.states(times, positions, velocities, epoch)
+        try:
+            return cls.states(times, positions, velocities, epoch)
+        except ValueError as exc:
+            raise ValueError(f"orbit file {path.name!r}: {exc}") from None
 
     def describe(self) -> str:
         """How positions are computed, with the order of the interpolation and its measured error, and from when on."""

@@ -203,8 +203,14 @@ class Scene:
                     f"the unit of this mesh is {scale:g} m, as its file says: its longest side is taken as {size:.4g} "
                     f"m. Give scale={scale:g} to confirm it, or another scale, m per unit, where the file is wrong"
                 )
+        placed = loaded.triangles * scale @ rotate.T + position
+        if not geometry.solid(placed).any():
+            what = f"mesh file {Path(mesh).name!r}" if isinstance(mesh, (str, Path)) else "mesh"
+            raise ValueError(
+                f"all {len(placed)} facets are degenerate (zero area); nothing would reflect: check the {what}"
+            )
         scene = cls.facets(
-            loaded.triangles * scale @ rotate.T + position,
+            placed,
             **parts,
             roughness=roughness,
             two_sided=not loaded.closed,

@@ -5,6 +5,7 @@ A case is a number: `mutated(data, seed)` gives the same bytes every time, so th
 
 from __future__ import annotations
 
+import faulthandler
 import os
 import pickle
 import resource
@@ -76,6 +77,7 @@ def _in_child(cases: list[int], judge: Callable[[int], str]) -> tuple[list[str],
         child = os.fork()
     if child == 0:
         os.close(reading)
+        faulthandler.disable()  # crashes are counted, not printed
         signal.signal(signal.SIGALRM, signal.SIG_DFL)
         signal.signal(signal.SIGINT, signal.SIG_DFL)
         with open("/proc/self/statm") as file:
