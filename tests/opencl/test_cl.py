@@ -16,7 +16,11 @@ import sarcl
 from sarcl.base import float_pairs
 from sarcl.base.threads import threads
 from sarcl.cli.parser import main
+from sarcl.fullwave.fields import Fields
+from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.target import Target
 from sarcl.opencl import _programs, _trial_record, choose_device, device_list, fft
+from sarcl.opencl import device as device_module
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import DeviceInfo
 
@@ -252,6 +256,29 @@ def test_only_the_room_opencl_imports_pyopencl():
 def test_kernels_are_built_once_for_each_set_of_macros(device):
     first = device.kernel("ray_casting.cl", "hidden")
     assert device.kernel("ray_casting.cl", "hidden") is first
+
+
+def test_a_kernel_of_many_launches_is_told_the_types_of_its_numbers_and_gives_the_same_bits(device, monkeypatch):
+    import pyopencl
+
+    told, tell = [], pyopencl.Kernel.set_scalar_arg_dtypes
+
+    def counted(kernel, types):
+        told.append((kernel.function_name, [t and t.name for t in types]))
+        return tell(kernel, types)
+
+    monkeypatch.setattr(pyopencl.Kernel, "set_scalar_arg_dtypes", counted)
+    grid, fields = Lattice(0.01, (3, 4, 16), np.zeros(3)), []
+    start = np.random.default_rng(1).uniform(-1, 1, (2, 3, *grid.shape))
+    for many in (10**9, 3):
+        monkeypatch.setattr(device_module, "MANY_LAUNCHES", many)
+        run = Fields(device_module.Device(device.info, device._raw), grid, Target.nothing())
+        run.start(*start)
+        run.advance(8)
+        fields.append(run.download())
+    assert sorted(name for name, _ in told) == ["update_e", "update_h"]
+    assert told[0][1][:4] == [None] * 4 and told[0][1][-2:] == ["float32", "int32"]
+    assert np.array_equal(*fields)
 
 
 def test_includes_are_expanded_once_and_lines_point_at_the_files():

@@ -55,7 +55,7 @@ def test_a_dielectric_sphere_is_a_conductor_for_large_permittivity_and_a_dipole_
         assert np.isclose(abs(dielectric_sphere(1.0, 0.01, eps)[0]), abs(wanted), rtol=1e-3)
 
 
-def sphere_run(param, ka, cells, travel, n, staircase=False, material=None):
+def sphere_run(param, ka, cells, travel, n, staircase=False, material=None, pulse=None):
     """Currents of a sphere of 1 m radius at n wavenumbers up to ka, `cells` cells per shortest wavelength."""
     cell = 2 * np.pi / ka / cells
     centre = cell * np.array([0.13, 0.27, 0.41])
@@ -67,7 +67,7 @@ def sphere_run(param, ka, cells, travel, n, staircase=False, material=None):
     else:
         target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase)
     top = ka * SPEED_OF_LIGHT / (2 * np.pi)
-    wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), Pulse.gaussian(0.05 * top, top))
+    wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), pulse or Pulse.gaussian(0.05 * top, top))
     k = np.linspace(0.5, ka, n)
     return currents(opened(param), grid, target, wave, k, absorber=10, gap=3), centre
 
@@ -149,3 +149,24 @@ def test_echoes_are_reciprocal(param):
     a, b = amplitude(there, u, q)[0], amplitude(back, -d, p)[0]
     assert abs(a) > 0.01
     assert abs(a - b) < 0.01 * abs(a)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("param", variants(names=()))
+def test_echoes_do_not_depend_on_the_waveform(param):
+    """A Gaussian pulse, and one whose spectrum is spread in time as that of a chirp."""
+    top = 1.5 * SPEED_OF_LIGHT / (2 * np.pi)
+    short = Pulse.gaussian(0.3 * top, top)
+    spread = 5.0 / top**2  # s per Hz: frequencies that differ by `top` pass 5/top apart
+
+    def chirp(f):
+        return short.spectrum(f) * np.exp(-1j * np.pi * spread * (f - 0.65 * top) ** 2)
+
+    long = Pulse(chirp, short.half_length + spread * top, short.highest)
+    runs = [sphere_run(param, 1.5, 20, (0.5, -0.3, -0.8), 3, pulse=pulse) for pulse in (short, long)]
+    (a, b), steps = (
+        [echo(*run, -run[0].wave.travel, run[0].wave.polarization) for run in runs],
+        [r.n_steps for r, _ in runs],
+    )
+    assert steps[1] > steps[0]
+    assert np.abs(a - b).max() < 1e-3 * np.abs(a).max()
