@@ -19,6 +19,7 @@ from .lattice import COURANT, LANES, Lattice
 from .target import Target
 
 ROWS = 8  # rows per work-item on a CPU
+TILE = 16  # planes per tile on a CPU
 
 
 def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[int, int]]]:
@@ -38,14 +39,16 @@ class Fields:
     """E and H of a grid on a device, with everything that is not vacuum.
 
     absorber  layers on each side, at most LANES; 0: the grid ends at its walls (kernels/fdtd.clh)
-    wave      an incident wave;  tile  planes per tile, None: all
+    wave      an incident wave
+    tile      planes per tile; None: TILE on CPUs, whose caches hold the planes from step to step, and all on GPUs
     """
 
     def __init__(
         self, device: Device, lattice: Lattice, target: Target, *, absorber: int = 0, wave: WaveTable | None = None,
         tile: int | None = None,
     ) -> None:  # fmt: skip
-        self.device, self.lattice, self.tile = device, lattice, tile or lattice.shape[0] + BLOCK
+        self.device, self.lattice = device, lattice
+        self._tile = tile or (TILE if device.is_cpu else lattice.shape[0] + BLOCK)
         self.lanes = LANES if device.info.vector_width > 1 else 1
         self.step = 0  # steps that are done
         self._update = [
@@ -76,7 +79,7 @@ class Fields:
     def advance(self, n_steps: int) -> None:
         """Do up to BLOCK steps. The residuals of the lists are those of these steps afterwards."""
         grid = self.lattice
-        for step, planes in tiles(grid.shape[0], n_steps, self.tile):
+        for step, planes in tiles(grid.shape[0], n_steps, self._tile):
             self._vacuum_step(step, planes, magnetic=True)
             self.faces.correct(
                 self._faces, (self.e, self.h), step, planes, grid.component, grid.plane, grid.row, np.float32(COURANT)

@@ -17,8 +17,8 @@ from . import _after_fork
 from ._programs import build, names_in, quiet, source
 from .device_list import DeviceInfo
 
-# A launch of 17 arguments takes pyopencl 84 us of processor time, and 4 us once it is told the types of the numbers. That
-# takes 0.4 ms itself, which kernels of few launches do not save.
+# A launch of 17 arguments takes pyopencl 84 us of processor time, and 4 us once it is told the types of the numbers.
+# Telling it takes 0.4 ms, which kernels of few launches do not save.
 MANY_LAUNCHES = 20
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
 
