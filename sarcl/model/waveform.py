@@ -105,7 +105,8 @@ class Waveform:
         f = np.asarray(frequency, dtype=np.float64) - self.center
         if self.sweep_rate is not None:
             inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
-            return np.exp(-1j * np.pi * f**2 / self.sweep_rate) * inside
+            made = np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside
+            return np.conj(made) if self.kind == "down-chirp" else made
         if self.kind == "tone":
             return np.sinc(f * self.duration).astype(np.complex128)
         return self._sampled_spectrum(f) / self._sampled_peak()
