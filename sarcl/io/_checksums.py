@@ -148,7 +148,10 @@ def of(path: Path) -> Checksums | None:
         text = file.read(length)
         if zlib.crc32(text) != int.from_bytes(end[:4], "little"):
             raise Damaged("its list of checksums is not as it was written")
-        found = Checksums(**json.loads(text))
+        try:
+            found = Checksums(**json.loads(text))
+        except (ValueError, TypeError):  # an empty text has the checksum 0
+            raise Damaged("its list of checksums is none") from None
         if found.size != size - END - length:
             raise Damaged(f"it has {size} bytes and was written with {found.size + END + length}")
         if _rest(file, found) != found.rest:

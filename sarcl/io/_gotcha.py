@@ -86,7 +86,10 @@ def load(path: Any, make: Make, autofocus: bool = False) -> Any:
         "polarization": name[1] if name else None,
         "compressed": True,
     }
-    return make("phase history", found)
+    try:
+        return make("phase history", found)
+    except ValueError as exc:
+        raise ValueError(f"{path.name}: {exc}") from None
 
 
 def _struct(path: Path) -> np.void:

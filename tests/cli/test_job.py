@@ -7,6 +7,7 @@ import threading
 import pytest
 
 from sarcl.cli._job import Job, complete
+from sarcl.cli.parser import main
 from sarcl.io import output_paths
 
 
@@ -97,3 +98,27 @@ def test_a_file_that_has_taken_its_place_is_complete_and_one_that_was_there_befo
         with output_paths.atomic(new) as part:
             part.write_text("whole")
     assert complete(outputs) == [str(new)]
+
+
+def test_sigterm_ends_a_command_as_ctrl_c_does_with_a_status_of_its_own(monkeypatch, capsys):
+    before = signal.signal(signal.SIGTERM, signal.SIG_DFL)
+    try:
+        with pytest.raises(KeyboardInterrupt) as caught, Job({}):
+            os.kill(os.getpid(), signal.SIGTERM)
+            raise AssertionError("it went on")
+        assert caught.value.args == (signal.SIGTERM,)
+        assert signal.getsignal(signal.SIGTERM) is signal.SIG_DFL
+        monkeypatch.setattr("sarcl.cli._commands.devices", lambda args, job: os.kill(os.getpid(), signal.SIGTERM))
+        assert main(["devices"]) == 143
+        assert "ended by SIGTERM; nothing was written" in capsys.readouterr().err
+    finally:
+        signal.signal(signal.SIGTERM, before)
+
+
+def test_a_program_that_handles_sigterm_itself_keeps_its_handler():
+    before = signal.signal(signal.SIGTERM, lambda *_: None)
+    try:
+        with Job({}):
+            os.kill(os.getpid(), signal.SIGTERM)
+    finally:
+        signal.signal(signal.SIGTERM, before)
