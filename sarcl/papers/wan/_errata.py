@@ -49,5 +49,6 @@ def section(lab: Lab) -> Section:
     out.number(
         "phase of an echo from 0.02 m farther, L band", "section 4", -2 * np.pi * FARTHER / wave,
         float(np.angle(farther[2, middle] / here[2, middle])), 0.02, "rad", why="the path is travelled twice",
+        cause="error in print",
     )  # fmt: skip
     return out

@@ -74,7 +74,7 @@ def section(lab: Lab) -> Section:
     out.draw(html.picture(
         _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
         f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figures 6 and 7).", floor_db=-30.0,
-        percentile=99.5,
+        percentile=99.5, equal=True,
     ))  # fmt: skip
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
@@ -82,7 +82,7 @@ def section(lab: Lab) -> Section:
     along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
     out.draw(html.picture(
         _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
-        "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5,
+        "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5, equal=True,
     ))  # fmt: skip
     return out
 

@@ -37,7 +37,7 @@ def section(lab: Lab) -> Section:
         "coefficient as permittivity grows", "figure 5 b", "falls", f"grows: rank correlation {fall:.2f}", fall < -0.9,
         "|R| of H polarisation grows with permittivity at any angle, and the facets that face the radar are the "
         "brightest; the damaged R_q of the paper may explain the printed trend", fall,
-        rule="rank correlation below -0.9",
+        rule="rank correlation below -0.9", cause="error in print",
     )  # fmt: skip
     reflected = 20 * np.log10((np.sqrt(permittivity) - 1) / (np.sqrt(permittivity) + 1))
     slope = float(stats.linregress(reflected, 10 * np.log10(eps)).slope)
