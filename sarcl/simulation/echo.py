@@ -9,7 +9,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
-from ..base import wgs84
+from ..base import host_memory, wgs84
 from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.types import PathLike
@@ -42,6 +42,8 @@ Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
 ]  # fmt: skip
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
+
+HOST_SHARE = 0.25  # of the machine's memory, for facets that are cut, where max_bytes does not say
 
 
 class EchoOptions(TypedDict, total=False):
@@ -128,7 +130,8 @@ def echo(
     compressed    False keeps the pulse's own spectrum (see `sarcl.compress`)
     max_edge      facets are cut until no edge is longer, m; "auto": as finely as the tolerance needs, rough ones at
                   least to half a resolution cell; None: they are not cut
-    max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU
+    max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU; facets are cut into as many as it
+                  holds (512 bytes each), by default a quarter of the machine's memory
     out           an HDF5 file of sarcl's (.h5): samples are written there pulse after pulse, and read when needed
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
@@ -238,7 +241,8 @@ def echo_request(
         choice("shadows", shadows, ("embree",))
     opened = open_device(device)
     return EchoRequest(
-        opened, allowed_error(tolerance), budget(opened, max_bytes), plan.skips(skip, skips),
+        opened, allowed_error(tolerance), budget(opened, max_bytes),
+        HOST_SHARE * host_memory.installed() if max_bytes is None else float(max_bytes), plan.skips(skip, skips),
         _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed,
         progress,
     )  # fmt: skip

@@ -41,12 +41,13 @@ Progress = Callable[[str, int, int], None]
 class EchoRequest:
     """What is asked for, of every channel alike: arguments of `sarcl.echo`, checked.
 
-    tolerance  of each channel;  vertical  (3,);  budget  bytes on the device
+    tolerance  of each channel;  vertical  (3,);  budget  bytes on the device;  host  bytes for facets that are cut
     """
 
     device: Device
     tolerance: float
     budget: float
+    host: float
     skips: set[str]
     polarizations: tuple[str, ...]
     vertical: np.ndarray
@@ -333,7 +334,7 @@ def plan_scene(
     if len(scene.triangles):
         made = plan_cut(
             scene, waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error,
-            request.budget,
+            request.host,
         )  # fmt: skip
         left = share / made.gain - made.plan.predicted_error
         _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)  # pieces: not counted yet

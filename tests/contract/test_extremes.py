@@ -9,6 +9,7 @@ import pytest
 from helpers.cases import noise_on
 
 import sarcl
+from sarcl.base import host_memory
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.opencl.choose_device import open_device
 
@@ -32,7 +33,7 @@ def test_one_pulse_straight_above_one_pixel_is_focused(tolerance):
     assert np.abs(image.data - wanted).max() <= 10 * tolerance * abs(wanted)
 
 
-def test_facets_are_cut_within_max_bytes():
+def test_facets_are_cut_within_max_bytes_or_a_quarter_of_the_memory(monkeypatch):
     square = np.array([[[0, 0, 0], [0.1, 0, 0], [0, 0.1, 0]], [[0.1, 0, 0], [0.1, 0.1, 0], [0, 0.1, 0]]])
     scene = sarcl.Scene.facets(square, two_sided=True)
     track = sarcl.Trajectory.line(start=(0, -0.5, 0.3), velocity=(0, 1, 0), prf=16.0, n_pulses=16)
@@ -40,6 +41,9 @@ def test_facets_are_cut_within_max_bytes():
     with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 .*max_bytes, 10 MB.*or a larger max_bytes"):
         sarcl.plan_echo(scene, chirp, track, max_bytes=1e7)
     sarcl.plan_echo(scene, chirp, track, max_bytes=1e7, tolerance=0.1)
+    monkeypatch.setattr(host_memory, "installed", lambda: 4e7)
+    with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 "):
+        sarcl.plan_echo(scene, chirp, track)
 
 
 def test_masked_values_are_refused_wherever_samples_come_from(tmp_path):
