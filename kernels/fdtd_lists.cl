@@ -14,7 +14,9 @@
 //           first, last  entries that are corrected;  each  entries of a work-item
 //           record    where this step's residuals begin
 //           share     (2, count): p, q;   weight (4, count): of the edges c(+b), c, b(+c), b of a face in direction a
-//           u         values of one step;  from (count,) int: first of the 6;  rest (count,): position from the third
+//           u         values of one step, the 6 components of each point;  from (count,) int: place of the first of 6
+//                     points, their component included: the wave is 0 at all six below quiet_below and above quiet_above
+//           rest      (count,): position from the third point
 //           phase     (steps, n_frequencies, 2): cosine and minus sine, from first_step on;  sums (n_frequencies, 2, count)
 // macros    LANES     count of transform is a multiple of 16
 // reference: sarcl/reference/fdtd.py:edges, faces, incident, transform
@@ -55,9 +57,11 @@ __kernel void faces(__global const float *restrict e, __global float *restrict h
 
 __kernel void incident(__global float *restrict field, __global const int *restrict at, __global const int *restrict from,
                        __global const float *restrict rest, __global const float *restrict amount,
-                       __global const float *restrict u, int u_at, int each, int first, int last) {
+                       __global const float *restrict u, int u_at, int quiet_below, int quiet_above, int each, int first, int last) {
     EACH_ENTRY {
-        __global const float *v = u + u_at + from[l];
+        if (from[l] < quiet_below || from[l] > quiet_above) continue;
+        __global const float *p = u + u_at + from[l];
+        float v[6] = {p[0], p[6], p[12], p[18], p[24], p[30]};
         float x = rest[l], a = x + 2, b = x + 1, c = x - 1, d = x - 2, g = x - 3;
         float far_low = v[1] * a - v[0] * b / 5, middle = v[3] * x - v[2] * c, far_high = v[5] * d / 5 - v[4] * g;
         float sum = far_low * x * c * d * g / 24 + middle * a * b * d * g / 12 + far_high * a * b * x * c / 24;

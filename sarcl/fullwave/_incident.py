@@ -18,6 +18,8 @@ from ._pulse import SILENCE, Pulse
 from .lattice import COURANT, Lattice, PlaneOrder
 
 SPACING = 1 / 3  # of the table, in cells: six points interpolate waves of 6 cells to 1e-5
+QUIET = 3e-8  # of the largest value of a table: float32 fields have errors ten times as large
+COMPONENTS = 6  # of E and H
 BEFORE, AFTER = 2, 3  # points of the table before and after the cell of a position
 
 
@@ -97,7 +99,8 @@ class WaveTable:
     """The wave over distance along its direction, for every time step until it has left the box.
 
     low, high  nodes at the faces of the box, int (3,)
-    values  float32 (n_steps, 6, n): E at step n and H at step n + 1/2, x, y and z each, peak about 1
+    values  float32 (n_steps, n, 6): E at step n and H at step n + 1/2, x, y and z each, peak about 1
+    loud    int (n_steps, 2): first and last point at which the wave is not negligible at a step (QUIET); -1, -2: none
     origin  distance of the first value from the origin of phases, m
     delay   s: the time at which the peak of the pulse passes the origin of phases
     centre  the origin of phases, m (3,)
@@ -109,6 +112,7 @@ class WaveTable:
     low: np.ndarray
     high: np.ndarray
     values: np.ndarray
+    loud: np.ndarray
     origin: float
     delay: float
     centre: np.ndarray
@@ -116,12 +120,12 @@ class WaveTable:
     omega: np.ndarray
 
     def read(self, source: np.ndarray, magnetic: bool) -> tuple[np.ndarray, np.ndarray]:
-        """First of the six values within a step, int32 (n,), and position from the third, in 0 ... 1 (n,)."""
+        """Place of the first of six points within a step, int32 (n,), and position from the third, in 0 ... 1 (n,)."""
         place = (self.lattice.positions(source, magnetic) - self.centre) @ self.wave.travel
         cell = (place - self.origin) / (SPACING * self.lattice.cell)
         whole = np.floor(cell)
         component = source // np.prod(self.lattice.shape) + 3 * magnetic
-        first = component * self.values.shape[2] + whole - BEFORE
+        first = COMPONENTS * (whole - BEFORE) + component
         return first.astype(np.int32), (cell - whole).astype(np.float32)
 
     def spectrum(self, omega: np.ndarray) -> np.ndarray:
@@ -151,11 +155,18 @@ def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndar
     k = _dispersion.wavenumber(lattice, omega, wave.travel)
     e, h = _dispersion.fields(_dispersion.grid_vector(lattice, k, wave.travel), wave.polarization)
     number = np.arange(1, n_lines)[kept]
-    values = np.empty((n_steps, 6, len(places)), np.float32)
+    values = np.empty((n_steps, len(places), COMPONENTS), np.float32)
     phase = np.exp(-1j * (np.multiply.outer(places, k) + omega * delay))
-    for component in range(6):
+    for component in range(COMPONENTS):
         unit = e[:, component] if component < 3 else h[:, component - 3] * np.exp(0.5j * omega * dt)
         bins = np.zeros((len(places), n_steps // 2 + 1), np.complex128)
         bins[:, number] = phase * (line * unit)
-        values[:, component] = np.fft.irfft(bins, n_steps, axis=1).T * (n_steps / 2)
-    return WaveTable(lattice, wave, low, high, values, float(first), float(delay), centre, line, omega)
+        values[:, :, component] = np.fft.irfft(bins, n_steps, axis=1).T * (n_steps / 2)
+    return WaveTable(lattice, wave, low, high, values, _loud(values), float(first), float(delay), centre, line, omega)
+
+
+def _loud(values: np.ndarray) -> np.ndarray:
+    """First and last point of each step whose values are not negligible, int (n_steps, 2); -1, -2: none."""
+    heard = np.abs(values).max(axis=2) > QUIET * np.abs(values).max()
+    first, last = heard.argmax(axis=1), heard.shape[1] - 1 - heard[:, ::-1].argmax(axis=1)
+    return np.where(heard.any(axis=1)[:, None], np.stack([first, last], axis=1), [-1, -2])

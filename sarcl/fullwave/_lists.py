@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._incident import Entrance, WaveTable
+from ._incident import AFTER, BEFORE, COMPONENTS, Entrance, WaveTable
 from .lattice import LANES, Lattice, PlaneOrder
 
 BLOCK = 8  # steps whose residuals are kept before they are transformed
@@ -59,9 +59,13 @@ class IncidentList:
         arrays = lattice.in_buffer(part.at), first, rest, part.amount
         self._arrays = tuple(device.copied(values) for values in arrays)
 
-    def correct(self, kernel: Any, field: Any, wave: Any, at: int, planes: tuple[int, int]) -> None:
-        """Correct a range of planes by the values of the wave that begin at `at` in its table."""
-        run_entries(self.device, kernel, self._first, planes, field, *self._arrays, wave, at)
+    def correct(self, kernel: Any, field: Any, wave: Any, at: int, loud: list[int], planes: tuple[int, int]) -> None:
+        """Correct a range of planes by the values of the wave that begin at `at` in its table.
+
+        loud  first and last point that are not negligible: entries that read neither these nor points between are left
+        """
+        below, above = COMPONENTS * (loud[0] - BEFORE - AFTER), COMPONENTS * loud[1] + COMPONENTS - 1
+        run_entries(self.device, kernel, self._first, planes, field, *self._arrays, wave, at, below, above)
 
 
 def run_entries(device: Device, kernel: Any, first_of: np.ndarray, planes: tuple[int, int], *args: Any) -> None:

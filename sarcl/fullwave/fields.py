@@ -63,6 +63,7 @@ class Fields:
         self.faces = TargetList(device, lattice, target.faces, target.weight)
         self._thickness, self._layers = absorber, layers(device, lattice, absorber)
         self._wave, self._wave_steps, self._wave_values = None, 0, 0
+        self._loud: list[list[int]] = []
         self._entrances: tuple[list[IncidentList], list[IncidentList]] = [], []
         if wave is not None:
             parts = entrances(lattice, wave.low, wave.high)
@@ -70,8 +71,8 @@ class Fields:
                 self._entrances[magnetic].extend(
                     IncidentList(device, lattice, p, wave, magnetic) for p in parts[magnetic]
                 )
-            self._wave = device.copied(wave.values)
-            self._wave_steps, self._wave_values = len(wave.values), 6 * wave.values.shape[2]
+            self._wave, self._loud = device.copied(wave.values), wave.loud.tolist()
+            self._wave_steps, self._wave_values = len(wave.values), wave.values[0].size
 
     def _kernel(self, file: str, name: str) -> Any:
         return self.device.kernel(file, name, LANES=self.lanes)
@@ -98,9 +99,9 @@ class Fields:
             vectors, each, np.float32(COURANT), planes[0],
         )  # fmt: skip
         if self.step + step < self._wave_steps:
-            at = (self.step + step) * self._wave_values
+            at, loud = (self.step + step) * self._wave_values, self._loud[self.step + step]
             for part in self._entrances[magnetic]:
-                part.correct(self._incident, self.h if magnetic else self.e, self._wave, at, planes)
+                part.correct(self._incident, self.h if magnetic else self.e, self._wave, at, loud, planes)
 
     def transform(self, part: TargetList, phase: Any, sums: Any, first: int, n_steps: int, n_frequencies: int) -> None:
         """Add the residuals of the last steps to their sums over time; see kernels/fdtd_lists.cl."""

@@ -62,7 +62,7 @@ class Twin:
             fdtd.absorb(to, source, self.psi[axis, magnetic], axis, *layers[magnetic], s)
         for part in self.entrances[magnetic] if self.wave and self.step < len(self.wave.values) else ():
             first, rest = self.wave.read(part.source, magnetic=not magnetic)
-            values = self.wave.values[self.step].ravel()[first[:, None] + np.arange(6)]
+            values = self.wave.values[self.step].ravel()[first[:, None] + 6 * np.arange(6)]
             fdtd.incident(to, part.at, values, rest, part.amount)
 
 
