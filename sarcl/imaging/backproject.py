@@ -176,8 +176,8 @@ def backproject(
             where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
             text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
             log.warning(text, where, remedy)
-        unseen = unseen_pixels(task) if done else None
-        if unseen and unseen.warning:
+        unseen = unseen_pixels(task)
+        if unseen and unseen.warning and done:
             warn(unseen.warning)
         measured = None
         exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8

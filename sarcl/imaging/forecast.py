@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
-from ..base.errors import ToleranceUnreachable
+from ..base.errors import ToleranceUnreachable, warn
 from ..base.stage_timer import Clock
 from ..base.text import duration, size_text
 from ..model.image_grid import ImageGrid
@@ -22,6 +22,7 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
 from . import profile_energy
+from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice
 from .factorized.plan import FactorPlan, moving_cost
 from .focus_options import FocusOptions
@@ -89,9 +90,15 @@ def plan(
     working = sum(_bytes(task, chosen, d, options.budget(d)) for d in devices)
     # seconds per pixel, for all rows that see it, at cost 1
     seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
+    details = chosen.plan.describe(chosen.method)
+    unseen = unseen_pixels(task)
+    if unseen:
+        details["pixels outside every range window"] = unseen.describe()
+        if unseen.warning:
+            warn(unseen.warning)
     return Forecast(
         chosen.method,
-        chosen.plan.describe(chosen.method),
+        details,
         seconds * _work(task, chosen),
         float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
         chosen.predicted_error,

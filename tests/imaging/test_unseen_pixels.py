@@ -34,6 +34,8 @@ def test_data_that_start_at_range_0_say_wrap_and_are_focused_with_it():
     assert share == pytest.approx(outside, abs=0.006)
     count = round(outside * GRID.size)
     assert image.report.plan["pixels outside every range window"].startswith(f"{count} of {GRID.size} tried")
+    with pytest.warns(sarcl.SarclWarning, match="of the pixels lie outside"):  # before the work too
+        assert sarcl.plan(raw, GRID).plan["pixels outside every range window"].startswith(f"{count} of {GRID.size}")
     assert (image.data == 0).mean() == pytest.approx(outside, abs=1e-9)
     whole = sarcl.backproject(raw, GRID, wrap=True)  # no warning: it would be an error here
     assert np.unravel_index(np.abs(whole.data).argmax(), GRID.shape)[1] == 40
