@@ -116,6 +116,7 @@ def test_a_forecast_equals_the_run(name):
     assert str(told).startswith(f"{raw.n_rows} rows of {raw.n_samples} samples: ")
 
 
+@pytest.mark.filterwarnings("ignore:.*shorter than 1/:sarcl.SarclWarning")  # of the first plan's carriers
 def test_a_forecast_includes_later_plans_of_carriers():
     array = line(5, step=20e6).switched(line(5, step=40e6), 10, 120)
     tone = sarcl.Waveform.tone(center=F0, duration=1 / 40e6)
