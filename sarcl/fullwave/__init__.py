@@ -11,13 +11,16 @@ For other folders:
 For this folder alone:
 
     _absorber     absorbing layers (CPML)
+    _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
     _cut_cells    conductors that cut cells, from the intervals of grid lines inside them
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     _far_field    echo amplitudes of currents, without the grid's own dispersion
     _incident     a plane wave that enters through the faces of a box
     _lists        lists of cells on a device
+    _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum
+    _thin_parts   refusals of parts of a mesh that are thinner than a cell
 """
 
 __all__ = ["fields", "lattice", "target"]

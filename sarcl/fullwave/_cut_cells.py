@@ -36,7 +36,7 @@ def conductor(lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals
 
     staircase  an edge conducts where both its ends are inside, and no edge or face is cut: for comparison
     """
-    inside = _nodes(lattice, intervals[0])
+    inside = nodes_inside(lattice, intervals[0])
     free = np.stack([_free_lengths(lattice, axis, part) for axis, part in enumerate(intervals)])
     for a in range(3):
         within = inside & _next(inside, a, False)
@@ -83,7 +83,7 @@ def _free_lengths(lattice: Lattice, axis: int, part: Intervals) -> np.ndarray:
     return free
 
 
-def _nodes(lattice: Lattice, part: Intervals) -> np.ndarray:
+def nodes_inside(lattice: Lattice, part: Intervals) -> np.ndarray:
     """Which nodes are inside the body, by its intervals along x: bool (*shape)."""
     which, along, place = _crossed(lattice, 0, part)
     inside = np.zeros(lattice.shape, bool)

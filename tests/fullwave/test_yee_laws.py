@@ -41,7 +41,7 @@ def test_a_closed_cavity_with_a_cut_sphere_keeps_its_energy(param):
     grid = grid_of()
     intervals = sphere_intervals(grid, CENTRE, 4.3 * CELL)
     target = conductor(grid, intervals)
-    inside = _cut_cells._nodes(grid, intervals[0])
+    inside = _cut_cells.nodes_inside(grid, intervals[0])
     length = np.stack([_cut_cells._free_lengths(grid, a, part) for a, part in enumerate(intervals)])
     area = np.stack([_cut_cells._free_area(inside, length, a) for a in range(3)])
     for a in range(3):

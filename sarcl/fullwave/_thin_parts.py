@@ -1,0 +1,85 @@
+"""Refusal of parts of a body that fall between the nodes of a grid, with the size of cells that resolves them.
+
+Between nodes a plate or a wire is transparent: no edge of the grid lies in it. Tips and sharp edges of a body are
+thinner than a cell as well, however small the cells are. A part is refused, therefore, where
+
+- a line enters and leaves between two nodes through facets that are parallel, or
+- no node is inside within REACH cells.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ._closed_mesh import ClosedMesh
+from .lattice import Lattice
+
+REACH = 4  # cells
+PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edges are taken as plates
+RAYS = 64  # at most, through the parts that are refused, to find how thick they are
+SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
+
+
+class ThinParts:
+    """Points of a surface, collected axis by axis, and the check of all."""
+
+    def __init__(self, lattice: Lattice, mesh: ClosedMesh) -> None:
+        self.lattice, self.corners = lattice, mesh.corners / mesh.unit
+        self._inwards = -np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
+        self._inwards /= np.maximum(np.linalg.norm(self._inwards, axis=1), 1e-300)[:, None]
+        self._points = [(np.arange(len(self.corners)), self.corners.mean(axis=1))]
+        self._bad: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def add(self, facet: np.ndarray, place: np.ndarray) -> None:
+        """Points on facets (n,), in nodes (n, 3)."""
+        self._points.append((facet, place))
+
+    def add_pairs(self, entered: np.ndarray, left: np.ndarray, place: np.ndarray) -> None:
+        """Facets (n,) through which lines enter, in nodes (n, 3), and leave again before the next node."""
+        plate = (self._inwards[entered] * self._inwards[left]).sum(axis=1) < -PARALLEL
+        self._bad.append((entered[plate], place[plate]))
+
+    def check(self, inside: np.ndarray) -> None:
+        """ValueError where parts are too thin; inside (*shape): the nodes that are."""
+        from scipy.ndimage import maximum_filter
+
+        near = maximum_filter(inside, size=2 * REACH + 1, mode="constant", cval=False)
+        for facet, place in self._points:
+            far = ~near[tuple(np.rint(place).astype(int).T)]
+            self._bad.append((facet[far], place[far]))
+        facet, place = (np.concatenate(part) for part in zip(*self._bad, strict=True))
+        if not len(facet):
+            return
+        some = np.linspace(0, len(facet) - 1, min(RAYS, len(facet))).astype(int)
+        cell = self.lattice.cell
+        thickness = cell * float(np.quantile(self._thickness(facet[some], place[some]), 0.25))
+        at = np.array2string(self.lattice.origin + cell * place[some[0]], precision=4)
+        remedy = "give them a thickness"
+        if thickness > 1e-5 * cell:
+            remedy = f"give cells of at most {SHARE * thickness:.2g} m, or make these parts thicker"
+        raise ValueError(
+            f"triangles have parts that are too thin for cells of {cell:g} m: about {thickness:.2g} m thick, one at "
+            f"{at} m, so that they fall between the nodes of the grid; {remedy}"
+        )
+
+    def _thickness(self, facet: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Distance from points on facets (n,) inwards to where the body ends, in cells (n,); inf where no facet is met.
+
+        Source: T. Moeller and B. Trumbore, J. Graphics Tools 2 (1997): u and v in the facet, t along the ray.
+        """
+        first, second = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
+        out = np.full(len(facet), np.inf)
+        for i, (ray, origin) in enumerate(zip(self._inwards[facet], place, strict=True)):
+            across = np.cross(ray, second)
+            from_corner = origin - self.corners[:, 0]
+            turned = np.cross(from_corner, first)
+            with np.errstate(divide="ignore", invalid="ignore"):
+                scale = 1 / (first * across).sum(axis=1)
+                u, v, t = (
+                    (from_corner * across).sum(axis=1) * scale,
+                    turned @ ray * scale,
+                    (turned * second).sum(1) * scale,
+                )
+                hit = (u > -1e-9) & (v > -1e-9) & (u + v < 1 + 1e-9) & (t > -1e-6) & (self._inwards @ ray < 0)
+            out[i] = np.maximum(t[hit], 0).min(initial=np.inf)
+        return out
