@@ -18,6 +18,7 @@ from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...numerics.windows import Window
 from ...opencl.device import DeviceChoice
+from ..collection import collection
 from ..forecast import Forecast, speed
 from ._doppler import fresnel, sine
 from ._focus import focus
@@ -102,7 +103,6 @@ def range_doppler(
     if check or (check is None and exact_seconds < 0.02 * sum(clock.seconds.values())):
         measured = _measure_error(raw, task, grid, data)
         clock.lap("check")
-    middle = raw.n_rows // 2
     seen = _row_weights(
         track, plan, np.array([task.extent.middle_time]), plan.ranges[[len(plan.ranges) // 2]], task.wavelength
     ).real
@@ -111,8 +111,7 @@ def range_doppler(
         grid,
         gain=float(task.sample_weight.sum() * (seen[0] * task.row_weight).sum()),
         frequency=SPEED_OF_LIGHT / task.wavelength,
-        tx=raw.tx[middle],
-        rx=raw.rx[middle],
+        **collection(raw, grid, window),
         report=Report(
             plan=task.describe(),
             tolerance=task.tolerance,
