@@ -6,9 +6,10 @@ For other folders:
 
 For this folder alone:
 
-    _commands   what each command does
+    _commands   what each command does, and the table of devices
     _job        output files and interruption of a command
     _methods    the methods of sarcl focus: options, plan, image
+    _pages      sarcl fda, papers and bench: pages and tables
 """
 
 __all__ = ["parser"]

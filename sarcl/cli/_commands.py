@@ -15,6 +15,7 @@ from typing import TYPE_CHECKING, Any
 
 from ..io import formats
 from ._job import Job, Outputs
+from ._pages import bench, fda, papers
 
 if TYPE_CHECKING:
     from ..base.report import Report
@@ -84,8 +85,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
     stem = Path(args.scenario).stem
     output = args.output or f"{stem}_raw.h5"
     images = args.image or ([f"{stem}.png"] if scenario.has_image else [])
-    _expect(job, [output], formats.writing("phase history"), [args.scenario])
-    _expect(job, images, formats.writing("picture", "image"), [args.scenario, output])
+    job.expect_named([output], formats.writing("phase history"), [args.scenario])
+    job.expect_named(images, formats.writing("picture", "image"), [args.scenario, output])
     _check_scale(args)
     grid = scenario.build_grid() if scenario.grid is not None else None
     options: dict[str, Any] = {"device": open_device(args.device)}
@@ -132,7 +133,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     method = Method.of(args)
     check_pieces(args, outputs)
-    _expect(job, outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
+    job.expect_named(outputs, formats.writing("picture", "image"), [*args.raw, *([args.grid] if args.grid else [])])
     _check_scale(args)
     given = _grid_options(args)
     grid = None if args.grid is None else load(args.grid).build_grid()
@@ -177,128 +178,6 @@ def measure(args: argparse.Namespace, job: Job) -> int:
 
     print(point_response.measure(image, near=args.near))
     return 0
-
-
-def fda(args: argparse.Namespace, job: Job) -> int:
-    """Run an experiment on frequency-diverse apertures: a page and its numbers."""
-    import json
-
-    from ..experiments.fda import experiment
-    from ..experiments.fda import page as fda_page
-    from ..experiments.fda.file import load
-    from ..experiments.fda.text import conclusion, setting, verdicts
-    from ..figures import plots
-    from ..opencl.choose_device import open_device
-
-    title, cases = load(args.experiment)
-    output = args.output or f"{Path(args.experiment).stem}.html"
-    numbers = str(Path(output).with_suffix(".json"))
-    _expect(job, [output], [formats.Format((".html", ".htm"))], [args.experiment])
-    job.expect(numbers)
-    plots.require("the page of sarcl fda")
-    results, sections = [], []
-    for i, case in enumerate(cases):
-        results.append(experiment.measure(case, open_device(args.device)))
-        sections.append(fda_page.section(results[-1]))
-        job.progress("fda", i + 1, len(cases))
-        # Both files are written after every case, so that a later failure does not lose them.
-        page = fda_page.html(results, title, args.command_line, sections, finished=len(results) == len(cases))
-        _write(numbers, json.dumps(results))
-        _write(output, page)
-    for result in results:
-        job.say(f"{result['name']}: {setting(result)}")
-        for verdict in verdicts(result):
-            job.say(f"  {verdict}")
-    for line in conclusion(results):
-        job.say(line)
-    job.say(f"wrote {output} and {numbers}")
-    return 0
-
-
-def papers(args: argparse.Namespace, job: Job) -> int:
-    """List the papers, or reproduce one: a page and its numbers."""
-    import json
-
-    from .. import papers as shelf
-    from ..figures import plots
-
-    if args.paper is None:
-        job.say(shelf.listing())
-        return 0
-    paper = shelf.find(args.paper)
-    output = Path(f"{paper.name}.html" if args.output is None else args.output)
-    if output.suffix.lower() not in (".html", ".htm"):  # a folder
-        output = output / f"{paper.name}.html"
-    numbers = output.with_suffix(".json")
-    for path in (output, numbers):
-        job.expect(path)
-    plots.require("the page of sarcl papers")
-    lab, sections = shelf.open_lab(paper, args.device, args.quick), []
-    for section in paper.run(lab):
-        sections.append(section)
-        job.progress("papers", len(sections), len(paper.sections))
-        # Both files are written after every section, so that a later failure does not lose them.
-        _write(numbers, json.dumps(paper.document(sections, args.quick), allow_nan=False))
-        _write(output, paper.html(sections, args.quick, args.command_line))
-        fine = sum(row.holds for row in section.rows)
-        tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
-        job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
-        for row in section.rows:
-            if not row.holds:
-                job.say(f"  differs: {row.item}: printed {row.published}, measured {row.measured}")
-    job.say(f"wrote {output} and {numbers}")
-    return 0
-
-
-def _write(path: str | Path, text: str) -> None:
-    """A text file that appears whole."""
-    from ..io import output_paths
-
-    with output_paths.atomic(path) as part:
-        part.write_text(text, encoding="utf-8")
-
-
-def bench(args: argparse.Namespace, job: Job) -> int:
-    """Measure run time against achieved error: tables and, if asked for, JSON and a plot."""
-    from ..bench import backproject
-    from ..figures import plots
-    from ..io import output_paths
-
-    if args.json is not None:
-        _expect(job, [args.json], [formats.Format((".json",))], [])
-    if args.picture is not None:
-        _expect(job, [args.picture], formats.writing("picture"), [])
-        plots.require("--picture")
-    names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
-    given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
-
-    def keep(document: dict[str, Any]) -> None:
-        if args.json is not None:
-            backproject.write(document, Path(args.json))
-
-    document = backproject.run(
-        **given, no_fp64=args.no_fp64, with_peers=not args.no_peers, say=job.say, progress=job.progress, keep=keep
-    )
-    if args.picture is not None:
-        from ..bench.pareto import picture
-
-        with output_paths.atomic(args.picture) as part:
-            part.write_bytes(picture(document["cases"]))
-    return 0
-
-
-def _expect(job: Job, paths: list[str], among: list[formats.Format], inputs: list[str]) -> None:
-    """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
-    taken = {Path(p).resolve() for p in inputs}
-    for path in paths:
-        if Path(path).resolve() in taken:
-            raise ValueError(f"output {path!r} is also read by this command; choose another name")
-        if formats.named(path, among) is None:
-            wanted = formats.suggested(among)
-            raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
-        job.expect(path)
-    if len({Path(p).resolve() for p in paths}) < len(paths):
-        raise ValueError(f"outputs {', '.join(paths)} name one file twice")
 
 
 def _check_scale(args: argparse.Namespace) -> None:

@@ -5,11 +5,12 @@ from __future__ import annotations
 import os
 import signal
 import sys
+from pathlib import Path
 from types import FrameType
 from typing import Any
 
 from ..base.progress import Bar
-from ..io import output_paths
+from ..io import formats, output_paths
 
 Outputs = dict[str, tuple[int, int] | None]
 
@@ -85,6 +86,19 @@ class Job:
         """Register an output path; raises what `output_paths.check_writable` raises where it cannot be written."""
         output_paths.check_writable(path)
         self.outputs[str(path)] = identity(path)
+
+    def expect_named(self, paths: list[str], among: list[formats.Format], inputs: list[str]) -> None:
+        """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
+        taken = {Path(p).resolve() for p in inputs}
+        for path in paths:
+            if Path(path).resolve() in taken:
+                raise ValueError(f"output {path!r} is also read by this command; choose another name")
+            if formats.named(path, among) is None:
+                wanted = formats.suggested(among)
+                raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
+            self.expect(path)
+        if len({Path(p).resolve() for p in paths}) < len(paths):
+            raise ValueError(f"outputs {', '.join(paths)} name one file twice")
 
     def _interrupt(self, number: int, frame: FrameType | None) -> None:
         self.interrupted = number

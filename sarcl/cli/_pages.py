@@ -1,0 +1,118 @@
+"""Commands that write pages and tables of results: sarcl fda, papers and bench."""
+
+from __future__ import annotations
+
+import argparse
+from pathlib import Path
+from typing import Any
+
+from ..io import formats
+from ._job import Job
+
+
+def fda(args: argparse.Namespace, job: Job) -> int:
+    """Run an experiment on frequency-diverse apertures: a page and its numbers."""
+    import json
+
+    from ..experiments.fda import experiment
+    from ..experiments.fda import page as fda_page
+    from ..experiments.fda.file import load
+    from ..experiments.fda.text import conclusion, setting, verdicts
+    from ..figures import plots
+    from ..opencl.choose_device import open_device
+
+    title, cases = load(args.experiment)
+    output = args.output or f"{Path(args.experiment).stem}.html"
+    numbers = str(Path(output).with_suffix(".json"))
+    job.expect_named([output], [formats.Format((".html", ".htm"))], [args.experiment])
+    job.expect(numbers)
+    plots.require("the page of sarcl fda")
+    results, sections = [], []
+    for i, case in enumerate(cases):
+        results.append(experiment.measure(case, open_device(args.device)))
+        sections.append(fda_page.section(results[-1]))
+        job.progress("fda", i + 1, len(cases))
+        # Both files are written after every case, so that a later failure does not lose them.
+        page = fda_page.html(results, title, args.command_line, sections, finished=len(results) == len(cases))
+        _write(numbers, json.dumps(results))
+        _write(output, page)
+    for result in results:
+        job.say(f"{result['name']}: {setting(result)}")
+        for verdict in verdicts(result):
+            job.say(f"  {verdict}")
+    for line in conclusion(results):
+        job.say(line)
+    job.say(f"wrote {output} and {numbers}")
+    return 0
+
+
+def papers(args: argparse.Namespace, job: Job) -> int:
+    """List the papers, or reproduce one: a page and its numbers."""
+    import json
+
+    from .. import papers as shelf
+    from ..figures import plots
+
+    if args.paper is None:
+        job.say(shelf.listing())
+        return 0
+    paper = shelf.find(args.paper)
+    output = Path(f"{paper.name}.html" if args.output is None else args.output)
+    if output.suffix.lower() not in (".html", ".htm"):  # a folder
+        output = output / f"{paper.name}.html"
+    numbers = output.with_suffix(".json")
+    for path in (output, numbers):
+        job.expect(path)
+    plots.require("the page of sarcl papers")
+    lab, sections = shelf.open_lab(paper, args.device, args.quick), []
+    for section in paper.run(lab):
+        sections.append(section)
+        job.progress("papers", len(sections), len(paper.sections))
+        # Both files are written after every section, so that a later failure does not lose them.
+        _write(numbers, json.dumps(paper.document(sections, args.quick), allow_nan=False))
+        _write(output, paper.html(sections, args.quick, args.command_line))
+        fine = sum(row.holds for row in section.rows)
+        tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
+        job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
+        for row in section.rows:
+            if not row.holds:
+                job.say(f"  differs: {row.item}: printed {row.published}, measured {row.measured}")
+    job.say(f"wrote {output} and {numbers}")
+    return 0
+
+
+def bench(args: argparse.Namespace, job: Job) -> int:
+    """Measure run time against achieved error: tables and, if asked for, JSON and a plot."""
+    from ..bench import backproject
+    from ..figures import plots
+    from ..io import output_paths
+
+    if args.json is not None:
+        job.expect_named([args.json], [formats.Format((".json",))], [])
+    if args.picture is not None:
+        job.expect_named([args.picture], formats.writing("picture"), [])
+        plots.require("--picture")
+    names = "scenes data sizes tolerances methods devices peer_python peer_backend repeats pixels limit patience"
+    given = {name: value for name in names.split() if (value := getattr(args, name)) is not None}
+
+    def keep(document: dict[str, Any]) -> None:
+        if args.json is not None:
+            backproject.write(document, Path(args.json))
+
+    document = backproject.run(
+        **given, no_fp64=args.no_fp64, with_peers=not args.no_peers, say=job.say, progress=job.progress, keep=keep
+    )
+    if args.picture is not None:
+        from ..bench.pareto import picture
+
+        with output_paths.atomic(args.picture) as part:
+            part.write_bytes(picture(document["cases"]))
+    return 0
+
+
+def _write(path: str | Path, text: str) -> None:
+    """A text file that appears whole."""
+    from ..io import output_paths
+
+    with output_paths.atomic(path) as part:
+        part.write_text(text, encoding="utf-8")
