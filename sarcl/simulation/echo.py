@@ -43,7 +43,8 @@ Skip = Literal[
 ]  # fmt: skip
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
 
-HOST_SHARE = 0.25  # of the machine's memory, for facets that are cut, where max_bytes does not say
+# Memory for facets that are cut: a share of the machine's, or max_bytes, but no less than the process takes anyway
+HOST_SHARE, LEAST_HOST = 0.25, 2.0**28
 
 
 class EchoOptions(TypedDict, total=False):
@@ -131,7 +132,7 @@ def echo(
     max_edge      facets are cut until no edge is longer, m; "auto": as finely as the tolerance needs, rough ones at
                   least to half a resolution cell; None: they are not cut
     max_bytes     memory for blocks, default 1 GiB on CPUs, half the memory of a GPU; facets are cut into as many as it
-                  holds (512 bytes each), by default a quarter of the machine's memory
+                  holds (512 bytes each; at least 256 MiB), by default a quarter of the machine's memory
     out           an HDF5 file of sarcl's (.h5): samples are written there pulse after pulse, and read when needed
     tolerance     L2 error of the samples, relative to the larger of their norm and the norm they would have if
                   scatterers added with random phases
@@ -242,7 +243,8 @@ def echo_request(
     opened = open_device(device)
     return EchoRequest(
         opened, allowed_error(tolerance), budget(opened, max_bytes),
-        HOST_SHARE * host_memory.installed() if max_bytes is None else float(max_bytes), plan.skips(skip, skips),
+        max(LEAST_HOST, HOST_SHARE * host_memory.installed() if max_bytes is None else max_bytes),
+        plan.skips(skip, skips),
         _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed,
         progress,
     )  # fmt: skip

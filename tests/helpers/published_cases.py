@@ -30,7 +30,7 @@ class Radar(FarRadar):
 
 def speckle(pixels):
     """p values of Rayleigh amplitudes and of uniform phases, and std/mean of the intensity."""
-    return astuple(far_radar.speckle(pixels))
+    return astuple(far_radar.speckle(pixels))[:3]
 
 
 def inside_box(x, y, z, size):

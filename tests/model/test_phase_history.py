@@ -417,7 +417,7 @@ BAD = {
     "samples of no axis": ({"samples": np.array(1j)}, r"samples has shape \(\), wanted"),
     "no rows": ({"samples": np.ones((0, 5), complex)}, r"samples has shape \(0, 5\), wanted .* neither zero"),
     "no samples": ({"samples": np.ones((5, 0), complex)}, r"samples has shape \(5, 0\)"),
-    "ragged samples": ({"samples": ragged(2, 1)}, "samples must be numbers"),
+    "ragged samples": ({"samples": ragged(2, 1)}, "samples is .*, whose rows differ in length; give rows"),
     "samples of truths": ({"samples": np.ones((6, 5), bool)}, "samples has type bool, wanted complex64 or complex128"),
     "samples of words": ({"samples": [["a", "b"]]}, "samples must be numbers"),
     "samples too long": ({"samples": np.ones((6, 5), np.clongdouble)}, "samples has type complex256, wanted complex64"),

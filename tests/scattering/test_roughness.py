@@ -49,7 +49,7 @@ def test_power_follows_the_diagram_and_is_kept(material, omega, lobe, elevation)
 
 
 def test_the_kernel_has_a_line_for_every_diagram():
-    kernel = files("sarcl.kernels").joinpath("spread_facets.cl").read_text()
+    kernel = files("sarcl.kernels").joinpath("facet_planes.clh").read_text()
     for name in set(DIAGRAMS) - set(COHERENT):
         assert f"diagram == (fv)DIAGRAM_{name.upper()} ?" in kernel, name
 

@@ -63,7 +63,7 @@ class FocusPlan:
         return float(sum(self.errors.values()))
 
     def cost(self, n_rows: int, n_samples: int) -> float:
-        """Cost in contributions of numerics/cost_model.py: FFTs, filters, reading along the migration."""
+        """Cost in contributions of sarcl/numerics/cost_model.py: FFTs, filters, reading along the migration."""
         bins, columns, several = len(self.bins), len(self.ranges), len(self.blocks) > 1
         filters = len(self.blocks) + 1 if several else 1
         out = n_rows * n_samples * cost_model.REFERENCED + n_samples * cost_model.profile(self.length)
