@@ -91,13 +91,13 @@ def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
 @contextmanager
 def _opened(path: Path, name: str) -> Iterator[Any]:
     """A raster, open for reading."""
+    if not path.is_dir():  # some formats are folders
+        input_paths.check(path, "DEM file")
     try:
         import rasterio
         from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
     except ImportError as exc:
         raise ImportError("elevation models need the package rasterio: pip install sarcl[dem]") from exc
-    if not path.is_dir():  # some formats are folders
-        input_paths.check(path, "DEM file")
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:

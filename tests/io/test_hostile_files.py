@@ -208,6 +208,8 @@ def test_a_file_that_declares_more_than_it_has_is_refused_at_once(tmp_path):
 @pytest.mark.parametrize("kind", ["pipe", "socket", "folder", "missing"])
 @pytest.mark.parametrize("reader", ["read", "mesh", "orbit", "scenario", "dem"])
 def test_what_is_no_regular_file_is_said_to_be_none(tmp_path, kind, reader):
+    if (reader, kind) == ("dem", "folder"):
+        pytest.importorskip("rasterio")  # some formats are folders, which it alone knows
     path = tmp_path / {"mesh": "a.stl", "orbit": "a.EOF", "scenario": "a.toml", "dem": "a.tif"}.get(reader, "a.h5")
     if kind == "pipe":
         os.mkfifo(path)
