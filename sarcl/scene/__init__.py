@@ -4,9 +4,14 @@ For other folders:
 
     material    Material: permittivity, conductivity, roughness below the size of a facet
     scene       Scene: point scatterers and triangular facets
-    shapes      solids of exact dimensions as facets: sphere, box, cone ...
+    shapes      solids of exact dimensions as facets: sphere, box, cone, tank ...
     terrain     facets over grids of heights, and heights above them
     triangles   areas, normals and centroids of triangles; cutting; rotations
+
+For this folder alone:
+
+    _solids    triangles of surfaces of revolution, prisms and geodesic spheres
+    _tank      the parts of a tank
 """
 
 __all__ = ["material", "scene", "shapes", "terrain", "triangles"]

@@ -7,6 +7,7 @@ import pytest
 import trimesh
 
 from sarcl import shapes
+from sarcl.scene import _tank
 from sarcl.scene.material import MATERIALS
 from sarcl.scene.triangles import areas, centroids, edges, normals
 
@@ -72,6 +73,31 @@ def test_round_solids_converge_to_the_round_ones_as_the_square_of_the_sections()
         assert short[1] < 1.1e-3 and short[0] / short[1] == pytest.approx(4, rel=0.01)
 
 
+@pytest.mark.parametrize("options", [{}, {"edge": 0.5}, {"sections": 8}, {"size": (1.916, 0.802, 0.402)}])
+def test_a_tank_has_its_size_and_is_made_of_closed_bodies_that_face_outwards(options):
+    scene = shapes.tank(**options)
+    size = np.array(options.get("size", (9.58, 4.01, 4.02)))  # Zou et al. 2021, table 2
+    assert scene.bounds == pytest.approx(np.array([[-0.5, -0.5, 0], [0.5, 0.5, 1]]) * size, abs=1e-12)
+    tank = mesh(scene)
+    assert tank.is_watertight and tank.is_winding_consistent
+    bodies = tank.split()
+    assert len(bodies) == 12 and all(body.is_watertight and body.volume > 0 for body in bodies)
+    if "edge" in options:
+        assert edges(scene.triangles).max() <= options["edge"]
+
+
+def test_a_tanks_plane_parts_have_the_volume_of_their_outlines():
+    """Hull, mantlet, tracks and side boxes: area of the outline by the shoelace formula, times the width."""
+    parts = [_tank.HULL, _tank.MANTLET, _tank.TRACK, _tank.TRACK, _tank.SIDE_BOX, _tank.SIDE_BOX]
+    wanted = []
+    for outline, (low, high) in parts:
+        x, z = np.array(outline).T
+        wanted.append((x @ np.roll(z, -1) - z @ np.roll(x, -1)) / 2 * (high - low))
+    found = sorted(body.volume for body in mesh(shapes.tank()).split())
+    assert all(np.isclose(found, v, rtol=1e-9).any() for v in wanted)
+    assert min(wanted) > 0.2 and sum(found) > sum(wanted)
+
+
 def test_few_facets_where_flat():
     assert len(shapes.plate((1, 2)).triangles) == 2 and len(shapes.box((1, 2, 3)).triangles) == 12
     assert len(shapes.cylinder(1, 2, sections=10).triangles) == 40
@@ -134,6 +160,7 @@ BAD = {
     "flat box": (lambda: shapes.box((1, 0, 1)), r"size\[1\] is 0"),
     "box of two": (lambda: shapes.box((1, 1)), r"size has shape \(2,\), wanted \(3,\)"),
     "nan": (lambda: shapes.sphere(np.nan), "radius is nan"),
+    "short tank": (lambda: shapes.tank((9.58, 0, 4.02)), r"size\[1\] is 0"),
     "two sections": (lambda: shapes.cylinder(1, 1, sections=2), "sections is 2; it must be at least 3"),
     "no edge": (lambda: shapes.box((1, 1, 1), edge=0), "edge is 0"),
     "edge and facets": (lambda: shapes.sphere(1, edge=0.1, facets=100), "edge or facets, not both"),
