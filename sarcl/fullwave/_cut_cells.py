@@ -1,11 +1,12 @@
 """Conductors that cut cells (Dey and Mittra): free lengths of edges and free areas of faces, as lists.
 
 The surface comes as intervals: on every line of the grid, where the line is inside the body. A formula gives them for a
-sphere, rays for a mesh.
+sphere, rays for a mesh. All arrays are those of a box around the body.
 """
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -16,6 +17,7 @@ from .target import Target
 # Smallest free area of a face, per length of its longest free edge, both relative to a whole cell. Stable from
 # COURANT^2 on; smaller areas are enlarged.
 LEAST_AREA = 1.2 * COURANT**2
+MARGIN = 2  # cells of a box beyond the cells that a body cuts
 
 
 @dataclass(frozen=True, eq=False)
@@ -31,65 +33,103 @@ class Intervals:
     end: np.ndarray
 
 
+@dataclass(frozen=True, eq=False)
+class Box:
+    """The part of a grid near a body: arrays of this shape, whose cell (0, 0, 0) is cell `low` of the grid."""
+
+    low: np.ndarray
+    shape: tuple[int, int, int]
+
+    @classmethod
+    def around(cls, lattice: Lattice, intervals: Sequence[Intervals]) -> Box:
+        """Holds cells that intervals along x, y and z touch, and MARGIN more on each side, as far as the grid goes."""
+        ends = [
+            np.roll(np.column_stack([np.floor(end), part.lines]), axis, axis=1)
+            for axis, part in enumerate(intervals)
+            for end in (part.start, part.end)
+        ]
+        places = np.concatenate(ends).astype(int) if any(map(len, ends)) else np.zeros((1, 3), int)
+        last = np.array(lattice.shape)
+        low = np.clip(places.min(axis=0) - MARGIN, 0, last - 1)
+        nx, ny, nz = np.clip(places.max(axis=0) + MARGIN + 1, low + 1, last) - low
+        return cls(low, (int(nx), int(ny), int(nz)))
+
+    def in_grid(self, lattice: Lattice, at: np.ndarray, component: int) -> np.ndarray:
+        """Places in the grid of cells `at` (n,), numbers of a raveled array of the box, in the same order."""
+        node = np.unravel_index(at, self.shape)
+        within = np.ravel_multi_index([n + first for n, first in zip(node, self.low, strict=True)], lattice.shape)
+        return np.asarray(within + component * np.prod(lattice.shape))
+
+
 def conductor(lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals], staircase: bool = False) -> Target:
     """The lists of a perfect conductor, from its intervals along x, y and z.
 
     staircase  an edge conducts where both its ends are inside, and no edge or face is cut: for comparison
     """
-    inside = nodes_inside(lattice, intervals[0])
-    free = np.stack([_free_lengths(lattice, axis, part) for axis, part in enumerate(intervals)])
+    box = Box.around(lattice, intervals)
+    inside = nodes_inside(box, intervals[0])
+    free = np.stack([free_lengths(box, axis, part) for axis, part in enumerate(intervals)])
     for a in range(3):
-        within = inside & _next(inside, a, False)
         if staircase:
             free[a] = 1
-        free[a][within] = 0  # a gap that is shorter than a cell is closed
+        free[a][inside & _next(inside, a, False)] = 0  # a gap that is shorter than a cell is closed
     faces, weights = [], []
     near = np.zeros(free.shape, bool)  # edges beside a face whose field is not zero
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
-        lengths = np.stack([_next(free[c], b, 1), free[c], _next(free[b], c, 1), free[b]])
-        area = np.ones(lattice.shape) if staircase else _free_area(inside, free, a)
-        longest = lengths.max(axis=0)
-        live = longest > 0
+        live = _any_of_four(free[b] > 0, free[c] > 0, a, True)
         for direction, along in ((c, b), (b, c)):
             near[direction] |= live | _before(live, along)
-        cut = live & ((lengths < 1) & (lengths > 0)).any(axis=0) | live & (area < 1)
+        if staircase:
+            continue
+        touched = _any_of_four(free[b] < 1, free[c] < 1, a, False) | _any_of_four(inside, inside, a, False)
+        at = np.flatnonzero(live & touched)
+        corners, lengths = _around(inside, free, a, at)
+        area = _free_area(corners, lengths)
+        longest = lengths.max(axis=0)
+        cut = ((lengths < 1) & (lengths > 0)).any(axis=0) | (area < 1)
         area = np.maximum(area, LEAST_AREA * longest)
-        at = np.flatnonzero(cut)
-        faces.append(at + a * cut.size)
-        weights.append(lengths.reshape(4, -1)[:, at] / area.flat[at])
-    edges = np.flatnonzero((free == 0) & near)
-    return Target(edges, np.zeros((2, len(edges))), np.concatenate(faces), np.concatenate(weights, axis=1))
+        faces.append(box.in_grid(lattice, at[cut], a))
+        weights.append(lengths[:, cut] / area[cut])
+    edges = [box.in_grid(lattice, np.flatnonzero((free[a] == 0) & near[a]), a) for a in range(3)]
+    at = np.concatenate(edges)
+    if staircase:
+        return Target(at, np.zeros((2, len(at))), np.zeros(0, np.int64), np.zeros((4, 0)))
+    return Target(at, np.zeros((2, len(at))), np.concatenate(faces), np.concatenate(weights, axis=1))
 
 
-def _crossed(lattice: Lattice, axis: int, part: Intervals) -> tuple[np.ndarray, np.ndarray, tuple[np.ndarray, ...]]:
-    """Pairs of an interval and an edge of the grid that it touches: interval, edge's number along the axis, place."""
-    first = np.maximum(np.floor(part.start).astype(int), 0)
-    last = np.minimum(np.floor(part.end).astype(int), lattice.shape[axis] - 1)
-    count = np.maximum(last - first + 1, 0)
-    which = np.repeat(np.arange(len(count)), count)
-    along = np.arange(len(which)) - np.repeat(np.cumsum(count) - count, count) + first[which]
-    place = [along, part.lines[which, 0], part.lines[which, 1]]
-    return which, along, tuple(place[(n - axis) % 3] for n in range(3))
+def _span(box: Box, axis: int, part: Intervals, first: np.ndarray, last: np.ndarray) -> np.ndarray:
+    """Which cells of a box are from `first` to `last` (n,) along the lines of intervals: bool (*shape)."""
+    n = box.shape[axis]
+    change = np.zeros((n + 1, *(box.shape[(axis + m) % 3] for m in (1, 2))), np.int8)
+    across = [part.lines[:, m] - box.low[(axis + 1 + m) % 3] for m in (0, 1)]
+    first, last = np.clip(first - box.low[axis], 0, n), np.clip(last + 1 - box.low[axis], 0, n)
+    some = first < last
+    for at, step in ((first, 1), (last, -1)):
+        np.add.at(change, (at[some], *(place[some] for place in across)), np.int8(step))
+    np.cumsum(change, axis=0, out=change)
+    return np.asarray(np.moveaxis(change[:-1] > 0, (0, 1, 2), [(axis + m) % 3 for m in range(3)]))
 
 
-def _free_lengths(lattice: Lattice, axis: int, part: Intervals) -> np.ndarray:
+def free_lengths(box: Box, axis: int, part: Intervals) -> np.ndarray:
     """Share of each edge along an axis that is outside the body, float32 (*shape)."""
-    which, along, place = _crossed(lattice, axis, part)
+    first, last = np.floor(part.start).astype(int), np.floor(part.end).astype(int)
+    free = np.ones(box.shape, np.float32)
+    ends = np.stack([first, np.where(first == last, -1, last)], axis=1)
+    within = (ends >= box.low[axis]) & (ends < box.low[axis] + box.shape[axis])
+    which, _ = np.nonzero(within)
+    along = ends[within]
     covered = np.clip(part.end[which] - along, 0, 1) - np.clip(part.start[which] - along, 0, 1)
-    free = np.ones(lattice.shape, np.float32)
-    np.subtract.at(free, place, covered.astype(np.float32))
+    place = np.roll(np.column_stack([along, part.lines[which]]), axis, axis=1) - box.low
+    np.subtract.at(free, tuple(place.T), covered.astype(np.float32))
+    free[_span(box, axis, part, first + 1, last - 1)] = 0
     free[free < 1e-6] = 0  # rounding
     return free
 
 
-def nodes_inside(lattice: Lattice, part: Intervals) -> np.ndarray:
+def nodes_inside(box: Box, part: Intervals) -> np.ndarray:
     """Which nodes are inside the body, by its intervals along x: bool (*shape)."""
-    which, along, place = _crossed(lattice, 0, part)
-    inside = np.zeros(lattice.shape, bool)
-    held = along >= part.start[which]
-    inside[tuple(n[held] for n in place)] = True
-    return inside
+    return _span(box, 0, part, np.ceil(part.start).astype(int), np.floor(part.end).astype(int))
 
 
 def _next(values: np.ndarray, axis: int, beyond: float | bool) -> np.ndarray:
@@ -106,19 +146,42 @@ def _before(values: np.ndarray, axis: int) -> np.ndarray:
     return np.flip(_next(np.flip(values, axis), axis, False), axis)
 
 
-def _free_area(inside: np.ndarray, free: np.ndarray, axis: int) -> np.ndarray:
-    """Share of each face across an axis that is outside the body, (*shape), by straight lines between cut edges."""
+def _any_of_four(of_b: np.ndarray, of_c: np.ndarray, axis: int, beyond: bool) -> np.ndarray:
+    """Where one of the four edges of a face across an axis is True; its edges along b and c, the axes after, are given.
+
+    Of nodes, given twice, those at three corners of the face; `beyond` is the value of edges beyond the box.
+    """
     b, c = (axis + 1) % 3, (axis + 2) % 3
-    corner = [inside, _next(inside, b, False), _next(inside, c, False)]
-    corner.append(_next(corner[1], c, False))  # corners 0, b, c, bc
-    along_b = [free[b], free[b], _next(free[b], c, 1), _next(free[b], c, 1)]  # the edge along b that meets each corner
-    along_c = [free[c], _next(free[c], b, 1), free[c], _next(free[c], b, 1)]
-    n = sum(held.astype(np.int8) for held in corner)
+    return np.asarray(of_b | _next(of_b, c, beyond) | of_c | _next(of_c, b, beyond))
+
+
+def _around(inside: np.ndarray, free: np.ndarray, axis: int, at: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Corners 0, b, c, bc of faces `at` (n,) across an axis that are inside, and free lengths of their edges c(+b), c,
+    b(+c), b: (4, n) each."""
+    b, c = (axis + 1) % 3, (axis + 2) % 3
+    node = np.stack(np.unravel_index(at, inside.shape))
+
+    def moved(values: np.ndarray, steps: Sequence[int], beyond: float) -> np.ndarray:
+        place = node.copy()
+        for along in steps:
+            place[along] += 1
+        held = (place < np.array(inside.shape)[:, None]).all(axis=0)
+        return np.asarray(np.where(held, values[tuple(np.where(held, place, 0))], values.dtype.type(beyond)))
+
+    corners = np.stack([moved(inside, steps, 0) for steps in ((), (b,), (c,), (b, c))])
+    edges = ((free[c], (b,)), (free[c], ()), (free[b], (c,)), (free[b], ()))
+    return corners, np.stack([moved(values, steps, 1) for values, steps in edges])
+
+
+def _free_area(corner: np.ndarray, lengths: np.ndarray) -> np.ndarray:
+    """Share of faces that is outside the body, by straight lines between cut edges; arguments as from `_around`."""
+    c_high, c_low, b_high, b_low = lengths
+    along_b, along_c = (b_low, b_low, b_high, b_high), (c_low, c_high, c_low, c_high)  # the edges that meet a corner
+    n = corner.sum(axis=0)
     outside = sum(np.where(held, 0, lb * lc / 2) for held, lb, lc in zip(corner, along_b, along_c, strict=True))
     covered = sum(
         np.where(held, (1 - lb) * (1 - lc) / 2, 0) for held, lb, lc in zip(corner, along_b, along_c, strict=True)
     )
-    across_b = (along_b[0] + along_b[2]) / 2  # both corners on one side of b inside: a trapezoid
-    across_c = (along_c[0] + along_c[1]) / 2
+    across_b, across_c = (b_low + b_high) / 2, (c_low + c_high) / 2  # two corners inside, side by side: a trapezoid
     two = np.where(corner[0] == corner[1], across_c, np.where(corner[0] == corner[2], across_b, 1 - covered))
     return np.asarray(np.select([n == 0, n == 1, n == 2, n == 3], [1.0, 1 - covered, two, outside], 0.0))

@@ -19,7 +19,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._closed_mesh import ClosedMesh, closed_mesh
-from ._cut_cells import Intervals, nodes_inside
+from ._cut_cells import Box, Intervals, nodes_inside
 from ._thin_parts import ThinParts
 from .lattice import Lattice
 
@@ -90,7 +90,8 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
         entered, left = (_facet_at(mesh, found, line[between], at[between]) for at in (start, end))
         thin.add_pairs(entered, left, _points(lattice, mesh, axis, line[between], start[between]))
     x, y, z = intervals
-    thin.check(nodes_inside(lattice, x))
+    box = Box.around(lattice, intervals)
+    thin.check(nodes_inside(box, x), box.low)
     return MeshLines((x, y, z), np.array(volume))
 
 

@@ -39,13 +39,15 @@ class ThinParts:
         plate = (self._inwards[entered] * self._inwards[left]).sum(axis=1) < -PARALLEL
         self._bad.append((entered[plate], place[plate]))
 
-    def check(self, inside: np.ndarray) -> None:
-        """ValueError where parts are too thin; inside (*shape): the nodes that are."""
+    def check(self, inside: np.ndarray, low: np.ndarray) -> None:
+        """ValueError where parts are too thin; inside: which nodes are, from node `low` (3,) on."""
         from scipy.ndimage import maximum_filter
 
-        near = maximum_filter(inside, size=2 * REACH + 1, mode="constant", cval=False)
+        near = maximum_filter(np.pad(inside, REACH), size=2 * REACH + 1, mode="constant", cval=False)
         for facet, place in self._points:
-            far = ~near[tuple(np.rint(place).astype(int).T)]
+            node = np.rint(place).astype(int) - low + REACH
+            held = ((node >= 0) & (node < near.shape)).all(axis=1)
+            far = ~(near[tuple(np.where(held[:, None], node, 0).T)] & held)
             self._bad.append((facet[far], place[far]))
         facet, place = (np.concatenate(part) for part in zip(*self._bad, strict=True))
         if not len(facet):

@@ -2,13 +2,15 @@
 
 from __future__ import annotations
 
+import tracemalloc
+
 import numpy as np
 import pytest
 from helpers.devices import opened, variants
 from helpers.fdtd_cases import sphere_intervals
 
 from sarcl.fullwave import _cut_cells
-from sarcl.fullwave._cut_cells import Intervals, conductor
+from sarcl.fullwave._cut_cells import Box, Intervals, conductor
 from sarcl.fullwave._lists import BLOCK
 from sarcl.fullwave.fields import Fields
 from sarcl.fullwave.lattice import COURANT, Lattice
@@ -41,13 +43,14 @@ def test_a_closed_cavity_with_a_cut_sphere_keeps_its_energy(param):
     grid = grid_of()
     intervals = sphere_intervals(grid, CENTRE, 4.3 * CELL)
     target = conductor(grid, intervals)
-    inside = _cut_cells.nodes_inside(grid, intervals[0])
-    length = np.stack([_cut_cells._free_lengths(grid, a, part) for a, part in enumerate(intervals)])
-    area = np.stack([_cut_cells._free_area(inside, length, a) for a in range(3)])
+    whole = Box(np.zeros(3, int), grid.shape)
+    inside = _cut_cells.nodes_inside(whole, intervals[0])
+    length = np.stack([_cut_cells.free_lengths(whole, a, part) for a, part in enumerate(intervals)])
+    area = np.empty(length.shape)
     for a in range(3):
-        b, c = (a + 1) % 3, (a + 2) % 3
-        around = [length[c], _cut_cells._next(length[c], b, 1), length[b], _cut_cells._next(length[b], c, 1)]
-        area[a] = np.maximum(area[a], _cut_cells.LEAST_AREA * np.max(around, axis=0))
+        corners, around = _cut_cells._around(inside, length, a, np.arange(inside.size))
+        least = _cut_cells.LEAST_AREA * around.max(axis=0)
+        area[a] = np.maximum(_cut_cells._free_area(corners, around), least).reshape(grid.shape)
     e, h = np.random.default_rng(7).uniform(-1, 1, (2, 3, *grid.shape))
     e[length == 0], h[area == 0] = 0, 0
     fields = Fields(opened(param), grid, target)
@@ -161,25 +164,20 @@ def test_a_slab_cuts_edges_across_it_and_the_faces_beside_them(along):
 
 def test_the_free_area_of_a_face_is_that_of_its_polygon():
     """Every number of corners inside, for a plane that cuts a face at an angle."""
-    grid = Lattice(CELL, (2, 2, 16), np.zeros(3))
     rng = np.random.default_rng(10)
     seen = set()
     for _ in range(60):
         normal, offset = rng.normal(size=2), rng.uniform(-0.5, 1.5)
         value = np.add.outer(normal[0] * np.arange(2), normal[1] * np.arange(2)) - offset * normal.sum()
-        inside = np.zeros(grid.shape, bool)
-        inside[:, :, 0] = value < 0
-        free = np.ones((3, *grid.shape))
 
         def outside(start, end):
             return 1.0 if min(start, end) >= 0 else 0.0 if max(start, end) < 0 else max(start, end) / abs(start - end)
 
-        for at in (0, 1):
-            free[0, 0, at, 0] = outside(value[0, at], value[1, at])
-            free[1, at, 0, 0] = outside(value[at, 0], value[at, 1])
+        free = [outside(*value[at]) for at in (1, 0)] + [outside(*value[:, at]) for at in (1, 0)]
         fine = (np.arange(400) + 0.5) / 400
         wanted = (np.add.outer(normal[0] * fine, normal[1] * fine) - offset * normal.sum() >= 0).mean()
-        assert abs(_cut_cells._free_area(inside, free, 2)[0, 0, 0] - wanted) < 0.005
+        got = _cut_cells._free_area((value < 0).T.reshape(4, 1), np.array(free)[:, None])
+        assert abs(got[0] - wanted) < 0.005
         seen.add(int((value < 0).sum()))
     assert seen == {0, 1, 2, 3, 4}
 
@@ -195,6 +193,24 @@ def test_the_least_area_is_that_of_a_fifth_above_the_limit_of_stability():
     target = conductor(grid, sphere_intervals(grid, CENTRE, 4.3 * CELL))
     assert np.isclose(_cut_cells.LEAST_AREA, 1.2 * COURANT**2)
     assert np.isclose(target.weight.max(), 1 / _cut_cells.LEAST_AREA, rtol=1e-6)
+
+
+def test_the_lists_do_not_depend_on_how_large_the_grid_is_around_the_body():
+    """Neither do the arrays that are made: a sphere at the same place in a grid of 30 times as many cells."""
+    lists, peaks = [], []
+    for more in (0, 32):
+        grid = grid_of(tuple(n + 2 * more for n in SHAPE))
+        intervals = sphere_intervals(grid, CENTRE + more * CELL, 4.3 * CELL)
+        tracemalloc.start()
+        target = conductor(grid, intervals)
+        peaks.append(tracemalloc.get_traced_memory()[1])
+        tracemalloc.stop()
+        component, *node = np.unravel_index(target.edges, (3, *grid.shape))
+        lists.append(np.stack([component, *(n - more for n in node)]))
+        lists.append(np.sort(target.weight, axis=1))
+    assert np.array_equal(lists[0], lists[2])
+    assert np.allclose(lists[1], lists[3], rtol=1e-4)
+    assert peaks[1] < 1.1 * peaks[0]
 
 
 def test_an_empty_target_has_empty_lists():
