@@ -1,5 +1,7 @@
 """Plane waves of the Yee grid: its own wavenumber, frequency, polarisation and energy flux.
 
+Directions are unit vectors (3,) or, one per pulse, (P, 3); then results have P in front of their shape.
+
 A plane wave exp(j omega t - j k d.x) along the unit vector d solves the grid's equations in vacuum where
 
     |K| = Omega,   K_i = (2/dx) sin(k d_i dx/2),   Omega = 2/(c dt) sin(omega dt/2)
@@ -18,9 +20,14 @@ from .lattice import Lattice
 STEPS = 12  # of Newton's method, which converges quadratically from k = Omega
 
 
+def _phase_per_cell(lattice: Lattice, k: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """k d_i dx (n, 3)."""
+    return np.asarray(np.asarray(k)[..., None] * np.asarray(direction)[..., None, :] * lattice.cell)
+
+
 def grid_vector(lattice: Lattice, k: np.ndarray, direction: np.ndarray) -> np.ndarray:
     """K of waves of wavenumbers k (n,), rad/m, along `direction` (3,): (n, 3)."""
-    return np.asarray(2 / lattice.cell * np.sin(np.multiply.outer(k, direction) * lattice.cell / 2))
+    return np.asarray(2 / lattice.cell * np.sin(_phase_per_cell(lattice, k, direction) / 2))
 
 
 def grid_omega(lattice: Lattice, k: np.ndarray, direction: np.ndarray) -> np.ndarray:
@@ -41,10 +48,10 @@ def wavenumber(lattice: Lattice, omega: np.ndarray, direction: np.ndarray) -> np
     """Wavenumbers, rad/m (n,), of waves of angular frequencies omega (n,) along `direction`."""
     dt = lattice.time_step
     wanted = 2 / (SPEED_OF_LIGHT * dt) * np.sin(np.asarray(omega) * dt / 2)
-    k = wanted.copy()
+    k = wanted * np.ones_like(np.asarray(direction)[..., :1])
     for _ in range(STEPS):
         vector = grid_vector(lattice, k, direction)
-        slope = (vector * np.cos(np.multiply.outer(k, direction) * lattice.cell / 2)) @ direction  # of |K|^2/2
+        slope = _along(lattice, vector, k, direction)  # of |K|^2/2
         k -= ((vector**2).sum(axis=-1) - wanted**2) / (2 * np.where(slope == 0, 1, slope))
     if (np.abs((grid_vector(lattice, k, direction) ** 2).sum(axis=-1) - wanted**2) > 1e-9 * wanted**2).any():
         raise ValueError(
@@ -57,7 +64,8 @@ def wavenumber(lattice: Lattice, omega: np.ndarray, direction: np.ndarray) -> np
 def fields(vector: np.ndarray, polarization: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """E and H, unit vectors (n, 3), of plane waves with K (n, 3): E is `polarization` (3,) less its part along K."""
     unit = vector / np.linalg.norm(vector, axis=-1, keepdims=True)
-    e = polarization - unit * (unit @ polarization)[..., None]
+    wanted = polarization[..., None, :]
+    e = wanted - unit * (unit * wanted).sum(axis=-1, keepdims=True)
     e = e / np.linalg.norm(e, axis=-1, keepdims=True)
     return e, np.cross(unit, e)
 
@@ -68,5 +76,10 @@ def flux(lattice: Lattice, k: np.ndarray, direction: np.ndarray) -> np.ndarray:
     E and H stand half a cell apart, so that their product averages to cos(k d_i dx/2) along axis i.
     """
     vector = grid_vector(lattice, k, direction)
-    slope = (vector * np.cos(np.multiply.outer(k, direction) * lattice.cell / 2)) @ direction
-    return np.asarray(slope / np.linalg.norm(vector, axis=-1))
+    return _along(lattice, vector, k, direction) / np.linalg.norm(vector, axis=-1)
+
+
+def _along(lattice: Lattice, vector: np.ndarray, k: np.ndarray, direction: np.ndarray) -> np.ndarray:
+    """Sum over i of d_i K_i cos(k d_i dx/2), (n,)."""
+    part = vector * np.cos(_phase_per_cell(lattice, k, direction) / 2)
+    return np.asarray((part * np.asarray(direction)[..., None, :]).sum(axis=-1))

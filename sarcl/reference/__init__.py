@@ -12,6 +12,7 @@ For other folders:
     facet          echo of triangular facets by physical optics
     fdtd           the steps of a Yee grid
     field          field of an array
+    formed_echo    waveform forming: sums of currents, term by term
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
@@ -32,6 +33,7 @@ __all__ = [
     "facet",
     "fdtd",
     "field",
+    "formed_echo",
     "geometry",
     "image",
     "interp",

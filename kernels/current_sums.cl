@@ -1,0 +1,119 @@
+// Currents of a target's cells, added up with the phases of their paths from the transmitter and to the receiver, for
+// many pulses: waveform forming.
+//
+//   s[f, p] = sum over cells n of I_f[n] exp(-2 pi j (kappa_f (D_t - d.y_n) + rho_f,p D_r))
+//   D = |a - y| - |a| = -2 m/(1 + sqrt(1 - 2 m/R)),   m = u.y - |y|^2/(2 R),   antenna at a = R u, all from the centre
+//
+// source    B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6); docs/theory/full_wave.md
+// symbols   cell      (cells, 4): y, m, and |y|^2/2, m^2;   current (n_frequencies, cells, 2): I
+//           chunk     (chunks + 1,) int: first cell of each
+//           antenna   (4, or 8 with a receiver of its own; n): u and 1/R of each pulse
+//           kappa     (n_frequencies,): wavenumber sent, cycles per m, and rho (n_frequencies, n): wavenumber received
+//           travel_*  d: direction of travel of the wave that made the currents
+//           sums      (chunks, frequencies up to whole blocks, 2, n): cosine and sine part of s
+// macros    VW        pulses per work-item; n is a multiple of it
+//           BISTATIC  1: receiver and rho apart; 0: receiver = transmitter and rho = kappa
+//           LINEAR    1: the phase is linear in the frequency over BLOCK frequencies, and followed by complex products
+// reference: sarcl/reference/formed_echo.py:current_sums
+
+#include "common.clh"
+
+#define BLOCK 8   // frequencies whose sums are in registers
+#define TILE 32   // cells whose paths are kept for all blocks of frequencies
+
+// D of a cell
+inline fv longer(fv x, fv y, fv z, fv inverse, float4 cell) {
+    fv m = fma(x, (fv)cell.x, fma(y, (fv)cell.y, fma(z, (fv)cell.z, (fv)(-cell.w) * inverse)));
+    return (fv)(-2.0f) * m / ((fv)1.0f + sqrt(fmax(fma((fv)(-2.0f) * m, inverse, (fv)1.0f), (fv)0.0f)));
+}
+
+inline void wave(fv cycles, fv *re, fv *im) {
+    fv s;
+    sincos_cycles(cycles - nearest(cycles), &s, re);
+    *im = -s;
+}
+
+// global size (n / VW, chunks, 1 or more: work-items among which blocks of frequencies are divided)
+__kernel void current_sums(__global const float4 *restrict cell, __global const float2 *restrict current,
+                           __global const int *restrict chunk, __global const float *restrict antenna,
+                           __global const float *restrict kappa, __global const float *restrict rho,
+                           __global float *restrict sums, int cells, int n_frequencies, int n, float travel_x,
+                           float travel_y, float travel_z) {
+    int p = get_global_id(0), here = get_global_id(1);
+    int blocks = (n_frequencies + BLOCK - 1) / BLOCK;
+    fv ux = LOAD(p, antenna), uy = LOAD(p, antenna + n), uz = LOAD(p, antenna + 2 * n), near = LOAD(p, antenna + 3 * n);
+#if BISTATIC
+    fv vx = LOAD(p, antenna + 4 * n), vy = LOAD(p, antenna + 5 * n), vz = LOAD(p, antenna + 6 * n);
+    fv v_near = LOAD(p, antenna + 7 * n);
+    fv back[TILE];
+#endif
+    fv path[TILE];
+    int first = chunk[here], end = chunk[here + 1];
+    for (int start = first; start < end; start += TILE) {
+        int many = min(TILE, end - start);
+        for (int i = 0; i < many; i++) {
+            float4 y = cell[start + i];
+            fv sent = longer(ux, uy, uz, near, y);
+            float along = fma(travel_x, y.x, fma(travel_y, y.y, travel_z * y.z));
+#if BISTATIC
+            path[i] = sent - along;
+            back[i] = longer(vx, vy, vz, v_near, y);
+#else
+            path[i] = fma(sent, (fv)2.0f, (fv)(-along));
+#endif
+        }
+        for (int b = get_global_id(2); b < blocks; b += get_global_size(2)) {
+            __global float *sum = sums + 2 * (size_t)n * (here * blocks + b) * BLOCK;
+            int f0 = b * BLOCK, last = n_frequencies - 1;
+            fv re[BLOCK], im[BLOCK];
+            for (int j = 0; j < BLOCK; j++) {
+                re[j] = start == first ? (fv)0.0f : LOAD(p, sum + 2 * n * j);
+                im[j] = start == first ? (fv)0.0f : LOAD(p, sum + 2 * n * j + n);
+            }
+#if LINEAR
+            int f1 = min(f0 + 1, last);
+            float k0 = kappa[f0], dk = kappa[f1] - k0;
+#if BISTATIC
+            fv r0 = LOAD(p, rho + (size_t)f0 * n), dr = LOAD(p, rho + (size_t)f1 * n) - r0;
+#endif
+#endif
+            for (int i = 0; i < many; i++) {
+                __global const float2 *at = current + start + i;
+                fv c, s;
+#if LINEAR
+                fv turn_c, turn_s;
+#if BISTATIC
+                wave(fma((fv)k0, path[i], r0 * back[i]), &c, &s);
+                wave(fma((fv)dk, path[i], dr * back[i]), &turn_c, &turn_s);
+#else
+                wave((fv)k0 * path[i], &c, &s);
+                wave((fv)dk * path[i], &turn_c, &turn_s);
+#endif
+#endif
+#pragma unroll
+                for (int j = 0; j < BLOCK; j++) {
+                    int f = min(f0 + j, last);
+                    float2 value = at[(size_t)f * cells];
+#if !LINEAR
+#if BISTATIC
+                    wave(fma((fv)kappa[f], path[i], LOAD(p, rho + (size_t)f * n) * back[i]), &c, &s);
+#else
+                    wave((fv)kappa[f] * path[i], &c, &s);
+#endif
+#endif
+                    re[j] = fma((fv)value.x, c, fma((fv)(-value.y), s, re[j]));
+                    im[j] = fma((fv)value.x, s, fma((fv)value.y, c, im[j]));
+#if LINEAR
+                    fv turned = fma(c, turn_c, -s * turn_s);
+                    s = fma(c, turn_s, s * turn_c);
+                    c = turned;
+#endif
+                }
+            }
+            for (int j = 0; j < BLOCK; j++) {
+                STORE(re[j], p, sum + 2 * n * j);
+                STORE(im[j], p, sum + 2 * n * j + n);
+            }
+        }
+    }
+}

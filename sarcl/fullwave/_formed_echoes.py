@@ -1,0 +1,59 @@
+"""Waveform forming: the echoes of many pulses from the currents of one run.
+
+    a(p, f) = -k dx^2/(2 sqrt(pi) s sqrt(g g_r)) sum_n (e_r . electric_n + h_r . magnetic_n)
+              exp(-j k ((|T - x_n| - |T - c|) - d.(x_n - c)) - j k_r (|R - x_n| - |R - c|)),   |a|^2 = RCS
+
+The current of a cell follows the incident wave, whose direction of travel was d: its phase is corrected by the
+difference of the paths from the transmitter T of this pulse, and the field at the receiver R of this pulse is that of
+these currents. k is the wavenumber that was asked for; at the frequency at which the grid's wave from T has it, the
+grid's wave towards R has k_r, and g, g_r, e_r, h_r as in _far_field. In the direction of the run itself this is
+`_far_field.amplitude`. Source: B. Zou, Y. Jia and Z. Qiao, Proc. SPIE 11742 (2021), equations (4) to (6);
+docs/theory/full_wave.md.
+"""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..opencl.device import Device
+from . import _dispersion
+from ._current_sums import Paths, current_sums
+from ._currents import Currents
+from .lattice import COURANT
+
+
+def formed_echoes(
+    device: Device, currents: Currents, tx: np.ndarray, rx: np.ndarray, received: np.ndarray, *,
+    max_bytes: float | None = None,
+) -> np.ndarray:  # fmt: skip
+    """Echo amplitudes, m, whose phase is that of `sarcl.echo` about the centre of the currents: complex64 (P, Q, F).
+
+    tx, rx    positions of the antennas, m (P, 3)
+    received  unit vectors, the polarisations received at each pulse (Q, P, 3)
+    """
+    paths = paths_of(currents, tx, rx)
+    sums = current_sums(device, currents, paths, max_bytes=max_bytes)
+    return weighted(currents, paths, sums, received)
+
+
+def paths_of(currents: Currents, tx: np.ndarray, rx: np.ndarray) -> Paths:
+    """Directions, distances and wavenumbers of pulses with antennas at tx and rx, m (P, 3)."""
+    towards, ranges = [], []
+    for antenna in (tx, rx):
+        ray = np.asarray(antenna, float) - currents.centre
+        ranges.append(np.linalg.norm(ray, axis=1))
+        towards.append(ray / ranges[-1][:, None])
+    omega = _dispersion.grid_omega(currents.lattice, currents.k, towards[0])
+    received = _dispersion.wavenumber(currents.lattice, omega, towards[1])
+    return Paths(towards[0], ranges[0], towards[1], ranges[1], currents.k, received)
+
+
+def weighted(currents: Currents, paths: Paths, sums: np.ndarray, received: np.ndarray) -> np.ndarray:
+    """Echo amplitudes from sums (6, P, F) over cells, in polarisations `received` (Q, P, 3): complex64 (P, Q, F)."""
+    grid = currents.lattice
+    vector = _dispersion.grid_vector(grid, paths.received, paths.rx)
+    e, h = _dispersion.fields(vector, np.asarray(received, float))
+    total = np.einsum("qpfa,apf->pqf", np.concatenate([e, h], axis=-1), sums)
+    flux = _dispersion.flux(grid, paths.sent, paths.tx) * _dispersion.flux(grid, paths.received, paths.rx)
+    scale = -paths.sent * grid.cell**2 / (2 * np.sqrt(np.pi) * COURANT) / np.sqrt(flux)
+    return np.asarray(scale[:, None] * total, np.complex64)

@@ -1,0 +1,141 @@
+"""Waveform forming: sums of currents against the twin in float64, echoes against the far field of the run itself."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sarcl.fullwave import _current_sums, _dispersion
+from sarcl.fullwave._currents import Currents
+from sarcl.fullwave._far_field import amplitude
+from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
+from sarcl.fullwave._incident import PlaneWave
+from sarcl.fullwave._pulse import Pulse
+from sarcl.fullwave.lattice import Lattice
+from sarcl.reference import formed_echo
+
+CELL = 0.02  # m
+RANGE = 1.1e3  # m
+# float32: paths of 10 m to 1e-6 m, phases of some 100 cycles to 3e-5 rad, sums of 2048 terms
+ROUNDING = 5e-5
+
+
+def unit(v):
+    return np.asarray(v, float) / np.linalg.norm(v)
+
+
+def random_currents(n, n_frequencies, shape=(48, 48, 48), cell=CELL, seed=0):
+    """Currents that are random at n edges and n faces of a grid."""
+    rng = np.random.default_rng(seed)
+    grid = Lattice(cell, shape, np.array([1.0, 2.0, 3.0]))
+    places = rng.permutation(3 * np.prod(grid.shape))[: 2 * n]
+    edges, faces = np.sort(places[:n]), np.sort(places[n:])
+    wave = PlaneWave(unit((1, 0.3, -0.9)), np.array([0, 1.0, 0]), Pulse.gaussian(1e9, 2e9))
+    k = np.linspace(0.7, 1, n_frequencies) * 2 * np.pi / (10 * cell)
+    phasors = rng.normal(size=(4, n_frequencies, n))
+    electric, magnetic = ((phasors[a] + 1j * phasors[a + 1]).astype(np.complex64) for a in (0, 2))
+    centre = grid.origin + cell * np.array(grid.shape) / 2
+    omega = _dispersion.grid_omega(grid, k, wave.travel)
+    return Currents(grid, wave, centre, k, omega, edges, electric, faces, magnetic, 0, 0.0)
+
+
+def antennas(currents, n, spread, distance=RANGE, seed=1):
+    """Antennas about the direction from which the wave came."""
+    rng = np.random.default_rng(seed)
+    towards = np.array([unit(-currents.wave.travel + spread * rng.normal(size=3)) for _ in range(n)])
+    return currents.centre + distance * towards
+
+
+def twin(currents, paths, tx, rx):
+    out = []
+    for _, offset, values in _current_sums._by_component(currents):
+        out.append(formed_echo.current_sums(
+            offset, values(slice(None)), currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
+            rx - currents.centre,
+        ))  # fmt: skip
+    return np.array(out)
+
+
+def difference(got, wanted):
+    return np.abs(got - wanted).max() / np.sqrt((np.abs(wanted) ** 2).mean())
+
+
+@pytest.mark.parametrize(
+    ("n", "n_frequencies", "n_pulses"), [(1, 1, 1), (31, 7, 8), (500, 8, 9), (700, 17, 3), (2049, 9, 16)]
+)
+def test_sums_of_currents_are_those_of_the_twin(device, n, n_frequencies, n_pulses):
+    currents = random_currents(n, n_frequencies)
+    tx = antennas(currents, n_pulses, 0.2)
+    for rx in (tx, antennas(currents, n_pulses, 0.5, seed=2)):
+        paths = paths_of(currents, tx, rx)
+        got = _current_sums.current_sums(device, currents, paths, max_bytes=None)
+        assert difference(got, twin(currents, paths, tx, rx)) < ROUNDING
+
+
+def test_distances_are_spherical_at_1100_metres_from_a_target_of_10_metres(device):
+    currents = random_currents(300, 5, shape=(64, 30, 32), cell=0.15)
+    tx = antennas(currents, 8, 0.1)
+    paths = paths_of(currents, tx, tx)
+    got = _current_sums.current_sums(device, currents, paths, max_bytes=None)
+    assert difference(got, twin(currents, paths, tx, tx)) < ROUNDING
+    far = currents.centre + 1e9 * paths.tx
+    assert difference(got, twin(currents, paths, far, far)) > 0.05
+
+
+def test_uneven_frequencies_are_followed_one_by_one(device):
+    currents = random_currents(200, 19)
+    object.__setattr__(currents, "k", currents.k * np.linspace(0.9, 1, 19) ** 2)
+    tx = antennas(currents, 5, 0.2)
+    paths = paths_of(currents, tx, tx)
+    assert not _current_sums._is_linear(paths, 0.5)
+    got = _current_sums.current_sums(device, currents, paths, max_bytes=None)
+    assert difference(got, twin(currents, paths, tx, tx)) < ROUNDING
+
+
+def test_little_memory_gives_the_same_sums_in_parts(device, monkeypatch):
+    monkeypatch.setattr(_current_sums, "PULSES", 16)
+    monkeypatch.setattr(_current_sums, "CHUNK", 128)
+    currents = random_currents(5000, 20)
+    tx = antennas(currents, 35, 0.2)
+    paths = paths_of(currents, tx, tx)
+    whole = _current_sums.current_sums(device, currents, paths, max_bytes=None)
+    assert difference(_current_sums.current_sums(device, currents, paths, max_bytes=1e6), whole) < 1e-6
+
+
+def test_in_the_direction_of_the_run_formed_echoes_are_its_far_field(device):
+    currents = random_currents(400, 6)
+    tx = currents.centre - 1e9 * currents.wave.travel[None]
+    received = np.random.default_rng(3).normal(size=(2, 1, 3))
+    got = formed_echoes(device, currents, tx, tx, received)[0]
+    wanted = np.array([amplitude(currents, -currents.wave.travel, vector) for vector in received[:, 0]])
+    assert difference(got, wanted) < ROUNDING
+
+
+def test_a_receiver_elsewhere_sees_the_bistatic_far_field(device):
+    currents = random_currents(400, 6)
+    towards = unit((-0.2, 0.9, 0.4))
+    tx, rx = (currents.centre + 1e9 * direction[None] for direction in (-currents.wave.travel, towards))
+    vector = np.array([0.3, -0.5, 0.8])
+    got = formed_echoes(device, currents, tx, rx, vector[None, None])[0, 0]
+    assert difference(got, amplitude(currents, towards, vector)) < ROUNDING
+
+
+def test_currents_that_follow_the_incident_wave_give_the_echo_of_the_run_of_each_pulse(device):
+    """Currents w exp(-j k d.x) differ in these phases alone from one direction d to another."""
+    first = random_currents(400, 6)
+    weight = np.random.default_rng(5).normal(size=(2, 400))
+    runs = []
+    for travel in (first.wave.travel, unit((1, 0.1, -0.8))):
+        wave = PlaneWave(travel, np.array([0, 1.0, 0]), first.wave.pulse)
+        parts = []
+        for row, (at, magnetic) in enumerate(((first.edges, False), (first.faces, True))):
+            path = (first.lattice.positions(at, magnetic) - first.centre) @ travel
+            parts.append((weight[row] * np.exp(-1j * np.outer(first.k, path))).astype(np.complex64))
+        omega = _dispersion.grid_omega(first.lattice, first.k, travel)
+        runs.append(Currents(
+            first.lattice, wave, first.centre, first.k, omega, first.edges, parts[0], first.faces, parts[1], 0, 0.0
+        ))  # fmt: skip
+    tx = first.centre - 1e9 * runs[1].wave.travel[None]
+    received = np.array([[[0.0, 1.0, 0.0]]])
+    formed, own = (formed_echoes(device, run, tx, tx, received) for run in runs)
+    assert difference(formed, own) < ROUNDING
