@@ -21,6 +21,9 @@ from .effects import noise as noise
 from .effects import stop_and_go as stop_and_go
 from .effects.noise import add_noise as add_noise
 from .experiments import fda as fda
+from .fullwave.echoes.fullwave_echo import fullwave_echo as fullwave_echo
+from .fullwave.echoes.fullwave_forecast import FullwaveForecast as FullwaveForecast
+from .fullwave.echoes.fullwave_forecast import plan_fullwave_echo as plan_fullwave_echo
 from .imaging.backproject import backproject as backproject
 from .imaging.compress import compress as compress
 from .imaging.forecast import Forecast as Forecast

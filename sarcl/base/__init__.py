@@ -6,6 +6,7 @@ For other folders:
     constants     the speed of light
     counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
     errors        warnings and errors of the library; a warning points to the user's line that called it
+    fingerprint   checksums of everything that a result depends on
     float_pairs   float64 as pairs of float32, for kernels on devices without float64
     host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory
@@ -28,6 +29,7 @@ __all__ = [
     "constants",
     "counter_rng",
     "errors",
+    "fingerprint",
     "float_pairs",
     "host_memory",
     "morton",

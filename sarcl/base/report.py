@@ -17,11 +17,13 @@ class Report:
     tolerance              relative L2 error asked for
     predicted_error        bound from the error formulas, <= tolerance
     measured_error         against the exact sum at random outputs, or None when not checked
-    contributions_done     pulse x pixel (or pulse x scatterer) pairs computed
+    contributions_done     pulse x pixel (or pulse x scatterer) pairs computed, or cells x time steps of a grid
     contributions_skipped  reason -> pairs left out
     seconds                stage -> s
     device                 the device's name
     seed                   of the random numbers, or None
+    model_error            predicted relative L2 error of the model itself, which no tolerance bounds: of the grid of
+                           `fullwave_echo`; None where the model has no error of its own, or none was predicted
     """
 
     plan: Mapping[str, object] = field(default_factory=dict)
@@ -33,6 +35,7 @@ class Report:
     seconds: Mapping[str, float] = field(default_factory=dict)
     device: str = ""
     seed: int | None = None
+    model_error: float | None = None
 
     def __post_init__(self) -> None:
         for name in ("plan", "contributions_skipped", "seconds"):
@@ -56,6 +59,8 @@ class Report:
         lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
         lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
+        if self.model_error is not None:
+            lines.append(f"model       {self.model_error:.1e} predicted for the model itself")
         if self.predicted_error > 0:
             lines.append(
                 f"contrast    trusted down to {self.dynamic_range_db:.0f} dB below what is bright in the same rows"

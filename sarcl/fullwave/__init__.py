@@ -1,17 +1,19 @@
-"""Full-wave scattering on a Yee grid (FDTD): the groundwork of full-wave echoes. Not public yet.
+"""Full-wave scattering on a Yee grid (FDTD), and fullwave_echo().
 
 docs/theory/full_wave.md has the equations, the arrays and what each part hands to the next.
 
 For other folders:
 
+    anchors       echoes along a track, interpolated between anchors
+    echoes/       fullwave_echo(): echoes of a track from few runs of the grid
     fields        fields on a device and their time steps, tile by tile
     lattice       the grid: cells, positions of field components, places in buffers
+    runs          one run as echoes need it: grid, cost, echoes that the currents form
     target        what a target is to the grid: lists of edges and faces
 
 For this folder alone:
 
     _absorber     absorbing layers (CPML)
-    _anchors      echoes along a track, interpolated between anchors
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
@@ -26,4 +28,4 @@ For this folder alone:
     _thin_parts   refusals of parts of a mesh that are thinner than a cell
 """
 
-__all__ = ["fields", "lattice", "target"]
+__all__ = ["anchors", "echoes", "fields", "lattice", "runs", "target"]

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -47,11 +48,12 @@ class Currents:
 
 def currents(
     device: Device, lattice: Lattice, target: Target, wave: PlaneWave, k: np.ndarray, *, absorber: int, gap: int,
-    most_steps: int = 20_000, tile: int | None = None,
+    most_steps: int = 20_000, tile: int | None = None, progress: Callable[[int, int], None] | None = None,
 ) -> Currents:  # fmt: skip
     """Currents of a target under a plane wave at wavenumbers k (F,), rad/m, in vacuum.
 
     absorber  layers on each side;  gap  cells between these and the box where the wave enters
+    progress  called as progress(steps done, steps expected)
     The target is inside that box. The run ends when the currents have decayed (LEFT), or after most_steps.
     """
     low = np.full(3, absorber + gap)
@@ -77,6 +79,8 @@ def currents(
         now = max(float(np.abs(part.residuals(BLOCK)).max(initial=0)) for part, _ in lists)
         largest = max(largest, now)
         left = now / largest if largest else 0.0
+        if progress is not None:
+            progress(fields.step, 2 * len(table.values))
     electric, magnetic = (_phasors(device, part, sum_, spectrum) for (part, _), sum_ in zip(lists, sums, strict=True))
     return Currents(
         lattice, wave, centre, np.asarray(k), omega, fields.edges.places, electric, fields.faces.places, magnetic,

@@ -26,7 +26,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.imaging.run import _fingerprint
+from sarcl.base import fingerprint
 
 ROOT = Path(__file__).resolve().parents[2]
 CITED = re.compile(r"(?<![\w./-])((?:[\w.-]+/)*[\w-]+\.(?:py|clh|cl|md))(?!\w)(?::([A-Za-z_]\w*))?")
@@ -242,11 +242,11 @@ def test_a_change_of_any_kernel_changes_the_fingerprint_of_all(tmp_path, monkeyp
     copy = tmp_path / "kernels"
     shutil.copytree(ROOT / "kernels", copy)
     monkeypatch.setattr("importlib.resources.files", lambda package: copy)
-    marks = {_fingerprint._kernels.__wrapped__()}
+    marks = {fingerprint.kernels.__wrapped__()}
     changed = [p for p in sorted(copy.rglob("*")) if p.suffix in (".cl", ".clh")]
     for path in changed:
         path.write_text(path.read_text() + "\n")
-        marks.add(_fingerprint._kernels.__wrapped__())
+        marks.add(fingerprint.kernels.__wrapped__())
     assert len(changed) > 20 and len(marks) == len(changed) + 1
 
 

@@ -536,7 +536,7 @@ def test_every_field_of_a_task_has_its_part_in_the_fingerprint(raw):
     marks = [mark_of(More(**known, more=value)) for value in kinds]
     assert len({*marks, mark_of(task)}) == len(kinds) + 1
     assert marks == [mark_of(More(**known, more=value)) for value in kinds]
-    with pytest.raises(TypeError, match="tiles computed with a function among the options"):
+    with pytest.raises(TypeError, match="results computed with a function among the options"):
         mark_of(More(**known, more=lambda x: x))
 
 

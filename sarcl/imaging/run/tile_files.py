@@ -21,9 +21,10 @@ from typing import Any
 
 import numpy as np
 
+from ...base.fingerprint import as_bytes, checker
 from ..engine import Skipped
 from ..tiling.tiling import Run, Tiling
-from ._fingerprint import as_bytes, checker, difference, mark
+from ._fingerprint import difference, mark
 
 log = logging.getLogger(__name__)
 

@@ -1,0 +1,241 @@
+"""One task of fullwave_echo: geometry, frequencies, the grid about the bodies, and the runs of an anchor."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass, field, replace
+from typing import Any
+
+import numpy as np
+
+from ...base import host_memory
+from ...base.boxes import corners
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import ToleranceUnreachable
+from ...base.fingerprint import checksum, kernels, leaves
+from ...base.validation import array as numbers
+from ...base.vectors import unit
+from ...base.version import __version__
+from ...model.trajectory import Trajectory
+from ...model.waveform import Waveform
+from ...numerics.pulse_geometry import half_path
+from ...opencl.device import Device
+from ...scattering.physical_optics import polarisation
+from ...scene.scene import Scene
+from ...simulation import echo_sampling
+from ...simulation.scene_echoes import EchoRequest
+from .. import runs
+from ..lattice import Lattice
+from ..target import Target
+from ._closed_bodies import check_bodies
+from ._grid_choice import SHARE, check_cells, grid_choice
+from ._run_progress import RunProgress
+
+LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
+
+
+@dataclass(frozen=True, eq=False)
+class FullwaveTask:
+    """What is computed, and on which grid.
+
+    band              lowest and highest frequency of the waveform, Hz
+    track, receiver   antennas while pulses are on their way;  motion  what the report says of them
+    reference_range   m (P,);  window  m (near, far);  frequencies  Hz (F,);  step  Hz
+    cells             per shortest wavelength;  lattice, cost  the grid, and what a run on it takes
+    max_bytes         allowed for a run
+    along             angle along the path of directions in which the target sees the transmitter, rad (P,)
+    """
+
+    request: EchoRequest
+    scene: Scene
+    waveform: Waveform
+    band: tuple[float, float]
+    track: Trajectory
+    receiver: Trajectory | None
+    motion: dict[str, object]
+    reference_range: np.ndarray
+    window: tuple[float, float]
+    frequencies: np.ndarray
+    step: float
+    compressed: bool
+    cells: float
+    lattice: Lattice
+    cost: runs.RunCost
+    max_bytes: float
+    along: np.ndarray
+    _targets: list[Target] = field(default_factory=list)
+
+    @property
+    def device(self) -> Device:
+        """Where the grid is."""
+        return self.request.device
+
+    @property
+    def tx(self) -> np.ndarray:
+        """Positions of the transmitter, m (P, 3)."""
+        return self.track.positions
+
+    @property
+    def rx(self) -> np.ndarray:
+        """Positions of the receiver, m (P, 3)."""
+        return self.tx if self.receiver is None else self.receiver.positions
+
+    @property
+    def centre(self) -> np.ndarray:
+        """Centre of the grid, m (3,): the centre of the scene's box."""
+        return self.lattice.origin + self.lattice.cell * np.array(self.lattice.shape) / 2
+
+    @property
+    def wavenumbers(self) -> np.ndarray:
+        """rad/m (F,)."""
+        return 2 * np.pi * self.frequencies / SPEED_OF_LIGHT
+
+    def target(self) -> Target:
+        """The bodies on the grid."""
+        if not self._targets:
+            self._targets.append(runs.target_of(self.lattice, self.scene.triangles))
+        return self._targets[0]
+
+    def sendings(self) -> Iterator[tuple[str, list[int]]]:
+        """The polarisations that are sent, and the indices of the polarisations whose echoes they give."""
+        names = self.request.polarizations
+        for sent in "HV":
+            which = [i for i, name in enumerate(names) if name[1] == sent]
+            if which:
+                yield sent, which
+
+    def senses(self, antennas: np.ndarray) -> dict[str, np.ndarray]:
+        """Unit vectors of H and V, (P, 3) each, of antennas (P, 3) that look at the target."""
+        h, v = polarisation(self.centre - antennas, tuple(self.request.vertical.tolist()))
+        return {"H": h, "V": v}
+
+    def parts(self) -> list[slice]:
+        """Frequencies whose phasors fit into memory together: a run for each part."""
+        n, most = len(self.frequencies), self.cost.frequencies(self.max_bytes)
+        each = -(-n // -(-n // most))
+        return [slice(first, min(first + each, n)) for first in range(0, n, each)]
+
+    def formed(
+        self, pulse: int, sent: str, received: list[str], pulses: np.ndarray, progress: RunProgress
+    ) -> tuple[np.ndarray, runs.RunEnd]:
+        """Echoes (n, Q, F) at some pulses (n,), formed from the currents of an anchor at one pulse, phase zero at the
+        centre; and how the runs ended.
+        """
+        tx, rx = self.tx[pulses], self.rx[pulses]
+        senses = self.senses(rx)
+        out = np.empty((len(pulses), len(received), len(self.frequencies)), np.complex64)
+        steps, left = 0, 0.0
+        for some in self.parts():
+            out[..., some], ended = runs.run(
+                self.device, self.lattice, self.target(), self.band, self.wavenumbers[some],
+                anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), tx=tx, rx=rx,
+                received=np.stack([senses[name] for name in received]),
+                most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=progress,
+            )  # fmt: skip
+            progress.run_done()
+            steps, left = steps + ended.steps, max(left, ended.left)
+        return out, runs.RunEnd(steps, left)
+
+    @property
+    def spectrum(self) -> np.ndarray:
+        """The waveform's spectrum, after its matched filter where samples are compressed (F,)."""
+        pulse = self.waveform.pulse_spectrum(self.frequencies)
+        return np.asarray(np.abs(pulse) ** 2 if self.compressed else pulse)
+
+    def factors(self, some: slice) -> np.ndarray:
+        """Factors of formed echoes: the spectrum, and the phase from the centre to the reference range, (n, F)."""
+        path = half_path(self.tx[some], self.rx[some], self.centre) - self.reference_range[some]
+        return np.asarray(self.spectrum * np.exp(-2j * np.outer(path, self.wavenumbers)))
+
+    def fingerprint(self) -> str:
+        """Checksum of all that echoes formed from an anchor depend on."""
+        parts: dict[str, Any] = {
+            "sarcl": f"{__version__}, kernels {kernels()}",
+            "bodies": [self.scene.triangles, self.scene.material, self.scene.materials],
+            "antennas": [self.tx, self.rx, self.request.vertical],
+            "polarizations": ", ".join(self.request.polarizations),
+            "frequencies": self.frequencies,
+            "grid": [self.cells, self.band, self.lattice, len(self.parts())],
+        }
+        return checksum(*leaves(parts))
+
+    def coarser(self, ratio: float) -> FullwaveTask:
+        """The same task with cells larger by a factor."""
+        lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes)
+        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[])
+
+
+def fullwave_task(
+    scene: Scene, waveform: Waveform, track: Trajectory, request: EchoRequest, *, receiver: Trajectory | None = None,
+    reference: Any = None, range_window: Any = None, compressed: bool = True, cells: float = 12.0,
+    max_bytes: float | None = None,
+) -> FullwaveTask:  # fmt: skip
+    """Checks the arguments of fullwave_echo, and chooses the grid. ValueError, MemoryError: what does not fit."""
+    check_bodies(scene)
+    band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
+    cells = check_cells(cells, band)
+    if request.tolerance < LEAST_TOLERANCE:
+        raise ToleranceUnreachable(request.tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
+    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
+    track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
+    tx, rx = track.positions, echo_sampling.receiver_positions(track, receiver)
+    _check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
+    reference_range = half_path(tx, rx, point)
+    window = _window(scene, waveform, tx, rx, reference_range, range_window)
+    frequency, step, n_samples = echo_sampling.sampling(waveform, *window, compressed)
+    budget = request.budget
+    if max_bytes is None:
+        budget = SHARE * min(request.device.info.memory, host_memory.installed())
+    lattice, cost = grid_choice(scene, band, cells, budget)
+    return FullwaveTask(
+        request, scene, waveform, band, track, receiver, motion, reference_range, window,
+        frequency + step * np.arange(n_samples), step, compressed, cells, lattice, cost, budget,
+        _along(unit(tx - scene.center)),
+    )  # fmt: skip
+
+
+def _along(directions: np.ndarray) -> np.ndarray:
+    """Angle along a path of unit vectors (P, 3), rad (P,)."""
+    here, after = directions[:-1], directions[1:]
+    turn = np.arctan2(np.linalg.norm(np.cross(here, after), axis=1), (here * after).sum(axis=1))
+    return np.concatenate([[0.0], np.cumsum(turn)])
+
+
+def _check_outside(scene: Scene, antennas: dict[str, np.ndarray]) -> None:
+    """ValueError where an antenna is so near that the sphere about the scene's box holds it."""
+    radius = float(np.linalg.norm(scene.bounds[1] - scene.bounds[0])) / 2
+    for name, places in antennas.items():
+        distance = np.linalg.norm(places - scene.center, axis=1)
+        if not (distance > radius).all():
+            at = int(np.argmin(distance))
+            raise ValueError(
+                f"{name} position {at} is {distance[at]:.4g} m from the scene's centre, and the scene reaches "
+                f"{radius:.4g} m from it; fullwave_echo takes the wave at the scene as plane: give antennas outside"
+            )
+
+
+def _window(
+    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
+) -> tuple[float, float]:
+    """The range window, m: as asked, or the smallest that holds the scene's box, and waves that creep round it, plus
+    10 %.
+
+    A wave that touches a body at its sides, creeps over its back and returns has gone a quarter of the box's girth
+    farther than the box's centre: pi/2 radii for a sphere, less than the 2 radii of its box.
+    """
+    box = echo_sampling.window(scene, waveform, tx, rx, reference_range, None)
+    if asked is None:
+        size = np.sort(scene.bounds[1] - scene.bounds[0])
+        late = float(size[1] + size[2]) / 2
+        late += float((half_path(tx, rx, scene.center) - reference_range).max())
+        half = max(box[1], 1.1 * late)
+        return -half, half
+    near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, asked)
+    ends = np.array([half_path(tx, rx, corner) - reference_range for corner in corners(scene.bounds)])
+    if near > ends.min() or far < ends.max():
+        raise ValueError(
+            f"range_window ({near:g}, {far:g}) m does not hold the scene, from {ends.min():.4g} to {ends.max():.4g} m "
+            "about the reference: echoes outside would appear at a wrong range, because fullwave_echo leaves out no "
+            "part of a body; give a wider window, or none"
+        )
+    return near, far

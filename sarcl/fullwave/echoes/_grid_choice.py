@@ -1,0 +1,65 @@
+"""The grid of fullwave_echo: cells per wavelength that carry the band, and the memory that a run takes."""
+
+from __future__ import annotations
+
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.text import size_text
+from ...base.validation import number
+from ...scattering.physical_optics import normals_and_areas
+from ...scene.scene import Scene
+from .. import runs
+from ..lattice import Lattice
+
+FEWEST_CELLS = 8.0  # per shortest wavelength; below, waves of the grid and cut cells differ too much from the truth
+SHARE = 0.5  # of the device's memory, where max_bytes is None: a run cannot be divided
+
+
+def check_cells(asked: Any, band: tuple[float, float]) -> float:
+    """`cells` as a number of at least FEWEST_CELLS; band  lowest and highest frequency, Hz."""
+    cells = number("cells", asked, above=0)
+    if cells < FEWEST_CELLS:
+        raise ValueError(
+            f"cells is {cells:g} per shortest wavelength, and the waveform reaches {band[1] / 1e9:.4g} GHz, "
+            f"above what they carry; give cells of at least {FEWEST_CELLS:g} (12 is the default), or a waveform up to "
+            f"{band[1] * cells / FEWEST_CELLS / 1e9:.4g} GHz"
+        )
+    return cells
+
+
+def grid_choice(scene: Scene, band: tuple[float, float], cells: float, budget: float) -> tuple[Lattice, runs.RunCost]:
+    """The grid of `cells` per shortest wavelength about a scene, and what a run on it takes.
+
+    MemoryError where it does not fit into `budget` bytes, with the size that does.
+    """
+    area = float(normals_and_areas(scene.triangles)[1].sum())
+
+    def planned(n: float) -> tuple[np.ndarray, runs.RunCost]:
+        cell = SPEED_OF_LIGHT / band[1] / n
+        return runs.grid_shape(scene.bounds, cell), runs.run_cost(scene.bounds, cell, area, band)
+
+    def fits(n: float) -> bool:
+        shape, cost = planned(n)
+        return cost.bytes(1) <= budget and not runs.too_many_cells(shape)
+
+    shape, cost = planned(cells)
+    if fits(cells):
+        return runs.grid_about(scene.bounds, SPEED_OF_LIGHT / band[1] / cells), cost
+    most, less = 0.0, cells
+    for _ in range(40):
+        middle = (most + less) / 2
+        most, less = (middle, less) if fits(middle) else (most, middle)
+    what = "more than the kernels count"
+    if cost.bytes(1) > budget:
+        what = f"it needs {size_text(cost.bytes(1))}, and {size_text(budget)} are allowed"
+    remedy = "raise max_bytes"
+    if most >= FEWEST_CELLS:
+        highest, best = band[1] * most / cells / 1e9, np.floor(10 * most) / 10
+        remedy = f"what fits is cells={best:g}, or a waveform up to {highest:.3g} GHz; or {remedy}"
+    elif most > 0.1:
+        highest = band[1] * most / FEWEST_CELLS / 1e9
+        remedy = f"what fits is a waveform up to {highest:.3g} GHz with cells={FEWEST_CELLS:g}; or {remedy}"
+    raise MemoryError(f"a run on a grid of {' x '.join(map(str, shape))} cells: {what}; {remedy}")

@@ -1,0 +1,108 @@
+"""Forecast of full-wave echoes before any run: memory, seconds, number of runs."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any, Unpack
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.text import duration, size_text
+from ...base.validation import instance
+from ...io import sarcl_hdf5
+from ...model.trajectory import Trajectory
+from ...model.waveform import Waveform
+from ...scene.scene import Scene
+from ...simulation.echo import echo_request
+from ._fullwave_task import FullwaveTask, fullwave_task
+from ._model_error import RATIO
+from ._run_speed import run_speed
+from .fullwave_echo import TOLERANCE, FullwaveOptions
+
+FEWEST = 5  # anchors before any interval is bisected, where there are as many pulses
+# Spacing of anchors, in wavelengths over the target's length: error of cubic interpolation, and the spacing that has it
+ERROR, SPACING = 1.5e-2, 1.7
+STEEPEST = 3.0  # the largest spacing, in the same unit, that the fourth power is trusted for
+
+# options that make up the request, and those of the task
+REQUEST = {"polarization", "vertical", "max_bytes", "tolerance", "device"}
+TASK = {"receiver", "reference", "range_window", "compressed", "cells", "max_bytes"}
+
+
+@dataclass(frozen=True, eq=False)
+class FullwaveForecast:
+    """Forecast of `fullwave_echo` with the same arguments.
+
+    n_rows, n_samples  of the phase history;  bytes  of its samples and geometry, in a file or in memory
+    runs               about the number of runs of the grid: anchors times polarisations sent times parts of the band
+    run_bytes          memory of one run on the device;  run_seconds  about, on this device at its present speed
+    seconds            about, of all runs, and of those for the model error and the check
+    plan               anchors, grid, cells, time steps
+    """
+
+    n_rows: int
+    n_samples: int
+    bytes: float
+    runs: int
+    run_bytes: float
+    run_seconds: float
+    seconds: float
+    plan: dict[str, object]
+
+    def __str__(self) -> str:
+        return (
+            f"{self.n_rows} rows of {self.n_samples} samples: {size_text(self.bytes)}\n"
+            f"about {self.runs} runs of {self.plan['grid']} cells and {self.plan['steps']} steps: "
+            f"{size_text(self.run_bytes)}, {duration(self.run_seconds)} each, about {duration(self.seconds)} in all"
+        )
+
+
+def plan_fullwave_echo(
+    scene: Scene, waveform: Waveform, track: Trajectory, **options: Unpack[FullwaveOptions]
+) -> FullwaveForecast:
+    """Forecast of `fullwave_echo(scene, waveform, track, ...)` with these options, as a FullwaveForecast.
+
+    No run is done; a small grid is timed, which takes about a second. The number of anchors is estimated from the
+    length of the target in wavelengths, the angle that the track covers and the tolerance: with anchors="auto" the
+    runs themselves decide. Raises as `fullwave_echo` does, except for what is found when bodies are cut by the grid;
+    `out` is not written.
+    """
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        instance(name, value, kind)
+    if unknown := set(options) - set(FullwaveOptions.__annotations__):
+        raise TypeError(f"plan_fullwave_echo() got an unexpected keyword argument {sorted(unknown)[0]!r}")
+    given: dict[str, Any] = {"tolerance": TOLERANCE, **options}
+    request = echo_request(scene, (), **{k: v for k, v in given.items() if k in REQUEST})
+    task = fullwave_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
+    parts, n_rows, n_samples = task.parts(), len(track) * len(request.polarizations), len(task.frequencies)
+    n_anchors = expected_anchors(task, options.get("anchors", "auto"), request.tolerance)
+    sent = len(list(task.sendings()))
+    speed = run_speed(task.device)
+    entries = task.cost.entries * n_samples / len(parts)
+    cells = float(np.prod(task.lattice.shape))
+    run_seconds = task.cost.steps * (cells / speed.cells + entries / speed.sums)
+    runs = n_anchors * sent * len(parts)
+    also = (RATIO**-4 if given.get("model_error", True) else 0.0) + (1.0 if given.get("check", False) else 0.0)
+    plan: dict[str, object] = {
+        "anchors": n_anchors,
+        "cells": task.cells,
+        "cell_m": float(f"{task.lattice.cell:.4g}"),
+        "grid": " x ".join(map(str, task.lattice.shape)),
+        "steps": task.cost.steps,
+        **task.motion,
+    }
+    return FullwaveForecast(
+        n_rows, n_samples, n_rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), runs, task.cost.bytes(parts[0].stop),
+        run_seconds, (runs + also * sent * len(parts)) * run_seconds, plan,
+    )  # fmt: skip
+
+
+def expected_anchors(task: FullwaveTask, anchors: Any, tolerance: float) -> int:
+    """About the number of anchors; as asked, unless that is "auto"."""
+    if not isinstance(anchors, str):
+        return int(anchors) if np.ndim(anchors) == 0 else len(anchors)
+    length = float(np.linalg.norm(task.scene.bounds[1] - task.scene.bounds[0]))
+    wavelength = SPEED_OF_LIGHT / float(task.frequencies[-1])
+    spacing = min(SPACING * (tolerance / ERROR) ** 0.25, STEEPEST) * wavelength / length
+    return min(len(task.along), max(FEWEST, 1 + int(np.ceil(float(np.ptp(task.along)) / spacing))))

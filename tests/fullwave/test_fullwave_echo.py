@@ -1,0 +1,195 @@
+"""Echoes of closed bodies through the public verb: Mie's series, physical optics, refusals, files, forecasts."""
+
+from __future__ import annotations
+
+import logging
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl import shapes
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.fullwave import runs
+from sarcl.fullwave.echoes import _fullwave_task
+from sarcl.reference import mie
+
+RADIUS = 0.1  # m
+CHIRP = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)  # ka 2.1 to 3.1
+SPHERE = shapes.sphere(RADIUS, edge=0.02)
+BOX = shapes.box((0.2, 0.3, 0.1))
+
+
+def around(*degrees, height=0.0, distance=40.0):
+    """Antennas about the z axis."""
+    angle = np.deg2rad(degrees)
+    return sarcl.Trajectory(None, np.stack([distance * np.cos(angle), distance * np.sin(angle), 0 * angle + height], 1))
+
+
+def samples(raw):
+    """(pulses, polarisations, frequencies), and wavenumbers, rad/m."""
+    n = len(np.unique(raw.polarization))
+    k = 2 * np.pi * (raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)) / SPEED_OF_LIGHT
+    return np.asarray(raw.samples).reshape(-1, n, raw.n_samples), k
+
+
+def difference(a, b):
+    return float(np.linalg.norm(a - b) / np.linalg.norm(b))
+
+
+@pytest.fixture(scope="module")
+def sphere():
+    """Two directions, with a run each."""
+    return sarcl.fullwave_echo(SPHERE, CHIRP, around(20, 65, height=15.0), polarization=("HH", "VH"), cells=14)
+
+
+def test_a_sphere_has_the_amplitude_and_phase_of_mie_in_every_direction(sphere):
+    """|sample|^2 = RCS, phase zero at the centre; the mesh lies inside the sphere; cells of a tenth of its radius."""
+    got, k = samples(sphere)
+    wanted = np.array([mie.conducting_sphere(RADIUS, x)[0] for x in k])
+    for horizontal, cross in got:
+        assert difference(horizontal, wanted) < 0.04
+        assert np.linalg.norm(cross) < 3e-3 * np.linalg.norm(wanted)
+
+
+@pytest.mark.slow
+def test_all_polarisations_are_those_of_runs_for_each(sphere):
+    track = around(20, 65, height=15.0)
+    options = {"cells": 14, "model_error": False}
+    got, _ = samples(sarcl.fullwave_echo(SPHERE, CHIRP, track, polarization="all", **options))
+    assert np.array_equal(got[:, [0, 2]], samples(sphere)[0])
+    for i, name in ((1, "HV"), (3, "VV")):
+        alone, _ = samples(sarcl.fullwave_echo(SPHERE, CHIRP, track, polarization=name, **options))
+        assert np.array_equal(got[:, i], alone[:, 0])
+    assert difference(got[:, 3], got[:, 0]) < 0.02
+
+
+def test_the_error_of_the_grid_is_predicted_within_a_factor_of_three(sphere):
+    got, k = samples(sphere)
+    wanted = np.array([mie.conducting_sphere(RADIUS, x)[0] for x in k])
+    error = difference(got[:, 0], np.broadcast_to(wanted, (2, len(k))))
+    assert error / 3 < sphere.report.model_error < 3 * error
+
+
+def test_the_report_says_what_was_computed(sphere):
+    plan = sphere.report.plan
+    assert plan["anchors"] == [0, 1] and plan["runs"] == 2 and plan["cells"] == 14
+    assert sphere.report.tolerance == 3e-2 and sphere.report.predicted_error <= 3e-2
+    assert sphere.report.contributions_done == plan["runs"] * plan["steps"] * np.prod(
+        [int(n) for n in plan["grid"].split(" x ")]
+    )
+    assert "predicted for the model itself" in str(sphere.report)
+
+
+@pytest.mark.slow
+def test_bistatic_echoes_of_a_sphere_are_those_of_mie():
+    """Both antennas in the plane z = 0: V is across it. Mie's fields in the plane have the sense opposite to H."""
+    tx, rx = around(0.0), around(110.0)
+    raw = sarcl.fullwave_echo(
+        SPHERE, CHIRP, tx, receiver=rx, polarization=("HH", "VV"), cells=14, model_error=False, range_window=(-1, 1)
+    )
+    (got,), k = samples(raw)
+    across, along = np.array([mie.conducting_sphere(RADIUS, x, np.pi - np.deg2rad(110)) for x in k]).T
+    assert difference(got[1], across) < 0.04
+    assert difference(got[0], -along) < 0.04
+
+
+@pytest.mark.parametrize(
+    "scene, options, error, message",
+    [
+        (BOX + sarcl.Scene.points([[0, 0, 0]]), {}, ValueError, r"scene has 1 points, .* add the samples that echo"),
+        (sarcl.Scene.from_heights([0, 1], [0, 1], np.zeros((2, 2))), {}, ValueError, "terrain, .* use echo"),
+        (shapes.box((1, 1, 1), roughness=0.1), {}, ValueError, "12 facets with a random roughness, .* roughness=0"),
+        (shapes.box((1, 1, 1), reflectivity=0.5), {}, ValueError, r"reflectivity 0\.5, .*\.Material\(eps_r=3"),
+        (shapes.box((1, 1, 1), material=sarcl.Material(diagram="cos")), {}, ValueError, "finer than a facet"),
+        (shapes.plate((0.3, 0.2)), {}, ValueError, "are open at 4 of 5 edges"),
+        (BOX, {"cells": 7}, ValueError, r"cells is 7 .* reaches 1\.5 GHz, .* at least 8 .* up to 1\.312 GHz"),
+        (BOX, {"max_bytes": 2e6}, MemoryError, r"cells: it needs 8\.\d+ MB, and 2 MB are allowed; raise max_bytes"),
+        (BOX, {"max_bytes": 6e6}, MemoryError, r"what fits is a waveform up to 1\.\d+ GHz with cells=8; or raise"),
+        (BOX, {"max_bytes": 2e7, "cells": 40}, MemoryError, r"what fits is cells=\d+\.?\d*, or a waveform up to"),
+        (BOX, {"tolerance": 1e-5}, sarcl.ToleranceUnreachable, r"with fields in float32; the best here is 1\.0e-04"),
+        (BOX, {"range_window": (-0.1, 0.1)}, ValueError, "does not hold the scene, from .* give a wider window"),
+        (shapes.box((90, 90, 1)), {}, ValueError, "track position 0 is 40 m from .* reaches 63.64 m"),
+    ],
+)  # fmt: skip
+def test_what_the_grid_cannot_hold_is_refused(scene, options, error, message):
+    with pytest.raises(error, match=message):
+        sarcl.fullwave_echo(scene, CHIRP, around(20), **options)
+
+
+def pretend(monkeypatch, stop_after=None):
+    """Runs of the grid replaced by random echoes; the list of those that are done. The one after `stop_after` fails."""
+    done = []
+
+    def run(device, lattice, target, band, k, *, anchor, tx, received, **options):
+        if len(done) == stop_after:
+            raise RuntimeError("the machine is switched off")
+        done.append(anchor)
+        random = np.random.default_rng(int(1e6 * abs(np.concatenate(anchor).sum())))
+        made = random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]
+        return made.astype(np.complex64), runs.RunEnd(100, 1e-6)
+
+    monkeypatch.setattr(_fullwave_task.runs, "run", run)
+    return done
+
+
+def test_an_interrupted_task_continues_from_its_finished_anchors(tmp_path, monkeypatch, caplog):
+    out, track = tmp_path / "raw.h5", around(20, 65)
+    given = {"cells": 8, "model_error": False, "polarization": ("VV", "HV", "HH")}
+    assert len(pretend(monkeypatch)) == 0
+    whole = sarcl.fullwave_echo(BOX, CHIRP, track, **given)
+    pretend(monkeypatch, stop_after=3)
+    with pytest.raises(RuntimeError, match="switched off"):
+        sarcl.fullwave_echo(BOX, CHIRP, track, out=out, **given)
+    kept = sorted((tmp_path / "raw.h5.anchors").iterdir())
+    assert not out.exists() and len(kept) == 3
+    damaged = bytearray(kept[0].read_bytes())
+    damaged[-100] ^= 1
+    kept[0].write_bytes(damaged)
+    kept[1].write_bytes(kept[1].read_bytes()[:20])
+    done = pretend(monkeypatch)
+    raw = sarcl.fullwave_echo(BOX, CHIRP, track, out=out, **given)
+    assert len(done) == 3 and caplog.text.count("is damaged: this anchor is computed again") == 2
+    assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples)) and not kept[0].parent.exists()
+    assert sarcl.read(out).report.plan["anchors"] == whole.report.plan["anchors"] == [0, 1]
+
+
+@pytest.mark.parametrize(
+    "change",
+    [{"cells": 8.5}, {"vertical": (0, 1, 1)}, {"track": around(20, 66)}, {"scene": shapes.box((0.2, 0.3, 0.11))}],
+)  # fmt: skip
+def test_a_changed_task_takes_no_anchors_of_another(tmp_path, monkeypatch, caplog, change):
+    first = {"scene": BOX, "waveform": CHIRP, "track": around(20, 65), "cells": 8, "out": tmp_path / "raw.h5"}
+    for task in (first, first | change):
+        done = pretend(monkeypatch, stop_after=1)
+        with pytest.raises(RuntimeError, match="switched off"):
+            sarcl.fullwave_echo(**task)
+        assert len(done) == 1
+    assert "holds 1 finished anchors of another task" in caplog.text
+    assert len(list((tmp_path / "raw.h5.anchors").iterdir())) == 2
+
+
+@pytest.mark.slow
+def test_progress_counts_steps_of_all_runs():
+    seen = []
+    raw = sarcl.fullwave_echo(
+        BOX, CHIRP, around(20, 65), cells=8, progress=lambda *report: seen.append(report)
+    )  # fmt: skip
+    stages = [report for report in seen if report[0] == "full-wave runs"]
+    assert raw.report.plan["runs"] == 2 and stages[0][1] == 0 and stages[-1][1] == stages[-1][2]
+    assert np.all(np.diff([done for _, done, _ in stages]) >= 0) and len(stages) > 6
+
+
+def test_the_forecast_says_memory_steps_and_runs_before_the_work(monkeypatch):
+    monkeypatch.setattr(_fullwave_task.runs, "run", None)
+    forecast = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20, 65), polarization="all", cells=8, out="nowhere/raw.h5")
+    assert (forecast.n_rows, forecast.n_samples, forecast.runs) == (8, 64, 4)
+    assert forecast.plan["grid"] == "39 x 43 x 48" and 1e6 < forecast.run_bytes < 2e7
+    assert forecast.seconds > forecast.runs * forecast.run_seconds
+    assert "about 4 runs of 39 x 43 x 48 cells" in str(forecast)
+
+
+def test_the_log_is_quiet_without_files(caplog):
+    caplog.set_level(logging.WARNING)
+    sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
+    assert not caplog.records
