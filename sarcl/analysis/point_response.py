@@ -36,7 +36,7 @@ class PointResponse:
     pslr      highest lobe outside the first nulls over the peak, dB
     islr      energy outside the first nulls, within +-`reach` IRW, over the energy between the nulls, dB
     peak      complex value of the image at `position`, in the unit of the image's data
-    gain      the image's gain: |peak/gain|^2 is the point's radar cross section, m^2
+    gain      the image's gain at that pixel: |peak/gain|^2 is the point's radar cross section, m^2
     reach     IRW on each side that pslr and islr cover: 10, or as far as the image extends
     """
 
@@ -111,7 +111,7 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
         pslr=(along.pslr, across.pslr),
         islr=(along.islr, across.islr),
         peak=complex(interpolated(position[None])[0]),
-        gain=image.gain,
+        gain=float(image.gain[row, column]) if isinstance(image.gain, np.ndarray) else image.gain,
         reach=(along.reach, across.reach),
     )
 

@@ -28,6 +28,7 @@ from .collection import collection
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip
+from .row_coverage import gain_of, room_for_gain
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
@@ -121,11 +122,12 @@ def backproject(
     cluster    a dask.distributed.Client whose workers compute the tiles, each on a device of its own
     progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
 
-    Returns an Image. Raises ToleranceUnreachable, a ValueError, where the tolerance cannot be met; it names the best
-    tolerance that can. ValueError: data not compressed, arguments that do not go together, tiles of another job in
-    "PATH.parts". ToleranceMissed, a ValueError that holds the finished image: the check measured an error above the
-    tolerance. MemoryError: max_bytes too small for a single row. SarclWarning: 1 % of the pixels or more lie outside
-    the range window of every row; report.plan counts them.
+    Returns an Image, whose gain is the sum of the weights of the rows that saw a pixel: an array where some pixels lie
+    outside the range window or the beam of some rows, else a number. Raises ToleranceUnreachable, a ValueError, where
+    the tolerance cannot be met; it names the best tolerance that can. ValueError: data not compressed, arguments that
+    do not go together, tiles of another job in "PATH.parts". ToleranceMissed, a ValueError that holds the finished
+    image: the check measured an error above the tolerance. MemoryError: max_bytes too small for a single row.
+    SarclWarning: 1 % of the pixels or more lie outside the range window of every row; report.plan counts them.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
     clock = Clock()
@@ -138,6 +140,7 @@ def backproject(
     piece = _piece(tile, resume, out)
     raw, task = options.task(raw, grid)
     workers, chosen = _open_workers(task, options, cluster)
+    room_for_gain(task, chosen.dtype)
     clock.lap("plan")
 
     with ExitStack() as stack:
@@ -184,6 +187,8 @@ def backproject(
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
             measured = _measure_error(task, grid, output.data)
             clock.lap("check")
+        gain = gain_of(task, chosen.dtype)
+        clock.lap("gain")
         plan = chosen.plan.describe(chosen.method)
         if kept:
             plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
@@ -206,7 +211,7 @@ def backproject(
         )
         image = output.image(
             job=checkpoint.mark if checkpoint and checkpoint.tiles else None,
-            gain=float(task.row_weight.sum() * task.sample_weight.sum()),
+            gain=gain,
             frequency=float(np.median(task.antennas.frequency)),
             report=report,
             **collection(task.raw, grid, window),

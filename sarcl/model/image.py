@@ -39,7 +39,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     data       complex, of grid.shape; real if it is intensity (after `multilook`). It may be a dataset of a file
     grid       positions of the pixels
-    gain       sum of all weights in a pixel: a unit point gives |data| = gain at its position
+    gain       sum of the weights of the rows that saw a pixel: a unit point gives |data| = gain at its position. A
+               number where it is the same in all pixels, else an array of grid.shape, 0 where no row saw the pixel
     frequency  centre frequency, Hz, and
     tx, rx     antenna positions at mid-aperture, m (3,): the image's local carrier follows from them
     report     how the image was made
@@ -56,7 +57,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     data: Any
     grid: ImageGrid
-    gain: float = 1.0
+    gain: Any = 1.0
     frequency: float | None = None
     tx: NDArray[np.float64] | None = None
     rx: NDArray[np.float64] | None = None
@@ -75,7 +76,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             self,
             data: ArrayLike | LazyRows,
             grid: ImageGrid,
-            gain: float = 1.0,
+            gain: ArrayLike = 1.0,
             frequency: float | None = None,
             tx: ArrayLike | None = None,
             rx: ArrayLike | None = None,
@@ -103,7 +104,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             raise ValueError(f"image data has type {self.data.dtype}, wanted complex or real numbers")
         if self.frequency is not None:
             object.__setattr__(self, "frequency", validation.number("image frequency", self.frequency, above=0))
-        object.__setattr__(self, "gain", validation.number("image gain", self.gain, above=0))
+        object.__setattr__(self, "gain", _checked_gain(self.gain, self.grid))
         for name, length in (("tx", 3), ("rx", 3), ("tx_velocity", 3), ("rx_velocity", 3), ("time", 2), ("band", 2)):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, validation.array(name, getattr(self, name), np.float64, (length,)))
@@ -128,7 +129,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         """Pixels: an Image on their part of the grid where every axis has a slice (or none), else their values."""
         slices = index if isinstance(index, tuple) else (index,)
         if len(slices) <= len(self.grid.shape) and all(isinstance(one, slice) for one in slices):
-            return replace(self, data=self.data[slices], grid=self.grid.part(*slices))
+            gain = self.gain[slices] if isinstance(self.gain, np.ndarray) else self.gain
+            return replace(self, data=self.data[slices], grid=self.grid.part(*slices), gain=gain)
         return self.data[index] if isinstance(self.data, np.ndarray) else np.asarray(self)[index]
 
     @property
@@ -141,27 +143,44 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __repr__(self) -> str:
         shape = " x ".join(map(str, self.grid.shape))
-        return f"Image({shape} {self.data.dtype} pixels, gain {self.gain:.6g})"
+        gain = f"{np.max(self.gain):.6g}"
+        if isinstance(self.gain, np.ndarray):
+            gain = f"{self.gain.min():.6g} to {gain}"
+        return f"Image({shape} {self.data.dtype} pixels, gain {gain})"
 
     @property
     def is_complex(self) -> bool:
         """True until the image is detected (multilooked)."""
         return np.dtype(self.data.dtype).kind == "c"
 
+    def normalized(self) -> NDArray[Any]:
+        """Pixels over their gain: data/gain, or intensity over gain^2; 0 where no row saw the pixel.
+
+        The squared modulus of a point's peak is its radar cross section, m^2.
+        """
+        data = np.asarray(self.data)
+        if not isinstance(self.gain, np.ndarray):
+            return np.asarray(data / (self.gain if self.is_complex else self.gain**2))
+        # where no row saw a pixel its data are 0, whatever they are divided by
+        gain = np.where(self.gain > 0, self.gain, 1)
+        return np.asarray(data / (gain if self.is_complex else gain**2))
+
     def decibels(self) -> NDArray[np.float32]:
         """20 log10 |data/gain| (10 log10 of an intensity over gain^2), dB, float32; -inf where data is 0."""
         data = np.asarray(self.data)
+        if not self.is_complex and (data < 0).any():
+            at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
+            raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
+        gain = np.where(self.gain > 0, self.gain, 1) if isinstance(self.gain, np.ndarray) else self.gain
         with np.errstate(divide="ignore"):
             if self.is_complex:
-                return (20 * np.log10(np.abs(data) / self.gain)).astype(np.float32)
-            if (data < 0).any():
-                at = [int(i) for i in np.unravel_index(int(np.argmin(data)), data.shape)]
-                raise ValueError(f"image data{at} is {data.min():g}; an intensity is not negative")
-            return (10 * np.log10(data / self.gain**2)).astype(np.float32)
+                return (20 * np.log10(np.abs(data) / gain)).astype(np.float32)
+            return (10 * np.log10(data / gain**2)).astype(np.float32)
 
     def multilook(self, looks: int | Sequence[int] | np.ndarray) -> Image:
         """Mean intensity |data|^2 over blocks of looks = (rows, columns) pixels; incomplete blocks are left out.
 
+        A gain that varies becomes the root of the mean of its square over the same blocks.
         Raises ValueError when the grid is neither a plane nor that of `range_doppler`, or the block is larger than the
         image.
         """
@@ -174,7 +193,14 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             raise ValueError(f"looks ({a}, {b}) is larger than the image {self.grid.shape}; take fewer")
         data = np.asarray(self.data)[: rows * a, : columns * b]
         power = np.abs(data) ** 2 if self.is_complex else data
-        return replace(self, data=power.reshape(rows, a, columns, b).mean(axis=(1, 3)), grid=_looked(self.grid, a, b))
+
+        def mean(values: np.ndarray) -> np.ndarray:
+            return np.asarray(values.reshape(rows, a, columns, b).mean(axis=(1, 3)))
+
+        gain = self.gain
+        if isinstance(gain, np.ndarray):
+            gain = np.sqrt(mean(gain[: rows * a, : columns * b] ** 2))
+        return replace(self, data=mean(power), grid=_looked(self.grid, a, b), gain=gain)
 
     def show(
         self,
@@ -262,6 +288,22 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             db, spacing, floor_db, title, top_db=top_db, percentile=percentile,
             zero="a unit point in focus", origin=origin, names=names,
         )  # fmt: skip
+
+
+def _checked_gain(gain: Any, grid: ImageGrid) -> float | NDArray[np.floating]:
+    """A gain as a number, or as a read-only array of the grid's shape; ValueError for one that cannot be."""
+    if np.ndim(gain) == 0:
+        return validation.number("image gain", gain, above=0)
+    kind = np.float32 if getattr(gain, "dtype", None) == np.float32 else np.float64
+    own = isinstance(gain, np.ndarray) and gain.dtype == kind and not gain.flags.writeable and gain.shape == grid.shape
+    made = gain if own else validation.array("image gain", gain, kind, tuple(grid.shape))
+    low = float(made.min())
+    if low < 0 or not np.isfinite(low) or not 0 < float(made.max()) < np.inf:
+        raise ValueError(
+            f"image gain is {low:g} to {made.max():g}; it is a sum of weights, 0 where no row saw a pixel, and greater "
+            "than 0 elsewhere"
+        )
+    return made
 
 
 def _looked(grid: ImageGrid, a: int, b: int) -> ImageGrid:

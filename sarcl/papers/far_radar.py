@@ -61,7 +61,7 @@ class FarRadar:
     def focus(self, raw: PhaseHistory, grid: ImageGrid, **options: Any) -> np.ndarray:
         """Pixels whose |.|^2 is the radar cross section of a point, m^2."""
         image = backproject(raw, grid, **{"tolerance": 1e-2, "check": False, **options})
-        return np.asarray(image.data) / image.gain
+        return image.normalized()
 
 
 def ground(y: tuple[float, float], x: tuple[float, float], cells: Sequence[int] = (1, 1), **options: Any) -> Scene:

@@ -222,6 +222,9 @@ BAD = {
     "truths": (lambda: image(np.ones(SHAPE, bool)), "image data has type bool, wanted complex or real"),
     "no gain": (lambda: image(gain=0), "image gain is 0; it must be greater than 0"),
     "gain not finite": (lambda: image(gain=np.inf), "image gain is inf"),
+    "gain of another shape": (lambda: image(gain=np.ones(3)), r"image gain has shape \(3,\), wanted"),
+    "gain negative": (lambda: image(gain=-np.ones(GRID.shape)), "image gain is -1 to -1; it is a sum of weights"),
+    "gain zero": (lambda: image(gain=np.zeros(GRID.shape)), "image gain is 0 to 0; it is a sum of weights"),
     "frequency a word": (lambda: image(frequency="X band"), "image frequency must be a number"),
     "flat antenna": (lambda: image(tx=(1, 2)), r"tx has shape \(2,\), wanted \(3,\)"),
     "antenna not finite": (lambda: image(rx=(1, np.nan, 2)), r"rx\[1\] is nan"),
@@ -336,3 +339,34 @@ def test_an_image_keeps_what_products_need_of_its_data(tmp_path):
         assert (again.window, again.polarization, again.frame) == (made.window, made.polarization, made.frame)
     with pytest.raises(ValueError, match="image frame is 'moon'; choose one of 'local', 'earth-fixed'"):
         sarcl.Image(np.ones((8, 8)), grid, frame="moon")
+
+
+def test_a_gain_that_varies_goes_with_its_pixels(tmp_path):
+    data, gain = noise(), np.random.default_rng(3).uniform(1, 9, GRID.shape).astype(np.float32)
+    gain[0, :2], data[0, :2] = 0, 0  # pixels that no row saw
+    image = sarcl.Image(data, GRID, gain=gain)
+    assert not image.gain.flags.writeable and "gain 0 to " in repr(image)
+    db = image.decibels()
+    assert np.isneginf(db[0, :2]).all()
+    clear = gain > 0
+    assert db[clear] == pytest.approx(20 * np.log10(np.abs(data[clear]) / gain[clear]), abs=1e-4)
+    assert image.normalized()[clear] == pytest.approx(data[clear] / gain[clear]) and not image.normalized()[0, :2].any()
+    part = image[1:5, ::2]
+    assert np.array_equal(part.gain, gain[1:5, ::2])
+    looked = image.multilook((2, 3))
+    blocks = (gain[: looked.data.shape[0] * 2, : looked.data.shape[1] * 3] ** 2).reshape(
+        looked.data.shape[0], 2, looked.data.shape[1], 3
+    )
+    assert looked.gain == pytest.approx(np.sqrt(blocks.mean(axis=(1, 3))), rel=1e-5)
+    image.save(tmp_path / "a.h5")
+    again = sarcl.read(tmp_path / "a.h5")
+    assert again.gain.dtype == np.float32 and np.array_equal(again.gain, gain)
+    assert np.array_equal(again.decibels(), db)
+    image.show()
+    # damage: the gain has a checksum of its own
+    whole = bytearray((tmp_path / "a.h5").read_bytes())
+    at = whole.find(gain[3].tobytes())
+    whole[at + 5] ^= 1
+    (tmp_path / "b.h5").write_bytes(whole)
+    with pytest.raises(ValueError, match="gain is not as it was written"):
+        sarcl.read(tmp_path / "b.h5")

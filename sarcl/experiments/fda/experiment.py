@@ -110,7 +110,7 @@ def cut(raw: PhaseHistory, case: Case, y: float, device: DeviceChoice | None = N
     at = y + step * np.arange(-int(REACH * STEPS), int(REACH * STEPS) + 1)
     grid = ImageGrid.points(np.stack([0 * at, at, 0 * at], axis=1))
     image = backproject(raw, grid, tolerance=1e-3, check=False, device=device)
-    return at, np.abs(np.asarray(image.data)) / image.gain
+    return at, np.abs(image.normalized())
 
 
 def response(at: np.ndarray, values: np.ndarray, place: float) -> dict[str, float]:

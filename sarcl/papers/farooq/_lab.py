@@ -85,7 +85,7 @@ class Lab:
         places = np.zeros((n, 3))
         places[:, axis] = at
         made = backproject(raw, ImageGrid.points(places), tolerance=1e-3, check=False, device=self.device)
-        return at, np.abs(np.asarray(made.data)) / made.gain
+        return at, np.abs(made.normalized())
 
     def measure(self, raw: PhaseHistory, axis: int = 1, half: float = 2.0, about: float = 0.0) -> dict[str, float]:
         """Response of a point `about` m along the axis: what `sarcl.fda.response` measures on a cut."""

@@ -123,4 +123,4 @@ def _image(
     """Amplitudes of a zone's image, `at` m behind its centre (n,)."""
     grid = ImageGrid.points(np.stack([radar.place(zone, b, elevation) for b in at]))
     made = backproject(of_zone(radar, record, zone), grid, tolerance=1e-5, check=False, device=device)
-    return np.abs(np.asarray(made.data)) / made.gain
+    return np.abs(made.normalized())

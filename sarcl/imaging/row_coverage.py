@@ -1,0 +1,165 @@
+"""Which rows saw a pixel, and the sum of their weights: the gain of the image, pixel by pixel.
+
+    gain(x) = sum_p v_p(x) w_p sum_n w_n,    v_p(x) = 1 in the range window and the beam of row p, else 0
+
+A tile of pixels lies in a sphere. Rows whose range window and beam contain the sphere count for all of its pixels, rows
+that miss it for none, and only the rows between are asked for each pixel, in float64.
+reference: sarcl/reference/backproject.py: the image of a unit point at x has the value gain(x) there
+"""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base import validation
+from ..base.constants import SPEED_OF_LIGHT
+from .focusing_task import FocusingTask
+from .tiling.of_grid import tiling_of
+
+SIDE = 16  # pixels along a side of a tile
+PAIRS = 2**20  # pairs of a tile and a row, and values of crossing pairs, that are looked at together
+SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, which are differences of squares
+
+
+def may_vary(task: FocusingTask) -> bool:
+    """Whether some pixel may lie outside the range window or the beam of some row."""
+    if task.antennas.beam is not None:
+        return True
+    if task.wrap:
+        return False
+    bounds, half = task.grid.bounds, SPEED_OF_LIGHT / (4 * task.raw.frequency_step)
+    corners = np.stack(np.meshgrid(*bounds.T, indexing="ij"), axis=-1).reshape(-1, 3)
+    ends = task.antennas.ends
+    # half a path is a convex function: largest in a corner of the box; and not less than the distances of the box
+    most = np.max([sum(np.linalg.norm(e - c, axis=1) for e in ends) / len(ends) for c in corners], axis=0)
+    least = sum(np.linalg.norm(e - np.clip(e, *bounds), axis=1) for e in ends) / len(ends)
+    reference = task.raw.reference_range
+    return bool((most - reference > half * (1 - SLACK)).any() or (reference - least > half * (1 - SLACK)).any())
+
+
+def room_for_gain(task: FocusingTask, dtype: Any) -> None:
+    """MemoryError where the gain needs a value per pixel and there is no memory for them."""
+    if may_vary(task):
+        validation.room(
+            f"the gain of {' x '.join(map(str, task.grid.shape))} pixels, one number per pixel",
+            float(task.grid.size * _kind(dtype).itemsize), "focus parts of the grid",
+        )  # fmt: skip
+
+
+def gain_of(task: FocusingTask, dtype: Any) -> float | np.ndarray:
+    """The image's gain: a number where it is the same in all pixels, else an array of the grid's shape.
+
+    dtype  of the pixels: the gain has float32 beside complex64, and float64 beside complex128
+    """
+    whole = float(task.row_weight.sum() * task.sample_weight.sum())
+    if not may_vary(task):
+        return whole
+    tiling, grid = tiling_of(task.grid, SIDE), task.grid
+    flat = np.zeros(grid.shape if tiling.in_rows else grid.size, _kind(dtype))
+    coverage, complete = RowCoverage(task), True
+    for band in range(tiling.n_bands):
+        orders = tiling.bands(band, band + 1)[1]
+        positions = tiling.positions(band, band + 1, orders)
+        weight, count = coverage.sums(positions, np.stack([task.row_weight, np.ones(task.raw.n_rows)]))
+        complete = complete and bool((count == task.raw.n_rows).all())
+        tiling.place((weight * task.sample_weight.sum()).ravel(), (band, band + 1), 0, orders, flat)
+    if complete:
+        return whole
+    made = flat.reshape(grid.shape)
+    used = made if grid.empty is None else made[~grid.empty]
+    low, high = float(used.min()), float(used.max())
+    if high == 0:  # no pixel is seen: the image is zero, and a gain is not
+        return whole
+    return low if low == high else made
+
+
+def _kind(dtype: Any) -> np.dtype:
+    return np.dtype(np.float64 if np.dtype(dtype) == np.complex128 else np.float32)
+
+
+@dataclass(frozen=True, eq=False)
+class RowCoverage:
+    """Range windows and beams of a task's rows."""
+
+    task: FocusingTask
+
+    def sums(self, positions: np.ndarray, weights: np.ndarray) -> np.ndarray:
+        """Sums (k, n_tiles, per_tile) of weights (k, n_rows) over the rows that see each of positions, m (n_tiles,
+        per_tile, 3)."""
+        made = np.zeros((len(weights), *positions.shape[:2]))
+        for first, stop, whole, tile, row in self._tiles(positions):
+            made[:, first:stop] += (weights @ whole.T)[..., None]
+            for some in _pieces(tile, positions.shape[1]):
+                seen = self.sees(positions[tile[some]], row[some])
+                starts = np.flatnonzero(np.diff(tile[some], prepend=-1))
+                for one, weight in zip(made, weights, strict=True):
+                    one[tile[some][starts]] += np.add.reduceat(weight[row[some], None] * seen, starts, axis=0)
+        return made
+
+    def sees(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
+        """Whether rows (m,) see points, m (m, n, 3): bool (m, n)."""
+        raw, antennas = self.task.raw, self.task.antennas
+        away = points - raw.tx[rows][:, None]
+        reach = np.sqrt(np.einsum("mnx,mnx->mn", away, away))
+        seen = np.ones(reach.shape, bool)
+        if not self.task.wrap:
+            path = reach
+            if not antennas.is_monostatic:
+                path = (reach + np.linalg.norm(points - raw.rx[rows][:, None], axis=-1)) / 2
+            half = SPEED_OF_LIGHT / (4 * raw.frequency_step[rows])
+            seen &= np.abs(path - raw.reference_range[rows][:, None]) <= half[:, None]
+        if antennas.beam is not None:
+            along = np.einsum("mnx,mx->mn", away, antennas.beam[rows])
+            seen &= along >= np.cos(antennas.beam_angle / 2) * reach
+        return seen
+
+    def _tiles(self, positions: np.ndarray) -> Iterator[tuple[int, int, np.ndarray, np.ndarray, np.ndarray]]:
+        """For tiles first ... stop - 1: rows that see all of each, (stop - first, n_rows) bool, and the pairs (tile,
+        row) for which each point must be asked, in the order of the tiles."""
+        raw, antennas = self.task.raw, self.task.antennas
+        low, high = positions.min(axis=1), positions.max(axis=1)
+        middle = (low + high) / 2
+        radius = np.sqrt(((positions - middle[:, None]) ** 2).sum(axis=-1).max(axis=1))
+        origin = middle.mean(axis=0)
+        half = SPEED_OF_LIGHT / (4 * raw.frequency_step)
+        ends = [e - origin for e in antennas.ends]
+        farthest = max(float(np.abs(e).max()) for e in ends) + float(np.abs(middle - origin).max())
+        step = max(1, PAIRS // raw.n_rows)
+        for first in range(0, len(middle), step):
+            stop = min(first + step, len(middle))
+            x, reach = middle[first:stop] - origin, radius[first:stop, None] + SLACK * farthest
+            distances = [_distances(x, e) for e in ends]
+            whole = np.ones((stop - first, raw.n_rows), bool)
+            outside = np.zeros_like(whole)
+            if not self.task.wrap:
+                depth = half - np.abs(sum(distances) / len(ends) - raw.reference_range)
+                whole &= depth > reach
+                outside |= depth < -reach
+            if antennas.beam is not None:
+                angle = antennas.beam_angle / 2
+                along = x @ antennas.beam.T - np.einsum("px,px->p", ends[0], antennas.beam)
+                across = np.sqrt(np.maximum(distances[0] ** 2 - along**2, 0))
+                inside = along * np.sin(angle) - across * np.cos(angle)  # no more than the distance from the cone
+                # of a point on the axis `across` is a difference of nearly equal squares
+                slack = reach + np.abs(np.cos(angle)) * np.sqrt(SLACK) * farthest * (across < 1e-4 * distances[0])
+                whole &= inside > slack
+                outside |= inside < -slack
+            tile, row = np.nonzero(~(whole | outside))
+            yield first, stop, whole, tile + first, row
+
+
+def _distances(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
+    """Distances (n, m) of points, m (n, 3), from ends, m (m, 3)."""
+    squares = (points**2).sum(axis=1)[:, None] + (ends**2).sum(axis=1) - 2 * points @ ends.T
+    return np.sqrt(np.maximum(squares, 0))
+
+
+def _pieces(tile: np.ndarray, per_tile: int) -> Iterator[slice]:
+    """All pairs, in pieces of about PAIRS values."""
+    step = max(1, PAIRS // per_tile)
+    for start in range(0, len(tile), step):
+        yield slice(start, start + step)
