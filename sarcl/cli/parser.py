@@ -148,7 +148,11 @@ def _focus(p: argparse.ArgumentParser) -> None:
         "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
     )
     how.add_argument("--dry-run", action="store_true", help="print method, time, memory and error, and focus nothing")
-    how.add_argument("--window", type=window, help="hamming, or taylor:SIDELOBE_DB:NBAR such as taylor:35:5")
+    how.add_argument(
+        "--window",
+        type=window,
+        help="hamming, taylor:SIDELOBE_DB:NBAR such as taylor:35:5, hann, kaiser:8.6 ...; or RANGE,CROSS-RANGE",
+    )
     how.add_argument(
         "--beam",
         type=degrees,
@@ -271,7 +275,7 @@ class _Version(argparse.Action):
 
 
 def window(text: str) -> Any:
-    """ "none", "hamming" or "taylor:35:5" as `backproject` takes it."""
+    """ "none", "hamming", "taylor:35:5" or "hann,none" as `backproject` takes it."""
     from ..numerics.windows import parse
 
     try:

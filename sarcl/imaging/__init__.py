@@ -12,7 +12,6 @@ For other folders:
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
     profile_energy   energy of the range profiles against the energy at the pixels
-    row_coverage     which rows saw a pixel, and the sum of their weights: the gain of the image
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
@@ -24,6 +23,7 @@ For other folders:
 
 For this folder alone:
 
+    _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
     _unseen_pixels   pixels outside the range window of every row
 """
 
@@ -43,7 +43,6 @@ __all__ = [
     "polar_format",
     "profile_energy",
     "range_doppler",
-    "row_coverage",
     "run",
     "strip_map",
     "tiling",

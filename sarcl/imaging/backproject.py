@@ -22,13 +22,13 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
+from ._row_coverage import gain_of, room_for_gain
 from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice, choose
 from .collection import collection
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip
-from .row_coverage import gain_of, room_for_gain
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
@@ -99,7 +99,9 @@ def backproject(
     tolerance  L2 error allowed, relative to the larger of the norm of I and the norm of the same contributions with
                random phases
     method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
-    window     None, "hamming" or ("taylor", sidelobe_db, nbar): over samples and over rows
+    window     None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as "hann" or
+               ("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or of
+               arrays with a weight per sample and per row of a channel
     weights    one per row (n_rows,), multiplied with window and raw.weight
     beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
                grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)

@@ -7,7 +7,7 @@ from typing import Any
 from ..base import wgs84
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
-from ..numerics.windows import Window
+from ..numerics.windows import Window, in_words
 
 
 def collection(raw: PhaseHistory, grid: ImageGrid, window: Window | None) -> dict[str, Any]:
@@ -24,13 +24,7 @@ def collection(raw: PhaseHistory, grid: ImageGrid, window: Window | None) -> dic
         **{name: None if speed is None else speed[middle] for name, speed in speeds.items()},
         "time": None if raw.time is None else (raw.time.min(), raw.time.max()),
         "band": ((raw.frequency - half).min(), (raw.frequency + (raw.n_samples - 1) * raw.frequency_step + half).max()),
-        "window": _in_words(window),
+        "window": in_words(window),
         "polarization": "+".join(kinds) or None,
         "frame": "local" if wgs84.vertical_at(grid.bounds.mean(axis=0)) is None else "earth-fixed",
     }
-
-
-def _in_words(window: Window | None) -> str | None:
-    if window is None or isinstance(window, str):
-        return window
-    return " ".join(f"{part:g}" if isinstance(part, (int, float)) else str(part) for part in window)

@@ -15,6 +15,7 @@ from ..base.validation import array, converted, finite, number
 from ..base.vectors import unit
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics import windows
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
@@ -150,15 +151,14 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
 
     The rows of each channel and polarisation, in time, share one window over the aperture.
     """
-    from ..numerics.windows import weights as window_weights
-
+    across, along = windows.both(window)
     rows = np.ones(raw.n_rows)
-    if window is not None:
+    if along is not None:
         when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
         group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
         for g in np.unique(group):
             members = np.flatnonzero(group == g)
-            rows[members[np.argsort(when[members])]] = window_weights(window, len(members))
+            rows[members[np.argsort(when[members])]] = windows.weights(along, len(members))
     if raw.weight is not None:
         rows = rows * raw.weight
     if weights is not None:
@@ -167,7 +167,7 @@ def weigh(raw: PhaseHistory, window: Window | None, weights: ArrayLike | None) -
         raise ValueError(f"weights[{int(np.argmin(rows))}] is negative; a weight cannot be")
     if not rows.any():
         raise ValueError("every row has weight 0; nothing would be focused")
-    return window_weights(window, raw.n_samples), rows
+    return windows.weights(across, raw.n_samples), rows
 
 
 def geometry_of(

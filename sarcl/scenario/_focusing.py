@@ -114,9 +114,9 @@ def _range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> di
 
 def check_window(scenario: Scenario) -> None:
     """Check the window before the simulation: the image would refuse it only after the echoes are computed."""
-    from ..numerics.windows import weights
+    from ..numerics.windows import check
 
     section = section_of(scenario)
     given = Builder(scenario).options(section, {})
     with scenario.where.blame((section,), given, always=False):
-        weights(given.get("window"), 8)
+        check(given.get("window"))

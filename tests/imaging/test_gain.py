@@ -11,8 +11,8 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.imaging._row_coverage import gain_of, may_vary
 from sarcl.imaging.focusing_task import make_task
-from sarcl.imaging.row_coverage import gain_of, may_vary
 from sarcl.reference.backproject import backproject as exact
 
 
