@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike
 from ..base import validation
 
 # of one direction: a name, (name, parameters) or an array; or a pair of these, or None, for range and cross-range
-Window = str | Sequence[Any] | ArrayLike
+OneWindow = str | Sequence[str | float | Sequence[float]] | ArrayLike
+Window = OneWindow | Sequence[OneWindow | None]
 KNOWN = (
     "None, 'hamming', ('taylor', sidelobe_db, nbar) such as ('taylor', 35, 5), the names in scipy.signal.windows such "
     "as 'hann' or ('kaiser', 8.6), an array of weights, and a pair (range, cross-range) of these"
