@@ -11,12 +11,14 @@ reference: sarcl/reference/quality.py computes the exact sum instead.
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
 from ..base import constants
 from ..model.image import Image
+from ._surface import Surface, has_surface, place_of, surface_at
+from ._view import Ends, ends_at
 
 CHIP = 32  # pixels on each side of the point from whose spectrum the occupied band is determined
 LEAST = 8  # pixels on each side that a spectrum needs at least
@@ -30,27 +32,36 @@ KAISER = 8.96, 5.715  # shape, and pixels times transition width, for 90 dB by K
 class ImageInterpolator:
     """Values of an image between pixels: called with positions m (n, 3) on the grid, it returns I, complex128 (n,).
 
-    origin  x_0, m (3,); the values depend on it by rounding alone
-    taps    pixels along each axis from which a value is interpolated, even
+    pixel    (row, column) of the response;  origin  x_0, its position, m (3,)
+    surface  where positions and indices belong together: the grid, or a plane that touches it
+    ends     positions of transmitter and receiver that the carrier follows from, m (3,) each
+    taps     pixels along each axis from which a value is interpolated, even
+    offset   cycles per pixel along rows and columns, which are left of the carrier and removed with it
 
     The error is at most 1e-4 of the nearby peak. Raises ValueError where a position lies within taps/2 pixels of the
     border, or a pixel is NaN or Inf.
     """
 
     image: Image
+    pixel: tuple[int, int]
     origin: np.ndarray
-    taps: int
+    surface: Surface
+    ends: Ends
+    taps: int = 2
+    offset: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
     def about(cls, image: Image, row: int, column: int) -> ImageInterpolator:
         """An interpolator for the response at a pixel. Raises ValueError if the grid is too coarse or too small."""
-        origin = image.grid.at(row, column)
-        band = max(_bands(image, origin, row, column))
+        origin = place_of(image, row, column)
+        plain = cls(image, (row, column), origin, surface_at(image, row, column), ends_at(image, origin))
+        bands, offset = _bands(plain)
         # transition of the kernel: from the band's edge to its alias, 1 - 2 band cycles per pixel
-        return cls(image, origin, 2 * int(np.ceil(KAISER[1] / (1 - 2 * band) / 2)))
+        taps = 2 * int(np.ceil(KAISER[1] / (1 - 2 * max(bands)) / 2))
+        return replace(plain, taps=taps, offset=offset)
 
     def __call__(self, position: np.ndarray) -> np.ndarray:
-        index = self.image.grid.index(position)
+        index = self.surface.index(position)
         first = np.floor(index).astype(int) - self.taps // 2 + 1
         low, high = first.min(axis=0), first.max(axis=0) + self.taps
         if (low < 0).any() or (high > self.image.grid.shape).any():
@@ -58,45 +69,66 @@ class ImageInterpolator:
                 f"a value between pixels needs {self.taps // 2} pixels on each side; the image of "
                 f"{self.image.grid.shape} ends before that about {index[0].round(1)}: focus a larger grid"
             )
-        chip = _baseband(self.image, self.origin, low, high)
+        chip = self.baseband(low, high)
         taken = first[:, :, None] + np.arange(self.taps)  # (n, 2, taps)
         weight = _kernel(index[:, :, None] - taken, self.taps)
         rows, columns = np.moveaxis(taken - low[:, None], 1, 0)
         near = chip[rows[:, :, None], columns[:, None, :]]
         values = np.einsum("na,nb,nab->n", weight[:, 0], weight[:, 1], near)
-        return values * _carrier(self.image, self.origin, position)
+        return values * self.carrier(position) * self._turned(index)
+
+    def carrier(self, position: np.ndarray) -> np.ndarray:
+        """exp(j phi(x)), complex (...), of positions, m (..., 3)."""
+        assert self.image.frequency is not None
+        path = np.zeros(position.shape[:-1])
+        for end in self.ends:
+            path += np.linalg.norm(position - end, axis=-1) - np.linalg.norm(self.origin - end)
+        return np.asarray(np.exp(2j * np.pi * self.image.frequency / constants.SPEED_OF_LIGHT * path))
+
+    def baseband(self, low: np.ndarray, high: np.ndarray) -> np.ndarray:
+        """Pixels low ... high - 1 (row, column) without their carrier, complex128; no others are read."""
+        chip = np.asarray(self.image.data[low[0] : high[0], low[1] : high[1]])
+        if not np.isfinite(chip).all():
+            i, j = np.argwhere(~np.isfinite(chip))[0]
+            raise ValueError(f"image data[{low[0] + i}, {low[1] + j}] is {chip[i, j]}; every value must be finite")
+        i, j = np.arange(low[0], high[0])[:, None], np.arange(low[1], high[1])
+        grid = self.image.grid
+        if has_surface(grid):
+            place = grid.at(i, j)
+        else:
+            place = grid.listed[low[0] : high[0], low[1] : high[1]]  # type: ignore[index]
+            if np.isnan(place).any():
+                raise ValueError(
+                    f"cells of the grid within {int(max(high - low) // 2)} pixels of pixel {self.pixel} are empty; a "
+                    "point is measured where all pixels about it have data"
+                )
+        turned = self._turned(np.stack(np.broadcast_arrays(i, j), axis=-1))
+        return np.asarray(chip * self.carrier(place).conj() * np.conj(turned))
+
+    def _turned(self, index: np.ndarray) -> np.ndarray | float:
+        """exp(2 pi j offset (index - pixel)), complex (...), of indices (..., 2); 1 without an offset."""
+        if not any(self.offset):
+            return 1.0
+        return np.asarray(np.exp(2j * np.pi * ((index - np.array(self.pixel)) @ np.array(self.offset))))
 
     def room(self, position: np.ndarray, axis: np.ndarray) -> float:
         """Largest distance, m, along +axis and -axis at which all pixels exist; 0 or less if some are missing here."""
-        here = self.image.grid.index(position)
-        slope = np.abs(self.image.grid.index(position + axis) - here)
+        here = self.surface.index(position)
+        slope = np.abs(self.surface.index(position + axis) - here)
         ahead = np.array(self.image.grid.shape) - 1 - self.taps // 2 - here
         behind = here - (self.taps // 2 - 1)
         with np.errstate(divide="ignore"):
             made = float(((np.minimum(ahead, behind) - 1e-6) / slope).min())
-        if not self.image.grid.is_plane:  # rows and columns of terrain are not evenly spaced: the ends must fit too
+        if (
+            self.image.grid.times is not None
+        ):  # rows and columns of terrain are not evenly spaced: the ends must fit too
             low, high = self.taps // 2 - 1, np.array(self.image.grid.shape) - 1 - self.taps // 2
             while made > 0:
-                ends = self.image.grid.index(position + made * np.array([[-1.0], [1.0]]) * axis)
+                ends = self.surface.index(position + made * np.array([[-1.0], [1.0]]) * axis)
                 if (ends >= low).all() and (ends <= high).all():
                     break
                 made *= SHRINK
         return made
-
-
-def antennas(image: Image) -> tuple[np.ndarray, np.ndarray]:
-    """Positions of transmitter and receiver at mid-aperture, m (3,)."""
-    assert image.tx is not None
-    return image.tx, image.tx if image.rx is None else image.rx
-
-
-def _carrier(image: Image, origin: np.ndarray, position: np.ndarray) -> np.ndarray:
-    """exp(j phi(x)), complex (...), of positions, m (..., 3)."""
-    assert image.frequency is not None
-    path = np.zeros(position.shape[:-1])
-    for end in antennas(image):
-        path += np.linalg.norm(position - end, axis=-1) - np.linalg.norm(origin - end)
-    return np.exp(2j * np.pi * image.frequency / constants.SPEED_OF_LIGHT * path)
 
 
 def _kernel(distance: np.ndarray, taps: int) -> np.ndarray:
@@ -104,40 +136,48 @@ def _kernel(distance: np.ndarray, taps: int) -> np.ndarray:
     return np.sinc(distance) * np.i0(KAISER[0] * np.sqrt(inside)) / np.i0(KAISER[0])
 
 
-def _baseband(image: Image, origin: np.ndarray, low: np.ndarray, high: np.ndarray) -> np.ndarray:
-    """Pixels low ... high - 1 (row, column) without their carrier, complex128; no others are read."""
-    chip = np.asarray(image.data[low[0] : high[0], low[1] : high[1]])
-    if not np.isfinite(chip).all():
-        i, j = np.argwhere(~np.isfinite(chip))[0]
-        raise ValueError(f"image data[{low[0] + i}, {low[1] + j}] is {chip[i, j]}; every value must be finite")
-    place = image.grid.at(np.arange(low[0], high[0])[:, None], np.arange(low[1], high[1]))
-    return chip * _carrier(image, origin, place).conj()
-
-
-def _bands(image: Image, origin: np.ndarray, row: int, column: int) -> list[float]:
-    """Largest frequencies, cycles per pixel, of the response at a pixel, along rows and along columns."""
-    at, shape = np.array([row, column]), np.array(image.grid.shape)
+def _bands(about: ImageInterpolator) -> tuple[list[float], tuple[float, float]]:
+    """Largest frequencies, cycles per pixel, of the response at a pixel, along rows and along columns; and the middle
+    of its band, where the response fits between its aliases about that, but not about the carrier."""
+    row, column = about.pixel
+    at, shape = np.array(about.pixel), np.array(about.image.grid.shape)
     half = np.minimum(CHIP, np.minimum(at, shape - 1 - at))
     if half.min() < LEAST:
         raise ValueError(
-            f"the peak at pixel ({row}, {column}) of an image of {image.grid.shape} lies {half.min()} pixels "
+            f"the peak at pixel ({row}, {column}) of an image of {about.image.grid.shape} lies {half.min()} pixels "
             f"from the border; at least {LEAST}, and 3 resolution cells, are needed: focus a larger grid"
         )
-    chip = _baseband(image, origin, at - half, at + half + 1)
+    chip = about.baseband(at - half, at + half + 1)
     for axis in (0, 1):  # a Hann taper: truncation must not leak over the band
         taper = np.cos(np.pi / 2 * np.arange(-half[axis], half[axis] + 1) / (half[axis] + 1)) ** 2
         chip *= np.expand_dims(taper, 1 - axis)
     power = np.abs(np.fft.fft2(chip)) ** 2
-    bands = []
+    bands, offset = [], []
     for axis, name in ((0, "row"), (1, "column")):
         density = power.max(axis=1 - axis)  # not the sum: a rotated band ends in a thin corner
         frequency = np.abs(np.fft.fftfreq(len(density)))
-        bands.append(float(frequency[density > FALL * density.max()].max()))
+        occupied = density > FALL * density.max()
+        bands.append(float(frequency[occupied].max()))
+        offset.append(0.0)
         if bands[-1] > BAND:
-            spacing = image.grid.spacing_at(row, column)[axis]
-            raise ValueError(
-                f"the grid is coarser than the resolution: at a {name} spacing of {spacing:g} m the response "
-                f"fills +-{bands[-1]:.2f} of +-0.5 cycles per pixel, more than +-{BAND}; focus again with a "
-                f"{name} spacing of at most {spacing / 2:g} m (or correct image.frequency, tx and rx)"
-            )
-    return bands
+            offset[-1], around = _middle(occupied)
+            if around > BAND:
+                spacing = about.surface.spacing_at(row, column)[axis]
+                raise ValueError(
+                    f"the grid is coarser than the resolution: at a {name} spacing of {spacing:g} m the response "
+                    f"fills +-{around:.2f} of +-0.5 cycles per pixel, more than +-{BAND}; focus again with a "
+                    f"{name} spacing of at most {spacing / 2:g} m"
+                )
+            bands[-1] = around
+    return bands, (offset[0], offset[1])
+
+
+def _middle(occupied: np.ndarray) -> tuple[float, float]:
+    """Middle and half width, cycles per pixel, of the band outside the longest run of frequencies (n,) that are not
+    occupied; frequencies in the order of the FFT, which go round in a circle."""
+    n, at = len(occupied), np.flatnonzero(occupied)
+    gaps = np.diff(np.append(at, at[0] + n))
+    k = int(gaps.argmax())
+    low, width = at[(k + 1) % len(at)], n - gaps[k]  # the band begins behind the gap
+    middle = (low + width / 2) / n
+    return float(middle - np.rint(middle)), float(width / 2 / n)

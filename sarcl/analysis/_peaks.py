@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base import validation
 from ..model.image import Image
+from ._surface import pixel_of, place_of
 
 
 def brightest(image: Image) -> tuple[int, int]:
@@ -31,7 +32,7 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
     """Row and column of the highest peak within two cells of `near`; the cell is the peak's half-power width."""
     near = validation.array("near", near, np.float64, (3,))
     shape = np.array(image.grid.shape)
-    index = image.grid.index(near)
+    index = pixel_of(image, near)
     start = np.rint(index).astype(int)
     if (start < 0).any() or (start >= shape).any():
         raise ValueError(f"near {place(near)} is pixel {place(index, 1)}, outside the image of {image.grid.shape}")
@@ -51,7 +52,7 @@ def peak_near(image: Image, near: Any) -> tuple[int, int]:
             break
         radius = np.maximum(radius, wanted)
     if level[i, j] < level[max(i - 1, 0) : i + 2, max(j - 1, 0) : j + 2].max():
-        uphill = image.grid.at(i + low[0], j + low[1])
+        uphill = place_of(image, int(i + low[0]), int(j + low[1]))
         raise ValueError(
             f"no peak lies within two resolution cells of near {place(near)}; the image still rises at "
             f"{place(uphill)}: move near to the point, or leave it out to measure the brightest"

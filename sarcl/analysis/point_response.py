@@ -10,21 +10,46 @@ all conventions; sarcl/reference/quality.py measures an exactly computed image.
 from __future__ import annotations
 
 from collections.abc import Callable
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from typing import TYPE_CHECKING, overload
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
 from ..model.image import Image
-from ._image_interpolator import ImageInterpolator, antennas
+from ._image_interpolator import ImageInterpolator
 from ._peaks import brightest, peak_near, place
+from ._surface import place_of, surface_at
+from ._view import ends_at
+
+if TYPE_CHECKING:
+    import PIL.Image
 
 REACH = 10.0  # IRW on each side over which side lobes are measured
 LEAST_REACH = 3.0  # IRW on each side that the image must hold
 MARGIN = 18  # pixels that the interpolator may need on each side
 STEPS = 32  # points of a cut per IRW
 NAMES = "range", "cross-range"
+
+
+@dataclass(frozen=True, eq=False)
+class Cut:
+    """A cut through a point response.
+
+    name      "range" or "cross-range"
+    distance  m (n,), from the peak, evenly spaced over +-reach IRW;  values  of the image there, complex128 (n,)
+    """
+
+    name: str
+    distance: NDArray[np.float64]
+    values: NDArray[np.complex128]
+
+    def decibels(self) -> NDArray[np.float64]:
+        """20 log10 of the modulus over that of the peak, dB (n,)."""
+        level = np.abs(self.values)
+        with np.errstate(divide="ignore"):
+            return np.asarray(20 * np.log10(level / level[len(level) // 2]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -36,8 +61,9 @@ class PointResponse:
     pslr      highest lobe outside the first nulls over the peak, dB
     islr      energy outside the first nulls, within +-`reach` IRW, over the energy between the nulls, dB
     peak      complex value of the image at `position`, in the unit of the image's data
-    gain      the image's gain at that pixel: |peak/gain|^2 is the point's radar cross section, m^2
+    gain      the image's gain at the nearest pixel: |peak/gain|^2 is the point's radar cross section, m^2
     reach     IRW on each side that pslr and islr cover: 10, or as far as the image extends
+    cuts      the cuts in range and cross-range from which the figures are taken
     """
 
     position: NDArray[np.float64]
@@ -47,10 +73,35 @@ class PointResponse:
     peak: complex
     gain: float = 1.0
     reach: tuple[float, float] = (REACH, REACH)
+    cuts: tuple[Cut, Cut] | None = field(default=None, repr=False)
+
+    @property
+    def rcs(self) -> float:
+        """|peak/gain|^2, m^2: the radar cross section if the image is calibrated."""
+        return float(abs(self.peak / self.gain) ** 2)
+
+    def show(self, floor_db: float = -50.0, *, title: str | None = None) -> PIL.Image.Image:
+        """The two cuts as a picture: decibels below the peak over metres from it. ValueError without cuts.
+
+        floor_db  the lowest level drawn;  title  above the picture
+        """
+        from ..figures.cut_plot import curves
+
+        if self.cuts is None:
+            raise ValueError("this PointResponse has no cuts; take one from sarcl.measure")
+        level = round(10 * np.log10(self.rcs), 2) + 0.0
+        caption = ", ".join(
+            f"{cut.name}: {irw:.4g} m, PSLR {pslr:.2f} dB, ISLR {islr:.2f} dB"
+            for cut, irw, pslr, islr in zip(self.cuts, self.irw, self.pslr, self.islr, strict=True)
+        )
+        return curves(
+            [(cut.name, cut.distance, cut.decibels()) for cut in self.cuts], "from the peak (m)", floor_db, title,
+            f"{caption}. Peak at {place(self.position)} m, {level:.2f} dBsm if calibrated.",
+        )  # fmt: skip
 
     def __str__(self) -> str:
         amplitude = abs(self.peak) / self.gain
-        level = round(20 * np.log10(amplitude), 2) + 0.0  # no -0.00
+        level = round(float(20 * np.log10(amplitude)), 2) + 0.0  # no -0.00
         rows = (
             ("IRW, half power", self.irw, ".4f", "m"),
             ("PSLR", self.pslr, ".2f", "dB"),
@@ -67,34 +118,54 @@ class PointResponse:
         return "\n".join(lines)
 
 
-def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
-    """Position, resolution and side lobes of one point of a complex image on a plane, or by `range_doppler`.
+@overload
+def measure(image: Image, near: None = None) -> PointResponse: ...
 
-    image  with frequency (Hz) and tx, rx (m; rx None is tx); only the data that are needed are read
-    near   m (3,), projected on the plane along its normal: the highest peak within two resolution cells of it
-           is measured. Default: the brightest pixel
 
-    Cuts run along range and cross-range projected on the grid. IRW is the half-power width; PSLR the highest
+@overload
+def measure(image: Image, near: ArrayLike | None) -> PointResponse | tuple[PointResponse, ...]: ...
+
+
+def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tuple[PointResponse, ...]:
+    """Position, resolution and side lobes of a point of a complex image, or of each of several points.
+
+    image  of rows and columns, with frequency (Hz) and tx, rx (m; rx None is tx); only the data that are needed are
+           read. On a plane or a grid by `range_doppler`, or on listed points of a surface: these are measured on the
+           plane that touches the surface at the peak
+    near   m (3,), projected on the surface along its normal: the highest peak within two resolution cells of it
+           is measured. Default: the brightest pixel. (n, 3): that many points, a tuple of a PointResponse each
+
+    Cuts run along range and cross-range projected on the grid; range is the direction of the antennas in the middle
+    of the rows that saw the point. IRW is the half-power width; PSLR the highest
     lobe outside the first nulls; ISLR takes the main lobe from null to null and side lobes out to 10 IRW, or
     as far as the image extends on both sides. A uniform aperture has -13.26 and -10.22 dB.
-    ValueError for a detected image, a grid of listed points, no frequency or tx, an image of zeros, NaN or
+    ValueError for a detected image, a grid of one axis or of three, no frequency or tx, an image of zeros, NaN or
     Inf, a `near` outside the grid or without a peak, a peak closer than 3 IRW to the border or in the
     response of a stronger one, and a grid coarser than the resolution: one on which the response fills more
     than +-0.42 of the +-0.5 cycles per pixel.
     Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
     """
     _check(image)
-    row, column = brightest(image) if near is None else peak_near(image, near)
-    axes = _axes(image, row, column)
+    if near is None:
+        return _measured(image, *brightest(image))
+    if validation.ndim("near", near) != 2:
+        return _measured(image, *peak_near(image, near))
+    places = validation.array("near", near, np.float64, ("n", 3))
+    return tuple(_measured(image, *peak_near(image, one)) for one in places)
+
+
+def _measured(image: Image, row: int, column: int) -> PointResponse:
+    """The response of the peak at a pixel."""
     interpolated = ImageInterpolator.about(image, row, column)
-    step = min(image.grid.spacing_at(row, column)) / 4
-    position = _ascend(interpolated, image.grid.at(row, column), axes, step)
+    axes = _axes(image, row, column)
+    step = min(interpolated.surface.spacing_at(row, column)) / 4
+    position = _ascend(interpolated, interpolated.origin, axes, step)
 
     def cut(axis: np.ndarray, name: str) -> _Cut:
-        def power(t: np.ndarray) -> np.ndarray:
-            return np.abs(interpolated(position + t[:, None] * axis)) ** 2
+        def values(t: np.ndarray) -> np.ndarray:
+            return interpolated(position + t[:, None] * axis)
 
-        made = _cut(power, interpolated.room(position, axis), step, name)
+        made = _cut(values, interpolated.room(position, axis), step, name)
         if made.pslr >= 0:
             stronger = position + made.lobe * axis
             raise ValueError(
@@ -113,14 +184,18 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse:
         peak=complex(interpolated(position[None])[0]),
         gain=float(image.gain[row, column]) if isinstance(image.gain, np.ndarray) else image.gain,
         reach=(along.reach, across.reach),
+        cuts=(along.cut, across.cut),
     )
 
 
 def _check(image: Image) -> None:
     if not image.is_complex:
         raise ValueError("the image is detected (multilooked), without phase; measure the complex image")
-    if not image.grid.is_plane and image.grid.times is None:
-        raise ValueError("the grid lists its points; cuts need rows and columns: focus on an ImageGrid.plane")
+    if len(image.grid.shape) != 2 or (min(image.grid.shape) < 2 and not image.grid.is_plane):
+        raise ValueError(
+            f"the grid lists points of shape {image.grid.shape}; cuts need rows and columns of a surface: focus on an "
+            "ImageGrid.plane, or list the points row by row"
+        )
     wanted = {"frequency": "the centre frequency, Hz", "tx": "the antenna at mid-aperture, m (3,)"}
     for name, what in wanted.items():
         if getattr(image, name) is None:
@@ -128,10 +203,11 @@ def _check(image: Image) -> None:
 
 
 def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors of range and cross-range on the plane, at a pixel."""
-    normal = image.grid.normal_at(row, column)
-    point = image.grid.at(row, column)
-    gradient = -np.sum([validation.direction("antenna less point", end - point) for end in antennas(image)], axis=0)
+    """Unit vectors of range and cross-range on the surface, at a pixel."""
+    normal = surface_at(image, row, column).normal_at(row, column)
+    point = place_of(image, row, column)
+    ends = ends_at(image, point)
+    gradient = -np.sum([validation.direction("antenna less point", end - point) for end in ends], axis=0)
     along = gradient - (gradient @ normal) * normal
     length = np.linalg.norm(along)
     if length < 1e-3:
@@ -154,7 +230,7 @@ def _ascend(
             x = x + step * float(np.clip(move, -1, 1)) * axis
         if np.linalg.norm(x - before) < 1e-5 * step:
             return x
-        if np.linalg.norm(interpolated.image.grid.index(x) - interpolated.image.grid.index(start)) > 3:
+        if np.linalg.norm(interpolated.surface.index(x) - interpolated.surface.index(start)) > 3:
             break
     raise ValueError(f"no peak was found at {place(start)}: the image rises in every direction from it")
 
@@ -166,10 +242,15 @@ class _Cut:
     islr: float
     reach: float
     lobe: float  # position of the highest side lobe, m from the peak
+    cut: Cut
 
 
-def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, name: str) -> _Cut:
-    """Resolution and side lobes of a cut; power(t) is |I|^2 at t m from the peak, t (n,), for |t| <= room."""
+def _cut(values: Callable[[np.ndarray], np.ndarray], room: float, step: float, name: str) -> _Cut:
+    """Resolution and side lobes of a cut; values(t) are I at t m from the peak, t (n,), for |t| <= room."""
+
+    def power(t: np.ndarray) -> np.ndarray:
+        return np.abs(values(t)) ** 2
+
     irw = _half_power(power, room, step) + _half_power(lambda t: power(-t), room, step)
     reach = min(REACH, room / irw)
     if not reach >= LEAST_REACH:
@@ -179,7 +260,8 @@ def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, na
         )
     n = int(np.ceil(reach * STEPS))
     t = np.linspace(-reach * irw, reach * irw, 2 * n + 1)
-    p = power(t)
+    sampled = values(t)
+    p = np.abs(sampled) ** 2
     rising = np.diff(p) > 0
     if not (rising[n:].any() and (~rising[:n]).any()):
         raise ValueError(f"in {name} the main lobe has no end within {reach:.1f} IRW: the image is not focused")
@@ -192,7 +274,7 @@ def _cut(power: Callable[[np.ndarray], np.ndarray], room: float, step: float, na
         bend = p[i - 1] - 2 * p[i] + p[i + 1]
         highest -= (p[i - 1] - p[i + 1]) ** 2 / (8 * bend)
     decibels = 10 * np.log10(np.array([highest / p[n], _integral(p) / inside - 1]))
-    return _Cut(irw, float(decibels[0]), float(decibels[1]), reach, float(lobe))
+    return _Cut(irw, float(decibels[0]), float(decibels[1]), reach, float(lobe), Cut(name, t, sampled))
 
 
 def _integral(p: np.ndarray) -> float:

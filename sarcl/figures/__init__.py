@@ -2,6 +2,7 @@
 
 For other folders:
 
+    cut_plot   curves in decibels in one frame, with Pillow
     decibels   grey images and line plots in decibels, with Pillow
     html       a page in one file: headings, tables, figures; needs the extra `plots`
     plots      plots as PNG files, with matplotlib; needs the extra `plots`
@@ -11,4 +12,4 @@ For this folder alone:
     _axes      frame, ticks, title and caption of a grey image
 """
 
-__all__ = ["decibels", "html", "plots"]
+__all__ = ["cut_plot", "decibels", "html", "plots"]

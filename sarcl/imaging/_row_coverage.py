@@ -17,10 +17,13 @@ import numpy as np
 
 from ..base import validation
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.rows import spread_over
+from ..numerics.pulse_geometry import UNLIMITED
 from .focusing_task import FocusingTask
 from .tiling.of_grid import tiling_of
 
 SIDE = 16  # pixels along a side of a tile
+ROWS = 256  # of Image.aperture, at most
 PAIRS = 2**20  # pairs of a tile and a row, and values of crossing pairs, that are looked at together
 SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, which are differences of squares
 
@@ -50,14 +53,16 @@ def room_for_gain(task: FocusingTask, dtype: Any) -> None:
         )  # fmt: skip
 
 
-def gain_of(task: FocusingTask, dtype: Any) -> float | np.ndarray:
-    """The image's gain: a number where it is the same in all pixels, else an array of the grid's shape.
+def seen_by(task: FocusingTask, dtype: Any) -> dict[str, Any]:
+    """Fields `gain` and `aperture` of an Image.
 
-    dtype  of the pixels: the gain has float32 beside complex64, and float64 beside complex128
+    The gain is a number where it is the same in all pixels, else an array of the grid's shape. The aperture is None
+    where every row saw every pixel. dtype is that of the pixels: the gain has float32 beside complex64, and float64
+    beside complex128.
     """
     whole = float(task.row_weight.sum() * task.sample_weight.sum())
     if not may_vary(task):
-        return whole
+        return {"gain": whole}
     tiling, grid = tiling_of(task.grid, SIDE), task.grid
     flat = np.zeros(grid.shape if tiling.in_rows else grid.size, _kind(dtype))
     coverage, complete = RowCoverage(task), True
@@ -68,13 +73,26 @@ def gain_of(task: FocusingTask, dtype: Any) -> float | np.ndarray:
         complete = complete and bool((count == task.raw.n_rows).all())
         tiling.place((weight * task.sample_weight.sum()).ravel(), (band, band + 1), 0, orders, flat)
     if complete:
-        return whole
+        return {"gain": whole}
     made = flat.reshape(grid.shape)
     used = made if grid.empty is None else made[~grid.empty]
     low, high = float(used.min()), float(used.max())
-    if high == 0:  # no pixel is seen: the image is zero, and a gain is not
-        return whole
-    return low if low == high else made
+    # where no pixel is seen the image is zero, and a gain is not
+    gain = whole if high == 0 else low if low == high else made
+    return {"gain": gain, "aperture": _aperture(task)}
+
+
+def _aperture(task: FocusingTask) -> np.ndarray:
+    """Rows spread over all, (k, 13), as Image.aperture holds them."""
+    raw, antennas = task.raw, task.antennas
+    rows = spread_over(raw.n_rows, ROWS)
+    half = np.full(len(rows), UNLIMITED) if task.wrap else SPEED_OF_LIGHT / (4 * raw.frequency_step[rows])
+    beam, cosine = np.zeros((len(rows), 3)), -1.0
+    if antennas.beam is not None:
+        beam, cosine = antennas.beam[rows], float(np.cos(antennas.beam_angle / 2))
+    reference = raw.reference_range[rows]
+    limits = [np.full(len(rows), cosine), reference - half, reference + half, task.row_weight[rows]]
+    return np.column_stack([raw.tx[rows], raw.rx[rows], beam, *limits])
 
 
 def _kind(dtype: Any) -> np.dtype:

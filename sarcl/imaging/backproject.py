@@ -22,7 +22,7 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import DeviceChoice
-from ._row_coverage import gain_of, room_for_gain
+from ._row_coverage import room_for_gain, seen_by
 from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice, choose
 from .collection import collection
@@ -189,7 +189,7 @@ def backproject(
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
             measured = _measure_error(task, grid, output.data)
             clock.lap("check")
-        gain = gain_of(task, chosen.dtype)
+        seen = seen_by(task, chosen.dtype)
         clock.lap("gain")
         plan = chosen.plan.describe(chosen.method)
         if kept:
@@ -213,7 +213,7 @@ def backproject(
         )
         image = output.image(
             job=checkpoint.mark if checkpoint and checkpoint.tiles else None,
-            gain=gain,
+            **seen,
             frequency=float(np.median(task.antennas.frequency)),
             report=report,
             **collection(task.raw, grid, window),

@@ -26,7 +26,7 @@ FRAMES = ("local", "earth-fixed")
 # all fields but data and grid, as files hold them
 FIELDS = (
     "gain", "frequency", "tx", "rx", "report", "tx_velocity", "rx_velocity", "time", "band", "window", "polarization",
-    "frame",
+    "frame", "aperture",
 )  # fmt: skip
 
 
@@ -52,6 +52,9 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     band          lowest and highest frequency, Hz (2,)
     window        the window that it was made with, in words
     polarization  "HH", ..., or the several that were summed: "HH+VV"
+    aperture      (k, 13), where rows saw different pixels: up to 256 rows, spread over all. Columns: tx and rx, m;
+                  unit direction of the beam and cosine of half its angle (0 and -1: no beam); smallest and largest
+                  half path of the range window, m; weight. What saw a position follows from them (`sarcl.measure`)
     frame         of positions: "earth-fixed" where the grid lies within 32 km of the ellipsoid, or "local"
     """
 
@@ -69,6 +72,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     window: str | None = None
     polarization: str | None = None
     frame: str | None = None
+    aperture: NDArray[np.float64] | None = None
 
     if TYPE_CHECKING:  # types of the arguments; the fields above have the types after conversion
 
@@ -88,6 +92,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             window: str | None = None,
             polarization: str | None = None,
             frame: str | None = None,
+            aperture: ArrayLike | None = None,
         ) -> None: ...
 
     def __post_init__(self) -> None:
@@ -108,6 +113,9 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         for name, length in (("tx", 3), ("rx", 3), ("tx_velocity", 3), ("rx_velocity", 3), ("time", 2), ("band", 2)):
             if getattr(self, name) is not None:
                 object.__setattr__(self, name, validation.array(name, getattr(self, name), np.float64, (length,)))
+        if self.aperture is not None:
+            rows = validation.array("image aperture", self.aperture, np.float64, ("k", 13))
+            object.__setattr__(self, "aperture", rows)
         if self.frame is not None:
             validation.choice("image frame", self.frame, FRAMES)
 

@@ -332,8 +332,8 @@ def test_what_cannot_be_measured_is_refused(pair):
             sarcl.measure(broken, near=near)
 
     refused(r"multilooked\), without phase", image.multilook(2))
-    points = sarcl.ImageGrid.points(image.grid.positions)
-    refused("ImageGrid.plane", replace(image, grid=points))
+    points = sarcl.ImageGrid.points(image.grid.positions.reshape(-1, 3))
+    refused("ImageGrid.plane", replace(image, grid=points, data=np.ravel(image.data)))
     refused("image.frequency is None.*centre frequency", replace(image, frequency=None))
     refused("image.tx is None.*mid-aperture", replace(image, tx=None))
     refused("zero everywhere", replace(image, data=np.zeros(image.grid.shape, complex)))

@@ -43,3 +43,25 @@ def history(points=POINTS, lit=True):
         record, rate=RATE, start=start, tx=TX, kind="chirped", waveform=pulse, time=np.arange(N_ROWS) / 100
     )
     return sarcl.compress(raw)
+
+
+def unit_points(points=POINTS, n_samples=256):
+    """Echoes of unit points from the image equation: every sample has modulus 1, and each row those in its beam."""
+    frequency = CARRIER + (np.arange(n_samples) - (n_samples - 1) / 2) * BANDWIDTH / n_samples
+    reference = NEAR / np.cos(SQUINT)
+    samples = np.zeros((N_ROWS, n_samples), np.complex128)
+    for point, lit in zip(points, seen(points), strict=True):
+        path = np.linalg.norm(TX[lit] - point, axis=1) - reference
+        samples[lit] += np.exp(-4j * np.pi / SPEED_OF_LIGHT * path[:, None] * frequency)
+    return sarcl.PhaseHistory(
+        samples.astype(np.complex64), frequency=frequency[0], frequency_step=BANDWIDTH / n_samples, tx=TX,
+        reference_range=reference, time=np.arange(N_ROWS) / 100,
+    )  # fmt: skip
+
+
+def scene_grid(along=0.35, across=1.0):
+    """One grid that holds all points, and 28 m beyond them."""
+    y = AHEAD + np.mean(PLACES[:: len(PLACES) - 1])
+    return sarcl.ImageGrid.plane(
+        center=(NEAR, y, 0), shape=(int(606 / along), int(96 / across)), spacing=(along, across)
+    )

@@ -11,9 +11,13 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging._row_coverage import gain_of, may_vary
+from sarcl.imaging._row_coverage import may_vary, seen_by
 from sarcl.imaging.focusing_task import make_task
 from sarcl.reference.backproject import backproject as exact
+
+
+def gain_of(task, dtype):
+    return seen_by(task, dtype)["gain"]
 
 
 def by_hand(raw, points, beam=None, weights=None, wrap=False):
