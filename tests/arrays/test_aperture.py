@@ -92,6 +92,27 @@ def test_without_the_switch_nothing_grows():
         assert nulls[0] == pytest.approx(nulls[1], abs=1e-3)
 
 
+@pytest.mark.parametrize(
+    "antenna, step, apparent",
+    [
+        ((-4000.0, 300.0, 1000.0), 20e6, (-4000.025708, 292.502867, 999.868344)),  # g = d f0/df = 7.5 m
+        ((-5000.0, -200.0, 0.0), 2e6, (-4999.437596, -275.014018, 0.0)),  # 75 m
+    ],
+)
+def test_apparent_positions_are_those_of_the_papers_angles(antenna, step, apparent):
+    """Computed by hand: theta = atan2((Yc - Ry) + g (1 - ky^2), (Xc - Rx) - g kx ky), (5.14) with the signs corrected, at
+    range r + g ky, (5.15) and (5.16), and the elevation of the antenna, (5.17) and (5.18)."""
+    array = AntennaArray.linear(3, spacing=0.015, frequency_step=step, axis=(0, -1, 0))
+    here = sarcl.Trajectory([0.0, 0.1], [antenna, antenna])
+    tone = sarcl.Waveform.tone(center=F0, duration=1 / step)
+    raw = sarcl.echo(
+        sarcl.Scene.points([CENTER]), tone, here, array=array, reference=CENTER, range_window=(-3, 3), tolerance=1e-3
+    )
+    mapped = map_aperture(raw, "apparent")
+    np.testing.assert_allclose(mapped.tx, np.tile(apparent, (2, 1)), atol=1e-5)
+    np.testing.assert_allclose(mapped.reference_range, np.linalg.norm(apparent), atol=1e-5)
+
+
 def test_halved_offsets_make_half_the_growth():
     raw = collected(45, 20e6, pulses=51)
     growth = [np.ptp(map_aperture(raw, "apparent", offset=o).tx[:, 1]) - L for o in ("published", "halved")]

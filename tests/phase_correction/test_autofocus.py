@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
@@ -11,6 +12,7 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.model.lazy_rows import Columns, Scaled
 from sarcl.phase_correction import _phase_gradient, _phase_smoothing
+from sarcl.phase_correction._aperture_view import ApertureView
 from sarcl.phase_correction._bright_points import brightest, contributions
 from sarcl.reference.backproject import backproject as exact_image
 
@@ -407,6 +409,13 @@ def test_a_lag_is_half_the_path_behind_a_place():
     v = contributions(raw, nearer, [0.0, 0.5], 1.0)[N_PULSES // 2, 0]
     assert abs(v[1]) == pytest.approx(N_SAMPLES, rel=0.01)
     assert abs(v[0]) == pytest.approx(N_SAMPLES * np.sinc(0.5), rel=0.02)
+
+
+def test_an_antenna_that_is_farther_away_delays_the_phase():
+    frequency, farther = 9.6e9, np.array([0.0, 2e-3, -5e-3])
+    phase = -4 * np.pi * frequency * farther / SPEED_OF_LIGHT  # of exp(-j 2 pi f 2 d/c)
+    found = ApertureView.implied_range(SimpleNamespace(frequency=frequency), phase)
+    np.testing.assert_allclose(found, farther, rtol=1e-12)
 
 
 def test_brightest_places_lie_on_the_points_and_apart(points):

@@ -131,3 +131,19 @@ def test_rays_may_be_embrees():
 def test_other_ray_casters_are_refused():
     with pytest.raises(ValueError, match="choose one of 'embree'"):
         sarcl.echo(hills(n=4), WAVE, track(n=4), shadows="optix")
+
+
+def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found():
+    # as a pole's shadow sweeps over the ground; the check takes the shares of every pulse
+    x, n = np.linspace(-20, 20, 31), 240
+    ground = sarcl.Scene.from_heights(x, x, np.zeros((31, 31))).triangles
+    pole = shapes.box((0.8, 0.8, 6.0)).triangles
+    rough = sarcl.Material(eps_r=4, conductivity=1e-3, diagram="cos2")
+    scene = sarcl.Scene.facets(np.concatenate([ground, pole]), two_sided=False, material=rough)
+    track = sarcl.Trajectory.circle(radius=7e3, height=7e3, arc=0.5, n_pulses=n, prf=100.0)
+    chirp = sarcl.Waveform.chirp(center=0.3e9, bandwidth=50e6, duration=1e-6)
+    report = sarcl.echo(
+        scene, chirp, track, range_window=(-40, 40), max_edge=None, seed=3, tolerance=1e-2, check=True
+    ).report
+    assert report.contributions_skipped["shadowed"] > 0
+    assert report.measured_error <= report.predicted_error <= 1e-2

@@ -102,6 +102,19 @@ def test_facets_change_along_the_track_as_echo_computes_them(material, device):
     assert list(raw.polarization[:4]) == ["HH", "HV", "HH", "HV"]
 
 
+def test_facets_seen_at_a_squint_fade_with_the_slant_range(device):
+    axis = np.linspace(-6, 6, 7)
+    heights = np.random.default_rng(1).normal(size=(7, 7)) * 0.02
+    material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
+    scene = sarcl.Scene.from_heights(8e3 + axis, axis, heights, material=material)
+    track = sarcl.Trajectory.line(start=(0, -5e3, 6e3), velocity=(0, 100, 0), prf=250, n_pulses=40)  # 27 degrees
+    options = {"radar": sarcl.Radar(power=1e3), "seed": 3, "device": device}
+    raw = sarcl.spectral_echo(scene, CHIRP, track, tolerance=1e-2, check=False, **options)
+    wanted = sarcl.echo(scene, CHIRP, track, tolerance=3e-3, check=False, **options)
+    off = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
+    assert off <= raw.report.predicted_error + wanted.report.predicted_error
+
+
 def test_shadows_that_move_along_the_track(device):
     axis = np.linspace(-6, 6, 13)
     material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
