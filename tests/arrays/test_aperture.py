@@ -100,8 +100,8 @@ def test_without_the_switch_nothing_grows():
     ],
 )
 def test_apparent_positions_are_those_of_the_papers_angles(antenna, step, apparent):
-    """Computed by hand: theta = atan2((Yc - Ry) + g (1 - ky^2), (Xc - Rx) - g kx ky), (5.14) with the signs corrected, at
-    range r + g ky, (5.15) and (5.16), and the elevation of the antenna, (5.17) and (5.18)."""
+    """Computed by hand: theta = atan2((Yc - Ry) + g (1 - ky^2), (Xc - Rx) - g kx ky), (5.14) with the signs corrected,
+    at range r + g ky, (5.15) and (5.16), and the elevation of the antenna, (5.17) and (5.18)."""
     array = AntennaArray.linear(3, spacing=0.015, frequency_step=step, axis=(0, -1, 0))
     here = sarcl.Trajectory([0.0, 0.1], [antenna, antenna])
     tone = sarcl.Waveform.tone(center=F0, duration=1 / step)

@@ -2,8 +2,8 @@
 
     python tests/mutants/run.py [--only TEXT] [--jobs N] [--all]
 
-An entry names a file, a text that occurs once in it, what that text is changed into, and the tests that must fail. It is
-killed where at least one of them fails; it survives where all pass. Exit status 1: something survived, or the tests
+An entry names a file, a text that occurs once in it, what that text is changed into, and the tests that must fail. It
+is killed where at least one of them fails; it survives where all pass. Exit status 1: something survived, or the tests
 could not be run. Only quick tests run, but for entries with slow = true; --all runs every test of the named files.
 """
 
@@ -48,7 +48,7 @@ def copied(to: Path) -> Path:
 
 
 def verdict(entry: dict[str, Any], copy: Path, all_tests: bool) -> tuple[str, float, str]:
-    """Whether it was killed, survived or was not run; seconds; and the test that failed, or what pytest printed last."""
+    """Killed, survived or not run; seconds; and the test that failed, or what pytest printed last."""
     path = copy / entry["file"]
     right = path.read_text()
     path.write_text(right.replace(entry["old"], entry["new"]))
