@@ -52,7 +52,7 @@ def verdict(entry: dict[str, Any], copy: Path, all_tests: bool) -> tuple[str, fl
     path = copy / entry["file"]
     right = path.read_text()
     path.write_text(right.replace(entry["old"], entry["new"]))
-    marks = ["-m", ""] if all_tests or entry.get("slow") else []
+    marks = ["-mslow or not slow"] if all_tests or entry.get("slow") else []
     started = time.monotonic()
     try:
         done = subprocess.run(
