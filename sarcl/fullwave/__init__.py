@@ -17,11 +17,13 @@ For this folder alone:
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
-    _cut_cells    conductors that cut cells, from the intervals of grid lines inside them
+    _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
+    _face_areas   how much of each face of the grid closed meshes cover
     _far_field    echo amplitudes of currents, without the grid's own dispersion
     _formed_echoes  waveform forming: echoes of many pulses from the currents of one run
     _incident     a plane wave that enters through the faces of a box
+    _least_areas  the least areas of cut faces with which the time steps are stable
     _lists        lists of cells on a device
     _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum

@@ -11,12 +11,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from .lattice import COURANT, Lattice
+from ._least_areas import least_areas, weights
+from .lattice import Lattice
 from .target import Target
 
-# Smallest free area of a face, per length of its longest free edge, both relative to a whole cell. Stable from
-# COURANT^2 on; smaller areas are enlarged.
-LEAST_AREA = 1.2 * COURANT**2
 MARGIN = 2  # cells of a box beyond the cells that a body cuts
 
 
@@ -31,6 +29,21 @@ class Intervals:
     lines: np.ndarray
     start: np.ndarray
     end: np.ndarray
+
+
+@dataclass(frozen=True, eq=False)
+class FaceAreas:
+    """Shares of faces across one axis that a body covers (n,); their places in one component of the grid, sorted."""
+
+    places: np.ndarray
+    covered: np.ndarray
+
+    def free(self, at: np.ndarray, otherwise: np.ndarray) -> np.ndarray:
+        """The share of faces at places `at` (n,) that is outside; `otherwise` (n,) where a face is not listed."""
+        if not len(self.places):
+            return otherwise
+        found = np.minimum(np.searchsorted(self.places, at), len(self.places) - 1)
+        return np.where(self.places[found] == at, 1 - self.covered[found], otherwise)
 
 
 @dataclass(frozen=True, eq=False)
@@ -61,9 +74,13 @@ class Box:
         return np.asarray(within + component * np.prod(lattice.shape))
 
 
-def conductor(lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals], staircase: bool = False) -> Target:
+def conductor(
+    lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals],
+    areas: tuple[FaceAreas, FaceAreas, FaceAreas] | None = None, staircase: bool = False,
+) -> Target:  # fmt: skip
     """The lists of a perfect conductor, from its intervals along x, y and z.
 
+    areas      of faces across x, y and z; those of other faces are made from their edges
     staircase  an edge conducts where both its ends are inside, and no edge or face is cut: for comparison
     """
     box = Box.around(lattice, intervals)
@@ -73,29 +90,30 @@ def conductor(lattice: Lattice, intervals: tuple[Intervals, Intervals, Intervals
         if staircase:
             free[a] = 1
         free[a][inside & _next(inside, a, False)] = 0  # a gap that is shorter than a cell is closed
-    faces, weights = [], []
     near = np.zeros(free.shape, bool)  # edges beside a face whose field is not zero
+    cut, weight = [], np.ones(free.shape, np.float32)
     for a in range(3):
         b, c = (a + 1) % 3, (a + 2) % 3
         live = _any_of_four(free[b] > 0, free[c] > 0, a, True)
         for direction, along in ((c, b), (b, c)):
             near[direction] |= live | _before(live, along)
-        if staircase:
-            continue
         touched = _any_of_four(free[b] < 1, free[c] < 1, a, False) | _any_of_four(inside, inside, a, False)
         at = np.flatnonzero(live & touched)
         corners, lengths = _around(inside, free, a, at)
         area = _free_area(corners, lengths)
-        longest = lengths.max(axis=0)
-        cut = ((lengths < 1) & (lengths > 0)).any(axis=0) | (area < 1)
-        area = np.maximum(area, LEAST_AREA * longest)
-        faces.append(box.in_grid(lattice, at[cut], a))
-        weights.append(lengths[:, cut] / area[cut])
+        if areas is not None:
+            area = areas[a].free(box.in_grid(lattice, at, 0), area)
+        some = ((lengths < 1) & (lengths > 0)).any(axis=0) | (area < 1)
+        cut.append((at[some], lengths[:, some], area[some]))
+        weight[a][~live] = 0
+        weight[a].flat[at[some]] = weights(area[some])
+    faces, quotients = [np.zeros(0, np.int64)], [np.zeros((4, 0))]
+    for a, (at, lengths, area) in enumerate([] if staircase else cut):
+        faces.append(box.in_grid(lattice, at, a))
+        quotients.append(lengths / np.maximum(area, least_areas(weight, a, at, lengths)))
     edges = [box.in_grid(lattice, np.flatnonzero((free[a] == 0) & near[a]), a) for a in range(3)]
     at = np.concatenate(edges)
-    if staircase:
-        return Target(at, np.zeros((2, len(at))), np.zeros(0, np.int64), np.zeros((4, 0)))
-    return Target(at, np.zeros((2, len(at))), np.concatenate(faces), np.concatenate(weights, axis=1))
+    return Target(at, np.zeros((2, len(at))), np.concatenate(faces), np.concatenate(quotients, axis=1))
 
 
 def _span(box: Box, axis: int, part: Intervals, first: np.ndarray, last: np.ndarray) -> np.ndarray:

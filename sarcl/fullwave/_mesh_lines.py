@@ -19,7 +19,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._closed_mesh import ClosedMesh, closed_mesh
-from ._cut_cells import Box, Intervals, nodes_inside
+from ._cut_cells import Box, FaceAreas, Intervals, nodes_inside
+from ._face_areas import face_areas
 from ._thin_parts import ThinParts
 from .lattice import Lattice
 
@@ -33,11 +34,13 @@ class MeshLines:
     """What the lines of a grid see of closed meshes.
 
     intervals  along x, y and z, for `_cut_cells.conductor`
+    areas      of faces across x, y and z, exactly, for the same
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours
     """
 
     intervals: tuple[Intervals, Intervals, Intervals]
+    areas: tuple[FaceAreas, FaceAreas, FaceAreas]
     volume: np.ndarray
 
 
@@ -92,7 +95,8 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
     x, y, z = intervals
     box = Box.around(lattice, intervals)
     thin.check(nodes_inside(box, x), box.low)
-    return MeshLines((x, y, z), np.array(volume))
+    across_x, across_y, across_z = (face_areas(lattice, mesh, axis) for axis in range(3))
+    return MeshLines((x, y, z), (across_x, across_y, across_z), np.array(volume))
 
 
 def _crossings(lattice: Lattice, mesh: ClosedMesh, axis: int) -> _Crossings:

@@ -7,11 +7,13 @@ import pytest
 from helpers.devices import opened, variants
 from helpers.fdtd_cases import sphere_intervals
 
+from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave._currents import currents
 from sarcl.fullwave._cut_cells import conductor
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave
+from sarcl.fullwave._mesh_lines import mesh_lines
 from sarcl.fullwave._pulse import Pulse
 from sarcl.fullwave.lattice import lattice_around
 from sarcl.fullwave.target import VACUUM_PERMITTIVITY, material_edges
@@ -65,7 +67,7 @@ def sphere_run(param, ka, cells, travel, n, staircase=False, material=None, puls
         edges = places[np.linalg.norm(grid.positions(places, magnetic=False) - centre, axis=1) < 1.0]
         target = material_edges(grid, edges, *(np.full(len(edges), value) for value in material))
     else:
-        target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase)
+        target = conductor(grid, sphere_intervals(grid, centre, 1.0), staircase=staircase)
     top = ka * SPEED_OF_LIGHT / (2 * np.pi)
     wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), pulse or Pulse.gaussian(0.05 * top, top))
     k = np.linspace(0.5, ka, n)
@@ -92,6 +94,24 @@ def test_a_small_sphere_echoes_to_the_radar_and_to_the_side(param):
     )  # no cross-polarisation
     side = np.array([conducting_sphere(1.0, k, np.pi / 2)[0] for k in run.k])
     assert np.abs(echo(run, centre, across, run.wave.polarization) - side).max() < 0.03 * np.abs(side).max()
+
+
+@pytest.mark.parametrize("param", variants(names=()))
+@pytest.mark.parametrize("travel, largest", [((0.0, 0.0, -1.0), 0.04), ((0.5, -0.3, -0.8), 0.016)])
+def test_a_mesh_of_a_sphere_whose_radius_is_six_cells(param, travel, largest):
+    """Up to ka 4 at 10 cells per wavelength, with exact areas of faces; the mesh has the volume of the sphere."""
+    ball = shapes.sphere(1.0, facets=5000, rotation=(0.3, 0.5, -0.2)).triangles
+    ball = ball * (4 * np.pi / 3 / (np.linalg.det(ball).sum() / 6)) ** (1 / 3)
+    cell, top = 2 * np.pi / 4 / 10, 4 * SPEED_OF_LIGHT / (2 * np.pi)
+    centre = cell * np.array([0.13, 0.27, 0.41])
+    grid = lattice_around(centre - 1, centre + 1, cell, 15)
+    found = mesh_lines(grid, ball + centre)
+    target = conductor(grid, found.intervals, found.areas)
+    wave = PlaneWave(np.array(travel), np.array([1.0, 0.2, 0]), Pulse.gaussian(0.05 * top, top))
+    run = currents(opened(param), grid, target, wave, np.linspace(0.5, 4, 15), absorber=10, gap=3)
+    wanted = np.array([conducting_sphere(1.0, k)[0] for k in run.k])
+    got = echo(run, centre, -run.wave.travel, run.wave.polarization)
+    assert np.abs(got / wanted - 1).max() < largest
 
 
 @pytest.mark.slow
