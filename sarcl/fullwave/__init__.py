@@ -4,7 +4,7 @@ docs/theory/full_wave.md has the equations, the arrays and what each part hands 
 
 For other folders:
 
-    anchors       echoes along a track, interpolated between anchors
+    anchors       echoes along a track from anchors that are chosen, predicted, run and interpolated
     echoes/       fullwave_echo(): echoes of a track from few runs of the grid
     fields        fields on a device and their time steps, tile by tile
     lattice       the grid: cells, positions of field components, places in buffers
@@ -14,6 +14,7 @@ For other folders:
 For this folder alone:
 
     _absorber     absorbing layers (CPML)
+    _anchor_model interpolation between anchors by their correlation, and its error
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for

@@ -1,4 +1,4 @@
-"""Echoes along a track from few runs: at each pulse a weighted sum of the echoes from several anchors."""
+"""Echoes along a track from few runs: at each pulse a weighted sum of the echoes formed from several anchors."""
 
 from __future__ import annotations
 
@@ -8,10 +8,21 @@ from itertools import pairwise
 
 import numpy as np
 
-from ..numerics.polynomials import lagrange
+from ._anchor_model import NEAR, AnchorModel, anchor_model
 
-POINTS = 4  # anchors of a weighted sum: local cubic
-FIRST = 5  # anchors before any interval is bisected
+FIRST = (0.03, 0.3, 0.7, 0.97)  # first anchors, of the arc: unequal spacings show what equal ones hide
+LEAST = 5  # anchors before any end: one at least is predicted first
+OVERHANG = 0.1  # spacings beyond the first and the last of equispaced anchors: ends of sums are weak otherwise
+ENOUGH = 0.7  # of the tolerance: predicted error at which no further anchor is run, because it is an estimate
+
+
+@dataclass(frozen=True)
+class Check:
+    """An anchor that was predicted from the others before its run: relative errors of echoes near its pulse."""
+
+    pulse: int
+    predicted: float
+    found: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,89 +31,112 @@ class Anchored:
 
     samples          complex64 (P, Q, F)
     pulses           numbers of the anchors' pulses, ascending (n,)
-    predicted_error  estimate of the error of samples: root of the energy of the difference over that of the echoes;
-                     nan with one anchor
-    history          (number of anchors, predicted error) after each anchor
+    predicted_error  estimate of the relative error of samples: root of the energy of the difference to runs of each
+                     pulse over that of the echoes; nan with one anchor
+    history          number of anchors and predicted error, of the first anchors and after each that was added
+    checks           predictions of the anchors that were added
     """
 
     samples: np.ndarray
     pulses: np.ndarray
     predicted_error: float
     history: list[tuple[int, float]]
+    checks: list[Check]
 
 
 def anchored(
     formed: Callable[[int], np.ndarray], along: np.ndarray, *, anchors: str | int | np.ndarray = "auto",
-    tolerance: float = 3e-2, progress: Callable[[str, int, int], None] | None = None,
+    tolerance: float = 3e-2, mirror: np.ndarray | None = None, progress: Callable[[str, int, int], None] | None = None,
 ) -> Anchored:  # fmt: skip
     """Echoes of P pulses to a tolerance.
 
     formed     formed(pulse): the echoes of all pulses that the currents of an anchor at this pulse form (P, Q, F)
     along      directions of the pulses along their path as seen from the target, rad, ascending or descending (P,)
     anchors    "auto": as many as the tolerance needs; a number of anchors, equispaced; or the numbers of their pulses
-    tolerance  relative error of the energy of all echoes
+    tolerance  relative error of the echoes, as Anchored.predicted_error
+    mirror     for each pulse the number of the pulse whose anchor the same run serves by symmetry, or -1 (P,)
+    progress   progress("anchors", done, total), total a lower limit where anchors are "auto"
     """
-    along = np.asarray(along, float) * (1 if along[-1] >= along[0] else -1)
-    got: dict[int, np.ndarray] = {}
-    history: list[tuple[int, float]] = []
+    work = _Work(formed, np.asarray(along, float), mirror, progress)
+    if not isinstance(anchors, str):
+        asked = np.atleast_1d(anchors) if np.ndim(anchors) else _equispaced(work.along, int(anchors))
+        work.run(asked, len(asked))
+        return work.result()
+    work.run(_nearest(work.along, np.array(FIRST)), LEAST)
+    while work.model is not None and work.worst is not None:
+        if work.predicted_error <= ENOUGH * tolerance and len(work.got) >= LEAST:
+            break
+        work.check_and_run(work.worst)
+    return work.result()
 
-    def run(pulse: int) -> None:
-        got[pulse] = formed(pulse)
-        if progress:
-            progress("anchors", len(got), len(got) + 1)
 
-    auto = isinstance(anchors, str)
-    number = FIRST if auto else anchors
-    for pulse in np.atleast_1d(number) if np.ndim(number) else _equispaced(along, int(number)):
-        run(int(pulse))
-    error = np.full(len(along), np.nan)
-    while True:
-        pulses = np.array(sorted(got))
-        samples = _interpolated(got, along, pulses, np.arange(len(along)))
-        if len(pulses) > 1:
-            error = _left_out(got, along, pulses)
-        energy = (np.abs(samples) ** 2).sum()
-        history.append((len(pulses), float(np.sqrt(error.sum() / energy))))
-        wide = np.diff(pulses) > 1
-        if not auto or history[-1][1] <= tolerance or not wide.any():
-            return Anchored(samples, pulses, history[-1][1], history)
-        share = [error[a:b].sum() if b - a > 1 else -1.0 for a, b in pairwise(pulses)]
-        worst = int(np.argmax(share))
-        middle = np.mean(along[pulses[worst : worst + 2]])
-        inner = np.arange(pulses[worst] + 1, pulses[worst + 1])
-        run(int(inner[np.argmin(np.abs(along[inner] - middle))]))
+class _Work:
+    """Anchors that have been run, and the echoes from them."""
+
+    def __init__(
+        self, formed: Callable[[int], np.ndarray], along: np.ndarray, mirror: np.ndarray | None,
+        progress: Callable[[str, int, int], None] | None,
+    ) -> None:  # fmt: skip
+        self._formed, self._mirror, self._progress = formed, mirror, progress
+        self.along = along if along[-1] >= along[0] else -along
+        self.got: dict[int, np.ndarray] = {}
+        self.history: list[tuple[int, float]] = []
+        self.checks: list[Check] = []
+
+    def run(self, pulses: np.ndarray, total: int) -> None:
+        """Run anchors, and what a mirror gives with them, and interpolate."""
+        for pulse in pulses:
+            twin = -1 if self._mirror is None else int(self._mirror[pulse])
+            for number in (int(pulse), twin):
+                if number >= 0 and number not in self.got:
+                    self.got[number] = self._formed(number)
+            if self._progress:
+                self._progress("anchors", len(self.got), max(total, len(self.got)))
+        self.pulses = np.array(sorted(self.got))
+        several = len(self.pulses) > 1 and bool((np.diff(self.along[self.pulses]) > 0).all())
+        every = np.stack([self.got[int(pulse)] for pulse in self.pulses])
+        self.model: AnchorModel | None = anchor_model(every, self.pulses, self.along) if several else None
+        weights = self.model.weights if self.model else np.full((len(every), len(self.along)), 1 / len(every))
+        self.samples = np.einsum("ap,apqf->pqf", weights.astype(np.float32), every).astype(np.complex64)
+        error = self.model.error.sum() if self.model else 0.0 if np.ptp(self.along) == 0 else np.nan
+        self.predicted_error = float(np.sqrt(error / (np.abs(self.samples) ** 2).sum(dtype=np.float64)))
+        self.history.append((len(self.got), self.predicted_error))
+
+    @property
+    def worst(self) -> int | None:
+        """The pulse of the largest error, in the interval between anchors that has most of it; None: no interval."""
+        assert self.model is not None
+        ends = [(-1, int(self.pulses[0])), *pairwise(self.pulses.tolist()), (int(self.pulses[-1]), len(self.along))]
+        energy = [float(self.model.error[a + 1 : b].sum()) if b - a > 1 else -1.0 for a, b in ends]
+        first, last = ends[int(np.argmax(energy))]
+        if max(energy) <= 0:
+            return None
+        return first + 1 + int(np.argmax(self.model.error[first + 1 : last]))
+
+    def check_and_run(self, pulse: int) -> None:
+        """Run an anchor, and compare its echoes near its pulse with their prediction from the others."""
+        assert self.model is not None
+        weights, expected = self.model.weights[:, pulse], float(self.model.error[pulse])
+        reach = NEAR * np.abs(self.along[self.pulses] - self.along[pulse]).min()
+        near = np.abs(self.along - self.along[pulse]) <= reach
+        guess = sum(w * self.got[int(a)][near] for a, w in zip(self.pulses, weights, strict=True))
+        self.run(np.array([pulse]), len(self.got) + 1)
+        own = self.got[pulse][near]
+        energy = (np.abs(own) ** 2).sum()
+        found = np.sqrt((np.abs(guess - own) ** 2).sum() / energy)
+        self.checks.append(Check(pulse, float(np.sqrt(expected * near.sum() / energy)), float(found)))
+
+    def result(self) -> Anchored:
+        return Anchored(self.samples, self.pulses, self.predicted_error, self.history, self.checks)
 
 
 def _equispaced(along: np.ndarray, number: int) -> np.ndarray:
-    """Numbers of the pulses nearest to equispaced directions."""
-    wanted = np.linspace(along[0], along[-1], number) if number > 1 else [(along[0] + along[-1]) / 2]
-    return np.unique([np.argmin(np.abs(along - place)) for place in wanted])
+    """Numbers of pulses at equispaced directions; the middle for one anchor."""
+    edge = OVERHANG / (number - 1 + 2 * OVERHANG)
+    return _nearest(along, np.linspace(edge, 1 - edge, number) if number > 1 else np.array([0.5]))
 
 
-def _interpolated(got: dict[int, np.ndarray], along: np.ndarray, anchors: np.ndarray, at: np.ndarray) -> np.ndarray:
-    """The echoes of pulses `at` from anchors at these pulses."""
-    out = np.zeros((len(at), *got[int(anchors[0])].shape[1:]), np.complex64)
-    first = np.clip(np.searchsorted(anchors, at, "right") - POINTS // 2, 0, max(0, len(anchors) - POINTS))
-    for begin in np.unique(first):
-        here = np.flatnonzero(first == begin)
-        near = anchors[begin : begin + POINTS]
-        weights = lagrange(along[near], along[at[here]])
-        for anchor, weight in zip(near, weights, strict=True):
-            out[here] += weight[:, None, None].astype(np.float32) * got[int(anchor)][at[here]]
-    return out
-
-
-def _left_out(got: dict[int, np.ndarray], along: np.ndarray, pulses: np.ndarray) -> np.ndarray:
-    """Energy of the error of each pulse: that of each anchor's echoes predicted without it, to its neighbours' middles,
-    less by the power of the spacing."""
-    out = np.zeros(len(along))
-    edges = np.concatenate([[0], (pulses[1:] + pulses[:-1] + 1) // 2, [len(along)]])
-    for i, pulse in enumerate(pulses):
-        others = np.delete(pulses, i)
-        at = np.arange(edges[i], edges[i + 1])
-        near = others[np.argsort(np.abs(along[others] - along[pulse]))[:POINTS]]
-        weights = lagrange(along[near], along[[pulse]])[:, 0]
-        guess = sum(w * got[int(a)][at] for a, w in zip(near, weights, strict=True))
-        out[at] = (np.abs(guess - got[int(pulse)][at]) ** 2).sum(axis=(1, 2)) / 4 ** min(POINTS, len(near))
-    out[pulses] = 0  # an anchor's pulse has the echoes of its own run
-    return out
+def _nearest(along: np.ndarray, share: np.ndarray) -> np.ndarray:
+    """Numbers of the pulses nearest to shares of the arc, each once."""
+    wanted = along[0] + share * (along[-1] - along[0])
+    return np.unique(np.abs(along[:, None] - wanted).argmin(axis=0))

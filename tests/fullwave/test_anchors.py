@@ -1,0 +1,112 @@
+"""Anchors: echoes between them, and their own estimate of the error, on targets whose currents are known everywhere."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.forming_cases import case
+
+from sarcl.fullwave.anchors import ENOUGH, FIRST, LEAST, anchored
+
+
+def error(got, own):
+    return float(np.sqrt((np.abs(got - own) ** 2).sum() / (np.abs(own) ** 2).sum()))
+
+
+def results(seeds, **options):
+    """True errors, estimated errors and what was found, of random targets."""
+    out = []
+    for seed in seeds:
+        _, along, formed, own = case(seed)
+        got = anchored(lambda pulse, echoes=formed: echoes[pulse], along, **options)
+        out.append((error(got.samples, own), got.predicted_error, got))
+    true, predicted = np.array([row[:2] for row in out]).T
+    return true, predicted, [row[2] for row in out]
+
+
+def test_a_tolerance_is_kept_and_the_error_is_known():
+    true, predicted, got = results((200, 201, 203, 207), tolerance=3e-2)
+    assert true.max() < 0.04
+    assert (predicted <= ENOUGH * 0.03).all()
+    assert ((predicted > true / 2) & (predicted < 2 * true)).all()
+    assert all(len(g.pulses) == len(g.checks) + len(FIRST) and len(g.pulses) >= LEAST for g in got)
+
+
+@pytest.mark.slow
+def test_over_many_targets_estimates_are_within_a_factor_of_two():
+    """Errors below 0.2 % are left out: noise of float32."""
+    for tolerance in (3e-2, 1e-2):
+        true, predicted, got = results(range(300, 340), tolerance=tolerance)
+        ratio = (predicted / true)[true > 2e-3]
+        assert np.mean((ratio > 0.5) & (ratio < 2)) >= 0.8
+        assert 0.7 < np.median(ratio) < 1.3
+        assert np.quantile(true, 0.9) < tolerance
+        found = np.array([check.predicted / check.found for g in got for check in g.checks if check.found > 2e-3])
+        assert 0.7 < np.median(found) < 1.3
+
+
+def test_more_anchors_for_a_smaller_tolerance():
+    _, along, formed, own = case(201)
+    got = [anchored(lambda pulse: formed[pulse], along, tolerance=tolerance) for tolerance in (0.1, 3e-2, 3e-3)]
+    assert np.all(np.diff([len(g.pulses) for g in got]) >= 0) and len(got[2].pulses) > len(got[0].pulses)
+    assert error(got[2].samples, own) < 3e-3
+    assert [n for n, _ in got[2].history] == list(range(len(FIRST), len(got[2].pulses) + 1))
+
+
+def test_one_anchor_is_waveform_forming_as_published():
+    _, along, formed, _ = case(203)
+    got = anchored(lambda pulse: formed[pulse], along, anchors=1)
+    assert got.pulses.tolist() == [60] and np.isnan(got.predicted_error)
+    assert np.array_equal(got.samples, formed[60])
+
+
+def test_anchors_at_given_pulses_and_equispaced_ones():
+    _, along, formed, own = case(204)
+    got = anchored(lambda pulse: formed[pulse], along, anchors=np.array([5, 100, 40, 70]))
+    assert got.pulses.tolist() == [5, 40, 70, 100]
+    assert error(got.samples[got.pulses], own[got.pulses]) < 1e-5
+    few, many = (error(anchored(lambda p: formed[p], along, anchors=n).samples, own) for n in (4, 14))
+    assert len(anchored(lambda p: formed[p], along, anchors=14).pulses) == 14
+    assert many < few / 3
+
+
+def test_a_track_in_the_other_direction_gives_the_same_echoes():
+    _, along, formed, _ = case(205)
+    there = anchored(lambda pulse: formed[pulse], along, anchors=7)
+    back = anchored(lambda pulse: formed[120 - pulse, ::-1], along[::-1], anchors=7)
+    assert np.allclose(there.samples, back.samples[::-1], atol=1e-4 * np.abs(there.samples).max())
+
+
+def test_a_mirror_adds_the_other_anchor_of_a_run():
+    _, along, formed, _ = case(206)
+    asked = []
+
+    def run(pulse):
+        asked.append(pulse)
+        return formed[pulse]
+
+    got = anchored(run, along, tolerance=1e-2, mirror=120 - np.arange(121))
+    assert np.array_equal(np.sort(120 - got.pulses), got.pulses)
+    assert all(120 - pulse in asked for pulse in asked) and len(asked) == len(set(asked))
+
+
+def test_directions_that_are_all_the_same_need_one_anchor():
+    echoes = np.ones((3, 1, 2), np.complex64)
+    got = anchored(lambda pulse: echoes, np.zeros(3))
+    assert len(got.pulses) == 1 and got.predicted_error == 0 and np.array_equal(got.samples, echoes)
+
+
+def test_few_pulses_become_anchors_all():
+    _, along, formed, own = case(207)
+    some = [0, 20, 60, 61, 119]
+    got = anchored(lambda pulse: formed[some[pulse]][some], along[some], tolerance=1e-9)
+    assert got.pulses.tolist() == list(range(5))
+    assert error(got.samples, own[some]) < 1e-6
+
+
+def test_progress_counts_anchors():
+    _, along, formed, _ = case(201)
+    seen = []
+    got = anchored(lambda pulse: formed[pulse], along, progress=lambda *report: seen.append(report))
+    assert [done for _, done, _ in seen] == list(range(1, len(got.pulses) + 1))
+    assert all(stage == "anchors" and done <= total for stage, done, total in seen)
