@@ -64,7 +64,7 @@ def papers(args: argparse.Namespace, job: Job) -> int:
     for path in (output, numbers):
         job.expect(path)
     plots.require("the page of sarcl papers")
-    lab, sections = shelf.open_lab(paper, args.device, args.quick), []
+    lab, sections = shelf.open_lab(paper, args.device, args.quick, output.with_suffix(".runs"), job.progress), []
     for section in paper.run(lab):
         sections.append(section)
         job.progress("papers", len(sections), len(paper.sections))

@@ -82,7 +82,7 @@ def parser() -> argparse.ArgumentParser:
     _papers(
         command(
             "papers",
-            "list the reproduced papers, or reproduce one (farooq, saras, wan): published and measured values",
+            "list the reproduced papers, or reproduce one (farooq, saras, wan, zou): published and measured values",
             device,
         )
     )
@@ -222,7 +222,10 @@ def _fda(p: argparse.ArgumentParser) -> None:
 
 def _papers(p: argparse.ArgumentParser) -> None:
     p.add_argument(
-        "paper", nargs="?", metavar="NAME", help="farooq, saras or wan (docs/guide/papers.md); none: list the papers"
+        "paper",
+        nargs="?",
+        metavar="NAME",
+        help="farooq, saras, wan or zou (docs/guide/papers.md); none: list the papers",
     )
     p.add_argument(
         "-o",

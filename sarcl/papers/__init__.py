@@ -10,16 +10,19 @@ For other folders:
     farooq/    Farooq 2009, frequency-diverse arrays
     saras/     Franceschetti et al. 1992, raw signals of facet scenes
     wan/       Wan, Yue, Yang 2004, spaceborne raw data of facet scenes
+    zou/       Zou, Jia, Qiao 2021, full-wave echoes with waveform forming
 """
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from importlib import import_module
+from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 from ..base import text
 
-__all__ = ["PAPERS", "far_radar", "farooq", "find", "lab", "listing", "open_lab", "paper", "saras", "wan"]
+__all__ = ["PAPERS", "far_radar", "farooq", "find", "lab", "listing", "open_lab", "paper", "saras", "wan", "zou"]
 
 if TYPE_CHECKING:
     from ..opencl.device import DeviceChoice
@@ -29,6 +32,7 @@ PAPERS = {
     "farooq": "J. Farooq, Frequency Diversity for Improving Synthetic Aperture Radar Imaging, dissertation, AFIT 2009",
     "saras": "G. Franceschetti et al., SARAS: A Synthetic Aperture Radar Raw Signal Simulator, IEEE TGRS 30(1), 1992",
     "wan": "Wan F., Yue H., Yang R., Distributed Target's Raw Data Simulation of Spaceborne SAR, JEIT 26(8), 2004",
+    "zou": "Zou B., Jia Y., Qiao Z., A High-Precision SAR Echo Simulation Method Based on FDTD, Proc. SPIE 11742, 2021",
 }
 
 
@@ -45,8 +49,16 @@ def listing() -> str:
     return "\n".join(f"{name:10}{title}" for name, title in PAPERS.items())
 
 
-def open_lab(paper: Paper, device: DeviceChoice | None = None, quick: bool = False) -> Any:
-    """What the sections of a paper share, with its OpenCL device opened; quick: less of it (`Paper.quick`)."""
+def open_lab(
+    paper: Paper, device: DeviceChoice | None = None, quick: bool = False, folder: Path | None = None,
+    progress: Callable[[str, int, int], None] | None = None,
+) -> Any:  # fmt: skip
+    """What the sections of a paper share, with its OpenCL device opened.
+
+    quick     less of it (`Paper.quick`)
+    folder    where long runs are kept (`Paper.long`);  progress  called as progress(stage, done, total) by these
+    """
     from ..opencl.choose_device import open_device
 
-    return paper.lab(open_device(device), quick)
+    given: dict[str, Any] = {"folder": folder, "progress": progress} if paper.long else {}
+    return paper.lab(open_device(device), quick, **given)

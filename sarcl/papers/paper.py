@@ -100,16 +100,19 @@ class Paper:
     sections  functions of it, one for each section
     quick     what a quick run leaves out, a sentence
     main      items of the rows that a reader should see first
+    long      whether a full run takes hours: `lab` then also takes `folder`, in which it keeps what is finished, so
+              that a stopped run goes on, and `progress`
     """
 
     name: str
     title: str
     about: str
-    lab: Callable[[Any, bool], Any]
+    lab: Callable[..., Any]
     sections: tuple[Callable[[Any], Section], ...]
     quick: str
     terms: tuple[tuple[str, str], ...] = ()
     main: tuple[str, ...] = ()
+    long: bool = False
 
     def run(self, lab: Any) -> Iterator[Section]:
         """Its sections, one after the other, timed; lab: as `self.lab` makes it."""

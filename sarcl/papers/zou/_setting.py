@@ -1,0 +1,122 @@
+"""Zou et al. 2021, tables 1 and 2: the radar's own numbers, response of a point, targets, what a full run takes."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ...analysis.point_response import measure
+from ...base.constants import SPEED_OF_LIGHT
+from ...figures import html
+from ...imaging.backproject import backproject
+from ...scene.scene import Scene
+from ...simulation.echo import echo
+from ..paper import Section
+from . import _targets
+from ._lab import CELLS, Lab
+from ._radar import (
+    AZIMUTH_RESOLUTION,
+    BANDWIDTH,
+    CHIRP,
+    DOPPLER,
+    HALF_BEAM,
+    PRF,
+    PULSES,
+    RANGE,
+    RANGE_RESOLUTION,
+    SPEED,
+    WAVELENGTH,
+)
+
+TABLE = "table 1"
+HALF_POWER = 0.886  # of a flat spectrum: width at half power over the distance from peak to null
+POINT, SPACING = 3.0, 0.05  # m: half the range window and the image; pixels
+
+
+def section(lab: Lab) -> Section:
+    """Tables 1 and 2."""
+    out = Section("setting", "Radar and targets (tables 1 and 2)")
+    radar = lab.radar
+    out.number("range resolution, c/2B", TABLE, RANGE_RESOLUTION, SPEED_OF_LIGHT / (2 * BANDWIDTH), 1e-3, "m")
+    out.number("azimuth resolution, v/B_D", TABLE, AZIMUTH_RESOLUTION, SPEED / DOPPLER, 1e-3, "m")
+    y = radar.track.positions[:, 1]
+    seen = np.sin(np.arctan2(y, radar.range_))
+    out.number(
+        "Doppler bandwidth of the track", TABLE, DOPPLER, float(2 * SPEED / WAVELENGTH * np.ptp(seen)), 5, "Hz", ".0f",
+        "the range is chosen so that the pulses of the paper just cross the beam",
+    )  # fmt: skip
+    upper = DOPPLER * (1 + BANDWIDTH / (2 * CHIRP.center))
+    out.states(
+        "Doppler bandwidth at the band's upper end", TABLE, f"sampled at PRF {PRF:.0f} Hz", f"{upper:.0f} Hz",
+        upper < PRF, value=upper, rule="below PRF",
+    )  # fmt: skip
+    _point(out, lab)
+    plane = max(_curved(radar.range_, lab.scene(target.name)) for target in _targets.TARGETS)
+    whole = _curved(RANGE, _targets.find("tank").scene())
+    out.states(
+        "phase error of plane waves at the ends of the tank, equation 4", "section 2.2", "approximately a plane wave",
+        f"{whole:.2f} rad", whole < 0.1, "equation 4 leaves out r'^2/2r of the distance of a cell; sarcl delays every "
+        "cell by its own distance", whole, rule="below 0.1 rad, two ways", cause="interpretation",
+    )  # fmt: skip
+    out.keep(range_m=radar.range_, pulses=len(radar.track), half_beam_deg=np.degrees(HALF_BEAM), plane_wave_rad=plane)
+    size = "" if radar.reduction == 1 else f" This run has targets, range and track of 1/{radar.reduction} of these."
+    out.say(
+        f"The paper prints no range. Here it is {RANGE:.0f} m, at which {PULSES} pulses, "
+        f"{RANGE * 2 * np.tan(HALF_BEAM):.0f} m of track, just cross the beam of {np.degrees(HALF_BEAM):.1f} degrees "
+        f"on either side that 1000 Hz of Doppler bandwidth need.{size} Targets are in free space, with the centre of "
+        "their box at the origin, 45 degrees below the radar. Solids stand upright; cuboid and tank are longest along "
+        "the track. Distances are spherical: every cell has its own."
+    )
+    _table(out, lab)
+    return out
+
+
+def _point(out: Section, lab: Lab) -> None:
+    """Response of a point: widths and place."""
+    raw = echo(
+        Scene.points([[0.0, 0.0, 0.0]]), CHIRP, lab.radar.track, range_window=(-2 * POINT, 2 * POINT),
+        reference=(0.0, 0.0, 0.0), tolerance=1e-4, check=False, device=lab.device,
+    )  # fmt: skip
+    image = backproject(raw, lab.radar.grid((POINT, POINT), SPACING), tolerance=1e-3, check=False, device=lab.device)
+    found = measure(image, near=(0.0, 0.0, 0.0))
+    for name, width, printed in zip(
+        ("range", "azimuth"), found.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
+    ):
+        out.number(
+            f"{name} resolution of a point: distance of peak and null", TABLE, printed, width / HALF_POWER, 0.02, "m",
+            ".3f", f"{width:.3f} m wide at half power",
+        )  # fmt: skip
+    off = float(np.linalg.norm(found.position))
+    out.states(
+        "place of a point at the origin", "geometry", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off,
+        rule="within 10 mm",
+    )  # fmt: skip
+
+
+def _curved(range_: float, scene: Scene) -> float:
+    """Largest phase by which plane waves differ from spherical ones over a scene's corners, two ways, rad."""
+    from_radar = scene.triangles.reshape(-1, 3) - np.array([-1.0, 0, 1.0]) / np.sqrt(2) * range_
+    plane = range_ + scene.triangles.reshape(-1, 3) @ np.array([1.0, 0, -1.0]) / np.sqrt(2)
+    return float(4 * np.pi / WAVELENGTH * np.abs(np.linalg.norm(from_radar, axis=1) - plane).max())
+
+
+def _table(out: Section, lab: Lab) -> None:
+    """Targets, printed and made, and what their echoes take in full size."""
+    made, full = [], []
+    for target in _targets.TARGETS:
+        scene, needs = lab.scene(target.name), lab.forecast(target.name)
+        size = np.diff(scene.bounds, axis=0)[0]
+        made.append([target.name, target.printed, " x ".join(f"{v:.3g}" for v in size), len(scene.triangles)])
+        full.append([
+            target.name, needs.plan["grid"], needs.plan["steps"], f"{needs.run_bytes / 2**30:.1f}", needs.runs,
+            f"{needs.run_seconds / 60:.0f}", f"{needs.seconds / 3600:.1f}",
+        ])  # fmt: skip
+        out.keep(**{target.name: {"run_bytes": needs.run_bytes, "runs": needs.runs, "seconds": needs.seconds}})
+    out.draw(html.table(
+        ["target", "table 2", "here: ground range x azimuth x height, m", "facets"], made, "Targets of table 2.",
+        text=True,
+    ))  # fmt: skip
+    out.draw(html.table(
+        ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"], full,
+        f"What the sizes of the paper take with {CELLS[False]} cells per shortest wavelength, forecast for this "
+        "machine at its present speed (sarcl.plan_fullwave_echo).",
+    ))  # fmt: skip
