@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from ...analysis.point_response import measure
+from ...analysis.point_response import PointResponse, measure
 from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...imaging.backproject import backproject
@@ -78,6 +78,7 @@ def _point(out: Section, lab: Lab) -> None:
     )  # fmt: skip
     image = backproject(raw, lab.radar.grid((POINT, POINT), SPACING), tolerance=1e-3, check=False, device=lab.device)
     found = measure(image, near=(0.0, 0.0, 0.0))
+    assert isinstance(found, PointResponse)
     for name, width, printed in zip(
         ("range", "azimuth"), found.irw, (RANGE_RESOLUTION, AZIMUTH_RESOLUTION), strict=True
     ):
