@@ -2,15 +2,16 @@
 
 For other folders:
 
-    scenario   Scenario, load(), loads()
+    scenario     Scenario, load(), loads()
 
 For this folder alone:
 
-    _building  objects that the tables describe
-    _earth     local coordinates of a place on the Earth, passes of orbits
-    _focusing  the function that makes the image, and its arguments
-    _schema    tables and keys that a scenario may hold
-    _tables    Python objects (Scene, Trajectory, ...) written as tables
+    _building    objects that the tables describe
+    _earth       local coordinates of a place on the Earth, passes of orbits
+    _focusing    the function that makes the image, and its arguments
+    _schema      tables and keys that a scenario may hold
+    _simulating  the function that makes the echoes, and its arguments
+    _tables      Python objects (Scene, Trajectory, ...) written as tables
 """
 
 from .scenario import Scenario, load, loads

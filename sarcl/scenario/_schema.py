@@ -129,6 +129,10 @@ def calls(section: str) -> dict[str, Call]:
         from ..simulation.spectral.spectral_echo import spectral_echo
 
         return {"": spectral_echo}
+    if section == "fullwave_echo":
+        from ..fullwave.echoes.fullwave_echo import fullwave_echo
+
+        return {"": fullwave_echo}
     if section == "backproject":
         from ..imaging.backproject import backproject
 
@@ -146,10 +150,11 @@ def calls(section: str) -> dict[str, Call]:
 
 SECTIONS = (
     "waveform", "orbit", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna",
-    "array", "radar", "materials", "place", "scene", "grid", "echo", "spectral_echo", "noise", "backproject",
+    "array", "radar", "materials", "place", "scene", "grid", "echo", "spectral_echo", "fullwave_echo", "noise",
+    "backproject",
     "polar_format", "range_doppler",
 )  # fmt: skip
-ECHOES = ("echo", "spectral_echo")  # sections for echoes, and for images: one of each at most
+ECHOES = ("echo", "spectral_echo", "fullwave_echo")  # sections for echoes, and for images: one of each at most
 IMAGES = ("backproject", "polar_format", "range_doppler")
 
 

@@ -4,22 +4,23 @@ from __future__ import annotations
 
 import re
 import tomllib
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..base.text import unknown
 from ..io import input_paths, toml
-from . import _schema
+from . import _schema, _simulating
 from ._building import Builder
-from ._earth import earth_fixed, pass_text
+from ._earth import pass_text
 from ._focusing import check_window, focus, image_text, plan_focus, section_of
 from ._schema import Where
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
     from ..earth.place import Place
+    from ..fullwave.echoes.fullwave_forecast import FullwaveForecast
     from ..imaging.backproject import BackprojectOptions
     from ..imaging.focus_options import FocusKeywords
     from ..imaging.forecast import Forecast
@@ -58,7 +59,8 @@ class Scenario:
     place        {"longitude": ..., "latitude": ..., "height": ...}: scene, grid and points are east, north, up of it
     scene        {"points": [{...}], "from_mesh": [{...}], ...}, or a Scene
     grid         {"plane": {...}}, {"on_terrain": {...}} or {"points": {...}}, or an ImageGrid
-    echo         arguments of `sarcl.echo`; or spectral_echo, of `sarcl.spectral_echo`;  noise  of `sarcl.add_noise`
+    echo         arguments of `sarcl.echo`; or spectral_echo, fullwave_echo, of the functions of that name
+    noise        arguments of `sarcl.add_noise`
     backproject  arguments of `sarcl.backproject`; or polar_format, range_doppler, of the functions of that name
     folder       folder that names of mesh and elevation files are relative to
 
@@ -84,6 +86,7 @@ class Scenario:
     orbit: Table | None = None
     place: Table | None = None
     spectral_echo: Table | None = None
+    fullwave_echo: Table | None = None
     polar_format: Table | None = None
     range_doppler: Table | None = None
     folder: Path = Path()
@@ -111,6 +114,7 @@ class Scenario:
             orbit: Orbit | Mapping[str, object] | None = None,
             place: Place | Mapping[str, object] | None = None,
             spectral_echo: Mapping[str, object] | None = None,
+            fullwave_echo: Mapping[str, object] | None = None,
             polar_format: Mapping[str, object] | None = None,
             range_doppler: Mapping[str, object] | None = None,
             folder: PathLike = Path(),
@@ -201,14 +205,10 @@ class Scenario:
     def simulate(self, **options: Unpack[EchoOptions]) -> PhaseHistory:
         """Echoes of the scene, with [noise]. `options`, arguments of `sarcl.echo`, take precedence over [echo].
 
-        With [spectral_echo] they are computed by, and take precedence for, `sarcl.spectral_echo`.
+        With [spectral_echo] or [fullwave_echo] they are computed by that function, whose options these are then.
         """
-        if self.spectral_echo is not None:
-            from ..simulation.spectral.spectral_echo import spectral_echo as verb
-        else:
-            from ..simulation.echo import echo as verb  # type: ignore[assignment]
-
-        raw = self._echo(verb, options)
+        check_window(self)
+        raw: PhaseHistory = _simulating.call(self, options, forecast=False)
         if self.noise is None:
             return raw
         from ..effects.noise import add_noise
@@ -219,23 +219,11 @@ class Scenario:
         with self.where.blame(("noise",), level):
             return add_noise(raw, **level)
 
-    def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast:
-        """Forecast of `simulate` with these options: rows, bytes, seconds, predicted error."""
-        from ..simulation.echo_forecast import plan_echo, plan_spectral_echo
-
-        return self._echo(plan_echo if self.spectral_echo is None else plan_spectral_echo, options)
-
-    def _echo(self, verb: Callable[..., Any], options: Mapping[str, Any]) -> Any:
+    def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast | FullwaveForecast:
+        """Forecast of `simulate` with these options: rows, bytes, seconds, predicted error or number of runs."""
         check_window(self)
-        pieces = (self.build_scene(), self.build_waveform(), self.build_track())
-        section = "echo" if self.spectral_echo is None else "spectral_echo"
-        given = {**earth_fixed(self.build_place(), getattr(self, section) or {}), **options}
-        given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-        with self.where.blame((section,), {k: v for k, v in given.items() if k not in options}, always=False):
-            return verb(
-                *pieces, receiver=self.build_receiver(), antenna=self.build_antenna(), array=self.build_array(),
-                radar=self.build_radar(), **given,
-            )  # fmt: skip
+        made: EchoForecast | FullwaveForecast = _simulating.call(self, options, forecast=True)
+        return made
 
     @property
     def has_image(self) -> bool:

@@ -3,6 +3,11 @@
 from __future__ import annotations
 
 import logging
+import os
+import signal
+import subprocess
+import sys
+import time
 
 import numpy as np
 import pytest
@@ -57,10 +62,12 @@ def test_all_polarisations_are_those_of_runs_for_each(sphere):
     track = around(20, 65, height=15.0)
     options = {"cells": 14, "model_error": False}
     got, _ = samples(sarcl.fullwave_echo(SPHERE, CHIRP, track, polarization="all", **options))
-    assert np.array_equal(got[:, [0, 2]], samples(sphere)[0])
+    assert np.array_equal(got[:, [0, 2]], samples(sphere)[0])  # the same runs
+    scale = np.linalg.norm(got[:, 0])
     for i, name in ((1, "HV"), (3, "VV")):
         alone, _ = samples(sarcl.fullwave_echo(SPHERE, CHIRP, track, polarization=name, **options))
-        assert np.array_equal(got[:, i], alone[:, 0])
+        # weights of anchors follow from all polarisations that share their runs
+        assert np.linalg.norm(got[:, i] - alone[:, 0]) < 1e-4 * scale
     assert difference(got[:, 3], got[:, 0]) < 0.02
 
 
@@ -108,6 +115,9 @@ def test_bistatic_echoes_of_a_sphere_are_those_of_mie():
         (BOX, {"max_bytes": 6e6}, MemoryError, r"what fits is a waveform up to 1\.\d+ GHz with cells=8; or raise"),
         (BOX, {"max_bytes": 2e7, "cells": 40}, MemoryError, r"what fits is cells=\d+\.?\d*, or a waveform up to"),
         (BOX, {"tolerance": 1e-5}, sarcl.ToleranceUnreachable, r"with fields in float32; the best here is 1\.0e-04"),
+        (BOX, {"anchors": 2}, ValueError, "anchors is 2, and the track has 1 pulses"),
+        (BOX, {"anchors": [0, 0]}, ValueError, r"anchors is \[0, 0\]; give numbers of pulses from 0 to 0, each once"),
+        (BOX, {"anchors": "all"}, ValueError, "anchors is 'all'; choose one of 'auto'"),
         (BOX, {"range_window": (-0.1, 0.1)}, ValueError, "does not hold the scene, from .* give a wider window"),
         (shapes.box((90, 90, 1)), {}, ValueError, "track position 0 is 40 m from .* reaches 63.64 m"),
     ],
@@ -169,6 +179,39 @@ def test_a_changed_task_takes_no_anchors_of_another(tmp_path, monkeypatch, caplo
     assert len(list((tmp_path / "raw.h5.anchors").iterdir())) == 2
 
 
+SCENARIO = """
+[waveform.chirp]
+center = 1.25e9
+bandwidth = 500e6
+duration = 2e-8
+[trajectory.circle]
+radius = 40
+height = 15
+arc = 0.1
+n_pulses = 3
+[[scene.box]]
+size = [0.2, 0.3, 0.1]
+[fullwave_echo]
+cells = 8
+polarization = ["HH", "VH"]
+anchors = [0, 2]
+model_error = false
+"""
+
+
+def test_a_scenario_describes_full_wave_echoes(monkeypatch):
+    done = pretend(monkeypatch)
+    scenario = sarcl.scenario.loads(SCENARIO)
+    forecast, raw = scenario.plan(), scenario.simulate()
+    assert len(done) == 2 == forecast.runs and raw.report.plan["anchors"] == [0, 2]
+    assert (raw.n_rows, raw.n_samples) == (forecast.n_rows, forecast.n_samples) == (6, 64)
+    assert sarcl.scenario.loads(scenario.dumps()).tables == scenario.tables
+    with pytest.raises(ValueError, match=r"f\.toml:\d+: \[radar\] goes with \[echo\], .* leave \[radar\] out"):
+        sarcl.scenario.loads(SCENARIO + "[radar]\npower = 10\n", name="f.toml").simulate()
+    with pytest.raises(ValueError, match=r"f\.toml:14: \[fullwave_echo\] cells is 7 "):
+        sarcl.scenario.loads(SCENARIO.replace("cells = 8", "cells = 7"), name="f.toml").simulate()
+
+
 @pytest.mark.slow
 def test_progress_counts_steps_of_all_runs():
     seen = []
@@ -193,3 +236,70 @@ def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
     sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
     assert not caplog.records
+
+
+@pytest.mark.slow
+def test_a_large_plate_at_normal_incidence_is_that_of_physical_optics():
+    """Four wavelengths wide: edges, which physical optics leaves out, change less than 0.3 dB."""
+    plate, track = shapes.box((0.12, 0.9, 0.9), position=(0, 0, -0.45)), around(0, distance=400.0)
+    options = {"polarization": ("HH", "VV"), "reference": (0.06, 0, 0)}
+    got, _ = samples(sarcl.fullwave_echo(plate, CHIRP, track, cells=10, model_error=False, **options))
+    wanted, _ = samples(sarcl.echo(plate, CHIRP, track, **options))
+    assert got.shape == wanted.shape
+    ratio = (got * wanted.conj()).sum(axis=(0, 2)) / (np.abs(wanted) ** 2).sum(axis=(0, 2))
+    assert np.abs(20 * np.log10(np.abs(ratio))).max() < 0.3 and np.abs(np.angle(ratio)).max() < 0.06
+    assert difference(got, wanted) < 0.06
+
+
+@pytest.mark.slow
+def test_frequencies_that_do_not_fit_into_memory_take_runs_of_their_own():
+    options = {"cells": 8, "polarization": "VV", "model_error": False}
+    whole = sarcl.fullwave_echo(BOX, CHIRP, around(20), **options)
+    parts = sarcl.fullwave_echo(BOX, CHIRP, around(20), max_bytes=6.8e6, **options)
+    assert whole.report.plan["runs"] == 1 < parts.report.plan["runs"] < 8
+    assert parts.report.plan["bytes"] <= 6.8e6 < whole.report.plan["bytes"]
+    assert difference(np.asarray(parts.samples), np.asarray(whole.samples)) < 1e-5
+
+
+@pytest.mark.slow
+def test_a_check_measures_the_error_between_anchors():
+    track = around(*np.linspace(20, 40, 9))
+    raw = sarcl.fullwave_echo(BOX, CHIRP, track, cells=8, anchors=[0, 2, 6, 8], check=True, model_error=False)
+    whole = sarcl.fullwave_echo(BOX, CHIRP, track, cells=8, anchors=range(9), model_error=False)
+    wrong = np.abs(np.asarray(raw.samples) - np.asarray(whole.samples)) ** 2
+    one = float(np.sqrt(9 * wrong[4].sum() / (np.abs(np.asarray(raw.samples)) ** 2).sum()))
+    assert np.isclose(raw.report.measured_error, one, rtol=1e-3) and raw.report.measured_error < 3e-2
+    assert whole.report.predicted_error < 1e-3
+    with pytest.raises(sarcl.ToleranceMissed) as missed:
+        sarcl.fullwave_echo(BOX, CHIRP, track, cells=8, anchors=1, check=True, model_error=False, tolerance=1e-3)
+    assert missed.value.raw.n_rows == 9 and missed.value.raw.report.measured_error > 1e-3
+
+
+KILLED = """
+import numpy as np, sarcl, sys
+box, chirp = sarcl.shapes.box((0.2, 0.3, 0.1)), sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
+angle = np.deg2rad([20, 40, 60, 80])
+track = sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), 0 * angle], 1))
+raw = sarcl.fullwave_echo(box, chirp, track, polarization="all", cells=8, out=sys.argv[1])
+"""
+
+
+@pytest.mark.slow
+def test_a_task_that_was_killed_continues_and_gives_the_same_samples(tmp_path):
+    out, folder = tmp_path / "raw.h5", tmp_path / "raw.h5.anchors"
+    command = [sys.executable, "-c", KILLED]
+    running = subprocess.Popen([*command, str(out)])
+    end = time.monotonic() + 300
+    while len(list(folder.glob("*.anchor"))) < 3 and time.monotonic() < end:
+        assert running.poll() is None
+        time.sleep(0.02)
+    os.kill(running.pid, signal.SIGKILL)
+    assert running.wait() == -signal.SIGKILL
+    kept = {path.name: path.read_bytes() for path in folder.glob("*.anchor")}
+    assert 3 <= len(kept) < 8 and not out.exists()
+    subprocess.run([*command, str(out)], check=True)
+    subprocess.run([*command, str(tmp_path / "whole.h5")], check=True)
+    made, whole = sarcl.read(out), sarcl.read(tmp_path / "whole.h5")
+    assert np.array_equal(np.asarray(made.samples), np.asarray(whole.samples))
+    assert made.report.plan["runs"] == 8 - len(kept) and whole.report.plan["runs"] == 8
+    assert not folder.exists() and len(list(tmp_path.iterdir())) == 2

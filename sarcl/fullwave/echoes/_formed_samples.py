@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...base.report import Report
+from ...base.validation import array, choice, count, ndim
 from ..anchors import Anchored, anchored
 from ._anchor_files import AnchorFiles
 from ._anchor_runs import AnchorRuns
@@ -34,6 +35,7 @@ def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, m
     out  the file beside which finished anchors are kept, or None;  check, model_error  see fullwave_echo
     """
     request, n_pulses = task.request, len(task.tx)
+    anchors = checked_anchors(anchors, n_pulses)
     files = None if out is None else AnchorFiles(out, task.fingerprint())
     samples = np.empty((n_pulses, len(request.polarizations), len(task.frequencies)), np.complex64)
     progress = RunProgress(request.report, 1, task.cost.steps)
@@ -52,6 +54,24 @@ def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, m
             request.clock.lap("check")
     progress.finish()
     return FormedSamples(samples, sums.report(task), sums.measured, files)
+
+
+def checked_anchors(asked: Any, n_pulses: int) -> str | int | np.ndarray:
+    """`anchors` as `anchored` takes it."""
+    if isinstance(asked, str):
+        return choice("anchors", asked, ("auto",))
+    if ndim("anchors", asked) == 0:
+        number = count("anchors", asked)
+        if number > n_pulses:
+            raise ValueError(f"anchors is {number}, and the track has {n_pulses} pulses; give at most one per pulse")
+        return number
+    pulses = array("anchors", asked, np.int64, ("n",))
+    if not len(pulses) or len(np.unique(pulses)) < len(pulses) or pulses.min() < 0 or pulses.max() >= n_pulses:
+        raise ValueError(
+            f"anchors is {pulses.tolist()!r:.60}; give numbers of pulses from 0 to {n_pulses - 1}, each once, a number "
+            "of anchors, or 'auto'"
+        )
+    return pulses
 
 
 class _Sums:

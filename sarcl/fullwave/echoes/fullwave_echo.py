@@ -85,8 +85,8 @@ def fullwave_echo(
                   OUT.anchors, until it is complete: after a kill, the same call continues from them
     tolerance     L2 error of waveform forming: of the samples against those of a run at every pulse, on the same grid
     check         one run more per polarisation sent, between anchors: report.measured_error
-    model_error   predict the error of the grid itself, by a run with larger cells, which takes a fifth of the time:
-                  report.model_error
+    model_error   predict the error of the grid itself, report.model_error, by a run with larger cells, which takes
+                  about a fifth of the time
     progress      called as progress(stage, done, total)
 
     Returns a PhaseHistory whose samples are like those of `echo`: |sample|^2 = RCS, m^2. ToleranceUnreachable, a

@@ -15,6 +15,7 @@ from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...scene.scene import Scene
 from ...simulation.echo import echo_request
+from ._formed_samples import checked_anchors
 from ._fullwave_task import FullwaveTask, fullwave_task
 from ._model_error import RATIO
 from ._run_speed import run_speed
@@ -100,8 +101,9 @@ def plan_fullwave_echo(
 
 def expected_anchors(task: FullwaveTask, anchors: Any, tolerance: float) -> int:
     """About the number of anchors; as asked, unless that is "auto"."""
+    anchors = checked_anchors(anchors, len(task.along))
     if not isinstance(anchors, str):
-        return int(anchors) if np.ndim(anchors) == 0 else len(anchors)
+        return anchors if isinstance(anchors, int) else len(anchors)
     length = float(np.linalg.norm(task.scene.bounds[1] - task.scene.bounds[0]))
     wavelength = SPEED_OF_LIGHT / float(task.frequencies[-1])
     spacing = min(SPACING * (tolerance / ERROR) ** 0.25, STEEPEST) * wavelength / length
