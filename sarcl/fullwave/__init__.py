@@ -14,6 +14,7 @@ For other folders:
 For this folder alone:
 
     _absorber     absorbing layers (CPML)
+    _along_track  sums over cells at some pulses of a smooth track, interpolated at the others
     _anchor_model interpolation between anchors by their correlation, and its error
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device

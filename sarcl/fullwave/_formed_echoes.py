@@ -15,8 +15,10 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base import boxes
 from ..opencl.device import Device
 from . import _dispersion
+from ._along_track import along_track, farthest_phase
 from ._current_sums import Paths, current_sums
 from ._currents import Currents
 from .lattice import COURANT
@@ -31,9 +33,27 @@ def formed_echoes(
     tx, rx    positions of the antennas, m (P, 3)
     received  unit vectors, the polarisations received at each pulse (Q, P, 3)
     """
-    paths = paths_of(currents, tx, rx)
-    sums = current_sums(device, currents, paths, max_bytes=max_bytes)
-    return weighted(currents, paths, sums, received)
+    paths, received = paths_of(currents, tx, rx), np.asarray(received, float)
+
+    def sums(pulses: np.ndarray) -> np.ndarray:
+        found = current_sums(device, currents, paths.part(pulses), max_bytes=max_bytes)
+        return found.swapaxes(0, 1).reshape(len(pulses), -1)
+
+    def echoes(pulses: np.ndarray, found: np.ndarray) -> np.ndarray:
+        parts = found.reshape(len(pulses), 6, -1).swapaxes(0, 1)
+        return weighted(currents, paths.part(pulses), parts, received[:, pulses])
+
+    every = np.arange(len(paths.tx))
+    return echoes(every, along_track(sums, echoes, _farthest_phase(currents, tx, rx)))
+
+
+def _farthest_phase(currents: Currents, tx: np.ndarray, rx: np.ndarray) -> np.ndarray:
+    """How far the phase of the farthest cell has turned along the track, rad (P,)."""
+    places = [currents.lattice.positions(at, bool(n)) for n, at in enumerate((currents.edges, currents.faces))]
+    box = boxes.box(np.concatenate(places)) if sum(map(len, places)) else np.tile(currents.centre, (2, 1))
+    by = np.concatenate([boxes.corners(box), currents.centre[None]])
+    lengths = sum(np.linalg.norm(antenna[:, None] - by, axis=2) for antenna in (tx, rx))
+    return farthest_phase(lengths[:, :-1] - lengths[:, -1:], float(currents.k.max()))
 
 
 def paths_of(currents: Currents, tx: np.ndarray, rx: np.ndarray) -> Paths:
@@ -52,7 +72,7 @@ def weighted(currents: Currents, paths: Paths, sums: np.ndarray, received: np.nd
     """Echo amplitudes from sums (6, P, F) over cells, in polarisations `received` (Q, P, 3): complex64 (P, Q, F)."""
     grid = currents.lattice
     vector = _dispersion.grid_vector(grid, paths.received, paths.rx)
-    e, h = _dispersion.fields(vector, np.asarray(received, float))
+    e, h = _dispersion.fields(vector, received)
     total = np.einsum("qpfa,apf->pqf", np.concatenate([e, h], axis=-1), sums)
     flux = _dispersion.flux(grid, paths.sent, paths.tx) * _dispersion.flux(grid, paths.received, paths.rx)
     scale = -paths.sent * grid.cell**2 / (2 * np.sqrt(np.pi) * COURANT) / np.sqrt(flux)

@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarcl.fullwave import _current_sums, _dispersion
+from sarcl.fullwave import _current_sums, _dispersion, _formed_echoes
 from sarcl.fullwave._currents import Currents
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
@@ -139,3 +139,55 @@ def test_currents_that_follow_the_incident_wave_give_the_echo_of_the_run_of_each
     received = np.array([[[0.0, 1.0, 0.0]]])
     formed, own = (formed_echoes(device, run, tx, tx, received) for run in runs)
     assert difference(formed, own) < ROUNDING
+
+
+def smooth_track(currents, n, jitter=0.0):
+    """Antennas on a line at 1.1 km that sees the target over 19 degrees, and H and V of each."""
+    tx = currents.centre + np.column_stack([np.linspace(-184, 184, n), np.full(n, -778.0), np.full(n, 778.0)])
+    tx += jitter * np.random.default_rng(4).normal(size=tx.shape)
+    look = (currents.centre - tx) / np.linalg.norm(currents.centre - tx, axis=1)[:, None]
+    h = np.cross(look, [0, 0, 1.0]) / np.linalg.norm(np.cross(look, [0, 0, 1.0]), axis=1)[:, None]
+    return tx, np.stack([h, np.cross(h, look)])
+
+
+def computed_pulses(monkeypatch):
+    """Numbers of pulses of each call of current_sums from here on."""
+    seen, sums = [], _current_sums.current_sums
+
+    def counted(device, currents, paths, max_bytes):
+        seen.append(len(paths.tx))
+        return sums(device, currents, paths, max_bytes=max_bytes)
+
+    monkeypatch.setattr(_formed_echoes, "current_sums", counted)
+    return seen
+
+
+@pytest.mark.parametrize("receiver_at", [(0, 0, 0), (250, 0, 40)])
+def test_of_a_smooth_track_few_pulses_are_computed_and_the_others_interpolated(device, monkeypatch, receiver_at):
+    currents = random_currents(800, 5, shape=(64, 30, 32), cell=0.15)
+    tx, received = smooth_track(currents, 1024)
+    rx = tx + receiver_at
+    seen = computed_pulses(monkeypatch)
+    got = formed_echoes(device, currents, tx, rx, received)
+    assert len(seen) == 1 and seen[0] < 90
+    some = np.array([1, 2, 100, 333, 511, 700, 900, 1022])
+    wanted = formed_echoes(device, currents, tx[some], rx[some], received[:, some])
+    assert seen[1] == len(some)
+    assert difference(got[some], wanted) < 2 * ROUNDING
+
+
+def test_of_a_track_that_shakes_all_pulses_are_computed(device, monkeypatch):
+    currents = random_currents(200, 3, shape=(64, 30, 32), cell=0.15)
+    tx, received = smooth_track(currents, 1024, jitter=1.0)
+    seen = computed_pulses(monkeypatch)
+    got = formed_echoes(device, currents, tx, tx, received)
+    assert sum(seen) == 1024
+    some = np.arange(0, 1024, 150)
+    assert difference(got[some], formed_echoes(device, currents, tx[some], tx[some], received[:, some])) < ROUNDING
+
+
+def test_pulses_from_one_place_have_one_echo(device):
+    currents = random_currents(100, 3)
+    tx = np.tile(antennas(currents, 1, 0.0), (50, 1))
+    got = formed_echoes(device, currents, tx, tx, np.tile([0, 1.0, 0], (1, 50, 1)))
+    assert difference(got, np.tile(got[:1], (50, 1, 1))) < ROUNDING
