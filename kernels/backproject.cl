@@ -7,6 +7,7 @@
 // macros    VW, FP64, BISTATIC, WRAP, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers;  LOCAL as in tile_constants.cl
 //           VECTORS   vectors of pixels per work-item
 //           CHUNK     pulses added in float32 before they join the compensated total
+//           WEIGHT    1: pulses have a weight in each pixel, see pixel_weights.clh
 // reference: sarcl/reference/backproject.py:backproject
 
 #include "common.clh"
@@ -14,6 +15,7 @@
 #include "geometry.clh"
 #include "interp.clh"
 #include "range_phase.clh"
+#include "pixel_weights.clh"
 
 // global size (work-items per tile, tiles of this block), local size (work-items per tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
@@ -26,13 +28,19 @@
 //   image       (4, pixels)            totals re, im and their errors re, im; tiles in a row
 //   skipped     (tiles)                pulses in whose window no pixel of the tile is; not used where LOCAL
 //               BEAM: (2, tiles)       and those in whose window they are, but not in the beam
+//   place         (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT
 //   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 __kernel void backproject(__global const float *restrict profiles, int stride, int origin,
                           __global const float *restrict table, __global const float *restrict pulse, int n,
                           int n_used, __global const float *restrict constants,
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
-                          __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset) {
+                          __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset
+#if WEIGHT
+                          , __global const float *restrict place, __global const float *restrict taper,
+                          __global const float *restrict aperture
+#endif
+                          ) {
 #if LOCAL
     profiles += 2 * (local_offset + (size_t)get_global_id(1) * n_used * stride);
 #endif
@@ -44,6 +52,15 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
         x[r] = load_offset(offsets, (size_t)k * offset_step + get_global_id(0) * VECTORS + r, n_offsets);
         about_centre(&x[r], tile, k, n_tiles);
     }
+#if WEIGHT
+    fv from[VECTORS], inverse[VECTORS];
+#pragma unroll
+    for (int r = 0; r < VECTORS; r++) {
+        size_t i = (size_t)k * per_tile + get_global_id(0) * VECTORS + r;
+        from[r] = LOAD(i, aperture);
+        inverse[r] = LOAD(i, aperture + pixels);
+    }
+#endif
     int missed = 0, unlit = 0;
     for (int start = 0; start < n_used; start += CHUNK) {
         fv re[VECTORS], im[VECTORS];
@@ -79,6 +96,11 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                     g *= v;
                     h *= v;
                 }
+#if WEIGHT
+                fv weight = taper_weight(taper, ((fv)place[p] - from[r]) * inverse[r]);
+                g *= weight;
+                h *= weight;
+#endif
                 re[r] = fma(g, cosine, fma(-h, sine, re[r]));
                 im[r] = fma(g, sine, fma(h, cosine, im[r]));
             }

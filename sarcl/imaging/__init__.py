@@ -11,6 +11,7 @@ For other folders:
     focus_options    options that backproject, plan, the command line and scenarios share
     focusing_task    the image to be made: echoes, grid, weights, geometry
     forecast         plan(): method, seconds, bytes and error before the work
+    pixel_taper      a taper over the aperture of each pixel
     profile_energy   energy of the range profiles against the energy at the pixels
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
     direct/          every (row, pixel) pair that is not skipped, in float32
@@ -40,6 +41,7 @@ __all__ = [
     "focus_options",
     "focusing_task",
     "forecast",
+    "pixel_taper",
     "polar_format",
     "profile_energy",
     "range_doppler",

@@ -9,7 +9,7 @@ reference: sarcl/reference/backproject.py: the image of a unit point at x has th
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -53,12 +53,16 @@ def room_for_gain(task: FocusingTask, dtype: Any) -> None:
         )  # fmt: skip
 
 
-def seen_by(task: FocusingTask, dtype: Any) -> dict[str, Any]:
+Gains = Callable[[np.ndarray, np.ndarray], np.ndarray]
+
+
+def seen_by(task: FocusingTask, dtype: Any, tapered: Gains | None = None) -> dict[str, Any]:
     """Fields `gain` and `aperture` of an Image.
 
     The gain is a number where it is the same in all pixels, else an array of the grid's shape. The aperture is None
     where every row saw every pixel. dtype is that of the pixels: the gain has float32 beside complex64, and float64
-    beside complex128.
+    beside complex128. tapered gives sums of weights that differ from pixel to pixel, of positions, m (n_tiles,
+    per_tile, 3), and the number of rows that see each (`PixelTaper.gains`).
     """
     whole = float(task.row_weight.sum() * task.sample_weight.sum())
     if not may_vary(task):
@@ -70,9 +74,11 @@ def seen_by(task: FocusingTask, dtype: Any) -> dict[str, Any]:
         orders = tiling.bands(band, band + 1)[1]
         positions = tiling.positions(band, band + 1, orders)
         weight, count = coverage.sums(positions, np.stack([task.row_weight, np.ones(task.raw.n_rows)]))
+        if tapered is not None:
+            weight = tapered(positions, count)
         complete = complete and bool((count == task.raw.n_rows).all())
         tiling.place((weight * task.sample_weight.sum()).ravel(), (band, band + 1), 0, orders, flat)
-    if complete:
+    if complete and tapered is None:
         return {"gain": whole}
     made = flat.reshape(grid.shape)
     used = made if grid.empty is None else made[~grid.empty]
@@ -117,6 +123,22 @@ class RowCoverage:
                 for one, weight in zip(made, weights, strict=True):
                     one[tile[some][starts]] += np.add.reduceat(weight[row[some], None] * seen, starts, axis=0)
         return made
+
+    def spans(self, positions: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Least and largest of places (n_rows,) of the rows that see positions, m (n_tiles, per_tile, 3): (n_tiles,
+        per_tile) each, inf and -inf where none does."""
+        first, last = np.full(positions.shape[:2], np.inf), np.full(positions.shape[:2], -np.inf)
+        for low, stop, whole, tile, row in self._tiles(positions):
+            first[low:stop] = np.where(whole, places, np.inf).min(axis=1)[:, None]
+            last[low:stop] = np.where(whole, places, -np.inf).max(axis=1)[:, None]
+            for some in _pieces(tile, positions.shape[1]):
+                # in a strip map rows at both ends of the aperture are asked for; those between see the tile whole
+                seen, at = self.sees(positions[tile[some]], row[some]), places[row[some], None]
+                starts = np.flatnonzero(np.diff(tile[some], prepend=-1))
+                which = tile[some][starts]
+                first[which] = np.minimum(first[which], np.minimum.reduceat(np.where(seen, at, np.inf), starts, axis=0))
+                last[which] = np.maximum(last[which], np.maximum.reduceat(np.where(seen, at, -np.inf), starts, axis=0))
+        return first, last
 
     def sees(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
         """Whether rows (m,) see points, m (m, n, 3): bool (m, n)."""

@@ -29,6 +29,7 @@ from .collection import collection
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip
+from .pixel_taper import PixelTaper
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
@@ -101,7 +102,8 @@ def backproject(
     method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
     window     None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as "hann" or
                ("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or of
-               arrays with a weight per sample and per row of a channel
+               arrays with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels
+               out: over the aperture of each pixel, the rows that see it
     weights    one per row (n_rows,), multiplied with window and raw.weight
     beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
                grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
@@ -189,7 +191,7 @@ def backproject(
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
             measured = _measure_error(task, grid, output.data)
             clock.lap("check")
-        seen = seen_by(task, chosen.dtype)
+        seen = seen_by(task, chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
         clock.lap("gain")
         plan = chosen.plan.describe(chosen.method)
         if kept:
@@ -317,7 +319,8 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
 
     index, positions = grid.sample(256, seed=0)
     beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
-    wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE)
+    share = None if task.taper is None else PixelTaper(task).weights(positions)
+    wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE, share)
     got = (
         np.asarray(data)[index]
         if isinstance(data, np.ndarray)

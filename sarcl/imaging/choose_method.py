@@ -71,9 +71,19 @@ def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True
     tolerance can.
     """
     if method == "factorized":
+        if task.taper is not None:
+            raise ValueError(
+                "method='factorized' merges rows, and cannot taper the aperture of each pixel, which a window in "
+                "cross-range with a beam does: take method='direct' or 'auto', or window=(range, None)"
+            )
         return _factorized(task, tolerance, lanes, float64)
     direct = _direct(task, tolerance, lanes, float64)
-    if method == "direct" or direct.dtype != np.complex64 or task.pairs < cost_model.SEARCH_PAYS:
+    if (
+        method == "direct"
+        or task.taper is not None
+        or direct.dtype != np.complex64
+        or task.pairs < cost_model.SEARCH_PAYS
+    ):
         return direct
     try:
         merged = _Float32(task, tolerance).factorized(lanes)

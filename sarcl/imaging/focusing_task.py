@@ -35,6 +35,8 @@ class FocusingTask:
     sample_weight  (n_samples,) and row_weight (n_rows,), float64: window, raw.weight and `weights` together
     wrap           profiles repeat beyond the range window
     skips          reasons to leave out pairs
+    taper          window over the aperture of each pixel, as windows.table makes it, which is not in row_weight; None:
+                   the same weights in all pixels.  places  of the rows along the aperture (n_rows,), where there is one
     """
 
     raw: PhaseHistory
@@ -44,6 +46,8 @@ class FocusingTask:
     row_weight: np.ndarray
     wrap: bool
     skips: frozenset[str]
+    taper: np.ndarray | None = None
+    places: np.ndarray | None = None
 
     @property
     def highest(self) -> float:
@@ -111,9 +115,14 @@ def make_task(
         raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
     check_polarizations(raw, sum_polarizations)
     skips = known_skips(skip, SKIPS)
-    sample_weight, row_weight = weigh(raw, window, weights)
     # of a plane the pixel at `center`: with an even number of pixels the middle of the bounds is half a pixel off
     toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0) if grid.center is None else grid.center)
+    taper = None
+    if toward is not None and not _all_lit(geometry_of(raw, wrap, toward, angle), grid):
+        across, along = windows.both(window)
+        if along is not None:
+            taper, window = windows.table(along), (across, None)
+    sample_weight, row_weight = weigh(raw, window, weights)
     if "zero weight" in skips and not row_weight.all():
         used = np.flatnonzero(row_weight)
         raw, row_weight = raw[used], row_weight[used]
@@ -121,8 +130,35 @@ def make_task(
     if "no data" not in skips:
         grid = grid.filled()
     return FocusingTask(
-        raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips)
-    )
+        raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips), taper,
+        None if taper is None else places_of(raw),
+    )  # fmt: skip
+
+
+def _all_lit(antennas: PulseGeometry, grid: ImageGrid) -> bool:
+    """Whether every row sees the whole sphere about the grid."""
+    low, high = grid.bounds
+    middle, radius = (low + high) / 2, float(np.linalg.norm(high - low)) / 2 * (1 + 1e-9)
+    depth = antennas.beam_depth(middle) if antennas.wrap else np.minimum(
+        antennas.beam_depth(middle), antennas.depth(middle)
+    )  # fmt: skip
+    return bool((depth > radius).all())
+
+
+def places_of(raw: PhaseHistory) -> np.ndarray:
+    """Places of the rows along the aperture, float64 (n_rows,): whole numbers from 0 on in the order of time.
+
+    Channels of fewer rows than the longest are stretched to its length, so that all share an aperture.
+    """
+    when = np.arange(raw.n_rows) if raw.time is None else np.argsort(np.argsort(raw.time, kind="stable"))
+    group = groups(raw.n_rows, raw.tx_channel, raw.rx_channel, raw.polarization)
+    longest = int(np.bincount(group).max())
+    made = np.zeros(raw.n_rows)
+    for g in np.unique(group):
+        members = np.flatnonzero(group == g)
+        at = (np.arange(len(members)) + 0.5) / len(members) * longest - 0.5
+        made[members[np.argsort(when[members])]] = at if len(members) < longest else np.arange(longest)
+    return made
 
 
 def check_polarizations(

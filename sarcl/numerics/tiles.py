@@ -30,6 +30,12 @@ class Tiles:
     def n_tiles(self) -> int:
         return len(self.references)
 
+    @property
+    def positions(self) -> np.ndarray:
+        """Positions of all points about the scene's centre, m (n_tiles, per_tile, 3), float64."""
+        high, low = self.offsets.astype(np.float64).reshape(2, 3, -1, self.per_tile)
+        return np.asarray(self.references[:, None] + np.moveaxis(high + low, 0, -1))
+
     def picked(self, tiles: np.ndarray) -> Tiles:
         """These tiles only."""
         return Tiles(self.per_tile, self.references[tiles], self.radius[tiles], self.tile_offsets(tiles), self.shared)

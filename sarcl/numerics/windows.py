@@ -25,7 +25,7 @@ EDGE_TO_EDGE = (
 )  # fmt: skip
 # windows that have no continuous form: their parameters count cells, or their shape hinges on the number of cells
 OF_CELLS = ("chebwin", "exponential", "gaussian", "general_gaussian", "kaiser_bessel_derived")
-TABLE = 4096  # cells of `table`
+TABLE = 2**18  # cells of `table`: linear interpolation between them has an error of 4e-11 of a Hamming window
 
 
 def weights(window: Window | None, n: int) -> np.ndarray:

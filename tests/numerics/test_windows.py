@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sarcl.numerics.windows import both, check, in_words, parse, table, weights
+from sarcl.numerics.windows import TABLE, both, check, in_words, parse, table, weights
 
 TAYLOR = ("taylor", 35, 5)
 # window, width at half power in cells of 1/B, highest side lobe in dB, of the continuous windows' transforms
@@ -156,7 +156,7 @@ def test_a_pair_is_for_range_and_cross_range():
 
 
 def test_a_table_is_the_window_over_an_aperture_of_any_length():
-    u = (np.arange(4096) + 0.5) / 4096 - 0.5
+    u = (np.arange(TABLE) + 0.5) / TABLE - 0.5
     np.testing.assert_allclose(table("hann"), np.cos(np.pi * u) ** 2, atol=1e-12)
     assert table(np.array([1.0, 3.0])) == pytest.approx(np.clip(2 + 4 * u, 1, 3))
 

@@ -14,6 +14,7 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
+from ..pixel_taper import TaperOnDevice
 from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import Tiling
@@ -31,7 +32,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
     lined = None
-    if line_plan.possible(grid, lanes):
+    if task.taper is None and line_plan.possible(grid, lanes):  # lines share the weights of their pulses
         lined = line_plan.choose(
             tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
         )
@@ -64,7 +65,10 @@ class Direct(DirectEngine):
         self.lanes = device.info.vector_width
         bistatic = not task.antennas.is_monostatic
         beam = task.antennas.beam is not None
-        self.kernels = kernel_of(device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam)
+        self.taper = TaperOnDevice(device, task, np.float32)
+        self.kernels = kernel_of(
+            device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam, weights=self.taper.macros
+        )
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
         # per row, making the range profile costs a tenth of adding it to this many pixels
         self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
@@ -87,7 +91,7 @@ class Direct(DirectEngine):
 
     def tiles_at_once(self, nbytes: float) -> int:
         """See DirectEngine: sums, and offsets where each tile has its own, fit in the share of the pixels."""
-        pixel_bytes = 16 + self.tiling.offset_bytes
+        pixel_bytes = 16 + self.tiling.offset_bytes + self.taper.pixel_bytes
         return max(1, int(self._shares(nbytes)[1] / (pixel_bytes * self.tiling.per_tile)))
 
     def fill(
@@ -123,18 +127,20 @@ class Direct(DirectEngine):
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
         image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
         on = kernels.ready(tiles, self.task.skip_flags)
+        apertures = self.taper.apertures(tiles.positions + self.tiling.center) if self.task.taper is not None else None
         clock.lap("prepare")
         for start in range(0, raw.n_rows, rows):
             stop = min(start + rows, raw.n_rows)
             block = self.profiles.upload(start, stop)
             packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
             pulses = device.upload(packed), packed.shape[2], stop - start
+            weights = self.taper.arguments(apertures, start, stop)
             clock.lap("profiles")
             at_once = int(for_constants / (4 * kernels.components * packed.shape[2]))
             step = max(1, min(tiles.n_tiles, at_once))
             for tile in range(0, tiles.n_tiles, step):
                 end = min(tile + step, tiles.n_tiles)
-                kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image)
+                kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights)
                 if end < tiles.n_tiles:  # frees the constants of these tiles before the next are made
                     device.finish()
             device.finish()

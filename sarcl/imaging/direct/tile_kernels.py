@@ -6,6 +6,7 @@ tile has profiles of its own, relative to its reference point.
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
@@ -21,6 +22,7 @@ from . import line_plan
 from .line_plan import LinePlan, steps
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
+NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
 # pulses on the device: the packed array, its length with padding, and the number of pulses
@@ -33,12 +35,13 @@ class GatherKernel:
     chunk, least_rows = CHUNK, 1
 
     def __init__(
-        self, device: Device, plan: Plan, tiling: Tiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool
-    ) -> None:
+        self, device: Device, plan: Plan, tiling: Tiling, *, bistatic: bool, wrap: bool, local: bool, beam: bool,
+        weights: Mapping[str, int] = NO_WEIGHTS,
+    ) -> None:  # fmt: skip
         self.device, self.beam = device, beam
         self.lanes = device.info.vector_width
         macros = {**plan.macros(bistatic, wrap), "LOCAL": int(local), "VECTORS": VECTORS, "CHUNK": CHUNK}
-        macros["BEAM"] = int(beam)
+        macros |= {"BEAM": int(beam), **weights}
         self.components = plan.components(bistatic, beam)
         self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
@@ -53,9 +56,12 @@ class GatherKernel:
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any,
+        offset: int, image: Any, *weights: Any,
     ) -> None:  # fmt: skip
-        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`.
+
+        weights  of the pulses in the pixels, where they are tapered: `TaperOnDevice.arguments`
+        """
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         centers, radius, offsets = on.buffers
         constants = self.constants.compute(pulse, n, centers, radius, (low, high), tiles.n_tiles, on.skip)
@@ -64,7 +70,7 @@ class GatherKernel:
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
             source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
             tiles.offsets.shape[1], 0 if tiles.shared else tiles.per_tile // self.lanes, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *weights,
         )  # fmt: skip
 
 
@@ -73,8 +79,10 @@ class LineKernel:
 
     def __init__(
         self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
-        beam: bool,
+        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
     ) -> None:  # fmt: skip
+        if weights["WEIGHT"]:
+            raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
         self.device, self.tiling, self.beam = device, tiling, beam
         self.components = line_plan.components(beam)
         # the pulses of a group share one curvature, so blocks of rows are whole groups
@@ -98,7 +106,7 @@ class LineKernel:
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any,
+        offset: int, image: Any, *weights: Any,
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
@@ -132,8 +140,8 @@ class TilesOnDevice:
         return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
 
 
-def kernel_of(device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: bool) -> GatherKernel | LineKernel:
-    """The kernel for a plan; how: bistatic, wrap, local, beam."""
+def kernel_of(device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: Any) -> GatherKernel | LineKernel:
+    """The kernel for a plan; how: bistatic, wrap, local, beam, weights."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)
         return LineKernel(device, plan, tiling, **how)

@@ -13,6 +13,7 @@ from ...opencl.device import Device
 from ...opencl.device_list import devices
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
+from ..pixel_taper import TaperOnDevice
 from ..tiling.tiling import Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
@@ -34,7 +35,9 @@ class DirectFloat64(DirectEngine):
         self.lanes = device.info.vector_width
         geometry = {"BISTATIC": int(not task.antennas.is_monostatic), "BEAM": int(task.antennas.beam is not None)}
         self.constants = device.kernel("tile_constants_float64.cl", "tile_constants", **geometry)
-        self.kernel = device.kernel("backproject_float64.cl", "backproject", **geometry, **plan.macros(task.wrap))
+        self.taper = TaperOnDevice(device, task, np.float64)
+        macros = {**geometry, **plan.macros(task.wrap), **self.taper.macros}
+        self.kernel = device.kernel("backproject_float64.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length, dtype=np.complex128)
@@ -47,7 +50,13 @@ class DirectFloat64(DirectEngine):
                 f"max_bytes is {text.size_text(nbytes)} but the range profile of one row needs half of "
                 f"{text.size_text(least)}; give max_bytes={least:.2g} or more"
             )
-        return max(1, int(min(nbytes / 2, self.device.info.max_alloc) / (PIXEL_BYTES * self.tiling.per_tile)))
+        return max(
+            1,
+            int(
+                min(nbytes / 2, self.device.info.max_alloc)
+                / ((PIXEL_BYTES + self.taper.pixel_bytes) * self.tiling.per_tile)
+            ),
+        )
 
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
@@ -85,6 +94,7 @@ class DirectFloat64(DirectEngine):
         pixels = positions.shape[0] * positions.shape[1]
         image, missed = device.zeros(32 * pixels), device.zeros(8 * n_tiles)
         where = device.upload(positions.reshape(-1, 3).T)
+        apertures = self.taper.apertures(positions)
         tile, reach = device.upload(references.T), device.upload(radius)
         stride, wrap = self.profiles.stride, plan.length if self.task.wrap else 0
         clock.lap("prepare")
@@ -93,6 +103,7 @@ class DirectFloat64(DirectEngine):
             block = self.profiles.upload(start, stop)
             pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
             pulse, n = device.upload(pulse_host), pulse_host.shape[1]
+            weights = self.taper.arguments(apertures, start, stop)
             clock.lap("profiles")
             step = max(1, min(n_tiles, int(min(budget / 4, device.info.max_alloc) / (8 * N_CONST * n))))
             constants = device.empty(8 * N_CONST * n * step)
@@ -106,7 +117,7 @@ class DirectFloat64(DirectEngine):
                 device.run(
                     self.kernel, (items, count), (items, 1) if items <= self.group else None,
                     block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
-                    where, image, np.uint64(pixels), missed,
+                    where, image, np.uint64(pixels), missed, *weights,
                 )  # fmt: skip
             device.finish()
             clock.lap("backproject")
