@@ -27,6 +27,7 @@ For this folder alone:
     _incident     a plane wave that enters through the faces of a box
     _least_areas  the least areas of cut faces with which the time steps are stable
     _lists        lists of cells on a device
+    _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
     _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum
     _thin_parts   refusals of parts of a mesh that are thinner than a cell
