@@ -1,5 +1,5 @@
 // One time step of a Yee grid in vacuum: the update of every cell, whatever it holds, with layers that absorb (CPML) at its
-// sides. Lists correct it afterwards (fdtd_lists.cl).
+// sides; on CPUs each work-item then corrects its rows by lists (fdtd_lists.clh), while they are in its cache.
 //
 //   E(n + 1)   = E(n) + s curl H(n + 1/2),   curl_x H = (Hz[j] - Hz[j - 1]) - (Hy[k] - Hy[k - 1])
 //   H(n + 1/2) = H(n - 1/2) - s curl E(n),   curl_x E = (Ez[j + 1] - Ez[j]) - (Ey[k + 1] - Ey[k]);   y, z cyclically
@@ -9,18 +9,27 @@
 //   psi_b <- beta psi_b + gamma d_a F_c,   curl_b <- curl_b - psi_b
 //   psi_c <- beta psi_c + gamma d_a F_b,   curl_c <- curl_c + psi_c
 //
+// Cells whose fields are zero are left out: those inside conductors, and those ahead of the incident wave.
+//
 // source    K. S. Yee, IEEE Trans. Antennas Propag. 14 (1966); J. A. Roden and S. D. Gedney, Microw. Opt. Technol. Lett.
 //           27 (2000), with kappa = 1; docs/theory/full_wave.md
 // symbols   e, h  fields (3, component), layout of fdtd.clh; h is the magnetic field times the impedance of vacuum
 //           psi   memory of the layers along x, y and z, for each of them (2, planes, rows, cells): psi_b and psi_c of
 //                 2 thick planes, of 2 thick rows, or of the 32 cells in the first and last vector of each row
 //           coefficient  beta of the 2 thick layers, those at the low end first, their gamma; beta of the 32 cells, gamma
+//           resting (planes, rows, 2) ushort: first cell of each row that is not updated, and first one after these
+//           front   number of cells from node 0 to the front of the wave, along its direction;  along_x, along_y, along_z
+//                   that direction, along_z not 0: cells beyond the front are not updated, 16 at a time
 //           s  c dt/dx;  n_planes, n_rows, n_vectors  planes of the grid, rows of a plane, vectors of a row
 //           first  first of the planes that are updated;  rows_each  rows that a work-item updates
-// macros    LANES;  ABSORB  1 where layers absorb
-// reference: sarcl/reference/fdtd.py:update_e, update_h, absorb
+//           wave_rows (2, groups + 1) int: first entry of each group of rows_each rows, groups in the order of planes, in
+//                   the two parts of the list of the incident wave;  wave  1: it enters in this step
+//           rows    (groups + 1) int: first entry of each group in the list of the target;  others: fdtd_lists.clh
+// macros    LANES;  ABSORB  1 where layers absorb;  LISTS  1 where work-items correct their rows
+// reference: sarcl/reference/fdtd.py:update_e, update_h, absorb, edges, faces, incident
 
 #include "fdtd.clh"
+#include "fdtd_lists.clh"
 
 // The step of the layers in one vector. memory points to psi_b, `size` floats before psi_c.
 inline void absorb(__global float *memory, int size, lanes beta, lanes gamma, lanes d_c, lanes d_b, lanes *curl_b,
@@ -35,13 +44,28 @@ inline void absorb(__global float *memory, int size, lanes beta, lanes gamma, la
 // Number of a layer, from place p among n: -1 between the layers.
 inline int layer_of(int p, int n, int thick) { return p < thick ? p : p >= n - thick ? p - n + 2 * thick : -1; }
 
+// First vector of a row that the wave has reached, and the first one after these; the front is `ahead` cells away along the
+// direction of the wave from the first cell of the row.
+inline int2 reached(float ahead, float along_z, int n_vectors) {
+    int block = (int)floor(clamp(ahead / along_z, -16.0f, 1e6f) / 16), vectors = 16 / LANES;
+    return along_z > 0 ? (int2)(0, min((block + 1) * vectors, n_vectors)) : (int2)(max(block, 0) * vectors, n_vectors);
+}
+
 // global size (1 or vectors of a row, rows / rows_each rounded up, planes), for both kernels
-#define EACH_VECTOR                                                                                          \
-    int i = first + (int)get_global_id(2), plane_layer = layer_of(i, n_planes, thick);                       \
-    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * rows_each);                                        \
-    for (int j = (int)get_global_id(1) * rows_each; j < j_end; j++)                                          \
-        for (int v = (int)get_global_id(0), at = start + i * plane + j * row + LANES * v; v < n_vectors;     \
-             v += (int)get_global_size(0), at += LANES * (int)get_global_size(0))
+#define EACH_VECTOR                                                                                           \
+    int i = first + (int)get_global_id(2), plane_layer = layer_of(i, n_planes, thick), any = 0;               \
+    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * rows_each);                                         \
+    for (int j = (int)get_global_id(1) * rows_each; j < j_end; j++) {                                         \
+        int2 lit = reached(front - along_x * i - along_y * j, along_z, n_vectors);                            \
+        int hole = resting[2 * (i * n_rows + j)] / LANES, hole_end = resting[2 * (i * n_rows + j) + 1] / LANES; \
+        any |= lit.x < lit.y;                                                                                 \
+        for (int v = (int)get_global_id(0), at = start + i * plane + j * row + LANES * v; v < lit.y;          \
+             v += (int)get_global_size(0), at += LANES * (int)get_global_size(0)) {                           \
+            if (v < lit.x || (v >= hole && v < hole_end)) continue;
+
+#define END_EACH_VECTOR \
+    }                   \
+    }
 
 // curl of a field from its differences dx_y (of component y along x) ..., with the layers
 #define CURL                                                                                                 \
@@ -64,36 +88,72 @@ inline int layer_of(int p, int n, int thick) { return p < thick ? p : p >= n - t
                    dz_y, dz_x, &curl_x, &curl_y);                                                            \
     }
 
-__kernel void update_e(__global float *restrict e, __global const float *restrict h, __global float *restrict psi,
-                       __global const float *restrict coefficient, int thick, int component, int start, int plane,
-                       int row, int n_planes, int n_rows, int n_vectors, int rows_each, float s, int first) {
+#if LISTS
+
+// The incident wave enters the rows that were updated. No place occurs twice in a part of its list.
+#define ENTER(FIELD)                                                                                                   \
+    int group = i * (int)get_global_size(1) + (int)get_global_id(1);                                                   \
+    for (int part = 0; any && part < 2 * wave; part++) {                                                               \
+        __global const int *rows = wave_rows + part * (n_planes * (int)get_global_size(1) + 1) + group;                \
+        for (int l = rows[0]; l < rows[1]; l++)                                                                        \
+            enter(l, FIELD, wave_at, wave_from, wave_rest, wave_amount, u + u_at, n_points, quiet_below, quiet_above); \
+    }
+
+#define LIST_ARGUMENTS(COEFFICIENT)                                                                                  \
+    , int wave, __global const int *restrict wave_rows, __global const int *restrict wave_at,                        \
+        __global const int *restrict wave_from, __global const float *restrict wave_rest,                            \
+        __global const float *restrict wave_amount, __global const float *restrict u, int u_at, int n_points,        \
+        int quiet_below, int quiet_above, __global const int *restrict rows, __global const int *restrict list_at,   \
+        __global const float *restrict COEFFICIENT, __global float *restrict old, __global float *restrict residual, \
+        int count, int record,                                                                                       \
+        int conducts
+#else
+#define LIST_ARGUMENTS(COEFFICIENT)
+#endif
+
+#define GRID_ARGUMENTS                                                                                                \
+    __global float *restrict psi, __global const float *restrict coefficient, __global const ushort *restrict resting, \
+        int thick, int component, int start, int plane, int row, int n_planes, int n_rows, int n_vectors,             \
+        int rows_each, float s, int first, float front, float along_x, float along_y, float along_z
+
+__kernel void update_e(__global float *restrict e, __global const float *restrict h, GRID_ARGUMENTS
+                           LIST_ARGUMENTS(share)) {
     __global const float *hx = h, *hy = h + component, *hz = hy + component;
     __global float *ex = e, *ey = e + component, *ez = ey + component;
-    EACH_VECTOR {
-        lanes x = LOAD_LANES(hx + at), y = LOAD_LANES(hy + at), z = LOAD_LANES(hz + at);
-        lanes dx_y = y - LOAD_LANES(hy + at - plane), dx_z = z - LOAD_LANES(hz + at - plane);
-        lanes dy_x = x - LOAD_LANES(hx + at - row), dy_z = z - LOAD_LANES(hz + at - row);
-        lanes dz_x = x - LOAD_LANES(hx + at - 1), dz_y = y - LOAD_LANES(hy + at - 1);
-        CURL
-        STORE_LANES(fma((lanes)(s), curl_x, LOAD_LANES(ex + at)), ex + at);
-        STORE_LANES(fma((lanes)(s), curl_y, LOAD_LANES(ey + at)), ey + at);
-        STORE_LANES(fma((lanes)(s), curl_z, LOAD_LANES(ez + at)), ez + at);
-    }
+    EACH_VECTOR
+            lanes x = LOAD_LANES(hx + at), y = LOAD_LANES(hy + at), z = LOAD_LANES(hz + at);
+            lanes dx_y = y - LOAD_LANES(hy + at - plane), dx_z = z - LOAD_LANES(hz + at - plane);
+            lanes dy_x = x - LOAD_LANES(hx + at - row), dy_z = z - LOAD_LANES(hz + at - row);
+            lanes dz_x = x - LOAD_LANES(hx + at - 1), dz_y = y - LOAD_LANES(hy + at - 1);
+            CURL
+            STORE_LANES(fma((lanes)(s), curl_x, LOAD_LANES(ex + at)), ex + at);
+            STORE_LANES(fma((lanes)(s), curl_y, LOAD_LANES(ey + at)), ey + at);
+            STORE_LANES(fma((lanes)(s), curl_z, LOAD_LANES(ez + at)), ez + at);
+    END_EACH_VECTOR
+#if LISTS
+    ENTER(e)
+    for (int l = rows[group]; any && l < rows[group + 1]; l++)
+        edge(l, e, list_at, share, old, residual, count, record, conducts);
+#endif
 }
 
-__kernel void update_h(__global const float *restrict e, __global float *restrict h, __global float *restrict psi,
-                       __global const float *restrict coefficient, int thick, int component, int start, int plane,
-                       int row, int n_planes, int n_rows, int n_vectors, int rows_each, float s, int first) {
+__kernel void update_h(__global const float *restrict e, __global float *restrict h, GRID_ARGUMENTS
+                           LIST_ARGUMENTS(weight)) {
     __global float *hx = h, *hy = h + component, *hz = hy + component;
     __global const float *ex = e, *ey = e + component, *ez = ey + component;
-    EACH_VECTOR {
-        lanes x = LOAD_LANES(ex + at), y = LOAD_LANES(ey + at), z = LOAD_LANES(ez + at);
-        lanes dx_y = LOAD_LANES(ey + at + plane) - y, dx_z = LOAD_LANES(ez + at + plane) - z;
-        lanes dy_x = LOAD_LANES(ex + at + row) - x, dy_z = LOAD_LANES(ez + at + row) - z;
-        lanes dz_x = LOAD_LANES(ex + at + 1) - x, dz_y = LOAD_LANES(ey + at + 1) - y;
-        CURL
-        STORE_LANES(fma((lanes)(-s), curl_x, LOAD_LANES(hx + at)), hx + at);
-        STORE_LANES(fma((lanes)(-s), curl_y, LOAD_LANES(hy + at)), hy + at);
-        STORE_LANES(fma((lanes)(-s), curl_z, LOAD_LANES(hz + at)), hz + at);
-    }
+    EACH_VECTOR
+            lanes x = LOAD_LANES(ex + at), y = LOAD_LANES(ey + at), z = LOAD_LANES(ez + at);
+            lanes dx_y = LOAD_LANES(ey + at + plane) - y, dx_z = LOAD_LANES(ez + at + plane) - z;
+            lanes dy_x = LOAD_LANES(ex + at + row) - x, dy_z = LOAD_LANES(ez + at + row) - z;
+            lanes dz_x = LOAD_LANES(ex + at + 1) - x, dz_y = LOAD_LANES(ey + at + 1) - y;
+            CURL
+            STORE_LANES(fma((lanes)(-s), curl_x, LOAD_LANES(hx + at)), hx + at);
+            STORE_LANES(fma((lanes)(-s), curl_y, LOAD_LANES(hy + at)), hy + at);
+            STORE_LANES(fma((lanes)(-s), curl_z, LOAD_LANES(hz + at)), hz + at);
+    END_EACH_VECTOR
+#if LISTS
+    ENTER(h)
+    for (int l = rows[group]; any && l < rows[group + 1]; l++)
+        face(l, e, h, list_at, weight, old, residual, count, record, component, plane, row, s);
+#endif
 }

@@ -9,15 +9,17 @@ import numpy as np
 
 from ..opencl.device import Device
 from . import _dispersion
-from ._incident import PlaneWave, wave_table
-from ._lists import BLOCK, TargetList
-from .fields import Fields
-from .lattice import Lattice
+from ._decay import SPAN, Decay
+from ._incident import PlaneWave, WaveTable, wave_table
+from ._lists import SAMPLES, TargetList
+from ._pulse import Pulse
+from .fields import BLOCK, Fields
+from .lattice import COURANT, Lattice
 from .target import Target
 
-CHUNK = 128  # steps between two looks at how much of the currents is left: a multiple of BLOCK
 WEAKEST = 1e-3  # of the spectrum: float32 fields have errors of about 1e-6 of the peak
-LEFT = 1e-5  # largest residual of a block over the largest of all, below which the run ends
+ALIAS = 1e-6  # of the spectrum at a frequency: what sums over some steps alone may add to it from other frequencies
+PERIODS = (8, 4, 2)  # steps between two samples of the residuals, as far as ALIAS allows
 
 
 @dataclass(frozen=True, eq=False)
@@ -30,7 +32,8 @@ class Currents:
     k             wavenumbers of the incident wave on the grid, rad/m (F,), at the frequencies omega, rad/s (F,)
     edges, faces  places as in Lattice, of electric (F, n) and magnetic (F, m), complex64
     centre        where phases are zero, m (3,)
-    n_steps       steps that were done;  left  largest residual of the last block over the largest of all
+    n_steps       steps that were done
+    left, ended   what the run did not see, and why it ended: see _decay:Decay
     """
 
     lattice: Lattice
@@ -44,48 +47,78 @@ class Currents:
     magnetic: np.ndarray
     n_steps: int
     left: float
+    ended: str = "decayed"
 
 
 def currents(
     device: Device, lattice: Lattice, target: Target, wave: PlaneWave, k: np.ndarray, *, absorber: int, gap: int,
-    most_steps: int = 20_000, tile: int | None = None, progress: Callable[[int, int], None] | None = None,
+    tolerance: float = 1e-4, most_steps: int = 20_000, tile: int | None = None,
+    progress: Callable[[int, int], None] | None = None,
 ) -> Currents:  # fmt: skip
     """Currents of a target under a plane wave at wavenumbers k (F,), rad/m, in vacuum.
 
-    absorber  layers on each side;  gap  cells between these and the box where the wave enters
-    progress  called as progress(steps done, steps expected)
-    The target is inside that box. The run ends when the currents have decayed (LEFT), or after most_steps.
+    absorber   layers on each side;  gap  cells between these and the box where the wave enters
+    tolerance  of the part of the currents that comes after the end of the run, relative (Decay)
+    progress   is called with the steps that are done and those that are expected
+    The target is inside that box. The run ends as Decay says, or after most_steps, rounded up to whole windows.
     """
-    low = np.full(3, absorber + gap)
-    high = np.array(lattice.shape) - absorber - gap
-    centre = lattice.origin + lattice.cell * np.array(lattice.shape) / 2
+    low, high, centre = box_of(lattice, absorber, gap)
     _check_inside(lattice, target, low, high)
     table = wave_table(lattice, wave, low, high, centre)
-    fields = Fields(device, lattice, target, absorber=absorber, wave=table, tile=tile)
     omega = _dispersion.grid_omega(lattice, k, wave.travel)
-    lists = (fields.edges, 0.5), (fields.faces, 0.0)  # E changes between two steps, H about a step
     spectrum = table.spectrum(omega)
     _check_band(k, spectrum)
+    every = sample_period(wave.pulse, omega, lattice.time_step)
+    fields = Fields(device, lattice, target, absorber=absorber, wave=table, tile=tile, every=every)
+    lists = (fields.edges, 0.5), (fields.faces, 0.0)  # E changes between two steps, H about a step
     sums = [device.zeros(8 * len(omega) * part.count) for part, _ in lists]
-    largest, left = 0.0, 1.0
-    while fields.step < most_steps and (fields.step < len(table.values) or left > LEFT):
-        now = 0.0
-        times = fields.step + np.arange(CHUNK)
-        phases = [device.copied(_turns(lattice, omega, times + late)) for _, late in lists]
-        for block in range(CHUNK // BLOCK):
+    window = SAMPLES * every
+    decay = Decay(tolerance, window)
+    while fields.step < most_steps and (fields.step < table.n_steps or not decay.ended):
+        times = fields.step + every - 1 + every * np.arange(SAMPLES)
+        for _ in range(window // BLOCK):
             fields.advance(BLOCK)
-            for (part, _), phase, sum_ in zip(lists, phases, sums, strict=True):
-                fields.transform(part, phase, sum_, block * BLOCK, BLOCK, len(omega))
-        now = max(float(np.abs(part.residuals(BLOCK)).max(initial=0)) for part, _ in lists)
-        largest = max(largest, now)
-        left = now / largest if largest else 0.0
-        if progress is not None:
-            progress(fields.step, 2 * len(table.values))
+        norms = np.zeros((2, len(omega)))
+        for (part, late), sum_ in zip(lists, sums, strict=True):
+            turns = every * _turns(lattice, omega, times + late)
+            norms += fields.transform(part, device.copied(turns), sum_, SAMPLES, len(omega))
+        decay.add(*norms)
+        if progress:
+            progress(fields.step, min(most_steps, max(expected_steps(table), fields.step + decay.missing_steps())))
     electric, magnetic = (_phasors(device, part, sum_, spectrum) for (part, _), sum_ in zip(lists, sums, strict=True))
     return Currents(
         lattice, wave, centre, np.asarray(k), omega, fields.edges.places, electric, fields.faces.places, magnetic,
-        fields.step, left,
+        fields.step, decay.left, (decay.ended if fields.step >= table.n_steps else None) or "most_steps",
     )  # fmt: skip
+
+
+def box_of(lattice: Lattice, absorber: int, gap: int) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Nodes at the faces of the box where the wave enters, low and high (3,), and the middle of the grid, m (3,)."""
+    low = np.full(3, absorber + gap)
+    return low, np.array(lattice.shape) - low, lattice.origin + lattice.cell * np.array(lattice.shape) / 2
+
+
+def expected_steps(table: WaveTable) -> int:
+    """Steps of a run whose currents decay while a wave crosses the grid once more."""
+    diagonal = float(np.linalg.norm(table.lattice.shape))
+    return table.n_steps + int(diagonal / COURANT) + SPAN
+
+
+def sample_period(pulse: Pulse, omega: np.ndarray, time_step: float) -> int:
+    """Steps between two samples of the residuals that sums over time need, at frequencies omega, rad/s (F,).
+
+    The grid and its target are linear and do not change: residuals hold the frequencies of the pulse alone. A sum over
+    every n-th step holds, beside the frequency that is asked for, those that differ by multiples of 1/(n dt). It is
+    the sum over all steps, over n, where the pulse has nothing there (ALIAS).
+    """
+    wanted = omega / (2 * np.pi)
+    here = np.abs(pulse.spectrum(wanted))
+    for every in PERIODS:
+        shift = np.arange(1, every)[:, None] / (every * time_step)
+        there = wanted + np.concatenate([shift, -shift])
+        if (np.abs(pulse.spectrum(np.abs(there))).sum(axis=0) <= ALIAS * here).all():
+            return every
+    return 1
 
 
 def _check_inside(lattice: Lattice, target: Target, low: np.ndarray, high: np.ndarray) -> None:
@@ -117,5 +150,9 @@ def _turns(lattice: Lattice, omega: np.ndarray, steps: np.ndarray) -> np.ndarray
 
 
 def _phasors(device: Device, part: TargetList, sums: object, spectrum: np.ndarray) -> np.ndarray:
-    both = device.download(sums, np.empty((len(spectrum), 2, part.count), np.float32))[:, :, : len(part.places)]
-    return np.asarray((both[:, 0] + 1j * both[:, 1]) / spectrum[:, None], np.complex64)
+    out = np.empty((len(spectrum), len(part.places)), np.complex64)
+    both = np.empty((2, part.count), np.float32)
+    for f, weight in enumerate(spectrum):
+        device.download(sums, both, offset=f * both.nbytes)
+        out[f] = (both[0] + 1j * both[1])[: out.shape[1]] / weight
+    return out

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._least_areas import least_areas, weights
+from ._resting import resting_rows
 from .lattice import Lattice
 from .target import Target
 
@@ -112,8 +113,8 @@ def conductor(
         faces.append(box.in_grid(lattice, at, a))
         quotients.append(lengths / np.maximum(area, least_areas(weight, a, at, lengths)))
     edges = [box.in_grid(lattice, np.flatnonzero((free[a] == 0) & near[a]), a) for a in range(3)]
-    at = np.concatenate(edges)
-    return Target(at, np.zeros((2, len(at))), np.concatenate(faces), np.concatenate(quotients, axis=1))
+    at, resting = np.concatenate(edges), resting_rows(inside, box.low)
+    return Target(at, np.zeros((2, len(at))), np.concatenate(faces), np.concatenate(quotients, axis=1), resting)
 
 
 def _span(box: Box, axis: int, part: Intervals, first: np.ndarray, last: np.ndarray) -> np.ndarray:

@@ -15,11 +15,13 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import array, direction, sealed
 from . import _dispersion
 from ._pulse import SILENCE, Pulse
-from .lattice import COURANT, Lattice, PlaneOrder
+from .lattice import COURANT, GroupOrder, Lattice
 
 SPACING = 1 / 3  # of the table, in cells: six points interpolate waves of 6 cells to 1e-5
-QUIET = 3e-8  # of the largest value of a table: float32 fields have errors ten times as large
+QUIET = 3e-8  # of the peak of the wave: float32 fields have errors ten times as large
+AHEAD = 8  # cells from the last value that is not negligible to the front of the wave, beyond which fields are zero
 COMPONENTS = 6  # of E and H
+SILENT = [-1, -2]  # first and last point that is not negligible, where none is
 BEFORE, AFTER = 2, 3  # points of the table before and after the cell of a position
 
 
@@ -44,9 +46,10 @@ class PlaneWave:
 
 @dataclass(frozen=True, eq=False)
 class Entrance:
-    """Corrections of one field, each place at most once, sorted by plane: F[at] += amount u[from ...].
+    """Corrections of one field, each place at most once, in the order of GroupOrder: F[at] += amount u[from ...].
 
     at, source  places of the components that are corrected, and of those of the other field that the wave gives
+    first       first entry of each group of rows
     """
 
     at: np.ndarray
@@ -87,7 +90,7 @@ def _unique(lattice: Lattice, parts: list[tuple[np.ndarray, np.ndarray, int]]) -
     out = []
     while len(at):
         _, once = np.unique(at, return_index=True)
-        sort = PlaneOrder.of(lattice, at[once])
+        sort = GroupOrder.of(lattice, at[once])
         chosen = once[sort.order]
         out.append(Entrance(at[chosen], source[chosen], amount[chosen].astype(np.float32), sort.first))
         at, source, amount = (np.delete(values, once) for values in (at, source, amount))
@@ -96,43 +99,77 @@ def _unique(lattice: Lattice, parts: list[tuple[np.ndarray, np.ndarray, int]]) -
 
 @dataclass(frozen=True, eq=False)
 class WaveTable:
-    """The wave over distance along its direction, for every time step until it has left the box.
+    """The wave over distance along its direction, from step 0 until it has left the box.
 
     low, high  nodes at the faces of the box, int (3,)
-    values  float32 (n_steps, n, 6): E at step n and H at step n + 1/2, x, y and z each, peak about 1
-    loud    int (n_steps, 2): first and last point at which the wave is not negligible at a step (QUIET); -1, -2: none
-    origin  distance of the first value from the origin of phases, m
-    delay   s: the time at which the peak of the pulse passes the origin of phases
-    centre  the origin of phases, m (3,)
-    amplitudes, omega  of the lines of the spectrum, complex and rad/s (m,)
+    n_steps, n_points  number of steps, and of points along the wave, SPACING cells apart
+    origin     distance of the first point from the origin of phases, m
+    delay      s: the time at which the peak of the pulse passes the origin of phases
+    centre     the origin of phases, m (3,)
+    amplitudes, omega, k  of the lines of the spectrum: complex, rad/s and rad/m (m,)
+    units      field vectors E and H of the lines, (6, m)
+    signal     E of each step at the origin of phases, along its unit vector (n_steps,)
     """
 
     lattice: Lattice
     wave: PlaneWave
     low: np.ndarray
     high: np.ndarray
-    values: np.ndarray
-    loud: np.ndarray
+    n_steps: int
+    n_points: int
     origin: float
     delay: float
     centre: np.ndarray
     amplitudes: np.ndarray
     omega: np.ndarray
+    k: np.ndarray
+    units: np.ndarray
+    signal: np.ndarray
+
+    def values(self, first: int, n_steps: int) -> np.ndarray:
+        """E at steps first, first + 1 ... and H half a step later, float32 (n_steps, 6, n_points), peak about 1."""
+        times = (first + np.arange(n_steps)) * self.lattice.time_step - self.delay
+        turns = np.exp(1j * np.outer(times, self.omega))
+        places = self.origin + SPACING * self.lattice.cell * np.arange(self.n_points)
+        waves = self.amplitudes[:, None] * np.exp(-1j * np.outer(self.k, places))
+        late = np.exp(0.5j * self.omega * self.lattice.time_step)
+        out = np.empty((n_steps, COMPONENTS, self.n_points), np.float32)
+        for component, unit in enumerate(self.units):
+            x = turns * (unit if component < 3 else unit * late)
+            out[:, component] = x.real @ waves.real - x.imag @ waves.imag
+        return out
+
+    def loud(self, values: np.ndarray) -> np.ndarray:
+        """First and last point of each step whose values are not negligible, int (n_steps, 2); or SILENT."""
+        heard = np.abs(values).max(axis=1) > QUIET * np.abs(self.signal).max()
+        first, last = heard.argmax(axis=1), heard.shape[1] - 1 - heard[:, ::-1].argmax(axis=1)
+        return np.where(heard.any(axis=1)[:, None], np.stack([first, last], axis=1), SILENT)
+
+    def fronts(self, loud: np.ndarray, before: float) -> np.ndarray:
+        """Cells from node 0 to the front of the wave along its direction, at each step (n_steps,).
+
+        Nothing travels faster than the wave: beyond the front, scattered fields are zero too. `before` is the front one
+        step earlier, -inf where the wave has not begun.
+        """
+        node = float((self.lattice.origin - self.centre) @ self.wave.travel)
+        heard = (self.origin - node) / self.lattice.cell + SPACING * loud[:, 1] + AHEAD
+        steps = COURANT * np.arange(1, len(loud) + 1)
+        heard = np.where(loud[:, 1] < 0, -np.inf, heard)
+        return np.asarray(np.maximum(np.maximum.accumulate(heard - steps), before) + steps)
 
     def read(self, source: np.ndarray, magnetic: bool) -> tuple[np.ndarray, np.ndarray]:
-        """Place of the first of six points within a step, int32 (n,), and position from the third, in 0 ... 1 (n,)."""
+        """Entries of lists: 8 times the first of six points, plus the component, int32 (n,); position from the third
+        point, in 0 ... 1 (n,)."""
         place = (self.lattice.positions(source, magnetic) - self.centre) @ self.wave.travel
         cell = (place - self.origin) / (SPACING * self.lattice.cell)
         whole = np.floor(cell)
         component = source // np.prod(self.lattice.shape) + 3 * magnetic
-        first = COMPONENTS * (whole - BEFORE) + component
-        return first.astype(np.int32), (cell - whole).astype(np.float32)
+        return (8 * (whole - BEFORE) + component).astype(np.int32), (cell - whole).astype(np.float32)
 
     def spectrum(self, omega: np.ndarray) -> np.ndarray:
         """sum over steps n of u(n dt) exp(-j omega n dt) at the origin of phases, along the unit vector E: (n,)."""
-        n = np.arange(len(self.values)) * self.lattice.time_step
-        signal = (self.amplitudes * np.exp(1j * np.outer(n - self.delay, self.omega))).real.sum(axis=1)
-        return np.asarray(np.exp(-1j * np.outer(omega, n)) @ signal)
+        n = np.arange(self.n_steps) * self.lattice.time_step
+        return np.asarray(np.exp(-1j * np.outer(omega, n)) @ self.signal)
 
 
 def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndarray, centre: np.ndarray) -> WaveTable:
@@ -142,10 +179,10 @@ def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndar
         -1, 3
     )
     reach = (corners - centre) @ wave.travel
-    first = reach.min() - BEFORE * step
-    places = first + step * np.arange(int((reach.max() - first) / step) + AFTER + 2)
+    first = float(reach.min() - BEFORE * step)
+    n_points = int((reach.max() - first) / step) + AFTER + 2
     delay = wave.pulse.half_length - first / SPEED_OF_LIGHT
-    slowest = 1.2 * (places[-1] - first) / SPEED_OF_LIGHT
+    slowest = 1.2 * (n_points - 1) * step / SPEED_OF_LIGHT
     n_steps = int((2 * wave.pulse.half_length + slowest) / dt) + 2
     n_lines = min(n_steps // 2, int(wave.pulse.highest * n_steps * dt) + 1)
     frequency = np.arange(1, n_lines) / (n_steps * dt)
@@ -153,20 +190,8 @@ def wave_table(lattice: Lattice, wave: PlaneWave, low: np.ndarray, high: np.ndar
     kept = np.abs(line) > SILENCE * np.abs(line).max()
     omega, line = 2 * np.pi * frequency[kept], line[kept] / np.abs(line[kept]).sum()
     k = _dispersion.wavenumber(lattice, omega, wave.travel)
-    e, h = _dispersion.fields(_dispersion.grid_vector(lattice, k, wave.travel), wave.polarization)
-    number = np.arange(1, n_lines)[kept]
-    values = np.empty((n_steps, len(places), COMPONENTS), np.float32)
-    phase = np.exp(-1j * (np.multiply.outer(places, k) + omega * delay))
-    for component in range(COMPONENTS):
-        unit = e[:, component] if component < 3 else h[:, component - 3] * np.exp(0.5j * omega * dt)
-        bins = np.zeros((len(places), n_steps // 2 + 1), np.complex128)
-        bins[:, number] = phase * (line * unit)
-        values[:, :, component] = np.fft.irfft(bins, n_steps, axis=1).T * (n_steps / 2)
-    return WaveTable(lattice, wave, low, high, values, _loud(values), float(first), float(delay), centre, line, omega)
-
-
-def _loud(values: np.ndarray) -> np.ndarray:
-    """First and last point of each step whose values are not negligible, int (n_steps, 2); -1, -2: none."""
-    heard = np.abs(values).max(axis=2) > QUIET * np.abs(values).max()
-    first, last = heard.argmax(axis=1), heard.shape[1] - 1 - heard[:, ::-1].argmax(axis=1)
-    return np.where(heard.any(axis=1)[:, None], np.stack([first, last], axis=1), [-1, -2])
+    units = np.concatenate(_dispersion.fields(_dispersion.grid_vector(lattice, k, wave.travel), wave.polarization), 1)
+    signal = (np.exp(1j * np.outer(np.arange(n_steps) * dt - delay, omega)) @ line).real
+    return WaveTable(
+        lattice, wave, low, high, n_steps, n_points, first, delay, centre, line, omega, k, units.T, signal
+    )  # fmt: skip

@@ -7,70 +7,94 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
-from ._incident import AFTER, BEFORE, COMPONENTS, Entrance, WaveTable
-from .lattice import LANES, Lattice, PlaneOrder
+from ._incident import AFTER, BEFORE, Entrance, WaveTable
+from .lattice import LANES, GroupOrder, Lattice
 
-BLOCK = 8  # steps whose residuals are kept before they are transformed
-ENTRIES = 256  # entries per work-item on a CPU
+SAMPLES = 8  # samples of the residuals that are kept before they are transformed
+PARTS = 2  # of a list of the incident wave: components on an edge of its box are corrected twice
 
 
 class TargetList:
-    """Places of a field with their coefficients and old values, and the residuals of a block of steps.
+    """Places of a field with their coefficients and old values, and samples of the residuals.
 
-    places  as in Lattice, sorted by plane (n,);  count  n rounded up to whole vectors, at least one
+    places  as in Lattice, in the order of GroupOrder (n,);  count  n rounded up to whole vectors, at least one
     """
 
     def __init__(self, device: Device, lattice: Lattice, at: np.ndarray, values: np.ndarray) -> None:
-        self.device = device
-        sort = PlaneOrder.of(lattice, at)
+        self.device, self._groups = device, lattice.groups
+        sort = GroupOrder.of(lattice, at)
         self.places, self._first = at[sort.order], sort.first
         self.count = max(1, -(-len(at) // LANES)) * LANES
-        padded = np.zeros((len(values), self.count), np.float32)
-        padded[:, : len(at)] = values[:, sort.order]
+        self._conducts = len(values) == 2 and not values.any()  # edges of a conductor alone: no coefficients
+        kept = 0 if self._conducts else self.count
+        padded = np.zeros((len(values), max(kept, 1)), np.float32)
+        if kept:
+            padded[:, : len(at)] = values[:, sort.order]
         in_buffer = np.zeros(self.count, np.int32)
         in_buffer[: len(at)] = lattice.in_buffer(self.places)
+        self._rows = device.copied(sort.first)
         self._at, self._values = device.copied(in_buffer), device.copied(padded)
-        self._old, self.residual = device.zeros(4 * self.count), device.zeros(4 * self.count * BLOCK)
+        self._old, self.residual = device.zeros(4 * max(kept, 1)), device.zeros(4 * self.count * SAMPLES)
 
-    def correct(self, kernel: Any, fields: tuple[Any, ...], step: int, planes: tuple[int, int], *args: Any) -> None:
-        """Correct a range of planes; the residuals are those of step `step` of the block."""
-        run_entries(
-            self.device, kernel, self._first, planes, *fields, self._at, self._values, self._old, self.residual,
-            self.count, step * self.count, *args,
-        )  # fmt: skip
+    def arguments(self, sample: int | None) -> tuple[Any, ...]:
+        """Arguments of kernels: arrays, count, where sample number `sample` of the residuals is stored, conductor."""
+        record = -1 if sample is None else sample * self.count
+        return self._at, self._values, self._old, self.residual, self.count, record, int(self._conducts)
+
+    @property
+    def rows(self) -> Any:
+        """The buffer of the first entry of each group of rows."""
+        return self._rows
+
+    def span(self, planes: tuple[int, int]) -> tuple[int, int]:
+        """First entry of a range of planes, and the first one after these."""
+        return _span(self._first, self._groups, planes)
 
     def start(self, field: np.ndarray) -> None:
         """Take old values from a field (3, *shape)."""
-        old = np.zeros(self.count, np.float32)
-        old[: len(self.places)] = field.flat[self.places]
-        self.device.write(self._old, old)
+        if not self._conducts:
+            old = np.zeros(self.count, np.float32)
+            old[: len(self.places)] = field.flat[self.places]
+            self.device.write(self._old, old)
 
-    def residuals(self, n_steps: int) -> np.ndarray:
-        """The residuals of the first steps of the last block, float32 (n_steps, n)."""
-        return self.device.download(self.residual, np.empty((n_steps, self.count), np.float32))[:, : len(self.places)]
+    def residuals(self, n_samples: int) -> np.ndarray:
+        """The first of the samples that are kept, float32 (n_samples, n)."""
+        return self.device.download(self.residual, np.empty((n_samples, self.count), np.float32))[:, : len(self.places)]
 
 
 class IncidentList:
-    """Places where an incident wave corrects one field."""
+    """Places where an incident wave corrects one field, in PARTS parts without a place that occurs twice."""
 
-    def __init__(self, device: Device, lattice: Lattice, part: Entrance, table: WaveTable, magnetic: bool) -> None:
-        self.device, self._first = device, part.first
-        first, rest = table.read(part.source, magnetic=not magnetic)
-        arrays = lattice.in_buffer(part.at), first, rest, part.amount
-        self._arrays = tuple(device.copied(values) for values in arrays)
+    def __init__(
+        self, device: Device, lattice: Lattice, parts: list[Entrance], table: WaveTable | None, magnetic: bool
+    ) -> None:
+        self._groups = lattice.groups
+        if len(parts) > PARTS:
+            raise AssertionError(f"{len(parts)} parts")  # a component lies on two faces of a box at most
+        groups = lattice.shape[0] * lattice.groups + 1
+        sizes = [len(part.at) for part in parts] + [0] * (PARTS - len(parts))
+        self._first = np.zeros((PARTS, groups), np.int32)
+        for n in range(PARTS):
+            self._first[n] = sum(sizes[:n]) + (parts[n].first if n < len(parts) else 0)
+        columns: list[np.ndarray] = [np.zeros(1, dtype) for dtype in (np.int32, np.int32, np.float32, np.float32)]
+        if table is not None and parts:
+            read = [table.read(part.source, magnetic=not magnetic) for part in parts]
+            columns = [
+                np.concatenate([lattice.in_buffer(part.at) for part in parts]),
+                *(np.concatenate([both[n] for both in read]) for n in (0, 1)),
+                np.concatenate([part.amount for part in parts]),
+            ]
+        self.rows, self.arrays = device.copied(self._first), tuple(device.copied(values) for values in columns)
 
-    def correct(self, kernel: Any, field: Any, wave: Any, at: int, loud: list[int], planes: tuple[int, int]) -> None:
-        """Correct a range of planes by the values of the wave that begin at `at` in its table.
-
-        loud  first and last point that are not negligible: entries that read neither these nor points between are left
-        """
-        below, above = COMPONENTS * (loud[0] - BEFORE - AFTER), COMPONENTS * loud[1] + COMPONENTS - 1
-        run_entries(self.device, kernel, self._first, planes, field, *self._arrays, wave, at, below, above)
+    def spans(self, planes: tuple[int, int]) -> list[tuple[int, int]]:
+        """First entry of a range of planes, and the first one after these, of each part."""
+        return [_span(first, self._groups, planes) for first in self._first]
 
 
-def run_entries(device: Device, kernel: Any, first_of: np.ndarray, planes: tuple[int, int], *args: Any) -> None:
-    """Run a kernel of kernels/fdtd_lists.cl over the entries of a range of planes, if there are any."""
-    first, last = int(first_of[planes[0]]), int(first_of[planes[1]])
-    each = ENTRIES if device.is_cpu else 1
-    if first < last:
-        device.run(kernel, (-(-(last - first) // each),), None, *args, each, first, last)
+def heard(loud: list[int]) -> tuple[int, int]:
+    """Limits of `from` (kernels/fdtd_lists.clh) beyond which entries read no point from loud[0] to loud[1]."""
+    return 8 * (loud[0] - BEFORE - AFTER), 8 * loud[1] + 7
+
+
+def _span(first: np.ndarray, groups: int, planes: tuple[int, int]) -> tuple[int, int]:
+    return int(first[planes[0] * groups]), int(first[planes[1] * groups])

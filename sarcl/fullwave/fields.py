@@ -13,13 +13,17 @@ import numpy as np
 
 from ..opencl.device import Device
 from ._absorber import layers
-from ._incident import WaveTable, entrances
-from ._lists import BLOCK, IncidentList, TargetList
-from .lattice import COURANT, LANES, Lattice
+from ._incident import COMPONENTS, SILENT, WaveTable, entrances
+from ._lists import SAMPLES, IncidentList, TargetList, heard
+from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target
 
-ROWS = 8  # rows per work-item on a CPU
+BLOCK = 8  # steps of a block, which is done tile by tile
 TILE = 16  # planes per tile on a CPU
+WAVE_STEPS = 64  # steps of the incident wave that are on the device at a time: a multiple of BLOCK
+VECTORS = 16  # vectors per work-item of a transform on a CPU
+ITEMS = 4096  # work-items of a transform on a GPU
+LEAST_Z = 1e-6  # component along z of the direction of a wave across z, for kernels, which divide by it
 
 
 def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[int, int]]]:
@@ -39,76 +43,130 @@ class Fields:
     """E and H of a grid on a device, with everything that is not vacuum.
 
     absorber  layers on each side, at most LANES; 0: the grid ends at its walls (kernels/fdtd.clh)
-    wave      an incident wave
+    wave      an incident wave; cells that it has not reached are not updated, unless fields are given by `start`
     tile      planes per tile; None: TILE on CPUs, whose caches hold the planes from step to step, and all on GPUs
+    every     residuals are kept at every so many steps, from step number every - 1 on; 1, 2, 4 or 8
     """
 
     def __init__(
         self, device: Device, lattice: Lattice, target: Target, *, absorber: int = 0, wave: WaveTable | None = None,
-        tile: int | None = None,
+        tile: int | None = None, every: int = 1,
     ) -> None:  # fmt: skip
         self.device, self.lattice = device, lattice
-        self._tile = tile or (TILE if device.is_cpu else lattice.shape[0] + BLOCK)
         self.lanes = LANES if device.info.vector_width > 1 else 1
+        self._rows_are_items = self.lanes > 1  # else each cell and each entry of a list is a work-item
+        self._tile = tile or (TILE if self._rows_are_items else lattice.shape[0] + BLOCK)
+        self._every = every
         self.step = 0  # steps that are done
         self._update = [
-            device.kernel("fdtd_vacuum.cl", name, LANES=self.lanes, ABSORB=int(absorber > 0))
+            device.kernel(
+                "fdtd_vacuum.cl", name, LANES=self.lanes, ABSORB=int(absorber > 0), LISTS=int(self._rows_are_items)
+            )
             for name in ("update_e", "update_h")
         ]
-        self._edges, self._faces, self._incident, self._transform = (
-            self._kernel("fdtd_lists.cl", name) for name in ("edges", "faces", "incident", "transform")
+        self._edges, self._faces, self._enter, self._transform = (
+            device.kernel("fdtd_lists.cl", name, LANES=self.lanes)
+            for name in ("edges", "faces", "incident", "transform")
         )
         self.e, self.h = (device.zeros(12 * lattice.component) for _ in range(2))
         self.edges = TargetList(device, lattice, target.edges, target.share)
         self.faces = TargetList(device, lattice, target.faces, target.weight)
         self._thickness, self._layers = absorber, layers(device, lattice, absorber)
-        self._wave, self._wave_steps, self._wave_values = None, 0, 0
-        self._loud: list[list[int]] = []
-        self._entrances: tuple[list[IncidentList], list[IncidentList]] = [], []
-        if wave is not None:
-            parts = entrances(lattice, wave.low, wave.high)
-            for magnetic in (False, True):
-                self._entrances[magnetic].extend(
-                    IncidentList(device, lattice, p, wave, magnetic) for p in parts[magnetic]
-                )
-            self._wave, self._loud = device.copied(wave.values), wave.loud.tolist()
-            self._wave_steps, self._wave_values = len(wave.values), wave.values[0].size
-
-    def _kernel(self, file: str, name: str) -> Any:
-        return self.device.kernel(file, name, LANES=self.lanes)
+        resting = np.zeros((*lattice.shape[:2], 2), np.uint16)
+        if target.resting is not None:
+            resting[target.resting[:, 0], target.resting[:, 1]] = target.resting[:, 2:]
+        self._resting = device.copied(resting)
+        parts = entrances(lattice, wave.low, wave.high) if wave else ([], [])
+        self._entrances = [IncidentList(device, lattice, parts[m], wave, magnetic=bool(m)) for m in (0, 1)]
+        self._wave = wave
+        self._dark = wave is not None  # fields are zero beyond the front of the wave
+        travel = np.array([0, 0, 1.0]) if wave is None else wave.wave.travel
+        along_z = travel[2] if abs(travel[2]) > LEAST_Z else LEAST_Z
+        self._travel = tuple(np.float32(d) for d in (*travel[:2], along_z))
+        self._wave_first, self._loud, self._front = -WAVE_STEPS, [SILENT], np.full(WAVE_STEPS, -np.inf)
+        self._wave_values = device.zeros(4)
 
     def advance(self, n_steps: int) -> None:
-        """Do up to BLOCK steps. The residuals of the lists are those of these steps afterwards."""
-        grid = self.lattice
-        for step, planes in tiles(grid.shape[0], n_steps, self._tile):
-            self._vacuum_step(step, planes, magnetic=True)
-            self.faces.correct(
-                self._faces, (self.e, self.h), step, planes, grid.component, grid.plane, grid.row, np.float32(COURANT)
-            )
-            self._vacuum_step(step, planes, magnetic=False)
-            self.edges.correct(self._edges, (self.e,), step, planes)
+        """Do up to BLOCK steps, which do not pass a multiple of BLOCK."""
+        self._load_wave()
+        for step, planes in tiles(self.lattice.shape[0], n_steps, self._tile):
+            for magnetic in (True, False):
+                self._half_step(self.step + step, planes, magnetic)
         self.step += n_steps
 
-    def _vacuum_step(self, step: int, planes: tuple[int, int], magnetic: bool) -> None:
-        """The vacuum update of one field, with its absorbing layers, and its incident wave."""
-        grid, vectors = self.lattice, self.lattice.shape[2] // self.lanes
-        each, columns = (ROWS, 1) if self.device.is_cpu else (1, vectors)
-        self.device.run(
-            self._update[magnetic], (columns, -(-grid.shape[1] // each), planes[1] - planes[0]), None, self.e, self.h,
-            *self._layers[magnetic], self._thickness, grid.component, grid.start, grid.plane, grid.row, *grid.shape[:2],
-            vectors, each, np.float32(COURANT), planes[0],
-        )  # fmt: skip
-        if self.step + step < self._wave_steps:
-            at, loud = (self.step + step) * self._wave_values, self._loud[self.step + step]
-            for part in self._entrances[magnetic]:
-                part.correct(self._incident, self.h if magnetic else self.e, self._wave, at, loud, planes)
+    def _load_wave(self) -> None:
+        """Have the next steps of the incident wave on the device."""
+        wave, first = self._wave, self.step - self.step % WAVE_STEPS
+        if wave is None or self.step < self._wave_first + WAVE_STEPS:
+            return
+        if first >= wave.n_steps:
+            self._wave, self._dark, self._wave_values = None, False, self.device.zeros(4)
+            return
+        values = wave.values(first, WAVE_STEPS)
+        loud = wave.loud(values)
+        loud[wave.n_steps - first :] = SILENT
+        self._wave_first, self._loud = first, loud.tolist()
+        self._front = wave.fronts(loud, float(self._front[-1]))
+        self._wave_values = self.device.copied(values)
 
-    def transform(self, part: TargetList, phase: Any, sums: Any, first: int, n_steps: int, n_frequencies: int) -> None:
-        """Add the residuals of the last steps to their sums over time; see kernels/fdtd_lists.cl."""
+    def _half_step(self, step: int, planes: tuple[int, int], magnetic: bool) -> None:
+        """The update of one field in a range of planes, with its absorbing layers, its incident wave and its list."""
+        grid, field, wave = self.lattice, self.h if magnetic else self.e, self._wave
+        part, entrance = self.faces if magnetic else self.edges, self._entrances[magnetic]
+        now = step - self._wave_first
+        loud = self._loud[now] if wave else SILENT
+        points = wave.n_points if wave else 0
+        enters = self._wave_values, now * COMPONENTS * points if wave else 0, points, *heard(loud)
+        sample = step // self._every % SAMPLES if (step + 1) % self._every == 0 else None
+        vectors = grid.shape[2] // self.lanes
+        columns, each, groups = (1, ROWS, grid.groups) if self._rows_are_items else (vectors, 1, grid.shape[1])
+        lists: tuple[Any, ...] = ()
+        if self._rows_are_items:
+            lists = (
+                int(loud != SILENT), entrance.rows, *entrance.arrays, *enters, part.rows, *part.arguments(sample)
+            )  # fmt: skip
         self.device.run(
-            self._transform, (part.count // self.lanes,), None, part.residual, phase, sums, part.count, first,
-            n_steps, n_frequencies,
+            self._update[magnetic], (columns, groups, planes[1] - planes[0]), None, self.e, self.h,
+            *self._layers[magnetic], self._resting, self._thickness, grid.component, grid.start, grid.plane, grid.row,
+            *grid.shape[:2], vectors, each, np.float32(COURANT), planes[0],
+            np.float32(self._front[now] if self._dark else np.inf), *self._travel, *lists,
         )  # fmt: skip
+        if not self._rows_are_items:
+            for first, last in entrance.spans(planes) if loud != SILENT else ():
+                if first < last:
+                    self.device.run(self._enter, (last - first,), None, field, *entrance.arrays, *enters, first)
+            self._correct(part, sample, part.span(planes), magnetic)
+
+    def _correct(self, part: TargetList, sample: int | None, span: tuple[int, int], magnetic: bool) -> None:
+        """Correct entries of the list of a target, each by a work-item."""
+        if span[0] < span[1]:
+            grid, size, arrays = self.lattice, (span[1] - span[0],), part.arguments(sample)
+            if magnetic:
+                self.device.run(
+                    self._faces, size, None, self.e, self.h, *arrays[:-1], grid.component, grid.plane, grid.row,
+                    np.float32(COURANT), span[0],
+                )  # fmt: skip
+            else:
+                self.device.run(self._edges, size, None, self.e, *arrays, span[0])
+
+    def transform(self, part: TargetList, phase: Any, sums: Any, n_samples: int, n_frequencies: int) -> np.ndarray:
+        """Add the samples of the residuals to their sums over time (kernels/fdtd_lists.cl).
+
+        Returns the sums over the list of |change|^2 and of |sum|^2, float64 (2, n_frequencies).
+        """
+        vectors = part.count // self.lanes
+        if self._rows_are_items:
+            items, begin, stride, each = -(-vectors // VECTORS), VECTORS, 1, VECTORS
+        else:
+            items = min(vectors, ITEMS)
+            begin, stride, each = 1, items, -(-vectors // items)
+        norms = self.device.empty(8 * n_frequencies * items)
+        self.device.run(
+            self._transform, (items,), None, part.residual, phase, sums, norms, part.count, n_samples, n_frequencies,
+            begin, stride, each,
+        )  # fmt: skip
+        out = self.device.download(norms, np.empty((2, n_frequencies, items), np.float32))
+        return np.asarray(out.sum(axis=2, dtype=np.float64))
 
     def download(self) -> tuple[np.ndarray, np.ndarray]:
         """Copies of E and of H times the impedance of vacuum, float32 (3, *shape) each."""
@@ -120,6 +178,7 @@ class Fields:
 
     def start(self, e: np.ndarray, h: np.ndarray) -> None:
         """Set E and H, (3, *shape) each."""
+        self._dark = False
         for buffer, values, part in ((self.e, e, self.edges), (self.h, h, self.faces)):
             self.device.write(buffer, self.lattice.to_buffer(values))
             part.start(values)

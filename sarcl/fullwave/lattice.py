@@ -12,6 +12,7 @@ from ..base.validation import array, count, number, sealed
 
 COURANT = 0.5 / sqrt(3)  # c dt/dx: half the limit of a grid without cut cells, which leaves room for cut faces
 LANES = 16  # cells of a vector: rows are multiples of it, and are separated by as many cells that hold zero
+ROWS = 8  # rows of a group: those that a work-item updates on a CPU
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,23 +84,29 @@ class Lattice:
         self.from_buffer(buffer)[...] = values
         return buffer
 
-    def plane_of(self, at: np.ndarray) -> np.ndarray:
-        """The plane i of components at places `at` (n,)."""
-        return np.asarray(at // (self.shape[1] * self.shape[2]) % self.shape[0])
+    @property
+    def groups(self) -> int:
+        """Groups of ROWS rows in a plane; the last may have fewer rows."""
+        return -(-self.shape[1] // ROWS)
 
 
 @dataclass(frozen=True, eq=False)
-class PlaneOrder:
-    """How a list of places is sorted by plane: `order` (n,), and the first entry of each plane, (planes + 1,)."""
+class GroupOrder:
+    """How a list of places is sorted by plane and group of rows.
+
+    order  (n,);  first  first entry of each group, groups in the order of planes, int32 (planes * groups + 1,)
+    """
 
     order: np.ndarray
     first: np.ndarray
 
     @classmethod
-    def of(cls, lattice: Lattice, at: np.ndarray) -> PlaneOrder:
-        plane = lattice.plane_of(at)
-        order = np.lexsort((at, plane))
-        return cls(sealed(order), sealed(np.searchsorted(plane[order], np.arange(lattice.shape[0] + 1))))
+    def of(cls, lattice: Lattice, at: np.ndarray) -> GroupOrder:
+        _, plane, row, _ = np.unravel_index(at, (3, *lattice.shape))
+        group = plane * lattice.groups + row // ROWS
+        order = np.lexsort((at, group))
+        first = np.searchsorted(group[order], np.arange(lattice.shape[0] * lattice.groups + 1))
+        return cls(sealed(order), sealed(first.astype(np.int32)))
 
 
 def lattice_around(low: np.ndarray, high: np.ndarray, cell: float, margin: int) -> Lattice:

@@ -19,12 +19,14 @@ class Target:
     edges   places of E (n,);  share  (2, n): E = share[0] E_old + share[1] E_vacuum; both 0 in a conductor
     faces   places of H (m,);  weight (4, m): free length over free area of the edges c(+b), c, b(+c), b of a face in
             direction a, with b and c the directions after a
+    resting  cells inside conductors that need no updates, int (k, 4): see _resting:resting_rows; None: none
     """
 
     edges: np.ndarray
     share: np.ndarray
     faces: np.ndarray
     weight: np.ndarray
+    resting: np.ndarray | None = None
 
     @classmethod
     def nothing(cls) -> Target:

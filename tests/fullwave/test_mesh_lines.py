@@ -11,9 +11,8 @@ from sarcl import shapes
 from sarcl.fullwave import _mesh_lines
 from sarcl.fullwave._closed_mesh import closed_mesh
 from sarcl.fullwave._cut_cells import conductor
-from sarcl.fullwave._lists import BLOCK
 from sarcl.fullwave._mesh_lines import mesh_lines
-from sarcl.fullwave.fields import Fields
+from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice, lattice_around
 
 CELL = 0.1  # m

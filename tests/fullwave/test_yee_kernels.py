@@ -7,9 +7,8 @@ import pytest
 from helpers.fdtd_cases import Twin, random_target
 
 from sarcl.fullwave._incident import PlaneWave, wave_table
-from sarcl.fullwave._lists import BLOCK
 from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave.fields import Fields, tiles
+from sarcl.fullwave.fields import BLOCK, Fields, tiles
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd
@@ -105,14 +104,17 @@ def test_running_transforms_equal_the_twin(device):
     fields = Fields(device, grid, target)
     fields.start(e, h)
     omega, part = np.array([0.0, 0.1, 0.4]), fields.edges
-    turns = np.exp(-1j * np.outer(np.arange(3 * BLOCK), omega))
-    phase = device.upload(np.stack([turns.real, turns.imag], -1).astype(np.float32))
     sums, wanted = device.zeros(8 * len(omega) * part.count), 0
     for block, n_steps in enumerate((BLOCK, BLOCK, 3)):
         fields.advance(n_steps)
-        fields.transform(part, phase, sums, block * BLOCK, n_steps, len(omega))
         times = block * BLOCK + np.arange(n_steps)
-        wanted = wanted + fdtd.transform(part.residuals(n_steps).astype(float), times, omega)
+        turns = np.exp(-1j * np.outer(times, omega))
+        phase = device.copied(np.stack([turns.real, turns.imag], -1).astype(np.float32))
+        norms = fields.transform(part, phase, sums, n_steps, len(omega))
+        change = fdtd.transform(part.residuals(n_steps).astype(float), times, omega)
+        wanted = wanted + change
+        for got, values in zip(norms, (change, wanted), strict=True):
+            assert np.allclose(got, (np.abs(values) ** 2).sum(axis=1), rtol=1e-5)
     got = device.download(sums, np.empty((len(omega), 2, part.count), np.float32))[:, :, : len(part.places)]
     assert np.abs(got[:, 0] + 1j * got[:, 1] - wanted).max() < 1e-6 * np.abs(wanted).max()
 

@@ -60,9 +60,9 @@ class Twin:
         for axis, layers in enumerate(self.layers):
             s = -COURANT if magnetic else COURANT
             fdtd.absorb(to, source, self.psi[axis, magnetic], axis, *layers[magnetic], s)
-        for part in self.entrances[magnetic] if self.wave and self.step < len(self.wave.values) else ():
+        for part in self.entrances[magnetic] if self.wave and self.step < self.wave.n_steps else ():
             first, rest = self.wave.read(part.source, magnetic=not magnetic)
-            values = self.wave.values[self.step].ravel()[first[:, None] + 6 * np.arange(6)]
+            values = self.wave.values(self.step, 1)[0][(first % 8)[:, None], (first // 8)[:, None] + np.arange(6)]
             fdtd.incident(to, part.at, values, rest, part.amount)
 
 
