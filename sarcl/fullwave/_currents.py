@@ -13,13 +13,12 @@ from ._decay import SPAN, Decay
 from ._incident import PlaneWave, WaveTable, wave_table
 from ._lists import SAMPLES, TargetList
 from ._pulse import Pulse
-from .fields import BLOCK, Fields
+from .fields import BLOCK, PERIODS, Fields
 from .lattice import COURANT, Lattice
 from .target import Target
 
 WEAKEST = 1e-3  # of the spectrum: float32 fields have errors of about 1e-6 of the peak
 ALIAS = 1e-6  # of the spectrum at a frequency: what sums over some steps alone may add to it from other frequencies
-PERIODS = (8, 4, 2)  # steps between two samples of the residuals, as far as ALIAS allows
 
 
 @dataclass(frozen=True, eq=False)

@@ -9,8 +9,7 @@ from typing import Any
 import numpy as np
 
 from ...opencl.device import Device
-from .._currents import PERIODS
-from ..fields import Fields
+from ..fields import PERIODS, Fields
 from ..lattice import Lattice
 from ..runs import ABSORBER
 from ..target import Target
