@@ -32,7 +32,6 @@ For this folder alone:
     _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum
     _resting      cells inside conductors, whose fields stay zero
-    _run_cost     bytes, steps and updates of cells of a run, before it starts
     _thin_parts   refusals of parts of a mesh that are thinner than a cell
 """
 

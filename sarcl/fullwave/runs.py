@@ -12,10 +12,12 @@ from ..opencl.device import Device
 from ._currents import currents
 from ._cut_cells import conductor
 from ._formed_echoes import formed_echoes
-from ._incident import PlaneWave
+from ._incident import COMPONENTS, SPACING, PlaneWave
+from ._lists import PARTS, SAMPLES
 from ._mesh_lines import mesh_lines
 from ._pulse import Pulse
-from .lattice import COURANT, LANES, Lattice, lattice_around
+from .fields import WAVE_STEPS
+from .lattice import COURANT, LANES, ROWS, Lattice, lattice_around
 from .target import Target
 
 ABSORBER, GAP, SPARE = 10, 3, 2  # cells on each side: absorbing layers, to the incident wave's box, to the target
@@ -23,12 +25,11 @@ MARGIN = ABSORBER + GAP + SPARE
 WIDEST = 0.5  # lowest over highest frequency of the incident pulse: a narrower band makes a pulse longer than its echo
 MOST_STEPS = 10.0  # of the predicted number, before a run is stopped
 
-CELL_BYTES = 24  # of a cell: six components, float32
-LAYER_BYTES = 16  # of a cell of an absorbing layer, for each axis along which the layer lies
-ENTRY_BYTES = 56  # of an edge or a face of the target: coefficients, old value, residuals of a block of steps
-FREQUENCY_BYTES = 8  # of an edge or a face and frequency: its phasor
-ENTRANCE_BYTES = 64  # of a cell of the incident wave's box: components that the wave corrects
-TABLE_BYTES = 72  # of a step and cell of the incident wave's table
+EDGE_BYTES = 4 + 4 * SAMPLES  # of an edge of a conductor: place, samples of its residual
+FACE_BYTES = EDGE_BYTES + 20  # of a face: four weights and the old value
+MATERIAL_BYTES = 12  # of an edge of another material: two shares and the old value
+FREQUENCY_BYTES = 16  # of an edge or a face and frequency: its sum over time on the device, and its phasor
+ENTRANCE_BYTES = 76  # of a component that the incident wave corrects: of NumPy arrays, while its list is made
 ENTRIES = 5.0  # edges and faces of the target per area of a cell of its surface; measured: 4.7 for a sphere
 RINGING = 2.0  # diagonals of the target's box: path of the currents until they have decayed
 
@@ -73,18 +74,36 @@ def grid_about(bounds: np.ndarray, cell: float) -> Lattice:
     return lattice_around(bounds[0], bounds[1], cell, MARGIN)
 
 
+def run_bytes(
+    shape: np.ndarray, edges: float, faces: float, frequencies: int, *, gap: int = GAP, absorber: int = ABSORBER,
+    conductor: bool = True,
+) -> tuple[float, float]:  # fmt: skip
+    """Bytes of the buffers of a run, and with them those of its NumPy arrays at most: _currents:currents.
+
+    shape      cells along x, y and z;  edges, faces  of the target;  frequencies  of its phasors
+    conductor  no edge is of another material
+    """
+    nx, ny, nz = (float(n) for n in shape)
+    box = np.array([nx, ny, nz]) - 2 * (absorber + gap)
+    entrances = 4 * 2 * float(box @ np.roll(box, 1) + box.sum())
+    groups = nx * np.ceil(ny / ROWS)
+    fields = 24 * (LANES + (nx + 2) * (ny + 1) * (nz + LANES) + (ny + 2) * (nz + LANES)) + 4 * nx * ny
+    layers = 16 * (2 * absorber * (nx + ny) * nz + 2 * LANES * nx * ny) if absorber else 0
+    lists = (EDGE_BYTES + (0 if conductor else MATERIAL_BYTES)) * edges + FACE_BYTES * faces
+    lists += 16 * entrances + 4 * (2 + 2 * PARTS) * groups
+    wave = 2 * 4 * WAVE_STEPS * COMPONENTS * float(np.linalg.norm(box)) / SPACING
+    device = fields + layers + lists + wave + FREQUENCY_BYTES / 2 * frequencies * (edges + faces)
+    host = max(ENTRANCE_BYTES * entrances, 4 * wave, FREQUENCY_BYTES / 2 * frequencies * (edges + faces))
+    return device, device + host
+
+
 def run_cost(bounds: np.ndarray, cell: float, area: float, band: tuple[float, float]) -> RunCost:
     """What one run takes on a grid about a box, m (2, 3), with a target of a surface of `area` m^2."""
-    nx, ny, nz = (float(n) for n in grid_shape(bounds, cell))
-    component = LANES + (nx + 2) * (ny + 1) * (nz + LANES)
-    layers = 2 * ABSORBER * (nx + ny) * nz + 2 * LANES * nx * ny
-    box = np.array([nx, ny, nz]) - 2 * (ABSORBER + GAP)
-    sides = 2 * float(box[0] * box[1] + box[1] * box[2] + box[2] * box[0])
-    diagonal = float(np.linalg.norm(box))  # cells
+    shape = grid_shape(bounds, cell)
+    diagonal = float(np.linalg.norm(shape - 2 * (ABSORBER + GAP)))  # cells
     pulse_steps = 2 * _pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
     entries = ENTRIES * area / cell**2
-    grid = CELL_BYTES * component + LAYER_BYTES * layers + ENTRY_BYTES * entries + ENTRANCE_BYTES * sides
-    grid += TABLE_BYTES * (pulse_steps + 1.2 * diagonal / COURANT) * diagonal
+    _, grid = run_bytes(shape, 0.4 * entries, 0.6 * entries, 0)
     return RunCost(grid, entries, int(pulse_steps + (1 + RINGING) * diagonal / COURANT))
 
 
