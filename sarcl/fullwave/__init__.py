@@ -20,7 +20,6 @@ For this folder alone:
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
     _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
-    _decay        when the currents of a run have decayed
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     _face_areas   how much of each face of the grid closed meshes cover
     _far_field    echo amplitudes of currents, without the grid's own dispersion
@@ -31,7 +30,6 @@ For this folder alone:
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
     _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum
-    _resting      cells inside conductors, whose fields stay zero
     _thin_parts   refusals of parts of a mesh that are thinner than a cell
 """
 

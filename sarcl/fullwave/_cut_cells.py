@@ -12,9 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._least_areas import least_areas, weights
-from ._resting import resting_rows
 from .lattice import Lattice
-from .target import Target
+from .target import Target, resting_rows
 
 MARGIN = 2  # cells of a box beyond the cells that a body cuts
 

@@ -14,19 +14,17 @@ from helpers.fdtd_cases import random_target, sphere_intervals
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import _currents
-from sarcl.fullwave._currents import currents, sample_period
+from sarcl.fullwave._currents import Decay, currents, sample_period
 from sarcl.fullwave._cut_cells import conductor
-from sarcl.fullwave._decay import Decay
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave, wave_table
 from sarcl.fullwave._lists import SAMPLES
 from sarcl.fullwave._mesh_lines import mesh_lines
 from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave._resting import resting_rows
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.runs import run_bytes
-from sarcl.fullwave.target import Target, material_edges
+from sarcl.fullwave.target import Target, material_edges, resting_rows
 
 CELL = 0.01  # m
 TOP = SPEED_OF_LIGHT / (10 * CELL)  # Hz: ten cells per wavelength
