@@ -7,7 +7,7 @@
 // macros    VW, FP64, BISTATIC, WRAP, BEAM, TAPS, TERMS, RANGE, ORDER as in the headers;  LOCAL as in tile_constants.cl
 //           VECTORS   vectors of pixels per work-item
 //           CHUNK     pulses added in float32 before they join the compensated total
-//           WEIGHT    1: pulses have a weight in each pixel, see pixel_weights.clh
+//           WEIGHT    0 to 3: see pixel_weights.clh; GAINS, ALIKE and others as in gains.clh where it is 2 or 3
 // reference: sarcl/reference/backproject.py:backproject
 
 #include "common.clh"
@@ -16,6 +16,11 @@
 #include "interp.clh"
 #include "range_phase.clh"
 #include "pixel_weights.clh"
+#if WEIGHT >= 2
+#include "vec3_complex.clh"
+#include "pattern.clh"
+#include "gains.clh"
+#endif
 
 // global size (work-items per tile, tiles of this block), local size (work-items per tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
@@ -28,7 +33,8 @@
 //   image       (4, pixels)            totals re, im and their errors re, im; tiles in a row
 //   skipped     (tiles)                pulses in whose window no pixel of the tile is; not used where LOCAL
 //               BEAM: (2, tiles)       and those in whose window they are, but not in the beam
-//   place         (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT
+//   place         (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
+//   row_weight    (n_used), axes (n_used, 18), patterns, second: as in gains.clh; where WEIGHT is 2 or 3
 //   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 __kernel void backproject(__global const float *restrict profiles, int stride, int origin,
                           __global const float *restrict table, __global const float *restrict pulse, int n,
@@ -36,9 +42,12 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
                           __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset
-#if WEIGHT
+#if WEIGHT == 1
                           , __global const float *restrict place, __global const float *restrict taper,
                           __global const float *restrict aperture
+#elif WEIGHT
+                          , __global const float *restrict row_weight, __global const float *restrict axes,
+                          __global const float *restrict patterns, int second
 #endif
                           ) {
 #if LOCAL
@@ -52,7 +61,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
         x[r] = load_offset(offsets, (size_t)k * offset_step + get_global_id(0) * VECTORS + r, n_offsets);
         about_centre(&x[r], tile, k, n_tiles);
     }
-#if WEIGHT
+#if WEIGHT == 1
     fv from[VECTORS], inverse[VECTORS];
 #pragma unroll
     for (int r = 0; r < VECTORS; r++) {
@@ -89,6 +98,22 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
 #if BEAM
                 if (state == CROSSING) v *= in_beam(record, x[r]);
 #endif
+#if WEIGHT >= 2
+                direction to_tx = load_direction(record, C_UX, C_LOW);
+#if BISTATIC
+                direction to_rx = load_direction(record, C_RX, C_RX_LOW);
+#else
+                direction to_rx = to_tx;
+#endif
+                fv tx_range, rx_range;
+                triple away = toward(to_tx, x[r], &tx_range), back = toward(to_rx, x[r], &rx_range);
+                antenna_view view = antenna_view_of(away, tx_range, back, rx_range, axes + 18 * (size_t)p, 1.0f);
+                complex_v gain = weight(view, patterns, second, 1.0f);
+#endif
+#if WEIGHT == 3
+                re[r] = fma(v * (fv)row_weight[p], fma(gain.re, gain.re, gain.im * gain.im), re[r]);
+                continue;
+#endif
                 fv g, h, sine, cosine;
                 look_up(row, stride, origin, at.base, at.t, table, &g, &h);
                 sincos_cycles(at.cycles, &sine, &cosine);
@@ -96,10 +121,14 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                     g *= v;
                     h *= v;
                 }
-#if WEIGHT
-                fv weight = taper_weight(taper, ((fv)place[p] - from[r]) * inverse[r]);
-                g *= weight;
-                h *= weight;
+#if WEIGHT == 1
+                fv tapered = taper_weight(taper, ((fv)place[p] - from[r]) * inverse[r]);
+                g *= tapered;
+                h *= tapered;
+#elif WEIGHT == 2
+                fv matched = fma(g, gain.re, h * gain.im);
+                h = fma(h, gain.re, -g * gain.im);
+                g = matched;
 #endif
                 re[r] = fma(g, cosine, fma(-h, sine, re[r]));
                 im[r] = fma(g, sine, fma(h, cosine, im[r]));

@@ -14,7 +14,7 @@
 // macros    VW, WRAP, TAPS, TERMS as in the headers
 //           BISTATIC  1: R differs from T;  BEAM  1: pulses see only points in their beams
 //           ORDER     of the series of d in q: 2, 3 or 4; 0: the quotient; -1: every path in pairs of float64
-//           WEIGHT    1: pulses have a weight in each pixel, see pixel_weights.clh
+//           WEIGHT    0 or 1: see pixel_weights.clh
 //           CHUNK     pulses added plainly before they join the compensated total
 // reference: sarcl/reference/backproject.py:backproject
 
@@ -56,14 +56,14 @@ inline lv in_window(__global const double *restrict pulse, size_t n, size_t p, p
 //   n_used      <= n                  pulses that are real; the rest pads the vectors
 //   positions   (3, pixels)           m; one tile after another
 //   image       (4, pixels)           totals re, im and their errors re, im
-//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT
+//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
 //   skipped     (2, n_tiles)          pulses in whose window no point of the tile lies, and those in whose beam none does
 __kernel void backproject(__global const double *restrict profiles, int stride, int origin,
                           __global const double *restrict table, __global const double *restrict pulse, int n,
                           int n_used, __global const double *restrict constants, __global const double *restrict tile,
                           int n_tiles, int first, __global const double *restrict positions,
                           __global double *restrict image, ulong pixels, __global int *restrict skipped
-#if WEIGHT
+#if WEIGHT == 1
                           , __global const double *restrict place, __global const double *restrict taper,
                           __global const double *restrict aperture
 #endif
@@ -135,7 +135,7 @@ __kernel void backproject(__global const double *restrict profiles, int stride, 
                 g *= inside;
                 h *= inside;
             }
-#if WEIGHT
+#if WEIGHT == 1
             dv weight = taper_weight(taper, ((dv)place[p] - LOAD(i, aperture)) * LOAD(i, aperture + pixels));
             g *= weight;
             h *= weight;

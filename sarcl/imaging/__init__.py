@@ -2,6 +2,7 @@
 
 For other folders:
 
+    antenna_beam     an antenna as the beam of an image: the matched filter of its pattern
     backproject      backproject(): an image to a stated tolerance
     choose_method    the cheapest method that meets the tolerance
     collection       what an image keeps of the data that it was made from
@@ -29,6 +30,7 @@ For this folder alone:
 """
 
 __all__ = [
+    "antenna_beam",
     "backproject",
     "choose_method",
     "collection",

@@ -30,7 +30,7 @@ SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, whi
 
 def may_vary(task: FocusingTask) -> bool:
     """Whether some pixel may lie outside the range window or the beam of some row."""
-    if task.antennas.beam is not None:
+    if task.antennas.beam is not None or task.antenna is not None:
         return True
     if task.wrap:
         return False

@@ -21,9 +21,10 @@ from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
-from ..opencl.device import DeviceChoice
+from ..opencl.device import Device, DeviceChoice
 from ._row_coverage import room_for_gain, seen_by
 from ._unseen_pixels import unseen_pixels
+from .antenna_beam import shares
 from .choose_method import MethodChoice, choose
 from .collection import collection
 from .engine import Skipped
@@ -106,7 +107,10 @@ def backproject(
                out: over the aperture of each pixel, the rows that see it
     weights    one per row (n_rows,), multiplied with window and raw.weight
     beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
-               grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap)
+               grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap). Or an
+               Antenna, aimed at the grid's centre, (antenna, direction) or (antenna, attitude), attitude (n_rows, 3, 3)
+               or a Trajectory that has one: rows are weighted by the conjugate of its gain towards the pixel, transmit
+               times receive (matched filter)
     mapping    for echoes of a frequency-diverse array: the mapping that `sarcl.map_aperture` applies first,
                "corrected", "apparent" or "channels", or a dict of its arguments, such as {"mapping": "apparent",
                "center": (0, 0, 5)}
@@ -191,7 +195,10 @@ def backproject(
         if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
             measured = _measure_error(task, grid, output.data)
             clock.lap("check")
-        seen = seen_by(task, chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
+        if task.antenna is None:
+            seen = seen_by(task, chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
+        else:
+            seen = {"gain": _antenna_gain(task, chosen, open_devices(None if cluster else device)[0], options)}
         clock.lap("gain")
         plan = chosen.plan.describe(chosen.method)
         if kept:
@@ -313,6 +320,21 @@ def _fill(
     return skipped, sum(b - a for a, b in there)
 
 
+def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: FocusOptions) -> Any:
+    """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
+    the same in all pixels."""
+    engine: Any = chosen.engine
+    tiling, budget = chosen.tiling, options.budget(device)
+    sums = engine(device, task, chosen.plan, tiling, gain=True)
+    flat = np.zeros(task.grid.shape if tiling.in_rows else task.grid.size, np.float32)
+    for first, last in sums.blocks(budget):
+        made = BandBuffer(tiling, first, last, np.complex64)
+        sums.fill(first, last, made, budget, Clock(), lambda rows: None)
+        flat[tiling.extent(first, last)] = made.values.real
+    flat *= task.sample_weight.sum()
+    return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
+
+
 def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import backproject as exact
@@ -320,6 +342,8 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
     index, positions = grid.sample(256, seed=0)
     beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
     share = None if task.taper is None else PixelTaper(task).weights(positions)
+    if task.antenna is not None:
+        share = shares(task, positions)
     wanted, spread = exact(task.raw, positions, task.sample_weight, task.row_weight, task.wrap, beam, EDGE, share)
     got = (
         np.asarray(data)[index]

@@ -13,7 +13,7 @@ from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.plan import LEAST_TOLERANCE
 from ..opencl.device import Device
-from . import profile_energy
+from . import antenna_beam, profile_energy
 from .direct import direct as direct_method
 from .direct import tile_kernels
 from .engine import Engine, ImagePlan
@@ -71,10 +71,11 @@ def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True
     tolerance can.
     """
     if method == "factorized":
-        if task.taper is not None:
+        if task.weighs_pixels:
             raise ValueError(
                 "method='factorized' merges rows, and cannot taper the aperture of each pixel, which a window in "
-                "cross-range with a beam does: take method='direct' or 'auto', or window=(range, None)"
+                "cross-range with a beam does, or an Antenna as beam: take method='direct' or 'auto', or "
+                "window=(range, None) and a beam of an angle"
             )
         return _factorized(task, tolerance, lanes, float64)
     direct = _direct(task, tolerance, lanes, float64)
@@ -112,12 +113,13 @@ class _Float32:
         self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
             self.energy.whole_profile - self.near, 0.0
         )
+        self.gains = 0.0 if task.antenna is None else antenna_beam.rounding(task)
         self.coordinates = 0.0
         if task.grid.is_plane:  # listed points are taken as they are
             farthest = float(np.abs(task.grid.bounds).max())
             self.coordinates = error_bounds.coordinate_rounding(farthest, task.highest)
         left = np.sqrt(max(tolerance**2 - self.coordinates**2, 0.0))
-        self.inner = float(left - self.rounding) / self.near
+        self.inner = float(left - self.rounding - self.gains) / self.near
 
     def direct(self, lanes: bool) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
@@ -143,10 +145,16 @@ class _Float32:
             LEAST_TOLERANCE,
             numerics_plan.least(self.task.raw.n_samples, tile_kernels.CHUNK) * self.near + self.rounding,
         )
-        least = max(np.hypot(least, self.coordinates), self.rounding / ROUNDING, self.coordinates / ROUNDING)
+        least = np.hypot(least + self.gains, self.coordinates)
+        least = max(least, *(error / ROUNDING for error in (self.rounding, self.coordinates, self.gains)))
         return rounded_up(float(least) * (1 + 1e-9))
 
     def _must_round_less(self, how: str, best: float | None) -> None:
+        if self.gains > ROUNDING * self.tolerance:
+            raise ToleranceUnreachable(
+                self.tolerance, best, "float32 gains of the antenna", "aim it at the grid, or give the beam an angle",
+                how=f"{how}: gains of the antenna have an error of {self.gains:.1g}",
+            )  # fmt: skip
         if self.coordinates > ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
                 self.tolerance, best, "float64 coordinates of a plane's pixels", "put the origin near the scene",
@@ -158,7 +166,7 @@ class _Float32:
             raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
 
     def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
-        error = float(np.hypot(self.near * made[0].predicted_error + self.rounding, self.coordinates))
+        error = float(np.hypot(self.near * made[0].predicted_error + self.rounding + self.gains, self.coordinates))
         error = min(error, self.tolerance)
         return MethodChoice(name, *made, engine, error, made[0].cost)
 
@@ -169,8 +177,13 @@ def _direct(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) ->
         try:
             return _Float32(task, tolerance).direct(lanes)
         except ToleranceUnreachable:
-            if not float64 or float64_plan.too_long(task):
+            if not float64 or task.antenna is not None or float64_plan.too_long(task):
                 raise
+    elif task.antenna is not None:
+        best = reachable(lambda t: _Float32(task, t).direct(lanes), LEAST_TOLERANCE)
+        raise ToleranceUnreachable(
+            tolerance, best, "float32 gains of the antenna", "give the beam an angle", how="with an antenna"
+        )
     elif not float64:
         best = reachable(lambda t: _direct(task, t, lanes, False), LEAST_TOLERANCE)
         raise ToleranceUnreachable(tolerance, best, "float32", float64_direct.remedy(), how="without float64")

@@ -13,15 +13,20 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import groups
 from ..base.validation import array, converted, finite, number
 from ..base.vectors import unit
+from ..model.antenna import Antenna
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..model.trajectory import Trajectory
 from ..numerics import windows
 from ..numerics.plan import skips as known_skips
 from ..numerics.pulse_geometry import UNLIMITED, PulseGeometry
 from ..numerics.windows import Window
+from ..scattering.antenna_weights import AntennaWeights
+from .antenna_beam import antenna_of, is_antenna, picked
 
 Skip = Literal["range window", "beam", "zero weight", "no data"]
-BeamCone = float | tuple[float, ArrayLike]  # full angle, rad, and direction of the axis
+# full angle, rad, and direction of the axis; or an antenna, and its direction or attitude
+BeamCone = float | tuple[float, ArrayLike] | Antenna | tuple[Antenna, ArrayLike | Trajectory]
 SKIPS = ("range window", "beam", "zero weight", "no data")
 
 
@@ -37,6 +42,7 @@ class FocusingTask:
     skips          reasons to leave out pairs
     taper          window over the aperture of each pixel, as windows.table makes it, which is not in row_weight; None:
                    the same weights in all pixels.  places  of the rows along the aperture (n_rows,), where there is one
+    antenna        gains that weigh the rows in each pixel, or None
     """
 
     raw: PhaseHistory
@@ -48,6 +54,12 @@ class FocusingTask:
     skips: frozenset[str]
     taper: np.ndarray | None = None
     places: np.ndarray | None = None
+    antenna: AntennaWeights | None = None
+
+    @property
+    def weighs_pixels(self) -> bool:
+        """Whether a row has another weight in each pixel."""
+        return self.taper is not None or self.antenna is not None
 
     @property
     def highest(self) -> float:
@@ -116,7 +128,9 @@ def make_task(
     check_polarizations(raw, sum_polarizations)
     skips = known_skips(skip, SKIPS)
     # of a plane the pixel at `center`: with an even number of pixels the middle of the bounds is half a pixel off
-    toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0) if grid.center is None else grid.center)
+    center = grid.bounds.mean(axis=0) if grid.center is None else grid.center
+    antenna = antenna_of(raw, beam, center) if is_antenna(beam) else None
+    toward, angle = beam_of(raw, None if antenna else beam, center)
     taper = None
     if toward is not None and not _all_lit(geometry_of(raw, wrap, toward, angle), grid):
         across, along = windows.both(window)
@@ -127,11 +141,12 @@ def make_task(
         used = np.flatnonzero(row_weight)
         raw, row_weight = raw[used], row_weight[used]
         toward = None if toward is None else toward[used]
+        antenna = antenna and picked(antenna, used)
     if "no data" not in skips:
         grid = grid.filled()
     return FocusingTask(
         raw, grid, geometry_of(raw, wrap, toward, angle), sample_weight, row_weight, wrap, frozenset(skips), taper,
-        None if taper is None else places_of(raw),
+        None if taper is None else places_of(raw), antenna,
     )  # fmt: skip
 
 

@@ -68,10 +68,14 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     pixel_power = near = pixels_inside = 0.0
     for row, samples in read.items():
         delays, inside = _delays(task, x, row)
-        values, close = _powers(samples / scale, shaped, length, delays[inside])
+        share = None
+        if task.antenna is not None:
+            share = np.abs(task.antenna.weights(x[inside], row, task.antenna.frequency)) ** 2
+        values, close = _powers(samples / scale, shaped, length, delays[inside], share)
         pixel_power, near = pixel_power + stands_for[row] * values, near + stands_for[row] * close
         pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
-    whole = pixels_inside * float(((bright / scale) ** 2).sum())
+    peak = 1.0 if task.antenna is None else task.antenna.peak
+    whole = pixels_inside * float(((bright / scale) ** 2).sum()) * peak**2
     if whole == 0 or near == 0:
         return ProfileEnergy(1.0, 1.0)
     floor = 1e-20 * whole  # where every pixel is at an exact null of every row
@@ -120,11 +124,14 @@ def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np
     return delays, seen
 
 
-def _powers(samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray) -> tuple[float, float]:
+def _powers(
+    samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray, share: np.ndarray | None
+) -> tuple[float, float]:
     """Power of a profile at delays (m,), in fractions of the window, summed; and the mean power of the samples around
     each delay, summed.
 
     shaped  (n_samples,): what makes up for the kernel's transform
+    share   (m,): weight of the power at each delay, or None
     """
     made = deconvolved(TAPS, FINER, TERMS, np.float64)
     weights = np.stack([shaped, np.ones(len(samples))])
@@ -136,4 +143,5 @@ def _powers(samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.nda
     values = (made.weights(place - first) * profile[taps]).sum(axis=1)
     # the samples that an interpolation reads, and one more on each side
     around = (first[:, None] + np.arange(-1, made.taps + 1)) % length
-    return float((np.abs(values) ** 2).sum()), float(power[around].mean(axis=1).sum())
+    here, near = np.abs(values) ** 2, power[around].mean(axis=1)
+    return (float(here.sum()), float(near.sum())) if share is None else (float(here @ share), float(near @ share))

@@ -12,6 +12,7 @@ from ...base.stage_timer import Clock
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
+from ..antenna_beam import AntennaOnDevice
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
@@ -32,7 +33,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
     lined = None
-    if task.taper is None and line_plan.possible(grid, lanes):  # lines share the weights of their pulses
+    if not task.weighs_pixels and line_plan.possible(grid, lanes):  # lines share the weights of their pulses
         lined = line_plan.choose(
             tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
         )
@@ -60,15 +61,20 @@ class Direct(DirectEngine):
 
     dtype = np.complex64
 
-    def __init__(self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: Tiling) -> None:
+    def __init__(
+        self, device: Device, task: FocusingTask, plan: Plan | LinePlan, tiling: Tiling, gain: bool = False
+    ) -> None:
+        """gain  True: it makes sums of squared gains of the antenna and the rows' weights, instead of an image."""
         self.device, self.task, self.plan, self.tiling = device, task, plan, tiling
         self.lanes = device.info.vector_width
         bistatic = not task.antennas.is_monostatic
         beam = task.antennas.beam is not None
         self.taper = TaperOnDevice(device, task, np.float32)
+        self.antenna = None if task.antenna is None else AntennaOnDevice(device, task, gain)
         self.kernels = kernel_of(
-            device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam, weights=self.taper.macros
-        )
+            device, plan, tiling, bistatic=bistatic, wrap=task.wrap, local=False, beam=beam,
+            weights=self.antenna.macros if self.antenna else self.taper.macros,
+        )  # fmt: skip
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
         # per row, making the range profile costs a tenth of adding it to this many pixels
         self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
@@ -135,6 +141,8 @@ class Direct(DirectEngine):
             packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
             pulses = device.upload(packed), packed.shape[2], stop - start
             weights = self.taper.arguments(apertures, start, stop)
+            if self.antenna:
+                weights = self.antenna.arguments(start, stop)
             clock.lap("profiles")
             at_once = int(for_constants / (4 * kernels.components * packed.shape[2]))
             step = max(1, min(tiles.n_tiles, at_once))
