@@ -23,7 +23,9 @@ SPACING = 0.05  # m, of pixels
 AROUND = 1.2  # m beside the target that pictures show
 FIELD_RATE = 6e9  # Hz, of the field in figure 5: four times the carrier
 FLOOR = -35.0  # dB, of pictures
-CHAIN = 0.05  # difference allowed between images of sampled and of unsampled echoes
+CHAIN = (
+    0.1  # difference allowed between images of samples and of echoes: records cut the ripples before and after pulses
+)
 RANGE_NAME, AZIMUTH_NAME, LEVEL = "slant range about the origin, m", "azimuth, m", "dB re 1 m²"
 DELAY_NAME, SLOW_NAME = "delay after the nearest echo of the origin, ns", "slow time, s"
 LEAST = 1e-7  # of the amplitude in HH that float32 resolves: VH is not below
@@ -96,7 +98,8 @@ def _say(out: Section, found: Levels, both: PhaseHistory) -> None:
         f"{20 * np.log10(found.optics):.1f}; the echoes of physical optics differ from those of full wave by "
         f"{found.apart:.0%} of their root mean square. Brightest pixel in VH {cross:.0f} dB of that in HH. Physical "
         f"optics of a perfect conductor sends back no VH. Grid of {grid['grid']} cells of {1e3 * grid['cell_m']:.3g} "
-        f"mm; error of waveform forming {report.predicted_error:.1%}, of the grid {model or 0:.0%}, both predicted."
+        f"mm, {grid['cells']:.1f} per shortest wavelength; error of waveform forming {report.predicted_error:.1%}, of "
+        f"the grid {model or 0:.0%}, both predicted."
     )
     out.keep(
         peak_hh_dbsm=20 * np.log10(found.peak[0]), cross_over_co_db=cross, rms_hh=found.rms[0], rms_vh=found.rms[1],

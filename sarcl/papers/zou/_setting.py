@@ -64,7 +64,7 @@ def section(lab: Lab) -> Section:
         f"{RANGE * 2 * np.tan(HALF_BEAM):.0f} m of track, just cross the beam of {np.degrees(HALF_BEAM):.1f} degrees "
         f"on either side that 1000 Hz of Doppler bandwidth need.{size} Targets are in free space, with the centre of "
         "their box at the origin, 45 degrees below the radar. Solids stand upright; cuboid and tank are longest along "
-        "the track. Distances are spherical: every cell has its own."
+        "the track. Distances are spherical: every cell has its own. Flat sides lie on nodes of the grid."
     )
     _table(out, lab)
     return out
@@ -118,6 +118,6 @@ def _table(out: Section, lab: Lab) -> None:
     ))  # fmt: skip
     out.draw(html.table(
         ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"], full,
-        f"What the sizes of the paper take with {CELLS[False]} cells per shortest wavelength, forecast for this "
-        "machine at its present speed (sarcl.plan_fullwave_echo).",
+        f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength, forecast for "
+        "this machine at its present speed (sarcl.plan_fullwave_echo).",
     ))  # fmt: skip
