@@ -17,12 +17,13 @@ from ._lists import PARTS, SAMPLES
 from ._mesh_lines import mesh_lines
 from ._pulse import Pulse
 from .fields import WAVE_STEPS
-from .lattice import COURANT, LANES, ROWS, Lattice, lattice_around
+from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target
 
 ABSORBER, GAP, SPARE = 10, 3, 2  # cells on each side: absorbing layers, to the incident wave's box, to the target
 MARGIN = ABSORBER + GAP + SPARE
 WIDEST = 0.5  # lowest over highest frequency of the incident pulse: a narrower band makes a pulse longer than its echo
+FINER = 1.06  # by which cells may be smaller than asked, so that flat sides lie on nodes
 MOST_STEPS = 10.0  # of the predicted number, before a run is stopped
 
 EDGE_BYTES = 4 + 4 * SAMPLES  # of an edge of a conductor: place, samples of its residual
@@ -62,16 +63,54 @@ class RunEnd:
     left: float
 
 
+def fitting_cell(bounds: np.ndarray, cell: float, flat: np.ndarray, finer: float) -> float:
+    """A size of cells, at most `cell` m and at least cell/finer, of which flat sides are nearly a whole number apart.
+
+    bounds  of a box, m (2, 3);  flat  which of its sides are flat: low and high, along x, y and z (2, 3)
+    """
+    extent = (bounds[1] - bounds[0])[flat.all(axis=0)]
+    if not len(extent):
+        return cell
+    tried = cell / np.linspace(1, finer, 241)
+    return float(tried[np.argmin(_whole(extent / tried[:, None])[1].max(axis=1))])
+
+
+def grid_about(bounds: np.ndarray, cell: float, flat: np.ndarray) -> Lattice:
+    """The grid about a box, m (2, 3), with room for absorbing layers and the incident wave.
+
+    A flat side (`flat` as in fitting_cell) lies on nodes, or little outside of them where both sides of an axis are
+    flat: edges of bodies between nodes are computed as if they were at the nodes inside of them. Along an axis with no
+    flat side or two, nodes lie alike on both sides of the box's centre, so that a mirrored body has a mirrored grid.
+    """
+    low, high = bounds
+    number, rest = _whole((high - low) / cell)
+    shape = np.ceil(number + rest).astype(np.int64) + 2 * MARGIN
+    more = -shape[2] % LANES
+    shape[2] += more
+    before = np.where(flat.any(axis=0), 0, (np.ceil(number + rest) - number - rest) / 2)  # of the low side, cells
+    before = np.where(flat.all(axis=0), -rest / 2, before)
+    before = np.where(flat[1] & ~flat[0], np.ceil(number + rest) - number - rest, before)
+    origin = low - cell * (MARGIN + before + np.array([0, 0, more // 2]))
+    return Lattice(cell, (int(shape[0]), int(shape[1]), int(shape[2])), origin)
+
+
 def grid_shape(bounds: np.ndarray, cell: float) -> np.ndarray:
     """Cells along x, y and z of `grid_about`."""
-    shape = np.ceil((bounds[1] - bounds[0]) / cell - 1e-9).astype(np.int64) + 2 * MARGIN
+    number, rest = _whole((bounds[1] - bounds[0]) / cell)
+    shape = np.ceil(number + rest).astype(np.int64) + 2 * MARGIN
     shape[2] += -shape[2] % LANES
     return shape
 
 
-def grid_about(bounds: np.ndarray, cell: float) -> Lattice:
-    """The grid about a box, m (2, 3), whose centre is the grid's: room for absorbing layers and the incident wave."""
-    return lattice_around(bounds[0], bounds[1], cell, MARGIN)
+def _whole(number: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Whole numbers of cells, and what is left, which is 0 where rounding alone makes it other."""
+    whole = np.floor(number + 1e-6)
+    return whole, np.maximum(number - whole, 0) * (number - whole > 1e-6)
+
+
+def centre_of(lattice: Lattice) -> np.ndarray:
+    """Centre of a grid, m (3,), where phases of echoes are zero."""
+    return np.asarray(lattice.origin + lattice.cell * np.array(lattice.shape) / 2)
 
 
 def run_bytes(
@@ -115,7 +154,8 @@ def too_many_cells(shape: np.ndarray) -> bool:
 
 def target_of(lattice: Lattice, triangles: np.ndarray) -> Target:
     """Perfect conductors of closed surfaces, m (k, 3, 3), on the grid; ValueError as `_mesh_lines` raises it."""
-    return conductor(lattice, mesh_lines(lattice, triangles).intervals)
+    found = mesh_lines(lattice, triangles)
+    return conductor(lattice, found.intervals, found.areas)
 
 
 def run(
@@ -130,7 +170,7 @@ def run(
     tx, rx    positions of the antennas, m (P, 3);  received  unit vectors, polarisations at each pulse (Q, P, 3)
     """
     place, sent = anchor
-    centre = lattice.origin + lattice.cell * np.array(lattice.shape) / 2
+    centre = centre_of(lattice)
     found = currents(
         device, lattice, target, PlaneWave(centre - place, sent, _pulse(band)), k, absorber=ABSORBER, gap=GAP,
         most_steps=most_steps, progress=progress,

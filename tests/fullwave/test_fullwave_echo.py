@@ -16,7 +16,7 @@ import sarcl
 from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import runs
-from sarcl.fullwave.echoes import _fullwave_task
+from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.reference import mie
 
 RADIUS = 0.1  # m
@@ -99,6 +99,31 @@ def test_bistatic_echoes_of_a_sphere_are_those_of_mie():
     across, along = np.array([mie.conducting_sphere(RADIUS, x, np.pi - np.deg2rad(110)) for x in k]).T
     assert difference(got[1], across) < 0.04
     assert difference(got[0], -along) < 0.04
+
+
+@pytest.mark.parametrize("size", [(0.31, 0.43, 0.22), (0.2, 0.3, 0.1), (1.0, 0.05, 0.33)])
+def test_flat_sides_of_a_box_lie_on_nodes_or_little_outside(size):
+    box = shapes.box(size, position=(3.0, -2.0, 7.0))
+    cell = SPEED_OF_LIGHT / 1.5e9 / 12
+    lattice, _ = _grid_choice.grid_choice(box, (1e9, 1.5e9), 12, 1e9)
+    assert cell / runs.FINER <= lattice.cell <= cell
+    low, high = (box.bounds - lattice.origin) / lattice.cell
+    outside = np.ceil(low - 1e-6) - low, high - np.floor(high + 1e-6)
+    assert np.allclose(*outside, atol=1e-6) and np.max(outside) < 0.2
+    assert (low >= runs.ABSORBER + runs.GAP).all() and (
+        np.array(lattice.shape) - high >= runs.ABSORBER + runs.GAP
+    ).all()
+    assert lattice.shape == tuple(runs.grid_shape(box.bounds, lattice.cell))
+
+
+def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid():
+    cone, _ = _grid_choice.grid_choice(shapes.cone(0.2, 0.4), (1e9, 1.5e9), 12, 1e9)
+    assert np.isclose(cone.origin[2] / cone.cell % 1, [0, 1], atol=1e-6).any()
+    below, _ = _grid_choice.grid_choice(shapes.cone(0.2, 0.4, rotation=(np.pi, 0, 0)), (1e9, 1.5e9), 12, 1e9)
+    assert np.isclose(below.origin[2] / below.cell % 1, [0, 1], atol=1e-6).any()
+    ball, _ = _grid_choice.grid_choice(SPHERE, (1e9, 1.5e9), 12, 1e9)
+    assert np.isclose(ball.cell, SPEED_OF_LIGHT / 1.5e9 / 12)
+    assert np.allclose(runs.centre_of(ball), 0, atol=ball.cell * (1 + 1e-9) * np.array([1e-6, 1e-6, 0.5]))
 
 
 @pytest.mark.parametrize(

@@ -19,7 +19,7 @@ from ._run_progress import RunProgress
 
 @dataclass(frozen=True, eq=False)
 class FormedSamples:
-    """Echoes of all pulses, phase zero at the grid's centre, without the waveform's spectrum: complex64
+    """Echoes of all pulses, phase zero at the scene's centre, without the waveform's spectrum: complex64
     (P, polarisations, F); their report; files of finished anchors, where there are any.
     """
 
@@ -125,7 +125,7 @@ class _Sums:
             "model": "full wave on a grid (FDTD), conformal conductors",
             "anchors": lists[0] if all(x == lists[0] for x in lists) else self.anchors,
             "runs": self.runs,
-            "cells": task.cells,
+            "cells": float(f"{task.carried_cells:.4g}"),
             "cell_m": float(f"{task.lattice.cell:.4g}"),
             "grid": " x ".join(map(str, task.lattice.shape)),
             "steps": int(self.steps / self.runs) if self.runs else 0,

@@ -82,8 +82,13 @@ class FullwaveTask:
 
     @property
     def centre(self) -> np.ndarray:
-        """Centre of the grid, m (3,): the centre of the scene's box."""
-        return self.lattice.origin + self.lattice.cell * np.array(self.lattice.shape) / 2
+        """Centre of the scene's box, m (3,)."""
+        return self.scene.center
+
+    @property
+    def carried_cells(self) -> float:
+        """Cells per shortest wavelength on the grid: those asked for, or little more."""
+        return SPEED_OF_LIGHT / self.band[1] / self.lattice.cell
 
     @property
     def wavenumbers(self) -> np.ndarray:
@@ -134,6 +139,8 @@ class FullwaveTask:
             )  # fmt: skip
             progress.run_done()
             steps, left = steps + ended.steps, max(left, ended.left)
+        path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
+        out *= np.exp(-2j * np.outer(path, self.wavenumbers))[:, None]
         return out, runs.RunEnd(steps, left)
 
     @property
@@ -159,9 +166,9 @@ class FullwaveTask:
         }
         return checksum(*leaves(parts))
 
-    def coarser(self, ratio: float) -> FullwaveTask:
-        """The same task with cells larger by a factor."""
-        lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes)
+    def coarser(self, ratio: float, finer: float) -> FullwaveTask:
+        """The same task with cells larger by a factor, divided by up to `finer`."""
+        lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
         return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[])
 
 

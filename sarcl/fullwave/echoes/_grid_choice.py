@@ -15,6 +15,7 @@ from .. import runs
 from ..lattice import Lattice
 
 FEWEST_CELLS = 8.0  # per shortest wavelength; below, waves of the grid and cut cells differ too much from the truth
+FLAT = 0.01  # of the surface: sides with less are not worth smaller cells
 SHARE = 0.5  # of the device's memory, where max_bytes is None: a run cannot be divided
 
 
@@ -30,15 +31,20 @@ def check_cells(asked: Any, band: tuple[float, float]) -> float:
     return cells
 
 
-def grid_choice(scene: Scene, band: tuple[float, float], cells: float, budget: float) -> tuple[Lattice, runs.RunCost]:
-    """The grid of `cells` per shortest wavelength about a scene, and what a run on it takes.
+def grid_choice(
+    scene: Scene, band: tuple[float, float], cells: float, budget: float, finer: float = runs.FINER
+) -> tuple[Lattice, runs.RunCost]:
+    """The grid of `cells` per shortest wavelength, or up to `finer` times as many, about a scene; what a run takes.
 
     MemoryError where it does not fit into `budget` bytes, with the size that does.
     """
-    area = float(normals_and_areas(scene.triangles)[1].sum())
+    area, flat = float(normals_and_areas(scene.triangles)[1].sum()), flat_sides(scene)
+
+    def cell_of(n: float) -> float:
+        return runs.fitting_cell(scene.bounds, SPEED_OF_LIGHT / band[1] / n, flat, finer)
 
     def planned(n: float) -> tuple[np.ndarray, runs.RunCost]:
-        cell = SPEED_OF_LIGHT / band[1] / n
+        cell = cell_of(n)
         return runs.grid_shape(scene.bounds, cell), runs.run_cost(scene.bounds, cell, area, band)
 
     def fits(n: float) -> bool:
@@ -47,7 +53,7 @@ def grid_choice(scene: Scene, band: tuple[float, float], cells: float, budget: f
 
     shape, cost = planned(cells)
     if fits(cells):
-        return runs.grid_about(scene.bounds, SPEED_OF_LIGHT / band[1] / cells), cost
+        return runs.grid_about(scene.bounds, cell_of(cells), flat), cost
     most, less = 0.0, cells
     for _ in range(40):
         middle = (most + less) / 2
@@ -63,3 +69,11 @@ def grid_choice(scene: Scene, band: tuple[float, float], cells: float, budget: f
         highest = band[1] * most / FEWEST_CELLS / 1e9
         remedy = f"what fits is a waveform up to {highest:.3g} GHz with cells={FEWEST_CELLS:g}; or {remedy}"
     raise MemoryError(f"a run on a grid of {' x '.join(map(str, shape))} cells: {what}; {remedy}")
+
+
+def flat_sides(scene: Scene) -> np.ndarray:
+    """Which sides of a scene's box hold facets of FLAT of its surface or more: low, high along x, y, z; bool (2, 3)."""
+    areas = normals_and_areas(scene.triangles)[1]
+    near = 1e-6 * float((scene.bounds[1] - scene.bounds[0]).max())
+    held = np.abs(scene.triangles[:, :, None] - scene.bounds).max(axis=1) <= near  # facets, low and high, axes
+    return np.asarray((areas[:, None, None] * held).sum(axis=0) >= FLAT * areas.sum())

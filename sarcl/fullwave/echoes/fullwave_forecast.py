@@ -87,7 +87,7 @@ def plan_fullwave_echo(
     also = (RATIO**-4 if given.get("model_error", True) else 0.0) + (1.0 if given.get("check", False) else 0.0)
     plan: dict[str, object] = {
         "anchors": n_anchors,
-        "cells": task.cells,
+        "cells": float(f"{task.carried_cells:.4g}"),
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
         "steps": task.cost.steps,
