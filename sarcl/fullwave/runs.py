@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.vectors import unit
 from ..opencl.device import Device
 from ._currents import currents
 from ._cut_cells import conductor
@@ -15,6 +16,8 @@ from ._formed_echoes import formed_echoes
 from ._incident import COMPONENTS, SPACING, PlaneWave
 from ._lists import PARTS, SAMPLES
 from ._mesh_lines import mesh_lines
+from ._mirrors import Twin as Twin
+from ._mirrors import mirror_axes, mirrored_echoes, twins
 from ._pulse import Pulse
 from .fields import WAVE_STEPS
 from .lattice import COURANT, LANES, ROWS, Lattice
@@ -82,23 +85,20 @@ def grid_about(bounds: np.ndarray, cell: float, flat: np.ndarray) -> Lattice:
     flat: edges of bodies between nodes are computed as if they were at the nodes inside of them. Along an axis with no
     flat side or two, nodes lie alike on both sides of the box's centre, so that a mirrored body has a mirrored grid.
     """
-    low, high = bounds
-    number, rest = _whole((high - low) / cell)
-    shape = np.ceil(number + rest).astype(np.int64) + 2 * MARGIN
-    more = -shape[2] % LANES
-    shape[2] += more
-    before = np.where(flat.any(axis=0), 0, (np.ceil(number + rest) - number - rest) / 2)  # of the low side, cells
-    before = np.where(flat.all(axis=0), -rest / 2, before)
-    before = np.where(flat[1] & ~flat[0], np.ceil(number + rest) - number - rest, before)
-    origin = low - cell * (MARGIN + before + np.array([0, 0, more // 2]))
+    number, rest = _whole((bounds[1] - bounds[0]) / cell)
+    shape = grid_shape(bounds, cell, flat)
+    lack = np.ceil(number + rest) - number - rest  # of a box to whole cells
+    before = np.select([flat.all(axis=0), flat[0], flat[1]], [-rest / 2, 0 * lack, lack], lack / 2)
+    spread = np.array([0, 0, (shape[2] - grid_shape(bounds, cell, flat, lanes=1)[2]) // 2])
+    origin = bounds[0] - cell * (MARGIN + before + spread)
     return Lattice(cell, (int(shape[0]), int(shape[1]), int(shape[2])), origin)
 
 
-def grid_shape(bounds: np.ndarray, cell: float) -> np.ndarray:
-    """Cells along x, y and z of `grid_about`."""
+def grid_shape(bounds: np.ndarray, cell: float, flat: np.ndarray, lanes: int = LANES) -> np.ndarray:
+    """Cells along x, y and z of `grid_about`; the last is a multiple of `lanes`."""
     number, rest = _whole((bounds[1] - bounds[0]) / cell)
-    shape = np.ceil(number + rest).astype(np.int64) + 2 * MARGIN
-    shape[2] += -shape[2] % LANES
+    shape = np.where(flat.all(axis=0), number, np.ceil(number + rest)).astype(np.int64) + 2 * MARGIN
+    shape[2] += -shape[2] % lanes
     return shape
 
 
@@ -136,9 +136,8 @@ def run_bytes(
     return device, device + host
 
 
-def run_cost(bounds: np.ndarray, cell: float, area: float, band: tuple[float, float]) -> RunCost:
-    """What one run takes on a grid about a box, m (2, 3), with a target of a surface of `area` m^2."""
-    shape = grid_shape(bounds, cell)
+def run_cost(shape: np.ndarray, cell: float, area: float, band: tuple[float, float]) -> RunCost:
+    """What one run takes on a grid of `shape` cells (3,) with a target of a surface of `area` m^2."""
     diagonal = float(np.linalg.norm(shape - 2 * (ABSORBER + GAP)))  # cells
     pulse_steps = 2 * _pulse(band).half_length * SPEED_OF_LIGHT / (COURANT * cell)
     entries = ENTRIES * area / cell**2
@@ -158,24 +157,37 @@ def target_of(lattice: Lattice, triangles: np.ndarray) -> Target:
     return conductor(lattice, found.intervals, found.areas)
 
 
+def mirror_twins(
+    lattice: Lattice, target: Target, tx: np.ndarray, sent: np.ndarray, k: float, radius: float
+) -> dict[int, Twin]:
+    """For pulses, the pulse that the run of their anchor serves too, by a mirror that leaves the target unchanged.
+
+    tx, sent  positions of the transmitter, m, and polarisations, unit vectors (P, 3);  k, radius  as `_mirrors:twins`
+    """
+    return twins(mirror_axes(lattice, target), unit(tx - centre_of(lattice)), sent, k, radius)
+
+
 def run(
     device: Device, lattice: Lattice, target: Target, band: tuple[float, float], k: np.ndarray, *,
-    anchor: tuple[np.ndarray, np.ndarray], tx: np.ndarray, rx: np.ndarray, received: np.ndarray, most_steps: int,
-    max_bytes: float, progress: Callable[[int, int], None] | None = None,
-) -> tuple[np.ndarray, RunEnd]:  # fmt: skip
-    """One run: echoes of P pulses from the currents of an anchor, complex64 (P, Q, F), phase zero at the grid's centre.
+    anchor: tuple[np.ndarray, np.ndarray], twin: Twin | None, tx: np.ndarray, rx: np.ndarray, received: np.ndarray,
+    tolerance: float, most_steps: int, max_bytes: float, progress: Callable[[int, int], None] | None = None,
+) -> tuple[list[np.ndarray], RunEnd]:  # fmt: skip
+    """One run: echoes of P pulses from the currents of an anchor, complex64 (P, Q, F), phase zero at the grid's centre;
+    and those from the currents of its twin, where it has one.
 
-    band      lowest and highest frequency of the waveform, Hz;  k  wavenumbers of the echoes, rad/m (F,)
-    anchor    the transmitter's position, m (3,), and the polarisation that is sent there, a unit vector (3,)
-    tx, rx    positions of the antennas, m (P, 3);  received  unit vectors, polarisations at each pulse (Q, P, 3)
+    band       lowest and highest frequency of the waveform, Hz;  k  wavenumbers of the echoes, rad/m (F,)
+    anchor     the transmitter's position, m (3,), and the polarisation that is sent there, a unit vector (3,)
+    tx, rx     positions of the antennas, m (P, 3);  received  unit vectors, polarisations at each pulse (Q, P, 3)
+    tolerance  part of the currents that may come after the end of the run
     """
     place, sent = anchor
-    centre = centre_of(lattice)
     found = currents(
-        device, lattice, target, PlaneWave(centre - place, sent, _pulse(band)), k, absorber=ABSORBER, gap=GAP,
-        most_steps=most_steps, progress=progress,
+        device, lattice, target, PlaneWave(centre_of(lattice) - place, sent, _pulse(band)), k, absorber=ABSORBER,
+        gap=GAP, tolerance=tolerance, most_steps=most_steps, progress=progress,
     )  # fmt: skip
-    echoes = formed_echoes(device, found, tx, rx, received, max_bytes=max_bytes)
+    echoes = [formed_echoes(device, found, tx, rx, received, max_bytes=max_bytes)]
+    if twin is not None:
+        echoes.append(mirrored_echoes(device, found, twin, tx, rx, received, max_bytes=max_bytes))
     return echoes, RunEnd(found.n_steps, found.left)
 
 

@@ -17,6 +17,7 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
+from sarcl.fullwave.echoes._anchor_files import AnchorFiles
 from sarcl.reference import mie
 
 RADIUS = 0.1  # m
@@ -113,7 +114,7 @@ def test_flat_sides_of_a_box_lie_on_nodes_or_little_outside(size):
     assert (low >= runs.ABSORBER + runs.GAP).all() and (
         np.array(lattice.shape) - high >= runs.ABSORBER + runs.GAP
     ).all()
-    assert lattice.shape == tuple(runs.grid_shape(box.bounds, lattice.cell))
+    assert lattice.shape == tuple(runs.grid_shape(box.bounds, lattice.cell, _grid_choice.flat_sides(box)))
 
 
 def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid():
@@ -136,7 +137,7 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
         (shapes.box((1, 1, 1), material=sarcl.Material(diagram="cos")), {}, ValueError, "finer than a facet"),
         (shapes.plate((0.3, 0.2)), {}, ValueError, "are open at 4 of 5 edges"),
         (BOX, {"cells": 7}, ValueError, r"cells is 7 .* reaches 1\.5 GHz, .* at least 8 .* up to 1\.312 GHz"),
-        (BOX, {"max_bytes": 2e6}, MemoryError, r"cells: it needs 8\.\d+ MB, and 2 MB are allowed; raise max_bytes"),
+        (BOX, {"max_bytes": 2e6}, MemoryError, r"cells: it needs 7\.\d+ MB, and 2 MB are allowed; raise max_bytes"),
         (BOX, {"max_bytes": 6e6}, MemoryError, r"what fits is a waveform up to 1\.\d+ GHz with cells=8; or raise"),
         (BOX, {"max_bytes": 2e7, "cells": 40}, MemoryError, r"what fits is cells=\d+\.?\d*, or a waveform up to"),
         (BOX, {"tolerance": 1e-5}, sarcl.ToleranceUnreachable, r"with fields in float32; the best here is 1\.0e-04"),
@@ -156,13 +157,13 @@ def pretend(monkeypatch, stop_after=None):
     """Runs of the grid replaced by random echoes; the list of those that are done. The one after `stop_after` fails."""
     done = []
 
-    def run(device, lattice, target, band, k, *, anchor, tx, received, **options):
+    def run(device, lattice, target, band, k, *, anchor, twin, tx, received, **options):
         if len(done) == stop_after:
             raise RuntimeError("the machine is switched off")
         done.append(anchor)
         random = np.random.default_rng(int(1e6 * abs(np.concatenate(anchor).sum())))
-        made = random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]
-        return made.astype(np.complex64), runs.RunEnd(100, 1e-6)
+        made = (random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]).astype(np.complex64)
+        return [made, 2 * made][: 1 + (twin is not None)], runs.RunEnd(100, 0.0)
 
     monkeypatch.setattr(_fullwave_task.runs, "run", run)
     return done
@@ -252,9 +253,9 @@ def test_the_forecast_says_memory_steps_and_runs_before_the_work(monkeypatch):
     monkeypatch.setattr(_fullwave_task.runs, "run", None)
     forecast = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20, 65), polarization="all", cells=8, out="nowhere/raw.h5")
     assert (forecast.n_rows, forecast.n_samples, forecast.runs) == (8, 64, 4)
-    assert forecast.plan["grid"] == "39 x 43 x 48" and 1e6 < forecast.run_bytes < 2e7
+    assert forecast.plan["grid"] == "38 x 42 x 48" and 1e6 < forecast.run_bytes < 2e7
     assert forecast.seconds > forecast.runs * forecast.run_seconds
-    assert "about 4 runs of 39 x 43 x 48 cells" in str(forecast)
+    assert "about 4 runs of 38 x 42 x 48 cells" in str(forecast)
 
 
 def test_the_log_is_quiet_without_files(caplog):
@@ -298,6 +299,39 @@ def test_a_check_measures_the_error_between_anchors():
     with pytest.raises(sarcl.ToleranceMissed) as missed:
         sarcl.fullwave_echo(BOX, CHIRP, track, cells=8, anchors=1, check=True, model_error=False, tolerance=1e-3)
     assert missed.value.raw.n_rows == 9 and missed.value.raw.report.measured_error > 1e-3
+
+
+@pytest.mark.slow
+def test_one_run_serves_two_anchors_of_a_body_that_is_its_own_mirror_image(monkeypatch):
+    track = around(*np.linspace(-40, 40, 7), height=20.0)
+    options = {"cells": 8, "polarization": ("HH", "VH", "VV"), "model_error": False, "anchors": range(7)}
+    both = sarcl.fullwave_echo(BOX, CHIRP, track, **options)
+    monkeypatch.setattr(_fullwave_task.runs, "mirror_twins", lambda *args: {})
+    alone = sarcl.fullwave_echo(BOX, CHIRP, track, **options)
+    assert (both.report.plan["runs"], both.report.plan["mirrored"]) == (8, 6)
+    assert (alone.report.plan["runs"], alone.report.plan["mirrored"]) == (14, 0)
+    assert difference(np.asarray(both.samples), np.asarray(alone.samples)) < 5e-3
+
+
+def test_a_kill_between_the_files_of_a_run_and_of_its_twin_makes_both_again(tmp_path, monkeypatch):
+    given = {"cells": 8, "model_error": False, "anchors": [0, 2], "out": tmp_path / "raw.h5"}
+    track, folder = around(-30, 0, 30), tmp_path / "raw.h5.anchors"
+    real = AnchorFiles.keep
+
+    def kept_once(self, *args):
+        if folder.exists():
+            raise RuntimeError("the machine is switched off")
+        real(self, *args)
+
+    monkeypatch.setattr(AnchorFiles, "keep", kept_once)
+    pretend(monkeypatch)
+    with pytest.raises(RuntimeError, match="switched off"):
+        sarcl.fullwave_echo(BOX, CHIRP, track, **given)
+    assert [path.name[-15:] for path in folder.iterdir()] == ["H-000002.anchor"]
+    monkeypatch.setattr(AnchorFiles, "keep", real)
+    done = pretend(monkeypatch)
+    raw = sarcl.fullwave_echo(BOX, CHIRP, track, **given)
+    assert len(done) == 1 == raw.report.plan["mirrored"]
 
 
 KILLED = """

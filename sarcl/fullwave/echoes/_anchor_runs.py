@@ -8,11 +8,12 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from ...base.errors import warn
+from ..runs import RunEnd, Twin
 from ._anchor_files import AnchorFiles
 from ._fullwave_task import FullwaveTask
 from ._run_progress import RunProgress
 
-UNFINISHED = 1e-3  # of the largest current: a warning where a run ends with more
+UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 
 
 @dataclass(eq=False)
@@ -20,8 +21,10 @@ class AnchorRuns:
     """Echoes at all pulses, formed from anchors one after the other.
 
     sent, received  the polarisation that is sent, and those that are received with it (Q)
+    twins           pulses whose anchor the run of another serves too, by mirror symmetry
     echoes          of each anchor's pulse, complex64 (P, Q, F)
-    steps, runs, seconds  of the runs that this process did;  left  largest part of the currents that a run left
+    steps, runs, seconds  of the runs that this process did;  mirrored  anchors that runs of others served
+    left            largest part of the currents that would have followed after a run
     """
 
     task: FullwaveTask
@@ -29,37 +32,51 @@ class AnchorRuns:
     received: list[str]
     files: AnchorFiles | None
     progress: RunProgress
+    twins: dict[int, Twin]
     echoes: dict[int, np.ndarray] = field(default_factory=dict)
     steps: int = 0
     runs: int = 0
+    mirrored: int = 0
     seconds: float = 0.0
     left: float = 0.0
 
     def __call__(self, pulse: int) -> np.ndarray:
         """The echoes (P, Q, F) that are formed from the anchor at a pulse."""
-        if pulse not in self.echoes:
-            self.echoes[pulse] = self._found(pulse)
+        if pulse not in self.echoes and not self._load(pulse):
+            twin = self.twins.get(pulse)
+            started = time.perf_counter()
+            found, ended = self.task.formed(
+                pulse, self.sent, self.received, np.arange(len(self.task.tx)), self.progress, twin
+            )
+            self.seconds += time.perf_counter() - started
+            self.runs += len(self.task.parts())
+            self.steps += ended.steps
+            numbers = [pulse, *([twin.pulse] if twin else [])]
+            self.mirrored += len(numbers) - 1
+            # the twin first: where a kill leaves one file, both are made again, by this run and not by the twin's own
+            for number, echoes in reversed(list(zip(numbers, found, strict=True))):
+                if self.files:
+                    self.files.keep(number, self.sent, echoes, ended)
+                self.echoes[number] = echoes
+            self._look_at(pulse, ended)
         return self.echoes[pulse]
 
-    def _found(self, pulse: int) -> np.ndarray:
-        task = self.task
-        shape = len(task.tx), len(self.received), len(task.frequencies)
+    def _load(self, pulse: int) -> bool:
+        """Take the echoes from a file, if there is one."""
+        shape = len(self.task.tx), len(self.received), len(self.task.frequencies)
         kept = self.files.load(pulse, self.sent, shape) if self.files else None
         if kept is None:
-            started = time.perf_counter()
-            kept = task.formed(pulse, self.sent, self.received, np.arange(shape[0]), self.progress)
-            self.seconds += time.perf_counter() - started
-            self.runs += len(task.parts())
-            self.steps += kept[1].steps
-            if self.files:
-                self.files.keep(pulse, self.sent, *kept)
-        else:
-            self.progress.run_done(len(task.parts()))
-        echoes, ended = kept
+            return False
+        self.echoes[pulse], ended = kept
+        self.progress.run_done(len(self.task.parts()))
+        self._look_at(pulse, ended)
+        return True
+
+    def _look_at(self, pulse: int, ended: RunEnd) -> None:
+        """Warn where the currents had not decayed."""
         self.left = max(self.left, ended.left)
         if ended.left > UNFINISHED:
             warn(
-                f"the currents of pulse {pulse} have fallen to {ended.left:.1e} of their peak alone when the run "
-                f"ended after {ended.steps} steps: the bodies resonate, and the echo of what was left is missing"
+                f"the run of pulse {pulse} ended after {ended.steps} steps, and {ended.left:.1e} of the currents would "
+                "have followed: the bodies resonate, and that part of the echo is missing"
             )
-        return echoes

@@ -41,8 +41,10 @@ def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, m
     progress = RunProgress(request.report, 1, task.cost.steps)
     sums = _Sums()
     for sent, which in task.sendings():
-        runs = AnchorRuns(task, sent, [request.polarizations[i][0] for i in which], files, progress)
-        made = anchored(runs, task.along, anchors=anchors, tolerance=request.tolerance)
+        twins = task.twins(sent)
+        runs = AnchorRuns(task, sent, [request.polarizations[i][0] for i in which], files, progress, twins)
+        mirror = np.array([twins[p].pulse if p in twins else -1 for p in range(n_pulses)])
+        made = anchored(runs, task.along, anchors=anchors, tolerance=request.tolerance, mirror=mirror)
         request.clock.lap("runs")
         samples[:, which] = made.samples
         sums.add(task, runs, made)
@@ -79,7 +81,7 @@ class _Sums:
 
     def __init__(self) -> None:
         self.anchors: dict[str, list[int]] = {}
-        self.runs, self.steps, self.seconds, self.left = 0, 0, 0.0, 0.0
+        self.runs, self.mirrored, self.steps, self.seconds, self.left = 0, 0, 0, 0.0, 0.0
         self.power, self.forming, self.checked = 0.0, 0.0, 0.0
         self.grid = self.grid_power = 0.0
         self.has_grid = self.has_check = False
@@ -98,7 +100,7 @@ class _Sums:
             self.steps + runs.steps,
             self.seconds + runs.seconds,
         )
-        self.left = max(self.left, runs.left)
+        self.left, self.mirrored = max(self.left, runs.left), self.mirrored + runs.mirrored
 
     def add_grid_error(self, task: FullwaveTask, runs: AnchorRuns, made: Anchored) -> None:
         middle = (task.along[0] + task.along[-1]) / 2
@@ -110,7 +112,7 @@ class _Sums:
         """One run at the pulse that is farthest from every anchor; its error counts for all pulses."""
         at = np.abs(task.along[:, None] - task.along[self.anchors[runs.sent]]).min(axis=1)
         pulse = int(np.argmax(at))
-        wanted = task.formed(pulse, runs.sent, runs.received, np.array([pulse]), runs.progress)[0][0]
+        wanted = task.formed(pulse, runs.sent, runs.received, np.array([pulse]), runs.progress)[0][0][0]
         wrong = float((np.abs((made.samples[pulse] - wanted) * np.abs(task.spectrum)) ** 2).sum())
         self.checked, self.has_check = self.checked + len(task.tx) * wrong, True
 
@@ -125,6 +127,7 @@ class _Sums:
             "model": "full wave on a grid (FDTD), conformal conductors",
             "anchors": lists[0] if all(x == lists[0] for x in lists) else self.anchors,
             "runs": self.runs,
+            "mirrored": self.mirrored,
             "cells": float(f"{task.carried_cells:.4g}"),
             "cell_m": float(f"{task.lattice.cell:.4g}"),
             "grid": " x ".join(map(str, task.lattice.shape)),

@@ -31,6 +31,7 @@ from ._closed_bodies import check_bodies
 from ._grid_choice import SHARE, check_cells, grid_choice
 from ._run_progress import RunProgress
 
+LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
 
@@ -64,6 +65,7 @@ class FullwaveTask:
     max_bytes: float
     along: np.ndarray
     _targets: list[Target] = field(default_factory=list)
+    _twins: dict[str, dict[int, runs.Twin]] = field(default_factory=dict)
 
     @property
     def device(self) -> Device:
@@ -120,27 +122,40 @@ class FullwaveTask:
         each = -(-n // -(-n // most))
         return [slice(first, min(first + each, n)) for first in range(0, n, each)]
 
+    def twins(self, sent: str) -> dict[int, runs.Twin]:
+        """For pulses, the pulse that the run of their anchor serves too, by mirror symmetry."""
+        if sent not in self._twins:
+            radius = float(np.linalg.norm(self.scene.bounds[1] - self.scene.bounds[0])) / 2
+            self._twins[sent] = runs.mirror_twins(
+                self.lattice, self.target(), self.tx, self.senses(self.tx)[sent], float(self.wavenumbers[-1]), radius
+            )
+        return self._twins[sent]
+
     def formed(
-        self, pulse: int, sent: str, received: list[str], pulses: np.ndarray, progress: RunProgress
-    ) -> tuple[np.ndarray, runs.RunEnd]:
+        self, pulse: int, sent: str, received: list[str], pulses: np.ndarray, progress: RunProgress,
+        twin: runs.Twin | None = None,
+    ) -> tuple[list[np.ndarray], runs.RunEnd]:  # fmt: skip
         """Echoes (n, Q, F) at some pulses (n,), formed from the currents of an anchor at one pulse, phase zero at the
-        centre; and how the runs ended.
+        centre, and from those of its twin, where one is given; and how the runs ended.
         """
         tx, rx = self.tx[pulses], self.rx[pulses]
         senses = self.senses(rx)
-        out = np.empty((len(pulses), len(received), len(self.frequencies)), np.complex64)
+        shape = len(pulses), len(received), len(self.frequencies)
+        out = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
+        path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
         steps, left = 0, 0.0
         for some in self.parts():
-            out[..., some], ended = runs.run(
+            found, ended = runs.run(
                 self.device, self.lattice, self.target(), self.band, self.wavenumbers[some],
-                anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), tx=tx, rx=rx,
-                received=np.stack([senses[name] for name in received]),
+                anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), twin=twin, tx=tx, rx=rx,
+                received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.request.tolerance,
                 most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=progress,
             )  # fmt: skip
+            turn = np.exp(-2j * np.outer(path, self.wavenumbers[some]))[:, None]
+            for to, echoes in zip(out, found, strict=True):
+                to[..., some] = echoes * turn
             progress.run_done()
             steps, left = steps + ended.steps, max(left, ended.left)
-        path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
-        out *= np.exp(-2j * np.outer(path, self.wavenumbers))[:, None]
         return out, runs.RunEnd(steps, left)
 
     @property
@@ -169,7 +184,7 @@ class FullwaveTask:
     def coarser(self, ratio: float, finer: float) -> FullwaveTask:
         """The same task with cells larger by a factor, divided by up to `finer`."""
         lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
-        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[])
+        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[], _twins={})
 
 
 def fullwave_task(

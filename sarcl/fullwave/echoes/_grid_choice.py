@@ -45,7 +45,8 @@ def grid_choice(
 
     def planned(n: float) -> tuple[np.ndarray, runs.RunCost]:
         cell = cell_of(n)
-        return runs.grid_shape(scene.bounds, cell), runs.run_cost(scene.bounds, cell, area, band)
+        shape = runs.grid_shape(scene.bounds, cell, flat)
+        return shape, runs.run_cost(shape, cell, area, band)
 
     def fits(n: float) -> bool:
         shape, cost = planned(n)

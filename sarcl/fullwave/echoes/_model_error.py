@@ -31,7 +31,7 @@ def grid_error(
     some = np.unique(np.append(np.linspace(0, n - 1, min(MOST_PULSES, n)).round().astype(int), pulse))
     larger = task.coarser(RATIO, FINER)
     ratio = larger.lattice.cell / task.lattice.cell
-    coarse, _ = larger.formed(pulse, sent, received, some, progress)
+    (coarse,), _ = larger.formed(pulse, sent, received, some, progress)
     weight = np.abs(task.spectrum)
     change = float((np.abs((coarse - echoes[some]) * weight) ** 2).sum())
     power = float((np.abs(echoes[some] * weight) ** 2).sum())

@@ -15,19 +15,20 @@ class RunProgress:
 
     def __init__(self, report: Callable[[str, int, int], None], runs: int, steps: int) -> None:
         self._report, self._runs, self._steps = report, runs, max(steps, 1)
-        self._finished = 0
+        self._finished, self._share = 0, 0.0  # runs that are done, and the part of the one that runs
         report(STAGE, 0, runs * self._steps)
 
     def __call__(self, steps: int, expected: int) -> None:
         """A run has done so many steps of those that it expects now."""
         self._runs = max(self._runs, self._finished + 1)
         # a run may take longer than expected: its share is full then, but not the whole
-        done = self._finished * self._steps + int(min(steps / max(expected, 1), 0.999) * self._steps)
+        self._share = max(self._share, min(steps / max(expected, 1), 0.999))
+        done = self._finished * self._steps + int(self._share * self._steps)
         self._report(STAGE, done, self._runs * self._steps)
 
     def run_done(self, runs: int = 1) -> None:
         """So many runs are done, or were done before."""
-        self._finished += runs
+        self._finished, self._share = self._finished + runs, 0.0
         self._runs = max(self._runs, self._finished + 1)
         self._report(STAGE, self._finished * self._steps, self._runs * self._steps)
 
