@@ -35,6 +35,7 @@ from .waveform import Waveform
 
 BLOCK = 2**20  # samples per block of rows
 SOME_ROWS = 16  # rows in which the sign of the beat is checked
+BAND_STEPS = 2**16  # frequencies at which the spectrum of a chirp is taken
 KINDS = ("compressed", "dechirped", "chirped")
 LIGHT = Fraction(SPEED_OF_LIGHT)
 
@@ -102,7 +103,7 @@ def spectra_of(
             start = start - waveform.duration / 2
         factor: complex = 1 / (rate * float(np.sqrt(waveform.peak_energy_density)))
         if waveform.sweep_rate is not None:  # that of exp(j pi K t^2) has a phase of pi/4 beside P
-            factor *= np.exp(-0.25j * np.pi * np.sign(waveform.sweep_rate))
+            factor *= np.exp(-0.25j * np.pi * np.sign(waveform.sweep_rate)) / _in_band(waveform)
         pad = int(np.ceil(waveform.duration * rate))
         return of_pulses(samples, rate, start, carrier, waveform.bandwidth, factor, pad), waveform
     kept = rate if waveform is None else waveform.bandwidth
@@ -114,6 +115,23 @@ def spectra_of(
         f = waveform.center + (np.arange(4 * n) + 0.5 - 2 * n) * kept / (4 * n)
         factor *= float(waveform.matched_spectrum(f).mean())
     return of_pulses(samples, rate, start, carrier, kept, factor), waveform
+
+
+def _in_band(chirp: Waveform) -> complex:
+    """Peak of a compressed chirp over that of the spectrum P of `Waveform.pulse_spectrum`, which has modulus 1 in the
+    band: a pulse with sharp ends has lost the energy outside of it.
+
+    The mean over the band of S conj(P), S the spectrum of exp(j pi K t^2), |t| <= T/2, from Fresnel's integrals:
+    1 - (1 + j)/(pi sqrt(2 T B)) for large T B, and the conjugate for a frequency that falls.
+    """
+    from scipy.special import fresnel
+
+    # in units of time sqrt(T/B): S conj(P) over the stationary value is (F(a) + F(b))/(1 + j), F = C + j S
+    product = chirp.duration * chirp.bandwidth
+    f = (np.arange(BAND_STEPS) + 0.5) / BAND_STEPS - 0.5
+    (s1, c1), (s2, c2) = (fresnel(np.sqrt(2 * product) * (0.5 + side * f)) for side in (-1, 1))
+    made = complex((((c1 + c2) + 1j * (s1 + s2)) / (1 + 1j)).mean())
+    return made if chirp.kind == "chirp" else made.conjugate()
 
 
 def _check_meant(

@@ -35,6 +35,13 @@ def test_unit_points_of_a_strip_map_read_0_dbsm_wherever_all_of_their_rows_are(s
     assert 20 * np.log10(abs(measured[1].peak) / whole) < -9
 
 
+def test_raw_records_of_a_down_chirp_read_0_dbsm_too():
+    raw, near = strip_map.history(), strip_map.POINTS[3]
+    grid = sarcl.ImageGrid.plane(center=near, shape=(96, 80), spacing=(0.35, 1.0))
+    seen = sarcl.measure(sarcl.backproject(raw, grid, beam=strip_map.BEAM), near=near)
+    assert abs(10 * np.log10(seen.rcs)) <= 0.02
+
+
 def test_the_carrier_is_that_of_the_rows_that_saw_the_point(scene):
     # from the antennas in the middle of the whole track the response lies at the edge of the band, or beyond it
     near = strip_map.POINTS[0]
