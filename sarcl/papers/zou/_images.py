@@ -27,7 +27,7 @@ CHAIN = (
     0.1  # difference allowed between images of samples and of echoes: records cut the ripples before and after pulses
 )
 RANGE_NAME, AZIMUTH_NAME, LEVEL = "slant range about the origin, m", "azimuth, m", "dB re 1 m²"
-DELAY_NAME, SLOW_NAME = "delay after the nearest echo of the origin, ns", "slow time, s"
+DELAY_NAME, SLOW_NAME = "delay after the nearest echo of the origin, ns", "slow time, ms"
 LEAST = 1e-7  # of the amplitude in HH that float32 resolves: VH is not below
 
 
@@ -83,7 +83,7 @@ def _draw_waves(out: Section, raw: PhaseHistory) -> None:
     delay = np.linspace(first, last, field.samples.shape[1])
     rows = (("middle of the track", raw.n_rows // 2), ("beginning", 0))
     out.draw(html.plot(
-        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "m",
+        [(name, delay, field.samples[row].real) for name, row in rows], DELAY_NAME, "field times range, m",
         "Field of two pulses at the receiver, HH.",
     ))  # fmt: skip
 
@@ -175,7 +175,7 @@ def _db(amplitude: np.ndarray) -> np.ndarray:
 
 
 def _ends(record: Record, raw: PhaseHistory) -> tuple[tuple[float, float], tuple[float, float]]:
-    """Edges of a picture of samples: delay, ns, and slow time, s."""
+    """Edges of a picture of samples: delay, ns, and slow time, ms."""
     delay = 1e9 * (record.times - 2 * raw.reference_range.min() / SPEED_OF_LIGHT)
     assert raw.time is not None
-    return (float(delay[0]), float(delay[-1])), (float(raw.time[0]), float(raw.time[-1]))
+    return (float(delay[0]), float(delay[-1])), (1e3 * float(raw.time[0]), 1e3 * float(raw.time[-1]))
