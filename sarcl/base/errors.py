@@ -92,6 +92,14 @@ class ToleranceUnreachable(ValueError):
         return out
 
 
+class TooThin(ValueError):
+    """Parts of a mesh are too thin for the cells of a grid; cell: the largest, m, that resolve them, None: none do."""
+
+    def __init__(self, text: str, cell: float | None = None) -> None:
+        super().__init__(text)
+        self.cell = cell
+
+
 class NothingSeen(ValueError):
     """No scatterer contributes to the echoes of these pulses. Other pulses may see some.
 

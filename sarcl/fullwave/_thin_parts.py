@@ -11,6 +11,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.errors import TooThin
 from ._closed_mesh import ClosedMesh
 from .lattice import Lattice
 
@@ -40,7 +41,7 @@ class ThinParts:
         self._bad.append((entered[plate], place[plate]))
 
     def check(self, inside: np.ndarray, low: np.ndarray) -> None:
-        """ValueError where parts are too thin; inside: which nodes are, from node `low` (3,) on."""
+        """TooThin, a ValueError, where parts are too thin; inside: which nodes are, from node `low` (3,) on."""
         from scipy.ndimage import maximum_filter
 
         near = maximum_filter(np.pad(inside, REACH), size=2 * REACH + 1, mode="constant", cval=False)
@@ -56,12 +57,14 @@ class ThinParts:
         cell = self.lattice.cell
         thickness = cell * float(np.quantile(self._thickness(facet[some], place[some]), 0.25))
         at = np.array2string(self.lattice.origin + cell * place[some[0]], precision=4)
-        remedy = "give them a thickness"
+        resolved, remedy = None, "give them a thickness"
         if thickness > 1e-5 * cell:
-            remedy = f"give cells of at most {SHARE * thickness:.2g} m, or make these parts thicker"
-        raise ValueError(
+            resolved = SHARE * thickness
+            remedy = f"give cells of at most {resolved:.2g} m, or make these parts thicker"
+        raise TooThin(
             f"triangles have parts that are too thin for cells of {cell:g} m: about {thickness:.2g} m thick, one at "
-            f"{at} m, so that they fall between the nodes of the grid; {remedy}"
+            f"{at} m, so that they fall between the nodes of the grid; {remedy}",
+            resolved,
         )
 
     def _thickness(self, facet: np.ndarray, place: np.ndarray) -> np.ndarray:

@@ -24,6 +24,7 @@ RADIUS = 0.1  # m
 CHIRP = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)  # ka 2.1 to 3.1
 SPHERE = shapes.sphere(RADIUS, edge=0.02)
 BOX = shapes.box((0.2, 0.3, 0.1))
+THIN = shapes.box((0.3, 0.3, 0.005), rotation=(0.5, 0.2, 0))
 
 
 def around(*degrees, height=0.0, distance=40.0):
@@ -136,6 +137,7 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
         (shapes.box((1, 1, 1), reflectivity=0.5), {}, ValueError, r"reflectivity 0\.5, .*\.Material\(eps_r=3"),
         (shapes.box((1, 1, 1), material=sarcl.Material(diagram="cos")), {}, ValueError, "finer than a facet"),
         (shapes.plate((0.3, 0.2)), {}, ValueError, "are open at 4 of 5 edges"),
+        (THIN, {}, ValueError, r"about 0\.005 m thick, .* at most 0\.0035 m, .*: cells=5\d\.\d, which are 12 now"),
         (BOX, {"cells": 7}, ValueError, r"cells is 7 .* reaches 1\.5 GHz, .* at least 8 .* up to 1\.312 GHz"),
         (BOX, {"max_bytes": 2e6}, MemoryError, r"cells: it needs 7\.\d+ MB, and 2 MB are allowed; raise max_bytes"),
         (BOX, {"max_bytes": 6e6}, MemoryError, r"what fits is a waveform up to 1\.\d+ GHz with cells=8; or raise"),

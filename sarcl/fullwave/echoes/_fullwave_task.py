@@ -11,7 +11,7 @@ import numpy as np
 from ...base import host_memory
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import ToleranceUnreachable
+from ...base.errors import ToleranceUnreachable, TooThin
 from ...base.fingerprint import checksum, kernels, leaves
 from ...base.validation import array as numbers
 from ...base.vectors import unit
@@ -100,7 +100,13 @@ class FullwaveTask:
     def target(self) -> Target:
         """The bodies on the grid."""
         if not self._targets:
-            self._targets.append(runs.target_of(self.lattice, self.scene.triangles))
+            try:
+                self._targets.append(runs.target_of(self.lattice, self.scene.triangles))
+            except TooThin as thin:
+                if thin.cell is None:
+                    raise
+                needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / thin.cell) / 10
+                raise TooThin(f"{thin}: cells={needed:g}, which are {self.cells:g} now", thin.cell) from None
         return self._targets[0]
 
     def sendings(self) -> Iterator[tuple[str, list[int]]]:

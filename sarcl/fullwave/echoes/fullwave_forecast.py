@@ -22,9 +22,9 @@ from ._run_speed import run_speed
 from .fullwave_echo import TOLERANCE, FullwaveOptions
 
 FEWEST = 5  # anchors before any interval is bisected, where there are as many pulses
-# Spacing of anchors, in wavelengths over the target's length: error of cubic interpolation, and the spacing that has it
-ERROR, SPACING = 1.5e-2, 1.7
-STEEPEST = 3.0  # the largest spacing, in the same unit, that the fourth power is trusted for
+# Spacing of anchors, in wavelengths over the length of the target, that has an error: boxes and cones of 3 wavelengths
+# and more; the error falls with about the fourth power of the spacing
+ERROR, SPACING, WIDEST = 3e-2, 0.75, 1.5
 
 # options that make up the request, and those of the task
 REQUEST = {"polarization", "vertical", "max_bytes", "tolerance", "device"}
@@ -106,5 +106,5 @@ def expected_anchors(task: FullwaveTask, anchors: Any, tolerance: float) -> int:
         return anchors if isinstance(anchors, int) else len(anchors)
     length = float(np.linalg.norm(task.scene.bounds[1] - task.scene.bounds[0]))
     wavelength = SPEED_OF_LIGHT / float(task.frequencies[-1])
-    spacing = min(SPACING * (tolerance / ERROR) ** 0.25, STEEPEST) * wavelength / length
+    spacing = min(SPACING * (tolerance / ERROR) ** 0.25, WIDEST) * wavelength / length
     return min(len(task.along), max(FEWEST, 1 + int(np.ceil(float(np.ptp(task.along)) / spacing))))
