@@ -167,16 +167,32 @@ def focus(args: argparse.Namespace, job: Job) -> int:
 
 
 def measure(args: argparse.Namespace, job: Job) -> int:
-    """The point response near a position, or at the brightest pixel, as a table."""
+    """The point response near each position, or at the brightest pixel, as a table; its cuts as a picture."""
     from ..model.image import Image
     from ..model.store import read
 
+    if args.plot is not None:
+        if len(args.near or [()]) > 1:
+            raise ValueError(f"--plot draws the cuts of one point, and {len(args.near)} --near are given; give one")
+        if not args.plot.lower().endswith(".png"):
+            raise ValueError(f"--plot is {args.plot!r}; cuts are drawn in a PNG: give a name that ends in .png")
+        job.expect(args.plot)
     image = read(args.image)
     if not isinstance(image, Image):
         raise ValueError(f"{args.image!r} holds echoes; measure wants an image (sarcl focus makes one)")
     from ..analysis import point_response
 
-    print(point_response.measure(image, near=args.near))
+    near = args.near[0] if args.near and len(args.near) == 1 else args.near
+    made = point_response.measure(image, near=near)
+    if isinstance(made, tuple):
+        print("\n\n".join(map(str, made)))
+        return 0
+    print(made)
+    if args.plot is not None:
+        from ..figures.decibels import write_png
+
+        write_png(made.show(), args.plot)
+        job.say(f"wrote {args.plot}")
     return 0
 
 

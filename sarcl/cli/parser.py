@@ -71,7 +71,11 @@ def parser() -> argparse.ArgumentParser:
     measure.add_argument(
         "image", metavar="IMAGE", help=f"image that sarcl wrote ({formats.suggested(formats.writing('image'))})"
     )
-    measure.add_argument("--near", nargs=3, type=float, metavar=("X", "Y", "Z"), help="m; default the brightest pixel")
+    measure.add_argument(
+        "--near", nargs=3, type=float, action="append", metavar=("X", "Y", "Z"),
+        help="m; default the brightest pixel; once per point",
+    )  # fmt: skip
+    measure.add_argument("--plot", metavar="FILE.png", help="draw the cuts in range and cross-range, of one point")
     _fda(
         command(
             "fda",

@@ -24,7 +24,7 @@ from .tiling.of_grid import tiling_of
 
 SIDE = 16  # pixels along a side of a tile
 ROWS = 256  # of Image.aperture, at most
-PAIRS = 2**20  # pairs of a tile and a row, and values of crossing pairs, that are looked at together
+PAIRS = 2**20  # pairs of a tile and a row that are looked at together
 SLACK = 1e-9  # of the largest distance: rounding of the distances of tiles, which are differences of squares
 
 
@@ -115,51 +115,52 @@ class RowCoverage:
         """Sums (k, n_tiles, per_tile) of weights (k, n_rows) over the rows that see each of positions, m (n_tiles,
         per_tile, 3)."""
         made = np.zeros((len(weights), *positions.shape[:2]))
-        for first, stop, whole, tile, row in self._tiles(positions):
+        for first, stop, whole, asked in self._tiles(positions):
             made[:, first:stop] += (weights @ whole.T)[..., None]
-            for some in _pieces(tile, positions.shape[1]):
-                seen = self.sees(positions[tile[some]], row[some])
-                starts = np.flatnonzero(np.diff(tile[some], prepend=-1))
-                for one, weight in zip(made, weights, strict=True):
-                    one[tile[some][starts]] += np.add.reduceat(weight[row[some], None] * seen, starts, axis=0)
+            for tile, rows in asked:
+                made[:, tile] += weights[:, rows] @ self.sees(positions[tile], rows)
         return made
 
     def spans(self, positions: np.ndarray, places: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Least and largest of places (n_rows,) of the rows that see positions, m (n_tiles, per_tile, 3): (n_tiles,
         per_tile) each, inf and -inf where none does."""
-        first, last = np.full(positions.shape[:2], np.inf), np.full(positions.shape[:2], -np.inf)
-        for low, stop, whole, tile, row in self._tiles(positions):
-            first[low:stop] = np.where(whole, places, np.inf).min(axis=1)[:, None]
-            last[low:stop] = np.where(whole, places, -np.inf).max(axis=1)[:, None]
-            for some in _pieces(tile, positions.shape[1]):
-                # in a strip map rows at both ends of the aperture are asked for; those between see the tile whole
-                seen, at = self.sees(positions[tile[some]], row[some]), places[row[some], None]
-                starts = np.flatnonzero(np.diff(tile[some], prepend=-1))
-                which = tile[some][starts]
-                first[which] = np.minimum(first[which], np.minimum.reduceat(np.where(seen, at, np.inf), starts, axis=0))
-                last[which] = np.maximum(last[which], np.maximum.reduceat(np.where(seen, at, -np.inf), starts, axis=0))
-        return first, last
+        least, most = np.full(positions.shape[:2], np.inf), np.full(positions.shape[:2], -np.inf)
+        for first, stop, whole, asked in self._tiles(positions):
+            least[first:stop] = np.where(whole, places, np.inf).min(axis=1)[:, None]
+            most[first:stop] = np.where(whole, places, -np.inf).max(axis=1)[:, None]
+            for tile, rows in asked:
+                rows = rows[np.argsort(places[rows], kind="stable")]
+                # rows within the span that is known already add nothing
+                rows = rows[(places[rows] < least[tile, 0]) | (places[rows] > most[tile, 0])]
+                if len(rows) == 0:
+                    continue
+                seen = self.sees(positions[tile], rows)
+                some, at = seen.any(axis=0), places[rows]
+                low, high = at[seen.argmax(axis=0)], at[len(rows) - 1 - seen[::-1].argmax(axis=0)]
+                least[tile] = np.where(some, np.minimum(least[tile], low), least[tile])
+                most[tile] = np.where(some, np.maximum(most[tile], high), most[tile])
+        return least, most
 
     def sees(self, points: np.ndarray, rows: np.ndarray) -> np.ndarray:
-        """Whether rows (m,) see points, m (m, n, 3): bool (m, n)."""
+        """Whether rows (m,) see points, m (n, 3), which lie near one another: bool (m, n)."""
         raw, antennas = self.task.raw, self.task.antennas
-        away = points - raw.tx[rows][:, None]
-        reach = np.sqrt(np.einsum("mnx,mnx->mn", away, away))
+        origin = points.mean(axis=0)
+        x, tx = points - origin, raw.tx[rows] - origin
+        reach = _distances(tx, x)
         seen = np.ones(reach.shape, bool)
         if not self.task.wrap:
-            path = reach
-            if not antennas.is_monostatic:
-                path = (reach + np.linalg.norm(points - raw.rx[rows][:, None], axis=-1)) / 2
+            path = reach if antennas.is_monostatic else (reach + _distances(raw.rx[rows] - origin, x)) / 2
             half = SPEED_OF_LIGHT / (4 * raw.frequency_step[rows])
             seen &= np.abs(path - raw.reference_range[rows][:, None]) <= half[:, None]
         if antennas.beam is not None:
-            along = np.einsum("mnx,mx->mn", away, antennas.beam[rows])
+            beam = antennas.beam[rows]
+            along = beam @ x.T - np.einsum("mx,mx->m", tx, beam)[:, None]
             seen &= along >= np.cos(antennas.beam_angle / 2) * reach
         return seen
 
-    def _tiles(self, positions: np.ndarray) -> Iterator[tuple[int, int, np.ndarray, np.ndarray, np.ndarray]]:
-        """For tiles first ... stop - 1: rows that see all of each, (stop - first, n_rows) bool, and the pairs (tile,
-        row) for which each point must be asked, in the order of the tiles."""
+    def _tiles(self, positions: np.ndarray) -> Iterator[tuple[int, int, np.ndarray, list[tuple[int, np.ndarray]]]]:
+        """For tiles first ... stop - 1: rows that see all of each, (stop - first, n_rows) bool, and the tiles with rows
+        for which each of their points must be asked, (tile, rows)."""
         raw, antennas = self.task.raw, self.task.antennas
         low, high = positions.min(axis=1), positions.max(axis=1)
         middle = (low + high) / 2
@@ -188,18 +189,12 @@ class RowCoverage:
                 slack = reach + np.abs(np.cos(angle)) * np.sqrt(SLACK) * farthest * (across < 1e-4 * distances[0])
                 whole &= inside > slack
                 outside |= inside < -slack
-            tile, row = np.nonzero(~(whole | outside))
-            yield first, stop, whole, tile + first, row
+            asked = ~(whole | outside)
+            some = np.flatnonzero(asked.any(axis=1))
+            yield first, stop, whole, [(int(first + t), np.flatnonzero(asked[t])) for t in some]
 
 
 def _distances(points: np.ndarray, ends: np.ndarray) -> np.ndarray:
     """Distances (n, m) of points, m (n, 3), from ends, m (m, 3)."""
     squares = (points**2).sum(axis=1)[:, None] + (ends**2).sum(axis=1) - 2 * points @ ends.T
     return np.sqrt(np.maximum(squares, 0))
-
-
-def _pieces(tile: np.ndarray, per_tile: int) -> Iterator[slice]:
-    """All pairs, in pieces of about PAIRS values."""
-    step = max(1, PAIRS // per_tile)
-    for start in range(0, len(tile), step):
-        yield slice(start, start + step)

@@ -70,7 +70,7 @@ class PixelTaper:
         step, rows = max(1, PIECE // task.raw.n_rows), np.arange(task.raw.n_rows)
         for at in range(0, len(others), step):
             tile, pixel = others[at : at + step].T
-            seen = RowCoverage(task).sees(positions[tile, pixel][None].repeat(len(rows), axis=0), rows).T
+            seen = RowCoverage(task).sees(positions[tile, pixel], rows).T
             u = (task.places - start[tile, pixel, None]) * inverse[tile, pixel, None]
             made[tile, pixel] = (seen * self.read(u)) @ task.row_weight
         return made

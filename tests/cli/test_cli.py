@@ -305,6 +305,13 @@ def test_measure_prints_the_point_response(raw_file, here, capsys):
     assert parser.main(["measure", "a.h5", "--near", "0.05", "0", "0"]) == 0
     assert capsys.readouterr().out == brightest
     assert re.search(r"PSLR +-13\.\d+ +-13\.\d+ dB", brightest)
+    twice = ["--near", "0.05", "0", "0", "--near", "0", "0.05", "0"]
+    assert parser.main(["measure", "a.h5", *twice]) == 0
+    assert capsys.readouterr().out == f"{brightest}\n{brightest}"
+    assert parser.main(["measure", "a.h5", "--plot", "cuts.png"]) == 0
+    assert capsys.readouterr().out == f"{brightest}wrote cuts.png\n" and (here / "cuts.png").stat().st_size > 1000
+    assert "draws the cuts of one point" in refused(capsys, "measure", "a.h5", "--plot", "b.png", *twice)
+    assert "ends in .png" in refused(capsys, "measure", "a.h5", "--plot", "b.svg")
 
 
 def test_simulate_makes_echoes_and_the_image(here, capsys):
