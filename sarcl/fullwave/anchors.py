@@ -10,10 +10,11 @@ import numpy as np
 
 from ._anchor_model import NEAR, AnchorModel, anchor_model
 
-FIRST = (0.03, 0.3, 0.7, 0.97)  # first anchors, of the arc: unequal spacings show what equal ones hide
-LEAST = 5  # anchors before any end: one at least is predicted first
+FIRST = (0.03, 0.5, 0.97)  # first anchors, of the arc
+LEAST = 4  # anchors before any end: estimates of three are too low, and one anchor at least is predicted first
 OVERHANG = 0.1  # spacings beyond the first and the last of equispaced anchors: ends of sums are weak otherwise
-ENOUGH = 0.7  # of the tolerance: predicted error at which no further anchor is run, because it is an estimate
+ENOUGH = 0.7  # of the tolerance: predicted error at which no further anchor is run, because it is an estimate;
+ENOUGH_OF_FEW = 0.25  # of the tolerance, with LEAST anchors
 
 
 @dataclass(frozen=True)
@@ -64,7 +65,8 @@ def anchored(
         return work.result()
     work.run(_nearest(work.along, np.array(FIRST)), LEAST)
     while work.model is not None and work.worst is not None:
-        if work.predicted_error <= ENOUGH * tolerance and len(work.got) >= LEAST:
+        n = len(work.got)
+        if n >= LEAST and work.predicted_error <= tolerance * (ENOUGH if n > LEAST else ENOUGH_OF_FEW):
             break
         work.check_and_run(work.worst)
     return work.result()
