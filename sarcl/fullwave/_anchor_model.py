@@ -23,7 +23,7 @@ FAMILIES: dict[str, Callable[[np.ndarray], np.ndarray]] = {
 }
 RATES = 36  # rates that are tried per family,
 SLOWEST, FASTEST = 0.05, 4.5  # rad over the mean and over the least spacing of the anchors
-NOISE = 1e-7  # variance of what is not correlated: float32 and the grid
+NOISE = 1e-10  # variance without correlation, for stable inverses: with 1e-7, echoes at anchors were not their own
 NEAR = 0.25  # spacings from an anchor: pulses in which its prediction is compared with its echoes
 REACH = 2.0  # mean spacings over which the scale of the error at an anchor holds
 
