@@ -12,7 +12,7 @@ from sarcl.fullwave._cut_cells import conductor
 from sarcl.fullwave._formed_echoes import formed_echoes
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave._mirrors import Twin, mirror_axes, mirrored_echoes, twins
-from sarcl.fullwave.lattice import Lattice
+from sarcl.fullwave.lattice import Lattice, lattice_around
 from sarcl.fullwave.target import material_edges
 from sarcl.scattering.physical_optics import polarisation
 
@@ -22,7 +22,7 @@ BAND = 1.8e9, 2.5e9  # Hz
 
 def on_grid(triangles, cell=CELL):
     low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
-    grid = runs.grid_about(np.array([low, high]), cell)
+    grid = lattice_around(low, high, cell, runs.MARGIN)
     return grid, runs.target_of(grid, triangles)
 
 
