@@ -53,20 +53,6 @@ def test_targets_have_the_sizes_of_table_2_and_are_closed_bodies_for_the_grid(ta
     assert found.volume == pytest.approx(np.full(3, volume), rel=overlap)
 
 
-@pytest.mark.parametrize("reduction, least", [(1, 12), (6, 10)])
-def test_flat_sides_of_targets_lie_on_nodes_of_the_grid(reduction, least):
-    for target in _targets.TARGETS:
-        cells = target.cells(least, reduction)
-        assert least <= cells < 1.25 * least
-        if target.name not in ("sphere", "tank"):
-            cell = SPEED_OF_LIGHT / 1.75e9 / cells
-            scene = target.scene(reduction)
-            lattice = lattice_around(*scene.bounds, cell, 6)
-            axes = (0, 1, 2) if target.name == "cuboid" else (2,)
-            at = (scene.bounds[:, axes] - lattice.origin[list(axes)]) / cell
-            assert at == pytest.approx(np.rint(at), abs=1e-6)
-
-
 def test_images_show_points_where_seen_says():
     radar = Radar(8)
     points = np.array([[0.4, -0.3, 0.2], [-0.5, 0.6, 0.1]])

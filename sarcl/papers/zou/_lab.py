@@ -24,7 +24,7 @@ from . import _targets
 from ._radar import CHIRP, DURATION, Radar
 
 REDUCTION = {True: 6, False: 1}  # of targets, range and track, but not of the wavelength
-CELLS = {True: 10, False: 12}  # per wavelength at 1.75 GHz, at least: `_targets.Target.cells`
+CELLS = {True: 10, False: 12}  # per wavelength at 1.75 GHz, at least
 TOLERANCE = 3e-2
 CREEPING = 1.25  # of the radius of the target: waves that creep round it arrive later
 PULSE = SPEED_OF_LIGHT * DURATION / 2  # m, of slant range
@@ -76,7 +76,6 @@ class Lab:
     def run(self, name: str, track: Trajectory, polarization: Any, kept: str, **options: Any) -> PhaseHistory:
         """Echoes by full wave; kept: what the file of a full run is called beside the name of the target."""
         scene, out = self.scene(name), None
-        cells = _targets.find(name).cells(CELLS[self.quick], self.radar.reduction)
         if self.folder is not None:
             self.folder.mkdir(exist_ok=True)
             out = self.folder / f"{name.replace(' ', '-')}-{kept}-{CELLS[self.quick]}-cells-{__version__}.h5"
@@ -85,16 +84,15 @@ class Lab:
                 assert isinstance(finished, PhaseHistory)
                 return finished
         return fullwave_echo(
-            scene, CHIRP, track, polarization=polarization, cells=cells, tolerance=TOLERANCE, out=out,
+            scene, CHIRP, track, polarization=polarization, cells=CELLS[self.quick], tolerance=TOLERANCE, out=out,
             device=self.device, progress=self.progress, **self.window(scene), **options,
         )  # fmt: skip
 
     def forecast(self, name: str) -> FullwaveForecast:
         """Memory, seconds and runs of the echoes of a target in full size."""
-        target = _targets.find(name)
-        scene = target.scene()
+        scene = _targets.find(name).scene()
         return plan_fullwave_echo(
-            scene, CHIRP, Radar().track, polarization=BOTH, cells=target.cells(CELLS[False]), tolerance=TOLERANCE,
+            scene, CHIRP, Radar().track, polarization=BOTH, cells=CELLS[False], tolerance=TOLERANCE,
             device=self.device, **self.window(scene),
         )  # fmt: skip
 

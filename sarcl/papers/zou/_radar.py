@@ -108,11 +108,18 @@ def received(raw: PhaseHistory, rate: float = SAMPLING, carrier: float = CENTER)
 
 
 def recorded(record: Record, raw: PhaseHistory) -> PhaseHistory:
-    """Echoes from a receiver's samples, still with the spectrum of the pulse; geometry of `raw`, of which they are."""
-    return PhaseHistory.from_time(
-        record.samples, kind="chirped", rate=record.rate, start=record.start, carrier=record.carrier, waveform=CHIRP,
-        pulse_time="middle", tx=raw.tx, time=raw.time, tx_velocity=raw.tx_velocity, rx_velocity=raw.rx_velocity,
+    """Echoes from a receiver's samples, still with the spectrum of the pulse; geometry of `raw`, of which they are.
+
+    The pulse of `received` has the spectrum of `CHIRP` alone, of modulus 1 in the band; a pulse with sharp ends has
+    another.
+    """
+    found = PhaseHistory.from_time(
+        record.samples, kind="compressed", rate=record.rate, start=record.start, carrier=record.carrier,
+        bandwidth=BANDWIDTH, tx=raw.tx, time=raw.time, tx_velocity=raw.tx_velocity, rx_velocity=raw.rx_velocity,
     )  # fmt: skip
+    peak = np.sqrt(DURATION * BANDWIDTH) * np.exp(0.25j * np.pi)  # as in `received`, and BANDWIDTH from_time takes
+    samples = (found.read(0, found.n_rows) / peak).astype(np.complex64)
+    return replace(found, samples=samples, waveform=CHIRP, compressed=False)
 
 
 def at_pulses(raw: PhaseHistory, samples: np.ndarray) -> PhaseHistory:

@@ -4,56 +4,37 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from math import pi
 
-import numpy as np
-
-from ...base.constants import SPEED_OF_LIGHT
 from ...scene import shapes
 from ...scene.scene import Scene
-from ._radar import BANDWIDTH, CENTER
 
-SHORTEST = SPEED_OF_LIGHT / (CENTER + BANDWIDTH / 2)  # wavelength, m
 SECTIONS, FACETS = 180, 8000  # of round targets: facets stay within 2e-4 of the radius
 
 
 @dataclass(frozen=True)
 class Target:
-    """A target of table 2: its letter in the figures, its name, the sizes printed, and what makes it in full size.
-
-    height  between two horizontal sides, m, of which all flat sides are multiples; None: it has no such sides
-    """
+    """A target of table 2: its letter in the figures, its name, the sizes printed, and what makes it in full size."""
 
     letter: str
     name: str
     printed: str
     make: Callable[[], Scene]
-    height: float | None = None
 
     def scene(self, reduction: float = 1) -> Scene:
         """The target with every length divided by `reduction`; the centre of its box is the origin."""
         whole = self.make()
         return Scene.facets((whole.triangles - whole.center) / reduction, two_sided=False)
 
-    def cells(self, least: float, reduction: float = 1) -> float:
-        """Cells per shortest wavelength, at least so many, with which flat sides lie on nodes of the grid.
-
-        The middle of the box is a node, so that an even number of cells is as high as the target. Rims and edges that
-        fall between nodes are displaced by up to a third of a cell.
-        """
-        if self.height is None:
-            return float(least)
-        per_cell = self.height / reduction / SHORTEST
-        return 2 * int(np.ceil(least * per_cell / 2)) / per_cell
-
 
 # Solids stand upright. Cuboid and tank are longest along the track: figure 8 of the paper sees a brick broadside.
 TARGETS = (
-    Target("a", "cuboid", "6 x 3 x 3 m", lambda: shapes.box((3, 6, 3)), 3),
-    Target("b", "cylinder", "radius 1.5 m, height 6 m", lambda: shapes.cylinder(1.5, 6, sections=SECTIONS), 6),
-    Target("c", "sharp cone", "radius 1.5 m, height 6 m", lambda: shapes.cone(1.5, 6, sections=SECTIONS), 6),
-    Target("d", "blunt cone", "radius 3 m, height 1.5 m", lambda: shapes.cone(3, 1.5, sections=SECTIONS), 1.5),
+    Target("a", "cuboid", "6 x 3 x 3 m", lambda: shapes.box((3, 6, 3))),
+    Target("b", "cylinder", "radius 1.5 m, height 6 m", lambda: shapes.cylinder(1.5, 6, sections=SECTIONS)),
+    Target("c", "sharp cone", "radius 1.5 m, height 6 m", lambda: shapes.cone(1.5, 6, sections=SECTIONS)),
+    Target("d", "blunt cone", "radius 3 m, height 1.5 m", lambda: shapes.cone(3, 1.5, sections=SECTIONS)),
     Target("e", "sphere", "radius 1.5 m", lambda: shapes.sphere(1.5, facets=FACETS)),
-    Target("f", "tank", "9.58 x 4.01 x 4.02 m", lambda: shapes.tank(rotation=np.pi / 2)),
+    Target("f", "tank", "9.58 x 4.01 x 4.02 m", lambda: shapes.tank(rotation=pi / 2)),
 )  # fmt: skip
 
 
