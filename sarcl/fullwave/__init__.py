@@ -16,10 +16,12 @@ For this folder alone:
     _absorber     absorbing layers (CPML)
     _along_track  sums over cells at some pulses of a smooth track, interpolated at the others
     _anchor_model interpolation between anchors by their correlation, and its error
+    _bodies       targets of bodies of several materials: conductors, dielectrics, and conductors in dielectrics
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
     _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
+    _dielectrics  permittivities of the edges of the grid in dielectric and lossy bodies
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
     _face_areas   how much of each face of the grid closed meshes cover
     _far_field    echo amplitudes of currents, without the grid's own dispersion

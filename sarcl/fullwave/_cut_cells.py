@@ -84,12 +84,9 @@ def conductor(
     staircase  an edge conducts where both its ends are inside, and no edge or face is cut: for comparison
     """
     box = Box.around(lattice, intervals)
-    inside = nodes_inside(box, intervals[0])
-    free = np.stack([free_lengths(box, axis, part) for axis, part in enumerate(intervals)])
-    for a in range(3):
-        if staircase:
-            free[a] = 1
-        free[a][inside & _next(inside, a, False)] = 0  # a gap that is shorter than a cell is closed
+    inside, free = edge_lengths(box, intervals)
+    if staircase:
+        free = np.stack([~(inside & _next(inside, a, False)) for a in range(3)]).astype(np.float32)
     near = np.zeros(free.shape, bool)  # edges beside a face whose field is not zero
     cut, weight = [], np.ones(free.shape, np.float32)
     for a in range(3):
@@ -127,6 +124,18 @@ def _span(box: Box, axis: int, part: Intervals, first: np.ndarray, last: np.ndar
         np.add.at(change, (at[some], *(place[some] for place in across)), np.int8(step))
     np.cumsum(change, axis=0, out=change)
     return np.asarray(np.moveaxis(change[:-1] > 0, (0, 1, 2), [(axis + m) % 3 for m in range(3)]))
+
+
+def edge_lengths(box: Box, intervals: Sequence[Intervals]) -> tuple[np.ndarray, np.ndarray]:
+    """Which nodes are inside, bool (*shape), and the share of each edge that is free, float32 (3, *shape).
+
+    An edge whose two ends are inside has none: a gap that is shorter than a cell is closed.
+    """
+    inside = nodes_inside(box, intervals[0])
+    free = np.stack([free_lengths(box, axis, part) for axis, part in enumerate(intervals)])
+    for axis in range(3):
+        free[axis][inside & _next(inside, axis, False)] = 0
+    return inside, free
 
 
 def free_lengths(box: Box, axis: int, part: Intervals) -> np.ndarray:

@@ -1,0 +1,103 @@
+"""Targets of bodies of several materials, from closed meshes: conductors, dielectrics, conductors in dielectrics."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.validation import number
+from ._cut_cells import Box, Intervals, conductor, edge_lengths
+from ._dielectrics import check_cells, conductivities, edge_permittivities, halved
+from ._mesh_lines import MeshLines, mesh_lines
+from .lattice import Lattice
+from .target import Target, material_edges
+
+
+@dataclass(frozen=True, eq=False)
+class Body:
+    """Closed surfaces of one material.
+
+    triangles     corners in m (k, 3, 3), counter-clockwise seen from outside
+    permittivity  relative, eps' - j eps'', with its losses by conductivity; None: a perfect conductor
+    """
+
+    triangles: np.ndarray
+    permittivity: complex | None = None
+
+
+def bodies(lattice: Lattice, parts: Sequence[Body], k: float) -> Target:
+    """The lists of several bodies.
+
+    k  wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity
+    Conductors take what they cover; where dielectrics overlap, the later one holds.
+
+    ValueError: `mesh_lines` refuses a mesh, a permittivity is not one of a passive body, or cells are too large for it.
+    """
+    number("k", k, above=0)
+    for i, part in enumerate(parts):
+        _check_passive(i, part.permittivity)
+    metal = [part.triangles for part in parts if part.permittivity is None]
+    made = Target.nothing()
+    found = _named("conductors", lattice, np.concatenate(metal)) if metal else None
+    if found is not None:
+        made = conductor(lattice, found.intervals, found.areas)
+    fine, dielectric = halved(lattice), []
+    for i, part in enumerate(parts):
+        if part.permittivity is not None:
+            check_cells(lattice, part.permittivity, k)
+            dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, complex(part.permittivity)))
+    if not dielectric:
+        return made
+    hidden = mesh_lines(fine, np.concatenate(metal)).intervals if metal else None
+    edges, values = _in_dielectrics(lattice, dielectric, hidden, found)
+    made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, k))
+    return Target(
+        np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
+        made.faces, made.weight,
+    )  # fmt: skip
+
+
+def _named(name: str, lattice: Lattice, triangles: np.ndarray) -> MeshLines:
+    """`mesh_lines`, whose errors name the part."""
+    try:
+        return mesh_lines(lattice, triangles)
+    except ValueError as error:
+        raise ValueError(f"{name}: {error}") from error
+
+
+def _check_passive(i: int, permittivity: complex | None) -> None:
+    if permittivity is None:
+        return
+    value = complex(permittivity)
+    if not (np.isfinite(value) and value.real >= 1 and value.imag <= 0):
+        raise ValueError(
+            f"parts[{i}] has permittivity {value:.4g}; wanted eps' - j eps'' of a passive body, with eps' at least 1 "
+            "and eps'' at least 0, or None for a perfect conductor"
+        )
+
+
+def _joined(group: list[Intervals]) -> Intervals:
+    """Intervals of the halved grid, in nodes of the grid itself."""
+    lines = np.concatenate([part.lines for part in group]) // 2
+    start, end = (np.concatenate([getattr(part, name) for part in group]) / 2 for name in ("start", "end"))
+    return Intervals(lines, start, end)
+
+
+def _in_dielectrics(
+    lattice: Lattice, parts: list[tuple[tuple[Intervals, Intervals, Intervals], complex]],
+    hidden: tuple[Intervals, Intervals, Intervals] | None, metal: MeshLines | None,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Places of edges that are partly in dielectrics, none in a conductor alone, and their permittivities."""
+    by_axis = [[intervals[axis] for intervals, _ in parts] for axis in range(3)]
+    box = Box.around(lattice, [_joined(group) for group in by_axis])
+    free = edge_lengths(box, metal.intervals)[1] if metal is not None else None
+    places, values = [], []
+    for axis in range(3):
+        along = [(intervals[axis], permittivity) for intervals, permittivity in parts]
+        at, value = edge_permittivities(box, axis, along, hidden[axis] if hidden is not None else None)
+        outside = np.ones(len(at), bool) if free is None else free[axis].flat[at] > 0
+        places.append(box.in_grid(lattice, at[outside], axis))
+        values.append(value[outside])
+    return np.concatenate(places), np.concatenate(values)

@@ -1,0 +1,128 @@
+"""Targets of several materials: closed forms of permittivities, overlaps, conductors in dielectrics, refusals."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+from sarcl import shapes
+from sarcl.fullwave import _dielectrics
+from sarcl.fullwave._bodies import Body, bodies
+from sarcl.fullwave._cut_cells import conductor
+from sarcl.fullwave._dispersion import grid_vector
+from sarcl.fullwave._mesh_lines import mesh_lines
+from sarcl.fullwave.lattice import COURANT, Lattice
+from sarcl.fullwave.target import material_edges
+from sarcl.scene.triangles import rotation
+
+CELL = 0.1  # m
+GRID = Lattice(CELL, (30, 30, 32), np.zeros(3))
+K = 2 * np.pi / (20 * CELL)
+
+
+def box(low, high):
+    low, high = CELL * np.array(low, float), CELL * np.array(high, float)
+    return shapes.box(high - low, position=[*(low + high)[:2] / 2, low[2]]).triangles
+
+
+def permittivity(target):
+    """Of lossless edges (3, *shape): share[1] is 1/permittivity; nan in conductors."""
+    out = np.ones((3, *GRID.shape))
+    inverse = target.share[1]
+    out.flat[target.edges] = np.where(inverse > 0, 1 / np.where(inverse > 0, inverse, 1), np.nan)
+    return out
+
+
+def test_conductors_alone_are_those_of_the_mesh():
+    parts = box((8.3, 8.6, 9.2), (14.5, 20.1, 16.9)), box((15.2, 8.6, 9.2), (19.7, 20.1, 16.9))
+    made = bodies(GRID, [Body(part) for part in parts], K)
+    found = mesh_lines(GRID, np.concatenate(parts))
+    wanted = conductor(GRID, found.intervals, found.areas)
+    for name in ("edges", "share", "faces", "weight"):
+        assert np.array_equal(getattr(made, name), getattr(wanted, name))
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+@pytest.mark.parametrize("end", [10.1, 10.4, 10.75])
+def test_a_boundary_along_the_grid_has_the_mean_along_it_and_the_harmonic_mean_across_it(axis, end):
+    low, high = np.array([5.3, 5.3, 5.3]), np.array([16.7, 16.7, 16.7])
+    high[axis] = end
+    made = permittivity(bodies(GRID, [Body(box(low, high), 3.0)], K))
+    middle = [11, 11, 11]
+    for component in range(3):
+        along = np.moveaxis(made[component], axis, 0)[:, middle[1], middle[2]][8:13]
+        start = np.arange(8, 13) - (0 if component == axis else 0.5)  # of the cell about the edge
+        share = np.clip(end - start, 0, 1)
+        if component == axis:
+            wanted = 1 / (share / 3 + 1 - share)
+        else:  # nine lines, half a cell apart, take the place of the integral over the cell
+            at = np.arange(8, 13)[:, None] + [-0.5, 0, 0.5]
+            wanted = 1 + 2 * (at < end) @ [0.25, 0.5, 0.25]
+            assert np.abs(wanted - (1 + 2 * share)).max() <= 0.5
+        assert np.allclose(along, wanted, atol=1e-5)
+
+
+def test_a_surface_askew_is_a_step_of_the_right_volume():
+    turned = shapes.box((1.1, 1.2, 0.9), position=(0, 0, -0.45)).triangles @ rotation(np.array([0.4, 0.6, 0.2])).T
+    made = permittivity(bodies(GRID, [Body(turned + 1.5, 3.0)], K))
+    assert set(np.unique(made)) == {1.0, 3.0}
+    for component in made:
+        assert np.isclose((component > 1).sum() * CELL**3, 1.1 * 1.2 * 0.9, rtol=0.02)
+
+
+def test_the_later_of_two_dielectrics_holds_and_the_core_of_a_coating_is_its_own():
+    coating, core = box((6, 6, 6), (20, 20, 20)), box((10, 10, 10), (16, 16, 16))
+    made = permittivity(bodies(GRID, [Body(coating, 2.0), Body(core, 5.0)], K))
+    assert np.isclose(made[0, 12, 13, 13], 5) and np.isclose(made[0, 7, 13, 13], 2) and made[0, 22, 13, 13] == 1
+    hidden = permittivity(bodies(GRID, [Body(core, 5.0), Body(coating, 2.0)], K))
+    assert np.isclose(hidden[0, 12, 13, 13], 2) and set(np.unique(hidden).round(6)) <= set(
+        np.unique(permittivity(bodies(GRID, [Body(coating, 2.0)], K))).round(6)
+    )
+
+
+@pytest.mark.parametrize("metal_first", [True, False])
+def test_a_conductor_in_a_dielectric_takes_its_edges(metal_first):
+    ball = shapes.sphere(0.62, facets=500, position=(1.5, 1.5, 1.6), rotation=(0.3, 0.5, -0.2)).triangles
+    parts = [Body(ball), Body(box((6.3, 6.3, 6.3), (24.2, 24.2, 25.4)), 2.5)]
+    made, alone = (bodies(GRID, some, K) for some in (parts if metal_first else parts[::-1], parts[:1]))
+    n = len(alone.edges)
+    assert np.array_equal(made.edges[:n], alone.edges) and np.array_equal(made.weight, alone.weight)
+    assert len(np.unique(made.edges)) == len(made.edges) > n
+    assert (made.share[1, n:] > 0).all()
+    inner = np.linalg.norm(GRID.positions(made.edges[n:], magnetic=False) - [1.5, 1.5, 1.6], axis=1)
+    assert inner.min() > 0.62 - CELL  # cut edges have their middle inside
+    near = inner < 0.75
+    assert near.sum() > 300 and np.allclose(made.share[1, n:][near], 1 / 2.5)
+
+
+def test_losses_are_those_of_the_permittivity_at_the_frequency_of_the_run():
+    """X/(change of E) of E = p E_old + q (E_old + X) for a wave of |K| averaged over directions is eps' - j eps''."""
+    directions = np.random.default_rng(3).normal(size=(20_000, 3))
+    directions /= np.linalg.norm(directions, axis=1)[:, None]
+    square = np.mean([(grid_vector(GRID, np.array([K]), d) ** 2).sum() for d in directions])
+    turn = np.exp(2j * np.arcsin(COURANT * CELL * np.sqrt(square) / 2))
+    eps = np.array([3 - 0.7j, 1.5 - 4j])
+    sigma = _dielectrics.conductivities(GRID, eps, K)
+    p, q = material_edges(GRID, np.arange(2), eps.real, sigma).share
+    assert np.allclose((turn - p - q) / (q * (turn - 1)), eps, rtol=1e-3)
+
+
+def test_permittivities_that_no_passive_body_has_are_refused():
+    body = box((8, 8, 8), (20, 20, 20))
+    for value in (0.5, 3 + 1j, np.inf):
+        with pytest.raises(
+            ValueError, match=r"parts\[1\] has permittivity .* at least 1 and eps'' at least 0, or None"
+        ):
+            bodies(GRID, [Body(body), Body(body, value)], K)
+
+
+def test_cells_too_large_for_the_waves_in_a_body_are_refused_with_the_size_that_fits():
+    body = box((8, 8, 8), (20, 20, 20))
+    with pytest.raises(ValueError, match=r"leaves 3\.3 cells of 0\.1 m per .* cells of at most 0\.0833 m, or None"):
+        bodies(GRID, [Body(body, 36.0)], K)
+    assert len(bodies(Lattice(0.08, (40, 40, 48), np.zeros(3)), [Body(body, 36.0)], K).edges) > 1000
+
+
+def test_an_open_dielectric_is_refused_by_its_number():
+    with pytest.raises(ValueError, match=r"parts\[1\]: triangles are open at"):
+        bodies(GRID, [Body(box((8, 8, 8), (12, 12, 12))), Body(box((14, 8, 8), (20, 20, 20))[1:], 3.0)], K)
