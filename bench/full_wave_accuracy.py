@@ -35,8 +35,9 @@ def echoes(
     """
     from sarcl.base.constants import SPEED_OF_LIGHT
     from sarcl.fullwave import runs
+    from sarcl.fullwave.lattice import lattice_around
 
-    grid = runs.grid_about(np.stack([-np.ones(3), np.ones(3)]) * radius, cell)
+    grid = lattice_around(-np.ones(3) * radius, np.ones(3) * radius, cell, runs.MARGIN)
     band = np.array([0.05, 1]) * top * SPEED_OF_LIGHT / (2 * np.pi)
     place = -DISTANCE * travel / np.linalg.norm(travel)
     made, _ = runs.run(

@@ -5,6 +5,7 @@ docs/theory/full_wave.md has the equations, the arrays and what each part hands 
 For other folders:
 
     anchors       echoes along a track from anchors that are chosen, predicted, run and interpolated
+    bodies/       targets of closed meshes: conductors that cut cells, dielectrics
     echoes/       fullwave_echo(): echoes of a track from few runs of the grid
     fields        fields on a device and their time steps, tile by tile
     lattice       the grid: cells, positions of field components, places in buffers
@@ -16,23 +17,15 @@ For this folder alone:
     _absorber     absorbing layers (CPML)
     _along_track  sums over cells at some pulses of a smooth track, interpolated at the others
     _anchor_model interpolation between anchors by their correlation, and its error
-    _bodies       targets of bodies of several materials: conductors, dielectrics, and conductors in dielectrics
-    _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _current_sums sums of currents over cells for many pulses, on a device
     _currents     one run: the equivalent currents of a target at the frequencies that are asked for
-    _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
-    _dielectrics  permittivities of the edges of the grid in dielectric and lossy bodies
     _dispersion   plane waves of the grid: wavenumber, frequency, polarisation, energy flux
-    _face_areas   how much of each face of the grid closed meshes cover
     _far_field    echo amplitudes of currents, without the grid's own dispersion
     _formed_echoes  waveform forming: echoes of many pulses from the currents of one run
     _incident     a plane wave that enters through the faces of a box
-    _least_areas  the least areas of cut faces with which the time steps are stable
     _lists        lists of cells on a device
     _mirrors      targets that a mirror leaves unchanged, and the anchors that then share a run
-    _mesh_lines   where grid lines are inside bodies of closed meshes
     _pulse        the waveform of the incident wave, by its spectrum
-    _thin_parts   refusals of parts of a mesh that are thinner than a cell
 """
 
-__all__ = ["anchors", "echoes", "fields", "lattice", "runs", "target"]
+__all__ = ["anchors", "bodies", "echoes", "fields", "lattice", "runs", "target"]

@@ -11,14 +11,13 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..opencl.device import Device
 from ._currents import currents
-from ._cut_cells import conductor
 from ._formed_echoes import formed_echoes
 from ._incident import COMPONENTS, SPACING, PlaneWave
 from ._lists import PARTS, SAMPLES
-from ._mesh_lines import mesh_lines
 from ._mirrors import Twin as Twin
 from ._mirrors import mirror_axes, mirrored_echoes, twins
 from ._pulse import Pulse
+from .bodies.materials import Body, bodies
 from .fields import WAVE_STEPS
 from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target
@@ -152,9 +151,8 @@ def too_many_cells(shape: np.ndarray) -> bool:
 
 
 def target_of(lattice: Lattice, triangles: np.ndarray) -> Target:
-    """Perfect conductors of closed surfaces, m (k, 3, 3), on the grid; ValueError as `_mesh_lines` raises it."""
-    found = mesh_lines(lattice, triangles)
-    return conductor(lattice, found.intervals, found.areas)
+    """Perfect conductors of closed surfaces, m (k, 3, 3), on the grid; ValueError as `bodies` raises it."""
+    return bodies(lattice, [Body(triangles)])
 
 
 def mirror_twins(

@@ -15,12 +15,12 @@ from sarcl import shapes
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import _currents
 from sarcl.fullwave._currents import Decay, currents, sample_period
-from sarcl.fullwave._cut_cells import conductor
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._incident import PlaneWave, wave_table
 from sarcl.fullwave._lists import SAMPLES
-from sarcl.fullwave._mesh_lines import mesh_lines
 from sarcl.fullwave._pulse import Pulse
+from sarcl.fullwave.bodies._cut_cells import conductor
+from sarcl.fullwave.bodies._mesh_lines import mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.runs import run_bytes

@@ -10,9 +10,9 @@ from helpers.devices import opened, variants
 from helpers.fdtd_cases import sphere_intervals
 
 from sarcl import shapes
-from sarcl.fullwave import _cut_cells, _least_areas
-from sarcl.fullwave._cut_cells import Box, Intervals, conductor
-from sarcl.fullwave._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies import _cut_cells, _least_areas
+from sarcl.fullwave.bodies._cut_cells import Box, Intervals, conductor
+from sarcl.fullwave.bodies._mesh_lines import mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import COURANT, Lattice
 from sarcl.fullwave.target import VACUUM_PERMITTIVITY, Target, material_edges

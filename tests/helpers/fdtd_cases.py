@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from sarcl.fullwave import _absorber
-from sarcl.fullwave._cut_cells import Intervals
 from sarcl.fullwave._incident import entrances
+from sarcl.fullwave.bodies._cut_cells import Intervals
 from sarcl.fullwave.lattice import COURANT
 from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd

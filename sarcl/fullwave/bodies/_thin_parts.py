@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.errors import TooThin
+from ...base.errors import TooThin
+from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh
-from .lattice import Lattice
 
 REACH = 4  # cells
 PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edges are taken as plates

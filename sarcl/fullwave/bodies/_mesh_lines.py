@@ -18,11 +18,11 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh, closed_mesh
 from ._cut_cells import Box, FaceAreas, Intervals, nodes_inside
 from ._face_areas import face_areas
 from ._thin_parts import ThinParts
-from .lattice import Lattice
 
 CANDIDATES = 2**20  # pairs of a facet and a line per array operation: bounds the memory
 TIE = 2  # whole numbers: shorter intervals and gaps are rounding

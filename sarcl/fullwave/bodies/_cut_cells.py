@@ -11,9 +11,9 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..lattice import Lattice
+from ..target import Target, resting_rows
 from ._least_areas import least_areas, weights
-from .lattice import Lattice
-from .target import Target, resting_rows
 
 MARGIN = 2  # cells of a box beyond the cells that a body cuts
 

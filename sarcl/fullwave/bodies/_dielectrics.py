@@ -13,9 +13,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from ..lattice import COURANT, Lattice
+from ..target import VACUUM_PERMITTIVITY
 from ._cut_cells import Box, Intervals, free_lengths
-from .lattice import COURANT, Lattice
-from .target import VACUUM_PERMITTIVITY
 
 LEAST_CELLS = 4  # per wavelength in a dielectric, and 2 pi times the depth that waves reach
 ALIGNED = 0.999  # cosine of the angle between an axis and the normal of a surface, at least

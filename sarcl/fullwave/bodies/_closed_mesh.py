@@ -11,8 +11,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.validation import array
-from .lattice import Lattice
+from ...base.validation import array
+from ..lattice import Lattice
 
 FINEST = 20  # corners are multiples of 2^-FINEST cells, 1e-6: float32 fields do not feel less
 WIDEST = 29  # bits of a coordinate: sums of products of two differences then stay below 2^62

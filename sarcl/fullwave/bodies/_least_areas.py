@@ -14,7 +14,7 @@ from __future__ import annotations
 
 import numpy as np
 
-from .lattice import COURANT
+from ..lattice import COURANT
 
 MARGIN = 1.02  # rounding of fields in float32 needs a little
 HEAVIEST = (1 / COURANT**2 / MARGIN - 1) / 3

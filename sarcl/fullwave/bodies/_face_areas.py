@@ -11,9 +11,9 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh
 from ._cut_cells import FaceAreas
-from .lattice import Lattice
 
 
 def face_areas(lattice: Lattice, mesh: ClosedMesh, axis: int) -> FaceAreas:

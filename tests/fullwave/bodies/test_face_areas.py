@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from sarcl import shapes
-from sarcl.fullwave._closed_mesh import closed_mesh
-from sarcl.fullwave._face_areas import face_areas
+from sarcl.fullwave.bodies._closed_mesh import closed_mesh
+from sarcl.fullwave.bodies._face_areas import face_areas
 from sarcl.fullwave.lattice import Lattice
 from sarcl.scene.triangles import rotation
 

@@ -7,12 +7,12 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base.validation import number
+from ...base.validation import number
+from ..lattice import Lattice
+from ..target import Target, material_edges
 from ._cut_cells import Box, Intervals, conductor, edge_lengths
 from ._dielectrics import check_cells, conductivities, edge_permittivities, halved
 from ._mesh_lines import MeshLines, mesh_lines
-from .lattice import Lattice
-from .target import Target, material_edges
 
 
 @dataclass(frozen=True, eq=False)
@@ -27,32 +27,31 @@ class Body:
     permittivity: complex | None = None
 
 
-def bodies(lattice: Lattice, parts: Sequence[Body], k: float) -> Target:
+def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> Target:
     """The lists of several bodies.
 
-    k  wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity
+    k  wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity; conductors need none
     Conductors take what they cover; where dielectrics overlap, the later one holds.
 
     ValueError: `mesh_lines` refuses a mesh, a permittivity is not one of a passive body, or cells are too large for it.
     """
-    number("k", k, above=0)
     for i, part in enumerate(parts):
         _check_passive(i, part.permittivity)
     metal = [part.triangles for part in parts if part.permittivity is None]
-    made = Target.nothing()
-    found = _named("conductors", lattice, np.concatenate(metal)) if metal else None
-    if found is not None:
+    made, found = Target.nothing(), None
+    if metal:
+        found = mesh_lines(lattice, np.concatenate(metal))
         made = conductor(lattice, found.intervals, found.areas)
-    fine, dielectric = halved(lattice), []
+    if len(metal) == len(parts):
+        return made
+    wavenumber, fine, dielectric = number("k", k, above=0), halved(lattice), []
     for i, part in enumerate(parts):
         if part.permittivity is not None:
-            check_cells(lattice, part.permittivity, k)
+            check_cells(lattice, part.permittivity, wavenumber)
             dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, complex(part.permittivity)))
-    if not dielectric:
-        return made
     hidden = mesh_lines(fine, np.concatenate(metal)).intervals if metal else None
     edges, values = _in_dielectrics(lattice, dielectric, hidden, found)
-    made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, k))
+    made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, wavenumber))
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
         made.faces, made.weight,

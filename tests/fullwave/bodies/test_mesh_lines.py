@@ -8,10 +8,10 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl import shapes
-from sarcl.fullwave import _mesh_lines
-from sarcl.fullwave._closed_mesh import closed_mesh
-from sarcl.fullwave._cut_cells import conductor
-from sarcl.fullwave._mesh_lines import mesh_lines
+from sarcl.fullwave.bodies import _mesh_lines
+from sarcl.fullwave.bodies._closed_mesh import closed_mesh
+from sarcl.fullwave.bodies._cut_cells import conductor
+from sarcl.fullwave.bodies._mesh_lines import mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice, lattice_around
 

@@ -1,0 +1,18 @@
+"""Targets of closed meshes on the grid: conductors that cut cells, dielectrics, conductors in dielectrics.
+
+For other folders:
+
+    materials     bodies of several materials as lists of edges and faces
+
+For this folder alone:
+
+    _closed_mesh  closed meshes in whole numbers; refusals of open meshes
+    _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
+    _dielectrics  permittivities of the edges of the grid in dielectric and lossy bodies
+    _face_areas   how much of each face of the grid closed meshes cover
+    _least_areas  the least areas of cut faces with which the time steps are stable
+    _mesh_lines   where grid lines are inside bodies of closed meshes
+    _thin_parts   refusals of parts of a mesh that are thinner than a cell
+"""
+
+__all__ = ["materials"]
