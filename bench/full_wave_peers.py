@@ -132,7 +132,8 @@ def peer(python: str, name: str, n: int, steps: int) -> tuple[float, float]:
     with tempfile.TemporaryDirectory() as folder:
         file = Path(folder) / "sphere.in"
         file.write_text("\n".join(["#title: sphere", *text]) + "\n")
-        command = [python, "-m", "gprMax", str(file), "--hide-progress-bars", *(["-opencl"] * ("OpenCL" in name))]
+        start = [python, "-c", "from gprMax.gprMax import cli; cli()", str(file), "--hide-progress-bars"]
+        command = [*start, *(["-opencl"] * ("OpenCL" in name))]
         settings = {**os.environ, "OMP_NUM_THREADS": str(os.cpu_count()), "OMP_WAIT_POLICY": "PASSIVE"}
         started = time.perf_counter(), _children()
         done = subprocess.run(command, env=settings, cwd=folder, capture_output=True, text=True)
