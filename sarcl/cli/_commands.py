@@ -268,6 +268,8 @@ def _say_report(what: str, report: Report | None, job: Job) -> None:
     error = f"error {report.tolerance:.1e} allowed, {report.predicted_error:.1e} predicted"
     if report.measured_error is not None:
         error += f", {report.measured_error:.1e} measured at random places"
+    if report.model_error is not None:
+        error += f"; model {report.model_error:.1e} predicted"
     job.say(f"{'':{len(what)}}  {error}")
     logging.getLogger("sarcl").info("%s", report)
 

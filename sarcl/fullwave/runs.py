@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -150,9 +150,11 @@ def too_many_cells(shape: np.ndarray) -> bool:
     return 3 * (LANES + (nx + 2) * (ny + 1) * (nz + LANES) + (ny + 1) * (nz + LANES)) >= 2**31
 
 
-def target_of(lattice: Lattice, triangles: np.ndarray) -> Target:
-    """Perfect conductors of closed surfaces, m (k, 3, 3), on the grid; ValueError as `bodies` raises it."""
-    return bodies(lattice, [Body(triangles)])
+def target_of(lattice: Lattice, parts: Sequence[tuple[np.ndarray, complex | None]], k: float) -> Target:
+    """Closed bodies on the grid: facets, m (k, 3, 3), and relative permittivity at the wavenumber k of each material,
+    None: a perfect conductor. ValueError as `bodies` raises it.
+    """
+    return bodies(lattice, [Body(*part) for part in parts], k)
 
 
 def mirror_twins(

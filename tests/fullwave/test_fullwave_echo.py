@@ -136,6 +136,7 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
         (shapes.box((1, 1, 1), roughness=0.1), {}, ValueError, "12 facets with a random roughness, .* roughness=0"),
         (shapes.box((1, 1, 1), reflectivity=0.5), {}, ValueError, r"reflectivity 0\.5, .*\.Material\(eps_r=3"),
         (shapes.box((1, 1, 1), material=sarcl.Material(diagram="cos")), {}, ValueError, "finer than a facet"),
+        (shapes.box((1, 1, 1), material="concrete"), {}, ValueError, r"4\.8 cells .* 'concrete' .* cells=15, or"),
         (shapes.plate((0.3, 0.2)), {}, ValueError, "are open at 4 of 5 edges"),
         (THIN, {}, ValueError, r"about 0\.005 m thick, .* at most 0\.0035 m, .*: cells=5\d\.\d, which are 12 now"),
         (BOX, {"cells": 7}, ValueError, r"cells is 7 .* reaches 1\.5 GHz, .* at least 8 .* up to 1\.312 GHz"),
@@ -264,6 +265,20 @@ def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
     sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
     assert not caplog.records
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("conductivity, allowed", [(0.0, 0.05), (0.05, 0.09)])
+def test_a_dielectric_sphere_has_the_echo_of_mie(conductivity, allowed):
+    """Permittivity 3, as a staircase of edges: 20 cells per wavelength in vacuum, 11.5 inside."""
+    material = sarcl.Material(eps_r=3, conductivity=conductivity)
+    ball = shapes.sphere(RADIUS, edge=0.01, material=material)
+    raw = sarcl.fullwave_echo(ball, CHIRP, around(30, height=15.0), cells=20)
+    (got,), k = samples(raw)
+    inside = material.permittivity(k * SPEED_OF_LIGHT / (2 * np.pi))
+    wanted = [mie.dielectric_sphere(RADIUS, *at)[0] for at in zip(k, inside, strict=True)]
+    error = difference(got[0], np.array(wanted))
+    assert error < allowed and error / 2 < raw.report.model_error < 5 * error
 
 
 @pytest.mark.slow

@@ -36,6 +36,7 @@ def a_report():
         seconds={"kernel": 1 / 3},
         device="a device",
         seed=5,
+        model_error=np.float64(0.1) / 3,
     )
 
 

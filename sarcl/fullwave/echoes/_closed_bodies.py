@@ -2,11 +2,15 @@
 
 from __future__ import annotations
 
+import numpy as np
+
 from ...scene.scene import Scene
+
+LEAST_INSIDE = 6.0  # cells per wavelength in a body; the run that predicts the error of the grid then has 4
 
 
 def check_bodies(scene: Scene) -> None:
-    """ValueError where a scene has points, terrain, rough or partly reflecting facets, or dielectrics.
+    """ValueError where a scene has points, terrain, rough or partly reflecting facets.
 
     Whether the bodies are closed is seen when they are cut by the lines of the grid (`_mesh_lines`).
     """
@@ -35,7 +39,31 @@ def check_bodies(scene: Scene) -> None:
             raise ValueError(said.format(
                 f"a material {name} with roughness finer than a facet", "give one with height 0 and diagram 'smooth'"
             ))  # fmt: skip
-        if not material.conducting:
-            raise ValueError(said.format(
-                f"a material {name} of relative permittivity {material.eps_r:g}", 'give material="metal"'
-            ))  # fmt: skip
+
+
+def check_wavelengths(scene: Scene, cells: float, highest: float) -> None:
+    """ValueError where a wavelength in a body has fewer cells than LEAST_INSIDE; cells  per wavelength in vacuum at the
+    highest frequency, Hz.
+    """
+    for material in scene.materials:
+        if material.conducting:
+            continue
+        shorter = float(np.abs(np.sqrt(material.permittivity(highest))))
+        if cells / shorter < LEAST_INSIDE:
+            name = repr(material.name) if material.name else "of a Material"
+            raise ValueError(
+                f"cells is {cells:g}, which leaves {cells / shorter:.2g} cells per wavelength in a material {name} of "
+                f"relative permittivity {complex(material.permittivity(highest)):.3g}; give "
+                f'cells={np.ceil(10 * LEAST_INSIDE * shorter) / 10:g}, or material="metal" where waves do not pass '
+                "through the body"
+            )
+
+
+def parts_of(scene: Scene, frequency: float) -> list[tuple[np.ndarray, complex | None]]:
+    """Facets of each material (k, 3, 3), and its permittivity, relative, at a frequency, Hz; None: a conductor."""
+    out: list[tuple[np.ndarray, complex | None]] = []
+    for number, material in enumerate(scene.materials):
+        triangles = scene.triangles[scene.material == number]
+        if len(triangles):
+            out.append((triangles, None if material.conducting else complex(material.permittivity(frequency))))
+    return out

@@ -124,7 +124,7 @@ class _Sums:
     def report(self, task: FullwaveTask) -> Report:
         lists = list(self.anchors.values())
         said: dict[str, object] = {
-            "model": "full wave on a grid (FDTD), conformal conductors",
+            "model": "full wave on a grid (FDTD)",
             "anchors": lists[0] if all(x == lists[0] for x in lists) else self.anchors,
             "runs": self.runs,
             "mirrored": self.mirrored,

@@ -27,7 +27,7 @@ from ...simulation.scene_echoes import EchoRequest
 from .. import runs
 from ..lattice import Lattice
 from ..target import Target
-from ._closed_bodies import check_bodies
+from ._closed_bodies import check_bodies, check_wavelengths, parts_of
 from ._grid_choice import SHARE, check_cells, grid_choice
 from ._run_progress import RunProgress
 
@@ -100,8 +100,10 @@ class FullwaveTask:
     def target(self) -> Target:
         """The bodies on the grid."""
         if not self._targets:
+            middle = self.waveform.center
             try:
-                self._targets.append(runs.target_of(self.lattice, self.scene.triangles))
+                parts = parts_of(self.scene, middle)
+                self._targets.append(runs.target_of(self.lattice, parts, 2 * np.pi * middle / SPEED_OF_LIGHT))
             except TooThin as thin:
                 if thin.cell is None:
                     raise
@@ -202,6 +204,7 @@ def fullwave_task(
     check_bodies(scene)
     band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
     cells = check_cells(cells, band)
+    check_wavelengths(scene, cells, band[1])
     if request.tolerance < LEAST_TOLERANCE:
         raise ToleranceUnreachable(request.tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))

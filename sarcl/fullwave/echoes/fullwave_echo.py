@@ -73,7 +73,8 @@ def fullwave_echo(
     currents of an anchor give the echoes of the other pulses (waveform forming); between anchors these echoes are
     interpolated.
 
-    scene         closed bodies of smooth facets: perfect conductors. No points, terrain, open or rough facets
+    scene         closed bodies of smooth facets: perfect conductors, dielectric and lossy materials. No points, no
+                  terrain, no open or rough facets
     track, receiver, polarization, vertical, reference, compressed   as in `echo`. One run of the grid gives all
                   polarisations of one that is sent: HH and VH share theirs
     range_window  as in `echo`, but it must hold the scene; default: also what creeps round its bodies
