@@ -30,6 +30,9 @@ mutants: ready  ## make each wrong sign, unit or factor of tests/mutants/mutatio
 bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
 	@.venv/bin/sarcl bench backproject $(ARGS)
 
+autofocus-trial: ready  ## autofocus on 200 random correct scenes and 200 with errors; bench/results/trials/autofocus.json
+	@.venv/bin/python bench/autofocus_trial.py --json bench/results/trials/autofocus.json $(ARGS)
+
 results: ready  ## docs/guide/results.md from bench/results/*.json
 	@.venv/bin/python bench/report.py
 

@@ -90,6 +90,17 @@ class Scaled(RowsOnDemand):
         return np.asarray(self.source[rows]) * self.factor[rows, None]
 
 
+class Tapered(RowsOnDemand):
+    """Rows of a source, each times the same factors (n_columns,); a slice reads and multiplies its rows."""
+
+    def __init__(self, source: Any, factors: np.ndarray) -> None:
+        self.source, self.factors = source, factors.astype(np.float32)
+        self.shape, self.dtype = source.shape, source.dtype
+
+    def __getitem__(self, rows: slice) -> np.ndarray:
+        return np.asarray(self.source[rows]) * self.factors
+
+
 class Columns(RowsOnDemand):
     """Columns first ... last - 1 of a source; a slice reads its rows."""
 

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
@@ -13,6 +14,8 @@ from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import Columns, Scaled
 from ..model.phase_history import PhaseHistory
 from . import _bright_points, _phase_gradient, _phase_smoothing
+from ._bright_points import Beam
+from ._narrow_aperture import narrow_pulses
 
 TOLERANCE = 1e-2  # of images in which bright points are chosen
 LAGS = np.arange(-4, 5) / 2  # range cells from a point
@@ -20,8 +23,6 @@ NO_LAG = np.zeros(1)
 WINDOW = 64.0  # Doppler cells about a point that sharpness is computed over, after the first passes
 MOST_PIXELS = 4000  # brightest pixels that are used over a wide aperture
 MOST_VALUES = 2.5e7  # contributions of a pulse to a point, 8 bytes each, that are kept at a time
-MOST_BEND = 2.0  # rad, nonlinear phase over a narrow aperture between points of one range cell
-LEAST_NARROW = 8  # pulses
 
 Errors = tuple[np.ndarray, np.ndarray]  # phase rad, range m, (n,) each
 
@@ -36,6 +37,7 @@ class ApertureView:
     alive      bool (n,): False for pulses without energy
     places     number of bright points that are used
     scale      contributions are divided by it, so that they are of order 1
+    beam       full angle, rad, and unit directions of the rows (n_rows, 3); None: every row sees every point
     options    further arguments of backproject
     """
 
@@ -47,6 +49,7 @@ class ApertureView:
     alive: np.ndarray
     places: int = 200
     scale: float = 1.0
+    beam: Beam | None = None
     options: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -61,20 +64,14 @@ class ApertureView:
 
     @property
     def is_narrow(self) -> bool:
-        """Whether phases of all points in one range cell are linear over the pulses: an FFT over them then focuses.
-
-        A point half a cell behind another differs from it in phase by shift_phase[:, 1] cell/2.
-        """
+        """Whether phases of all points near a place are linear over the pulses: an FFT over them then focuses."""
         return self.narrow_pulses == (0, self.n)
 
-    @property
+    @cached_property
     def narrow_pulses(self) -> tuple[int, int]:
         """The longest narrow sub-aperture about the middle: pulses first ... last - 1."""
-        bend = self.shift_phase[:, 1] * self.cell / 2
-        first, last = 0, self.n
-        while last - first > LEAST_NARROW and np.ptp(bend[first:last]) > MOST_BEND:
-            first, last = first + 1, last - 1
-        return first, last
+        rows = self.raw[:: self.channels]
+        return narrow_pulses(rows, self.grid, self.frequency, self.cell / 2)
 
     @property
     def window(self) -> float:
@@ -90,7 +87,10 @@ class ApertureView:
     def pulses(self, first: int, last: int) -> ApertureView:
         """The view with pulses first ... last - 1 alone."""
         rows = slice(first * self.channels, last * self.channels)
-        return replace(self, raw=self.raw[rows], shift_phase=self.shift_phase[first:last], alive=self.alive[first:last])
+        beam = None if self.beam is None else (self.beam[0], self.beam[1][rows])
+        return replace(
+            self, raw=self.raw[rows], shift_phase=self.shift_phase[first:last], alive=self.alive[first:last], beam=beam
+        )
 
     def corrected(self, errors: Errors) -> PhaseHistory:
         """The rows with the errors of the pulses removed."""
@@ -101,10 +101,12 @@ class ApertureView:
         """Power of the image of the corrected rows, of grid.shape, summed over polarisations; ValueError if 0."""
         raw = self.corrected(errors)
         kinds = [] if raw.polarization is None else sorted(set(raw.polarization.tolist()))
-        parts = [raw.select(polarization=kind) for kind in kinds] if len(kinds) > 1 else [raw]
+        parts = [np.flatnonzero(raw.polarization == kind) for kind in kinds] if len(kinds) > 1 else [slice(None)]
         power = np.zeros(self.grid.shape)
-        for part in parts:
-            made = backproject(part, self.grid, tolerance=TOLERANCE, check=False, **self.options)
+        for rows in parts:
+            beam = None if self.beam is None else (self.beam[0], self.beam[1][rows])
+            part = raw if len(parts) == 1 else raw[rows]
+            made = backproject(part, self.grid, tolerance=TOLERANCE, check=False, beam=beam, **self.options)
             power += (np.abs(made.data) / self.scale) ** 2
         if not power.any():
             raise ValueError(
@@ -123,15 +125,21 @@ class ApertureView:
         most = share * np.clip(MOST_VALUES / self.n, 500, MOST_PIXELS)
         return _bright_points.pixels(self.power(errors), self.grid, int(most))
 
-    def probes(self, *choices: Errors) -> np.ndarray:
-        """Points, m (k, 3), to compare errors at: those that are bright with any of the choices removed."""
+    def probes(self, *choices: Errors, apart: float = 8.0) -> np.ndarray:
+        """Points, m (k, 3), to compare errors at: those that are bright with any of the choices removed.
+
+        apart  Doppler cells between them, over narrow apertures
+        """
         if self.is_narrow:
-            return np.concatenate([self.brightest(e, 8.0, 1 / len(choices)) for e in choices])
+            return np.concatenate([self.brightest(e, apart, 1 / len(choices)) for e in choices])
         return np.concatenate([self.pixels(e, 1 / len(choices)) for e in choices])
 
-    def contributions(self, errors: Errors, places: np.ndarray, lags: np.ndarray) -> np.ndarray:
-        """Contributions of every pulse to places, with the errors removed: complex64 (n, columns, lags)."""
-        made = _bright_points.contributions(self.corrected(errors), places, lags, self.scale)
+    def contributions(self, errors: Errors, places: np.ndarray, lags: np.ndarray, *, taper: bool = False) -> np.ndarray:
+        """Contributions of every pulse to places, with the errors removed: complex64 (n, columns, lags).
+
+        taper  True: with a Hamming window over the band, so that a target has no side lobes at other ranges
+        """
+        made = _bright_points.contributions(self.corrected(errors), places, lags, self.scale, taper, self.beam)
         return made.reshape(self.n, -1, len(lags))
 
     def values(self, errors: Errors, places: np.ndarray) -> np.ndarray:

@@ -10,13 +10,14 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import groups
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
-from ..numerics import range_profiles
+from ..numerics import range_profiles, windows
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels from which points are chosen
 OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, different at each point
 ROWS = 64  # rows per array operation: bounds the memory
+Beam = tuple[float, np.ndarray]  # full angle, rad, and a unit vector per row (n_rows, 3): the cone that it sees
 
 
 def in_pulses(raw: PhaseHistory) -> np.ndarray:
@@ -74,12 +75,17 @@ def delay(raw: PhaseHistory, row: int, places: np.ndarray) -> np.ndarray:
 
 def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:
     """Positions, m (n, 3), of the `most` brightest pixels, brightest first, none with power 0; power  of grid.shape."""
+    return pixels_and_levels(power, grid, most)[0]
+
+
+def pixels_and_levels(power: np.ndarray, grid: ImageGrid, most: int) -> tuple[np.ndarray, np.ndarray]:
+    """`pixels`, and their power (n,)."""
     flat = power.ravel()
     count = min(most, flat.size)
     chosen = np.argpartition(flat, flat.size - count)[flat.size - count :]
     chosen = chosen[flat[chosen] > 0]
     chosen = chosen[np.argsort(-flat[chosen], kind="stable")]
-    return np.asarray(grid.positions_of(np.unravel_index(chosen, grid.shape)))
+    return np.asarray(grid.positions_of(np.unravel_index(chosen, grid.shape))), flat[chosen]
 
 
 def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: float, most: int) -> np.ndarray:
@@ -110,10 +116,14 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
     return np.asarray(places[kept])
 
 
-def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float) -> np.ndarray:
+def contributions(
+    raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float, taper: bool = False, beam: Beam | None = None
+) -> np.ndarray:
     """v_p(x)/scale at points x, m (n, 3), and at lags behind them in range: complex64 (n_rows, n, n_lags).
 
     lags  cells of c/(2 bandwidth) behind x at which the range profile is read, with the carrier phase of x itself
+    taper  True: the samples have a Hamming window
+    beam   a row contributes to places in its beam alone
     """
     n_rows, n_samples = raw.n_rows, raw.n_samples
     length = fft.good_length(OVERSAMPLE * n_samples)
@@ -124,6 +134,8 @@ def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float
     for start in range(0, n_rows, ROWS):
         stop = min(start + ROWS, n_rows)
         samples = raw.read(start, stop)
+        if taper:
+            samples = samples * windows.weights("hamming", n_samples).astype(np.float32)
         profiles = range_profiles.from_samples(None, samples, weight[start:stop, None] / scale, length)
         for row in range(start, stop):
             late = delay(raw, row, places)
@@ -135,5 +147,8 @@ def contributions(raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float
             profile = profiles[row - start]
             read = profile[before % length] * (1 - after) + profile[(before + 1) % length] * after
             read *= np.abs(turns) <= 0.5
+            if beam is not None:
+                apart = places - raw.tx[row]
+                read *= (apart @ beam[1][row] >= np.cos(beam[0] / 2) * np.linalg.norm(apart, axis=1))[:, None]
             out[row] = read * np.exp(2j * np.pi * (carrier * late % 1)).astype(np.complex64)[:, None]
     return out

@@ -20,6 +20,9 @@ LAST_PASSES = 3  # passes over the whole aperture
 BANDS = 8, 4, 2, 1  # parts of the band: a range error of eight cells is one cell of an eighth of the band
 LEAST_SAMPLES = 8  # in a part of the band
 RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of the pulses where that is fewer
+# Doppler cells between places where range errors are estimated. A target beside a place, in the window about it, moves
+# through range cells; where only places on one side see it, as at the edge of a grid, that looks like a range error
+APART = WINDOW
 RANGE_GAIN = 1.015  # least gain in sharpness by which range errors are accepted
 RANGE_CELLS = 0.05  # least rms of range errors, cells, at which they are tried: smaller ones can hardly be seen
 
@@ -38,7 +41,7 @@ def _narrow(view: ApertureView, errors: Errors, ranges: bool, passes: int) -> Er
     n, lags = view.n, LAGS if ranges else NO_LAG
     zero = np.zeros(n)
     for k in range(passes):
-        places = view.brightest(errors, max(n / 2 / 4**k, 8.0))
+        places = view.brightest(errors, max(n / 2 / 4**k, APART if ranges else 8.0))
         v = view.contributions(errors, places, lags)
         flat = v.reshape(n, -1)
         widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
@@ -80,7 +83,12 @@ def _widened(view: ApertureView, errors: Errors) -> Errors:
         start = _phase_gradient.extended(v, first - low, last - low)
         phase[low:high] += _phase_gradient.sharpen(v, start, 0)
         first, last = low, high
-    return view.shift_removed((phase, shift))
+    # a start without phases: where targets seen by different pulses have none in common, growth loses some of them
+    zero = np.zeros(n)
+    places = view.probes((zero, shift), (phase, shift))
+    v = view.values((zero, shift), places)
+    starts = [phase, _phase_gradient.sharpen(v, zero, 0)]
+    return view.shift_removed((max(starts, key=lambda start: _phase_gradient.sharpness(v, start, 0)), shift))
 
 
 def searches(view: ApertureView, ranges: bool) -> int:
@@ -92,31 +100,48 @@ def search(view: ApertureView, ranges: bool, tick: Callable[[], None]) -> Errors
     """Errors, from a start without any. Range errors are accepted where they gain enough in sharpness.
 
     Two kinds are tried: the range errors of a motion that explains the phase; and over narrow apertures those estimated
-    in an eighth of the band first, in whose range cells they stay, and then in more and more of it.
+    in an eighth of the band first, in whose range cells they stay, and then in more and more of it. The second kind is
+    left out where the echoes stay in their range cells under the phase alone.
     """
     zero = np.zeros(view.n)
     plain = ascend(view, (zero, zero))
     tick()
-    found = plain
-    if ranges and view.is_narrow:
-        found, m = (zero, zero), view.raw.n_samples
-        for parts in BANDS:
-            if m // parts >= LEAST_SAMPLES:
-                first = (m - m // parts) // 2
-                found = _narrow(view.band(first, first + m // parts), found, True, 3)
-            tick()
     if not ranges:
         return plain
-    places = view.probes(plain, found)
+    found = plain
+    if view.is_narrow:
+        if _migrates(view, plain):
+            found, m = (zero, zero), view.raw.n_samples
+            for parts in BANDS:
+                if m // parts >= LEAST_SAMPLES:
+                    first = (m - m // parts) // 2
+                    found = _narrow(view.band(first, first + m // parts), found, True, 3)
+                tick()
+        else:
+            for _ in BANDS:
+                tick()
+    motions = [(plain[0], view.implied_range(plain[0])), found, (found[0], view.implied_range(found[0]))]
+    motions = [e for e in motions[: 1 if found is plain else 3] if np.std(e[1]) > RANGE_CELLS * view.cell]
+    if not motions:
+        return plain
+    places = view.probes(*([plain] if found is plain else [plain, found]), apart=APART)
 
     def sharpened(errors: Errors) -> tuple[float, Errors]:
         v = view.values(errors, places)
         step = _phase_gradient.sharpen(v, zero, view.window)
         return _phase_gradient.sharpness(v, step, view.window), view.shift_removed((errors[0] + step, errors[1]))
 
-    still = max((sharpened(e) for e in (plain, (found[0], zero))), key=lambda s: s[0])
-    motions = [(plain[0], view.implied_range(plain[0])), found, (found[0], view.implied_range(found[0]))]
-    motions = [e for e in motions if np.std(e[1]) > RANGE_CELLS * view.cell]
-    best = max((sharpened(e) for e in motions), key=lambda s: s[0], default=still)
+    stays = [plain] if found is plain else [plain, (found[0], zero)]
+    still = max((sharpened(e) for e in stays), key=lambda s: s[0])
+    best = max((sharpened(e) for e in motions), key=lambda s: s[0])
     log.debug("with a range error the sharpness is x %.4f", best[0] / max(still[0], 1e-300))
     return best[1] if best[0] > RANGE_GAIN * still[0] else still[1]
+
+
+def _migrates(view: ApertureView, errors: Errors) -> bool:
+    """Whether echoes, with the errors removed, move through range cells from pulse to pulse, as far as can be seen."""
+    zero = np.zeros(view.n)
+    v = view.contributions(errors, view.brightest(errors, APART), LAGS)
+    cells = _phase_gradient.range_shift(v, zero, view.window, min(RANGE_MODES, view.n // 8)) / 2
+    log.debug("under the phase alone the echoes move by %.3f range cells", abs(cells).max())
+    return bool(abs(cells).max() >= MOVED)

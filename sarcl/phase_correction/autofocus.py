@@ -5,28 +5,28 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
-from typing import Any, NamedTuple
+from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.validation import count, instance, sealed
+from ..imaging.antenna_beam import is_antenna
+from ..imaging.focusing_task import BeamCone, beam_of, weigh
 from ..model.image_grid import ImageGrid
-from ..model.lazy_rows import in_memory
+from ..model.lazy_rows import Tapered, in_memory
 from ..model.phase_history import PhaseHistory
+from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
-from . import _bright_points, _phase_gradient, _phase_smoothing, _search
-from ._aperture_view import ApertureView, Errors, corrected
+from . import _bright_points, _hold_out, _search
+from ._aperture_view import ApertureView, corrected
 
 log = logging.getLogger(__name__)
 Progress = Callable[[str, int, int], None]
 
 LEAST_PULSES = 12  # with fewer, the halves of the band may agree by chance
 LEAST_SAMPLES = 16  # 8 in each half of the band
-AGREE = 0.4  # least closeness of the halves' phases at which they agree; that of noise is smaller
-GAIN = 1.005  # least gain in sharpness of a correction, where the halves agree
-SURE_GAIN = 1.5  # least gain where they do not agree: noise gains some per cent
 
 
 @dataclass(frozen=True, eq=False, repr=False)
@@ -41,6 +41,7 @@ class PhaseErrors:
     agreement  closeness of the halves' phases: 1 for equal phases, below 0.4 for unrelated ones
     spread     rms difference of the halves' phases, halved, rad: the uncertainty of a pulse's phase before smoothing
     modes      number of cosines over the aperture that `phase` consists of, besides a slope; n_pulses: not smoothed
+    reason     in words why nothing was applied, and what to do about it; empty where found is True
     """
 
     phase: NDArray[np.float64]
@@ -51,6 +52,7 @@ class PhaseErrors:
     agreement: float
     spread: float
     modes: int
+    reason: str = ""
 
     def __repr__(self) -> str:
         return f"PhaseErrors({self})"
@@ -58,7 +60,7 @@ class PhaseErrors:
     def __str__(self) -> str:
         tests = f"sharpness x {self.gain:.3f} in the other half of the band, halves agree to {self.agreement:.2f}"
         if not self.found:
-            return f"no error found: {tests}"
+            return f"no error found: {self.reason} ({tests})"
         return (
             f"phase {np.std(self.phase):.2f} rad rms of {self.modes} cosines, +-{self.spread:.2f} per pulse; "
             f"range {np.std(self.range):.4g} m rms; {tests}"
@@ -76,6 +78,9 @@ def autofocus(
     raw: PhaseHistory,
     grid: ImageGrid,
     *,
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    beam: BeamCone | None = None,
     range_errors: bool = True,
     places: int = 200,
     max_bytes: float | None = None,
@@ -87,13 +92,16 @@ def autofocus(
     raw           PhaseHistory, compressed, of 12 or more pulses and 16 or more samples. Rows of equal time (without
                   times: of equal antenna positions) are one pulse and share its error
     grid          ImageGrid of any kind over some of the brightest parts of the scene, no coarser than the resolution
+    window, weights, beam  as for `backproject`: the images that the estimate is made from are weighted so, and every
+                  row contributes in its beam alone. A cone of the beam, not an Antenna. raw comes back without weights
     range_errors  False: only phases are estimated
     places        largest number of bright points that are used
     max_bytes, device, progress  as for `backproject`, which makes the images
 
     Returns (raw, errors): the PhaseHistory corrected, lazily where its samples lie in a file, and a PhaseErrors.
-    A correction is applied only if it sharpens echoes that it was not estimated from (the other half of the band);
-    otherwise raw is returned as it was and errors.found is False. Phases that only shift the image cannot be
+    A correction is applied only if it sharpens echoes that it was not estimated from: the other half of the band, the
+    places at other ranges where there are bright ones, and if no bright point is lost. Otherwise raw is returned as it
+    was, errors.found is False, and errors.reason says why and what to do. Phases that only shift the image cannot be
     estimated: the mean of the phase, and the least-squares fit of a shift across range, are not corrected.
     TypeError, ValueError: arguments of the wrong kind; too few pulses; pulses that lack a channel others have; data
     not compressed; an image that is zero. Sources: _phase_gradient.py; docs/theory/autofocus.md.
@@ -111,20 +119,29 @@ def autofocus(
             f"{LEAST_SAMPLES} or more"
         )
     rows = _bright_points.in_pulses(raw)
-    energy = _bright_points.energy(raw)
+    sample_weight, row_weight = weigh(raw, window, weights)
+    if is_antenna(beam):
+        raise TypeError("beam is an Antenna; autofocus takes the cone that the antenna sees: (angle, direction), rad")
+    toward, angle = beam_of(raw, beam, grid.bounds.mean(axis=0) if grid.center is None else grid.center)
+    weighted = raw if window is None and weights is None else replace(raw, weight=row_weight)
+    if window is not None:
+        weighted = replace(weighted, samples=Tapered(raw.samples, sample_weight))
+    energy = _bright_points.energy(weighted)
     alive = energy[rows].any(axis=1)
     if alive.sum() < LEAST_PULSES:
         raise ValueError(
             f"raw has {alive.sum()} pulses with any energy, of {len(rows)}; autofocus needs {LEAST_PULSES} or more"
         )
-    view = _aperture_view(raw, rows, grid)
+    view = _aperture_view(weighted, rows, grid)
     options = {"max_bytes": max_bytes, "device": device}
-    view = replace(view, alive=alive, places=places, scale=float(np.sqrt(energy.max())), options=options)
+    scale = float(np.sqrt(energy.max()))
+    cone = None if toward is None else (angle, toward[rows.ravel()])
+    view = replace(view, alive=alive, places=places, scale=scale, beam=cone, options=options)
     tick = _ticker(progress, _search.searches(view, bool(range_errors)) + 2)
     errors = _search.search(view, bool(range_errors), tick)
-    errors, tests = _cross_validated(view, errors, tick)
+    errors, tests = _hold_out.cross_validated(view, errors, tick)
     if not tests["found"]:
-        log.warning("no correction by autofocus passed cross-validation; the data are unchanged")
+        log.warning("no correction by autofocus passed cross-validation; the data are unchanged: %s", tests["reason"])
         zero = sealed(np.zeros(raw.n_rows))
         return Autofocus(raw, PhaseErrors(zero, zero, view.frequency, **tests))
     phase, shift = np.empty(raw.n_rows), np.empty(raw.n_rows)
@@ -155,53 +172,6 @@ def _aperture_view(raw: PhaseHistory, rows: np.ndarray, grid: ImageGrid) -> Aper
     axes = np.linalg.svd(look, full_matrices=False)[2][:2]
     shift_phase = 2 * np.pi * frequency / SPEED_OF_LIGHT * look @ axes.T
     return ApertureView(ordered, rows.shape[1], grid, frequency, shift_phase, np.ones(len(rows), bool))
-
-
-def _cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]) -> tuple[Errors, dict[str, Any]]:
-    """Errors, smoothed as cross-validation asks for, and fields of PhaseErrors that say how well they passed it.
-
-    Each half of the band gives a phase of its own, with the given range errors. It is smoothed to the number of cosines
-    that sharpens the other half most. The halves have errors and scene in common, but neither noise nor speckle.
-    """
-    n, shift, samples = view.n, errors[1], view.raw.n_samples
-    zero = np.zeros(n)
-    parts = view.band(0, samples // 2), view.band(samples - samples // 2, samples)
-    phases, held, before = [], [], []
-    for part in parts:
-        phase, _ = _search.ascend(part, (zero, shift))
-        places = part.probes((phase, shift))
-        held.append(part.values((zero, shift), places))
-        before.append(part.sharpness((zero, zero), places))
-        phases.append(phase)
-        tick()
-
-    def gain(i: int, modes: int) -> float:
-        """Gain in sharpness of half i by the phase of the other half, registered to half i's own image."""
-        other = _phase_smoothing.smooth(phases[1 - i], modes)
-        phase, _ = _phase_smoothing.alignment(other, phases[i], view.shift_phase, view.cell / 2)
-        return _phase_gradient.sharpness(held[i], phase, parts[i].window) / max(before[i], 1e-300)
-
-    ladder = [2**k for k in range(2, 40) if 2**k < n] + [n]
-    gains = np.array([[gain(0, modes), gain(1, modes)] for modes in ladder])
-    best = int(gains.prod(axis=1).argmax())
-    moved, agreement = _phase_smoothing.alignment(phases[0], phases[1], view.shift_phase, view.cell / 2)
-    apart = np.exp(1j * (moved - phases[1]))
-    log.debug("gains of %s cosines: %s", ladder, gains.round(3).tolist())
-
-    # the result must sharpen the whole band too: a phase with an error of unwrapping would not
-    candidates = [errors[0], phases[0], phases[1]]
-    smoothed = [view.shift_removed((_phase_smoothing.smooth(c, ladder[best]), shift)) for c in candidates]
-    places = view.probes((zero, zero), smoothed[0])
-    levels = [view.sharpness(e, places) for e in smoothed]
-    least = min(*gains[best], max(levels) / max(view.sharpness((zero, zero), places), 1e-300))
-    agree = agreement > max(AGREE, _phase_smoothing.chance(n))
-    return smoothed[int(np.argmax(levels))], {
-        "found": bool(least > (GAIN if agree else SURE_GAIN)),
-        "gain": float(np.sqrt(gains[best].prod())),
-        "agreement": agreement,
-        "spread": float(np.std(np.angle(apart * apart.sum().conj())) / 2),
-        "modes": ladder[best],
-    }
 
 
 def _ticker(progress: Progress | None, total: int) -> Callable[[], None]:

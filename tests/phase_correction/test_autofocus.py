@@ -10,10 +10,12 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.model.lazy_rows import Columns, Scaled
+from sarcl.model.lazy_rows import Columns, Scaled, Tapered
 from sarcl.phase_correction import _phase_gradient, _phase_smoothing
 from sarcl.phase_correction._aperture_view import ApertureView
 from sarcl.phase_correction._bright_points import brightest, contributions
+from sarcl.phase_correction._constant_echo import without_constant_echo
+from sarcl.phase_correction._narrow_aperture import narrow_pulses
 from sarcl.reference.backproject import backproject as exact_image
 
 CENTER, BANDWIDTH, N_SAMPLES, N_PULSES, SIDE = 9.6e9, 300e6, 96, 128, 30.0
@@ -262,6 +264,7 @@ def test_noise_comes_back_as_it_was_and_the_estimate_says_so(points, seed):
     assert not errors.phase.any() and not errors.range.any()
     assert errors.agreement < 0.4
     assert "no error found" in str(errors)
+    assert "grid over bright isolated points" in errors.reason
 
 
 class Recording:
@@ -313,6 +316,45 @@ def test_pulses_that_hold_nothing_are_passed_over(points):
     better, errors = sarcl.autofocus(replace(points, samples=samples), GRID, range_errors=False)
     assert errors.found
     assert_as_sharp(better, replace(points, samples=truth))
+
+
+def test_window_and_weights_weigh_the_estimate_and_the_echoes_come_back_without(points):
+    phase = smooth(N_PULSES, 3, rms=6)
+    raw = disturbed(points, phase)
+    weights = np.hamming(N_PULSES)
+    better, errors = sarcl.autofocus(raw, GRID, window=("hamming", None), weights=weights, range_errors=False)
+    assert errors.found
+    assert better.weight is None
+    wanted = raw.samples * np.exp(-1j * errors.phase)[:, None]
+    assert np.abs(better.samples - wanted).max() <= 1e-5 * np.abs(wanted).max()
+    assert residual(raw, phase, errors.phase) <= 0.15
+
+
+def test_rows_with_weight_zero_have_no_part_in_the_estimate(points):
+    phase = smooth(N_PULSES, 3, rms=6)
+    raw = disturbed(points, phase)
+    spoiled = raw.samples.copy()
+    spoiled[40:48] = 100 * np.random.default_rng(0).standard_normal((8, N_SAMPLES))
+    weights = np.ones(N_PULSES)
+    weights[40:48] = 0
+    _, errors = sarcl.autofocus(replace(raw, samples=spoiled), GRID, weights=weights, range_errors=False)
+    seen = weights > 0
+    assert errors.found
+    assert residual(raw[seen], phase[seen], errors.phase[seen]) <= 0.15
+
+
+def test_a_pulse_contributes_in_its_beam_alone(points):
+    toward = -points.tx / np.linalg.norm(points.tx, axis=1)[:, None]
+    places = np.array([[0.0, 0, 0], [0, 9.0, 0]])
+    cone = (2 * 7.0 / 5e3, toward)  # 7 m on either side of the middle
+    every, within = (contributions(points, places, [0.0], 1.0, beam=beam)[:, :, 0] for beam in (None, cone))
+    assert np.array_equal(within[:, 0], every[:, 0])
+    assert every[:, 1].all() and not within[:, 1].any()
+    phase = smooth(N_PULSES, 3, rms=6)
+    beam = (cone[0], toward)
+    _, errors = sarcl.autofocus(disturbed(points, phase), GRID, beam=beam, range_errors=False)
+    assert errors.found and errors.reason == ""
+    assert residual(points, phase, errors.phase) <= 0.15
 
 
 def test_scale_and_listed_pixels_do_not_matter(points):
@@ -399,6 +441,37 @@ def test_contributions_add_up_to_the_exact_image(points):
     v = contributions(weighted, places, [0.0], 2.0)[:, :, 0]
     wanted, spread = exact_image(points, places, row_weight=weighted.weight)
     assert np.linalg.norm(2 * v.sum(axis=0) - wanted) <= 0.01 * max(np.linalg.norm(wanted), spread)
+
+
+def test_the_constant_echo_is_taken_out_and_nothing_else(points):
+    away = np.linalg.norm(points.tx, axis=1)
+    fixed = replace(points, reference_range=away + 3 * np.linspace(-1, 1, N_PULSES) ** 2)  # no point is at one delay
+    frequency = points.frequency[:, None] + points.frequency_step[:, None] * np.arange(N_SAMPLES)
+    leak = 100 * np.exp(-4j * np.pi / SPEED_OF_LIGHT * frequency * (away.min() + 1 - fixed.reference_range[:, None]))
+    shifted = np.exp(4j * np.pi / SPEED_OF_LIGHT * frequency * (fixed.reference_range - away)[:, None])
+    fixed = replace(fixed, samples=(points.samples * shifted).astype(np.complex64))
+    found = without_constant_echo(replace(fixed, samples=(fixed.samples + leak).astype(np.complex64)), 1)
+    left = found.read(0, N_PULSES) - fixed.samples
+    assert np.linalg.norm(left) < 0.3 * np.linalg.norm(fixed.samples) < 0.3 * np.linalg.norm(leak)
+    noise = np.random.default_rng(0).standard_normal((N_PULSES, N_SAMPLES)).astype(np.complex64)
+    assert without_constant_echo(replace(fixed, samples=noise), 1) is None
+
+
+def test_narrow_apertures_are_those_with_linear_phases_near_a_place(points):
+    assert narrow_pulses(points, GRID, CENTER, CELL / 2) == (0, N_PULSES)
+    wide = echoes(np.zeros((1, 3)), np.ones(1), arc(200, extent=np.radians(60)), bandwidth=600e6, n_samples=16)
+    first, last = narrow_pulses(wide, GRID, CENTER, CELL / 4)
+    # phase of a point at a distance d behind: k d cos(elevation)^2 (1 - cos a), of which a line leaves two thirds
+    bend = 4 * np.pi * CENTER / SPEED_OF_LIGHT * CELL / 4 * np.cos(0.6) ** 2
+    bend *= 1 - np.cos(np.radians(30) * (last - first) / 200)
+    assert first == 200 - last > 0
+    assert 2 / 3 * bend == pytest.approx(1.5, rel=0.1)
+    turn = np.linspace(-np.pi / 2, np.pi / 2, 200)  # an arm of 0.3 m, 3 m before its targets
+    arm = 0.3 * np.stack([np.cos(turn), np.sin(turn), 0 * turn], axis=1)
+    near = sarcl.ImageGrid.plane(center=(3, 0, 0), shape=(80, 80), spacing=0.05)
+    raw = echoes(np.array([[3.0, 0, 0]]), np.ones(1), arm, center=24e9, bandwidth=1.5e9, n_samples=16)
+    first, last = narrow_pulses(raw, near, 24e9, 0.05)
+    assert 60 < first < last < 140
 
 
 def test_a_lag_is_half_the_path_behind_a_place():
@@ -494,7 +567,9 @@ def test_alignment_removes_a_shift_and_distinguishes_unrelated_curves():
 def test_scaled_and_cut_rows_are_those_of_plain_arrays():
     samples = np.arange(24, dtype=np.complex64).reshape(6, 4)
     factor = np.exp(1j * np.arange(6))
-    scaled, cut = Scaled(samples, factor), Columns(samples, 1, 3)
+    scaled, cut, tapered = Scaled(samples, factor), Columns(samples, 1, 3), Tapered(samples, np.arange(4))
+    assert tapered.shape == (6, 4) and tapered.dtype == np.complex64
+    assert np.array_equal(tapered[2:5], (samples * np.arange(4))[2:5])
     assert scaled.shape == (6, 4) and scaled.dtype == np.complex64
     assert np.asarray(scaled) == pytest.approx(samples * factor[:, None], rel=1e-6)
     assert scaled[2:5] == pytest.approx((samples * factor[:, None])[2:5], rel=1e-6)
@@ -542,5 +617,7 @@ def test_arguments_of_the_wrong_kind(points):
         sarcl.autofocus(points, (1, 2))
     with pytest.raises(TypeError, match="range_errors is 'no'"):
         sarcl.autofocus(points, GRID, range_errors="no")
+    with pytest.raises(TypeError, match="beam is an Antenna; autofocus takes the cone"):
+        sarcl.autofocus(points, GRID, beam=sarcl.Antenna.isotropic())
     with pytest.raises(ValueError, match="places is 1; it must be at least 2"):
         sarcl.autofocus(points, GRID, places=1)

@@ -1,0 +1,57 @@
+"""Echoes without those of constant delay: leaks from transmitter to receiver, reflections from the vehicle itself."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.lazy_rows import RowsOnDemand
+from ..model.phase_history import PhaseHistory
+
+ROWS = 256  # rows per array operation: bounds the memory
+# shares of the energy, times the number of pulses, below which nothing is taken out: that of noise is 1
+LEAST = 4.0
+
+
+def without_constant_echo(raw: PhaseHistory, channels: int) -> PhaseHistory | None:
+    """The rows without the mean over the pulses of the echo at each delay, of each channel; None where it is faint.
+
+    raw  `channels` rows per pulse, one after another. Where pulses differ in frequency there is no mean: None
+    """
+    if np.ptp(raw.frequency) or np.ptp(raw.frequency_step):
+        return None
+    mean = np.zeros((channels, raw.n_samples), np.complex128)
+    energy = 0.0
+    for start in range(0, raw.n_rows, ROWS):
+        rows = slice(start, min(start + ROWS, raw.n_rows))
+        samples = raw.read(rows.start, rows.stop)
+        energy += float((np.abs(samples).astype(np.float64) ** 2).sum())
+        np.add.at(mean, np.arange(raw.n_rows)[rows] % channels, samples * _late(raw, rows).conj())
+    mean /= raw.n_rows // channels
+    if (np.abs(mean) ** 2).sum() * raw.n_rows / channels * (raw.n_rows // channels) < LEAST * energy:
+        return None
+    return replace(raw, samples=_Less(raw, mean))
+
+
+def _late(raw: PhaseHistory, rows: slice) -> np.ndarray:
+    """exp(+j 2 pi f tau_ref): turns samples of an echo of constant delay into those of a constant reference range."""
+    frequency = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
+    cycles = np.outer(2 * raw.reference_range[rows] / SPEED_OF_LIGHT, frequency)
+    return np.asarray(np.exp(2j * np.pi * (cycles % 1)))
+
+
+class _Less(RowsOnDemand):
+    """Samples of rows minus those of their channel's constant echo, `mean` (channels, n_samples)."""
+
+    def __init__(self, raw: PhaseHistory, mean: np.ndarray) -> None:
+        self.raw, self.mean = raw, mean
+        self.shape, self.dtype = raw.samples.shape, np.dtype(np.complex64)
+
+    def __getitem__(self, rows: slice) -> Any:
+        start, stop, _ = rows.indices(self.shape[0])
+        rows = slice(start, max(start, stop))
+        own = self.mean[np.arange(rows.start, rows.stop) % len(self.mean)] * _late(self.raw, rows)
+        return (np.asarray(self.raw.samples[rows]) - own).astype(np.complex64)

@@ -1,0 +1,215 @@
+"""Cross-validation: a part of the echoes gives a phase of its own, which must sharpen echoes it was not found from.
+
+Two ways to divide the echoes in halves are used. Halves of the band have the errors of the pulses and the scene in
+common, but neither noise nor speckle. Halves of the places are near and far ones: they have the errors in common, but
+no target. What makes one target sharper at the cost of others, such as an echo of constant delay, shows there.
+"""
+
+from __future__ import annotations
+
+import logging
+from collections.abc import Callable
+from dataclasses import replace
+from typing import Any
+
+import numpy as np
+
+from . import _bright_points, _phase_gradient, _phase_smoothing
+from ._aperture_view import NO_LAG, WINDOW, ApertureView, Errors
+from ._constant_echo import without_constant_echo
+from ._search import GROWTH
+
+log = logging.getLogger(__name__)
+
+AGREE = 0.4  # least closeness of two phases at which they agree; that of noise is smaller
+GAIN = 1.005  # least gain in sharpness of echoes that a phase was not found from
+KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
+BRIGHT = 10  # points of the uncorrected image that must not be lost
+FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
+LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
+PASSES = 3  # of the estimate from given places
+IN_FOCUS = (
+    "no phase sharpens echoes that it was not found from: the data are as well focused as these echoes can show; if "
+    "the image is blurred, give a grid over its brightest isolated points"
+)
+DISAGREE = (
+    "the halves of the band give phases that agree to {:.2f} only: noise or clutter hides the error, or no target is "
+    "seen by all pulses; give a grid over bright isolated points, beam= where pulses see a part of it, and longer data"
+)
+BLURRED = (
+    "the phase that sharpens some places blurs others at other ranges: an echo that is no target of the scene, "
+    "such as a leak of constant delay, stands out, or clutter hides the error; subtract the leak (the mean of "
+    "the range profiles over the pulses), or give a grid or beam= without it"
+)
+LOST_POINT = (
+    "a point that is bright now would be lost: no target is seen by all pulses; give beam=, a grid over targets that "
+    "neighbouring pulses see, and pixels no coarser than the resolution"
+)
+CLOSER = 1.05  # preference for the phase from all echoes, which is the most exact, unless its smoothing went wrong
+BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses
+
+
+def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]) -> tuple[Errors, dict[str, Any]]:
+    """Errors, smoothed as cross-validation asks for, and fields of PhaseErrors that say how well they passed it.
+
+    Every half of the echoes gives a phase of its own, with the given range errors. It is smoothed to the number of
+    cosines that sharpens the other halves most.
+    """
+    n, shift, samples = view.n, errors[1], view.raw.n_samples
+    zero = np.zeros(n)
+    places = view.probes((zero, zero), errors)
+    parts = view.band(0, samples // 2), view.band(samples - samples // 2, samples)
+    values = [part.contributions((zero, shift), places, NO_LAG, taper=True)[:, :, 0] for part in parts]
+    plain = values
+    if shift.any():
+        plain = [part.contributions((zero, zero), places, NO_LAG, taper=True)[:, :, 0] for part in parts]
+    tick()
+    sets = [np.tile(s, view.channels) for s in _near_and_far(parts[0], places, values, errors[0])]
+
+    def closeness(a: np.ndarray, b: np.ndarray) -> float:
+        return _phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[1]
+
+    least = max(AGREE, _phase_smoothing.chance(n))
+    bands = [_phase(view, v) for v in values]
+    moved, agreement = _phase_smoothing.alignment(bands[0], bands[1], view.shift_phase, view.cell / 2)
+    difference = np.exp(1j * (moved - bands[1]))
+    # (phase, columns it must sharpen, the same without any correction, phase of these columns)
+    tests = [(bands[1 - h], values[h], plain[h], bands[h]) for h in (0, 1)]
+    sides = []
+    for some in sets:
+        own = [_phase(view, v[:, some]) for v in values] if some.sum() > 1 else []
+        known = closeness(*own) if own else 0.0
+        both = np.concatenate([v[:, some] for v in values], axis=1)
+        old = np.concatenate([v[:, some] for v in plain], axis=1)
+        sides.append((known, _phase(view, both) if known > least else zero, both, old))
+        log.debug("%d places give phases that agree to %.2f between halves of the band", some.sum(), known)
+    if all(side[0] > least for side in sides):
+        tests += [(sides[1 - i][1], sides[i][2], sides[i][3], sides[i][1]) for i in (0, 1)]
+    tick()
+
+    def gain(test: tuple[np.ndarray, ...], modes: int) -> float:
+        """Gain in sharpness by the phase of other echoes, registered to the image of these."""
+        phase, held, before, own = test
+        phase = _phase_smoothing.smooth(phase, modes)
+        phase, _ = _phase_smoothing.alignment(phase, own, view.shift_phase, view.cell / 2)
+        was = _phase_gradient.sharpness(before, zero, view.window)
+        return _phase_gradient.sharpness(held, phase, view.window) / max(was, 1e-300)
+
+    ladder = [2**k for k in range(2, 40) if 2**k < n] + [n]
+    gains = np.array([[gain(test, modes) for test in tests] for modes in ladder])
+    best = int(gains[:, :2].prod(axis=1).argmax())
+    # phases from some of the places have more noise, and ask for more smoothing
+    apart = gains[:, 2:].min(axis=1).max() if len(tests) > 2 else np.inf
+    log.debug("gains of %s cosines: %s", ladder, gains.round(3).tolist())
+
+    # the result must sharpen the whole band too: a phase with an error of unwrapping would not
+    candidates = [errors[0], *bands]
+    smoothed = [view.shift_removed((_phase_smoothing.smooth(c, ladder[best]), shift)) for c in candidates]
+    both, old = np.concatenate(values, axis=1), np.concatenate(plain, axis=1)
+    levels = np.array([_phase_gradient.sharpness(both, e[0], view.window) for e in smoothed])
+    chosen = int((levels * (CLOSER, 1, 1)).argmax())
+    was = _phase_gradient.sharpness(old, zero, view.window)
+    lowest = min(*gains[best, :2], apart, levels[chosen] / max(was, 1e-300))
+    final = smoothed[chosen]
+    reason = ""
+    if agreement <= least:
+        reason = DISAGREE.format(agreement)
+    elif lowest > GAIN and not _sharpens_others(view, final):
+        reason = BLURRED
+    elif lowest > GAIN and not _none_lost(view, final):
+        reason = LOST_POINT
+    elif gains[best, :2].min() > GAIN >= apart:
+        reason = BLURRED
+    elif lowest <= GAIN:
+        reason = IN_FOCUS
+    return final, {
+        "found": not reason,
+        "gain": float(np.sqrt(gains[best, :2].prod())),
+        "agreement": agreement,
+        "spread": float(np.std(np.angle(difference * difference.sum().conj())) / 2),
+        "modes": ladder[best],
+        "reason": reason,
+    }
+
+
+def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
+    """Whether the echoes without those of constant delay, where there are any, are at least as sharp as they were."""
+    raw = without_constant_echo(view.raw, view.channels)
+    if raw is None:
+        return True
+    rest, zero = replace(view, raw=raw), (np.zeros(view.n), np.zeros(view.n))
+    places = rest.probes(zero, errors)
+    gain = rest.sharpness(errors, places) / max(rest.sharpness(zero, places), 1e-300)
+    log.debug("the sharpness without echoes of constant delay is x %.3f", gain)
+    return gain >= KEPT
+
+
+def _none_lost(view: ApertureView, errors: Errors) -> bool:
+    """Whether no bright point of the image without any correction is lost in the corrected one.
+
+    Where no target is seen by all pulses, most may become sharper and others blurred.
+    """
+    zero = np.zeros(view.n)
+    powers = view.power((zero, zero)), view.power(errors)
+    (old, was), (new, now) = (_bright_points.pixels_and_levels(p, view.grid, _bright_points.CANDIDATES) for p in powers)
+    bright = _bright_points.brightest(view.raw[:: view.channels], powers[0], view.grid, 8.0, BRIGHT)
+    # a phase that changes by so much per pulse moves a point by so much across range
+    turn = np.percentile(np.abs(np.diff(errors[0])), 90) * view.n / max(float(np.ptp(view.shift_phase[:, 0])), 1e-300)
+    for place in bright:
+        level = was[np.linalg.norm(old - place, axis=1).argmin()]
+        near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + turn
+        if level >= FAINT * was[0] and now[near].max(initial=0.0) < LOST * level:
+            log.debug("the point at %s, bright before, is lost", place)
+            return False
+    return True
+
+
+def _near_and_far(
+    view: ApertureView, places: np.ndarray, values: list[np.ndarray], phase: np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Two sets of places, bool (k,) each, at different ranges, of sharpness as equal as can be."""
+    middle = view.n // 2 * view.channels
+    cells = _bright_points.delay(view.raw, middle, places) * view.raw.bandwidth[0]
+    level = np.maximum(*(sum(abs(_phase_gradient.turned(v, e).sum(axis=0)) ** 4 for v in values)
+                         for e in (phase, 0 * phase)))  # fmt: skip
+    level = level.reshape(view.channels, -1).sum(axis=0)
+    order = np.argsort(cells)
+    total = np.cumsum(level[order])
+    border = cells[order][int(np.minimum(total, total[-1] - total).argmax())]
+    return cells <= border, cells > border + BETWEEN
+
+
+def _phase(view: ApertureView, v: np.ndarray) -> np.ndarray:
+    """The phase (n,), from a start without any, that sharpens the contributions v (n, k) to bright points most."""
+    if view.is_narrow:
+        return _narrow_phase(v)
+    first, last = view.narrow_pulses
+    phase = np.zeros(view.n)
+    brightest = np.argsort(-np.abs(v[first:last].sum(axis=0)))[: view.places]
+    phase[first:last] = _narrow_phase(v[first:last, brightest])
+    while last - first < view.n:
+        step = (last - first) // GROWTH + 1
+        low, high = max(0, first - step), min(view.n, last + step)
+        part = _phase_gradient.turned(v[low:high], phase[low:high])
+        start = _phase_gradient.extended(part, first - low, last - low)
+        phase[low:high] += _phase_gradient.sharpen(part, start, 0)
+        first, last = low, high
+    still = _phase_gradient.sharpen(v, np.zeros(view.n), 0)
+    return max((phase, still), key=lambda start: _phase_gradient.sharpness(v, start, 0))
+
+
+def _narrow_phase(v: np.ndarray) -> np.ndarray:
+    """`_phase` over a narrow aperture."""
+    n = len(v)
+    phase = np.zeros(n)
+    for k in range(PASSES):
+        widths = [max(n / 2 ** (k + i / 2), _phase_gradient.NARROWEST) for i in range(8)]
+        width = max(n / 4**k, WINDOW)
+        left = _phase_gradient.turned(v, phase)
+        starts = [np.zeros(n), _phase_gradient.gradient(left, widths)]
+        levels = [_phase_gradient.sharpness(left, start, width) for start in starts]
+        step = _phase_gradient.sharpen(left, starts[int(np.argmax(levels))], width)
+        phase = phase + step
+        if width <= WINDOW and _phase_gradient.sharpness(left, step, width) < 1.002 * levels[0]:
+            break
+    return phase

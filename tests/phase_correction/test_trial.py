@@ -1,0 +1,51 @@
+"""Autofocus on the scenes of bench/autofocus_trial.py: correct data are not harmed, errors are removed."""
+
+from __future__ import annotations
+
+import autofocus_trial as trials
+import numpy as np
+import pytest
+
+import sarcl
+
+RAIL = 10
+LEAK = 6  # a rail, five points and a leak of 5 dB: the halves of the band agree on a phase that focuses the leak
+
+
+def test_the_peak_of_a_point_falls_as_its_image_does():
+    made = trials.scene("error", RAIL)
+    zero = np.zeros(made.raw.n_rows)
+    wanted, blurred = (trials.peaks(made, phase, zero)[0] for phase in (zero, made.error))
+    alone = made.points[0]
+    grid = sarcl.ImageGrid.plane(center=alone, shape=(160, 40), spacing=(0.004, 0.02))
+    turned = np.asarray(made.raw.samples) * np.exp(-1j * made.error)[:, None]
+    right = made.raw.__class__(
+        turned.astype(np.complex64), frequency=made.raw.frequency, frequency_step=made.raw.frequency_step,
+        tx=made.raw.tx, reference_range=made.raw.reference_range,
+    )  # fmt: skip
+    levels = [np.abs(sarcl.backproject(raw, grid, beam=made.beam).data).max() for raw in (made.raw, right)]
+    # other points and the noise are in the image too
+    assert 20 * np.log10(levels[0] / levels[1]) == pytest.approx(20 * np.log10(blurred / wanted), abs=1.0)
+    assert levels[1] == pytest.approx(wanted * made.raw.n_samples, rel=0.1)
+
+
+def test_a_leak_is_not_focused_at_the_cost_of_the_points():
+    made = trials.scene("correct", LEAK)
+    assert "leak 5 dB" in made.words
+    better, errors = sarcl.autofocus(made.raw, made.grid)
+    assert better is made.raw and not errors.found
+    assert errors.gain > 5 and errors.agreement > 0.4  # what one half of the band shows, the other confirms
+    assert "leak of constant delay" in errors.reason and errors.reason in str(errors)
+
+
+@pytest.mark.parametrize("seed", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 1, *range(3, 10)))])
+def test_correct_data_are_not_harmed(seed):
+    row = trials.trial("correct", seed)
+    assert not row["harmed"], row
+
+
+@pytest.mark.slow
+def test_smooth_errors_are_removed():
+    rows = [trials.trial("error", seed) for seed in range(10)]
+    assert not any(row["harmed"] for row in rows), rows
+    assert sum(row["restored"] for row in rows) >= 9, rows
