@@ -12,6 +12,7 @@ from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave._pulse import Pulse
 from sarcl.fullwave.lattice import Lattice
+from sarcl.opencl.device import Device
 from sarcl.reference import formed_echo
 
 CELL = 0.02  # m
@@ -191,3 +192,12 @@ def test_pulses_from_one_place_have_one_echo(device):
     tx = np.tile(antennas(currents, 1, 0.0), (50, 1))
     got = formed_echoes(device, currents, tx, tx, np.tile([0, 1.0, 0], (1, 50, 1)))
     assert difference(got, np.tile(got[:1], (50, 1, 1))) < ROUNDING
+
+
+def test_work_items_that_share_the_frequencies_as_on_a_gpu_give_the_same_sums(device, monkeypatch):
+    currents = random_currents(3000, 20)
+    tx = antennas(currents, 5, 0.2)
+    paths = paths_of(currents, tx, tx)
+    wanted = _current_sums.current_sums(device, currents, paths, max_bytes=None)
+    monkeypatch.setattr(Device, "is_cpu", False)
+    assert difference(_current_sums.current_sums(device, currents, paths, max_bytes=None), wanted) < 1e-6
