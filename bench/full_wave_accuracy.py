@@ -40,9 +40,10 @@ def echoes(
     grid = lattice_around(-np.ones(3) * radius, np.ones(3) * radius, cell, runs.MARGIN)
     band = np.array([0.05, 1]) * top * SPEED_OF_LIGHT / (2 * np.pi)
     place = -DISTANCE * travel / np.linalg.norm(travel)
+    target = runs.target_of(grid, [(triangles, None)], top)
     (made,), _ = runs.run(
-        device, grid, runs.target_of(grid, triangles), (float(band[0]), float(band[1])), k, anchor=(place, sent),
-        twin=None, tolerance=1e-4, tx=np.broadcast_to(place, towards.shape), rx=DISTANCE * towards,
+        device, grid, target, (float(band[0]), float(band[1])), k, anchor=(place, sent), twin=None,
+        tolerance=1e-4, tx=np.broadcast_to(place, towards.shape), rx=DISTANCE * towards,
         received=received[None], most_steps=20_000, max_bytes=4e9,
     )  # fmt: skip
     return np.asarray(made[:, 0])

@@ -363,6 +363,7 @@ MAY_CATCH = {
     "io/_checksums.py": "text that is no JSON",
     "io/mesh.py": "trimesh's readers of damaged files",
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",
+    "fullwave/bodies/materials.py": "the number of the part is put before a message, which is raised again",
     "cli/_job.py": "signals outside the main thread",
     "imaging/run/tile_files.py": "text that is no JSON",
     "scenario/_schema.py": "the file and line are put before a message, which is raised again",
