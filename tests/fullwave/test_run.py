@@ -32,6 +32,7 @@ ABSORBER, GAP = 8, 3
 FREQUENCIES = np.linspace(0.2, 1, 5)
 
 on_devices = pytest.mark.parametrize("param", variants(names=()))
+on_twins = pytest.mark.parametrize("param", variants(names=("one-lane",)))  # the form for GPUs
 
 
 def grid_of(n):
@@ -96,7 +97,7 @@ def test_sums_over_every_eighth_step_are_those_over_every_step(param):
     assert np.linalg.norm(coarse - every, axis=1).max() > 1e-2 * np.linalg.norm(every, axis=1).max()
 
 
-@on_devices
+@on_twins
 def test_kept_samples_are_those_of_every_step(param):
     grid, rng = grid_of(16), np.random.default_rng(2)
     target = random_target(grid, rng)
@@ -125,17 +126,26 @@ def test_resting_rows_are_the_longest_stretches_of_vectors_inside():
     assert resting_rows(inside, low).tolist() == [[4, 5, 16, 32], [4, 6, 16, 32]]
 
 
-@on_devices
+@on_twins
 def test_cells_inside_a_conductor_may_be_left_out_bit_by_bit(param):
-    grid = grid_of(72)
-    target = ball(grid, 20)
+    grid, rng = grid_of(44), np.random.default_rng(3)
+    target = ball(grid, 18)
     assert (target.resting[:, 3] - target.resting[:, 2]).sum() > 0.03 * np.prod(grid.shape)
-    fast, slow = (run(param, grid, t, most_steps=256) for t in (target, replace(target, resting=None)))
-    assert np.abs(fast.electric).max() > 0.01
-    assert np.array_equal(fast.electric, slow.electric) and np.array_equal(fast.magnetic, slow.magnetic)
+    node = np.stack(np.indices(grid.shape)) - (centre_of(grid) / CELL)[:, None, None, None]
+    e, h = rng.uniform(-1, 1, (2, 3, *grid.shape)) * (np.linalg.norm(node, axis=0) > 20)  # nothing inside
+    ends = []
+    for listed in (target, replace(target, resting=None)):
+        fields = Fields(opened(param), grid, listed)
+        fields.start(e, h)
+        for _ in range(3):
+            fields.advance(BLOCK)
+        ends.append([*fields.download(), fields.edges.residuals(BLOCK), fields.faces.residuals(BLOCK)])
+    for fast, slow in zip(*ends, strict=True):
+        assert np.abs(slow).max() > 0.1
+        assert np.array_equal(fast, slow)
 
 
-@on_devices
+@on_twins
 @pytest.mark.parametrize("travel", [(0.5, -0.3, -0.8), (0, 0, 1), (-1, 0, 0), (0.6, 0.8, 0)])
 def test_fields_ahead_of_the_wave_are_below_rounding(param, travel):
     grid, wave = grid_of(48), wave_along(travel)
