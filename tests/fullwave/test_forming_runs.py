@@ -6,13 +6,13 @@ import functools
 
 import numpy as np
 import pytest
+from helpers.fdtd_cases import conductor_on_grid
 
 from sarcl.fullwave import runs
 from sarcl.fullwave._currents import currents
 from sarcl.fullwave._formed_echoes import formed_echoes
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave.anchors import anchored
-from sarcl.fullwave.lattice import lattice_around
 from sarcl.opencl.choose_device import open_device
 from sarcl.scattering.physical_optics import polarisation
 
@@ -49,9 +49,7 @@ class Runs:
 
     def __init__(self, triangles, elevation):
         self.device = open_device(None)
-        low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
-        self.grid = lattice_around(low, high, WAVELENGTH / CELLS, runs.MARGIN)
-        self.target = runs.target_of(self.grid, triangles)
+        self.grid, self.target = conductor_on_grid(triangles, WAVELENGTH / CELLS)
         self.centre = self.grid.origin + self.grid.cell * np.array(self.grid.shape) / 2
         azimuth, e = np.deg2rad(np.linspace(-9.6, 9.6, PULSES)), np.deg2rad(elevation)
         towards = np.stack([np.sin(azimuth) * np.cos(e), -np.cos(azimuth) * np.cos(e), np.full(PULSES, np.sin(e))], -1)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.fdtd_cases import sphere_intervals
+from helpers.fdtd_cases import conductor_on_grid, sphere_intervals
 
 from sarcl.fullwave import runs
 from sarcl.fullwave._currents import currents
@@ -12,18 +12,12 @@ from sarcl.fullwave._formed_echoes import formed_echoes
 from sarcl.fullwave._incident import PlaneWave
 from sarcl.fullwave._mirrors import Twin, mirror_axes, mirrored_echoes, twins
 from sarcl.fullwave.bodies._cut_cells import conductor
-from sarcl.fullwave.lattice import Lattice, lattice_around
+from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import material_edges
 from sarcl.scattering.physical_optics import polarisation
 
 CELL = 0.01  # m
 BAND = 1.8e9, 2.5e9  # Hz
-
-
-def on_grid(triangles, cell=CELL):
-    low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
-    grid = lattice_around(low, high, cell, runs.MARGIN)
-    return grid, runs.target_of(grid, triangles)
 
 
 def prism(outline, height):
@@ -62,7 +56,7 @@ def turned(triangles, angle):
     ids=["box", "box elsewhere", "turned box", "trapeze", "corner", "corner on its symmetry", "box with a knob"],
 )
 def test_planes_that_leave_a_mesh_unchanged(triangles, axes):
-    assert mirror_axes(*on_grid(triangles)) == axes
+    assert mirror_axes(*conductor_on_grid(triangles, CELL)) == axes
 
 
 def test_a_sphere_has_three_planes_and_one_beside_the_centre_of_the_grid_two():
@@ -115,7 +109,7 @@ def test_the_mirrored_run_gives_the_echoes_of_the_other_anchors_own_run(sent):
     from sarcl.opencl.choose_device import open_device
 
     device = open_device(None)
-    grid, target = on_grid(TRAPEZE, cell=0.014)
+    grid, target = conductor_on_grid(TRAPEZE, 0.014)
     assert mirror_axes(grid, target) == (0, 2)
     centre = grid.origin + grid.cell * np.array(grid.shape) / 2
     tx = antennas(np.array([-0.5, -0.2, 0.3, 0.5]), centre=centre)

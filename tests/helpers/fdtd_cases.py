@@ -4,10 +4,10 @@ from __future__ import annotations
 
 import numpy as np
 
-from sarcl.fullwave import _absorber
+from sarcl.fullwave import _absorber, runs
 from sarcl.fullwave._incident import entrances
 from sarcl.fullwave.bodies._cut_cells import Intervals
-from sarcl.fullwave.lattice import COURANT
+from sarcl.fullwave.lattice import COURANT, lattice_around
 from sarcl.fullwave.target import Target
 from sarcl.reference import fdtd
 
@@ -23,6 +23,13 @@ def sphere_intervals(lattice, centre, radius):
         half = np.sqrt(square[square > 0])
         out.append(Intervals(line[square > 0], node[a] - half, node[a] + half))
     return tuple(out)
+
+
+def conductor_on_grid(triangles, cell):
+    """The grid about the box of a closed conductor, facets (k, 3, 3), whose centre is the grid's; and its target."""
+    low, high = triangles.reshape(-1, 3).min(axis=0), triangles.reshape(-1, 3).max(axis=0)
+    grid = lattice_around(low, high, cell, runs.MARGIN)
+    return grid, runs.target_of(grid, [(triangles, None)], 1.0)
 
 
 class Twin:
