@@ -99,6 +99,14 @@ class ApertureView:
 
     def power(self, errors: Errors) -> np.ndarray:
         """Power of the image of the corrected rows, of grid.shape, summed over polarisations; ValueError if 0."""
+        return self._power(errors) if any(e.any() for e in errors) else self._plain_power
+
+    @cached_property
+    def _plain_power(self) -> np.ndarray:
+        """`power` without errors, which every search starts from, and every correction is compared with."""
+        return self._power((np.zeros(self.n), np.zeros(self.n)))
+
+    def _power(self, errors: Errors) -> np.ndarray:
         raw = self.corrected(errors)
         kinds = [] if raw.polarization is None else sorted(set(raw.polarization.tolist()))
         parts = [np.flatnonzero(raw.polarization == kind) for kind in kinds] if len(kinds) > 1 else [slice(None)]
