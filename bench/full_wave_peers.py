@@ -65,7 +65,7 @@ def main() -> None:
     base = rates["sarcl"]
     print("| solver | Mcells/s | Mcells per two CPU s | sarcl is faster by, clock | CPU |\n|---|---|---|---|---|")
     for name, rate in rates.items():
-        ratios = (f"{base[key] / value:.1f}" for key, value in rate.items())
+        ratios = (f"{base[key] / value:.1f}" if value else "not measured" for key, value in rate.items())
         print(f"| {name} | {' | '.join(f'{value:.0f}' for value in rate.values())} | {' | '.join(ratios)} |")
     if asked.json:
         versions = {"sarcl": sarcl.__version__, "gprMax": peer_version(asked.peer)}
@@ -93,7 +93,7 @@ class Ours:
         middle = cell * np.array(self.grid.shape) / 2
         radius = cell * (n / 2 - LAYERS - GAP - 10)
         ball = shapes.sphere(radius, facets=20_000, position=middle).triangles
-        target = target_of(self.grid, ball)
+        target = target_of(self.grid, [(ball, None)], 1.0)
         self.targets = {"sarcl": target, "sarcl, all cells": replace(target, resting=None)}
         self.resting = float((target.resting[:, 3] - target.resting[:, 2]).sum() / np.prod(self.grid.shape))
         top = SPEED_OF_LIGHT / (10 * cell)

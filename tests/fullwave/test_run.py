@@ -146,6 +146,19 @@ def test_cells_inside_a_conductor_may_be_left_out_bit_by_bit(param):
 
 
 @on_twins
+def test_cells_at_rest_are_left_as_they_are(param):
+    grid, rng = grid_of(44), np.random.default_rng(4)
+    target, (e, h) = ball(grid, 18), rng.uniform(-1, 1, (2, 3, *grid.shape)).astype(np.float32)
+    fields = Fields(opened(param), grid, target)
+    fields.start(e, h)
+    fields.advance(BLOCK)
+    plane, row, first, last = target.resting[len(target.resting) // 2]
+    for begun, ended in zip((e, h), fields.download(), strict=True):
+        assert np.array_equal(begun[:, plane, row, first:last], ended[:, plane, row, first:last])
+        assert (begun[:, plane, row, :first] != ended[:, plane, row, :first]).all()
+
+
+@on_twins
 @pytest.mark.parametrize("travel", [(0.5, -0.3, -0.8), (0, 0, 1), (-1, 0, 0), (0.6, 0.8, 0)])
 def test_fields_ahead_of_the_wave_are_below_rounding(param, travel):
     grid, wave = grid_of(48), wave_along(travel)

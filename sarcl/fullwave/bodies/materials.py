@@ -54,7 +54,7 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
     made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, wavenumber))
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
-        made.faces, made.weight,
+        made.faces, made.weight, made.resting,
     )  # fmt: skip
 
 
