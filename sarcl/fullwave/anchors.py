@@ -15,6 +15,7 @@ LEAST = 4  # anchors before any end: estimates of three are too low, and one anc
 OVERHANG = 0.1  # spacings beyond the first and the last of equispaced anchors: ends of sums are weak otherwise
 ENOUGH = 0.7  # of the tolerance: predicted error at which no further anchor is run, because it is an estimate;
 ENOUGH_OF_FEW = 0.25  # of the tolerance, with LEAST anchors
+APART = 0.25  # mean spacings: a mirrored anchor closer to another one predicts it, and hides what lies between others
 
 
 @dataclass(frozen=True)
@@ -88,9 +89,8 @@ class _Work:
     def run(self, pulses: np.ndarray, total: int) -> None:
         """Run anchors, and what a mirror gives with them, and interpolate."""
         for pulse in pulses:
-            twin = -1 if self._mirror is None else int(self._mirror[pulse])
-            for number in (int(pulse), twin):
-                if number >= 0 and number not in self.got:
+            for number in (int(pulse), *self._twin(int(pulse))):
+                if number not in self.got:
                     self.got[number] = self._formed(number)
             if self._progress:
                 self._progress("anchors", len(self.got), max(total, len(self.got)))
@@ -103,6 +103,15 @@ class _Work:
         error = self.model.error.sum() if self.model else 0.0 if np.ptp(self.along) == 0 else np.nan
         self.predicted_error = float(np.sqrt(error / (np.abs(self.samples) ** 2).sum(dtype=np.float64)))
         self.history.append((len(self.got), self.predicted_error))
+
+    def _twin(self, pulse: int) -> list[int]:
+        """The pulse whose anchor the run of a pulse serves too; none where it is close to another anchor."""
+        twin = -1 if self._mirror is None else int(self._mirror[pulse])
+        if twin < 0:
+            return []
+        others = self.along[[pulse, *self.got]]
+        apart = APART * float(np.ptp(self.along)) / max(LEAST, len(self.got) + 1)
+        return [twin] if np.abs(others - self.along[twin]).min() > apart else []
 
     @property
     def worst(self) -> int | None:

@@ -90,6 +90,15 @@ def test_a_mirror_adds_the_other_anchor_of_a_run():
     assert all(120 - pulse in asked for pulse in asked) and len(asked) == len(set(asked))
 
 
+def test_mirrored_anchors_beside_one_another_count_once():
+    # of an even number of pulses, the mirror of the middle one is its neighbour: both would predict one another
+    _, along, formed, own = case(206)
+    even = slice(0, 120)
+    got = anchored(lambda pulse: formed[pulse, even], along[even], tolerance=3e-2, mirror=119 - np.arange(120))
+    assert np.diff(got.pulses).min() > 5
+    assert error(got.samples, own[even]) < 3e-2
+
+
 def test_directions_that_are_all_the_same_need_one_anchor():
     echoes = np.ones((3, 1, 2), np.complex64)
     got = anchored(lambda pulse: echoes, np.zeros(3))
