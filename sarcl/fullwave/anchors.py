@@ -16,6 +16,7 @@ OVERHANG = 0.1  # spacings beyond the first and the last of equispaced anchors: 
 ENOUGH = 0.7  # of the tolerance: predicted error at which no further anchor is run, because it is an estimate;
 ENOUGH_OF_FEW = 0.25  # of the tolerance, with LEAST anchors
 APART = 0.25  # mean spacings: a mirrored anchor closer to another one predicts it, and hides what lies between others
+SAME = 1e-5  # of the arc: pulses that are closer have one direction, and no interpolation goes between them
 
 
 @dataclass(frozen=True)
@@ -87,21 +88,22 @@ class _Work:
         self.checks: list[Check] = []
 
     def run(self, pulses: np.ndarray, total: int) -> None:
-        """Run anchors, and what a mirror gives with them, and interpolate."""
+        """Run anchors, and what a mirror gives with them, and interpolate; one anchor serves each direction."""
         for pulse in pulses:
             for number in (int(pulse), *self._twin(int(pulse))):
-                if number not in self.got:
+                if not self._served[number]:
                     self.got[number] = self._formed(number)
             if self._progress:
                 self._progress("anchors", len(self.got), max(total, len(self.got)))
         self.pulses = np.array(sorted(self.got))
-        several = len(self.pulses) > 1 and bool((np.diff(self.along[self.pulses]) > 0).all())
+        several = len(self.pulses) > 1
         every = np.stack([self.got[int(pulse)] for pulse in self.pulses])
         self.model: AnchorModel | None = anchor_model(every, self.pulses, self.along) if several else None
         weights = self.model.weights if self.model else np.full((len(every), len(self.along)), 1 / len(every))
         self.samples = np.einsum("ap,apqf->pqf", weights.astype(np.float32), every).astype(np.complex64)
         error = self.model.error.sum() if self.model else 0.0 if np.ptp(self.along) == 0 else np.nan
-        self.predicted_error = float(np.sqrt(error / (np.abs(self.samples) ** 2).sum(dtype=np.float64)))
+        power = float((np.abs(self.samples) ** 2).sum(dtype=np.float64))
+        self.predicted_error = float(np.sqrt(error / power)) if power else 0.0  # a body of permittivity 1 has no echo
         self.history.append((len(self.got), self.predicted_error))
 
     def _twin(self, pulse: int) -> list[int]:
@@ -114,15 +116,22 @@ class _Work:
         return [twin] if np.abs(others - self.along[twin]).min() > apart else []
 
     @property
+    def _served(self) -> np.ndarray:
+        """Which pulses have the direction of an anchor, bool (P,)."""
+        places = self.along[list(self.got)]
+        return (np.abs(self.along[:, None] - places) <= SAME * np.ptp(self.along)).any(axis=1)
+
+    @property
     def worst(self) -> int | None:
         """The pulse of the largest error, in the interval between anchors that has most of it; None: no interval."""
         assert self.model is not None
+        error = np.where(self._served, 0.0, self.model.error)
         ends = [(-1, int(self.pulses[0])), *pairwise(self.pulses.tolist()), (int(self.pulses[-1]), len(self.along))]
-        energy = [float(self.model.error[a + 1 : b].sum()) if b - a > 1 else -1.0 for a, b in ends]
+        energy = [float(error[a + 1 : b].sum()) if b - a > 1 else -1.0 for a, b in ends]
         first, last = ends[int(np.argmax(energy))]
         if max(energy) <= 0:
             return None
-        return first + 1 + int(np.argmax(self.model.error[first + 1 : last]))
+        return first + 1 + int(np.argmax(error[first + 1 : last]))
 
     def check_and_run(self, pulse: int) -> None:
         """Run an anchor, and compare its echoes near its pulse with their prediction from the others."""

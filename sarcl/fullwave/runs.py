@@ -26,6 +26,7 @@ ABSORBER, GAP, SPARE = 10, 3, 2  # cells on each side: absorbing layers, to the 
 MARGIN = ABSORBER + GAP + SPARE
 WIDEST = 0.5  # lowest over highest frequency of the incident pulse: a narrower band makes a pulse longer than its echo
 FINER = 1.06  # by which cells may be smaller than asked, so that flat sides lie on nodes
+RESOLVED = 0.7  # of a gap between conductors: cells that leave a node in it
 MOST_STEPS = 10.0  # of the predicted number, before a run is stopped
 
 EDGE_BYTES = 4 + 4 * SAMPLES  # of an edge of a conductor: place, samples of its residual

@@ -105,6 +105,28 @@ def test_directions_that_are_all_the_same_need_one_anchor():
     assert len(got.pulses) == 1 and got.predicted_error == 0 and np.array_equal(got.samples, echoes)
 
 
+def test_a_target_without_echo_has_no_error():
+    with np.errstate(all="raise"):
+        got = anchored(lambda pulse: np.zeros((3, 1, 2), np.complex64), np.arange(3.0), anchors=1)
+    assert got.predicted_error == 0 and not got.samples.any()
+
+
+@pytest.mark.parametrize("anchors", ["auto", 4, np.arange(12)])
+def test_a_track_that_hovers_has_one_anchor_per_direction(anchors):
+    """Four places, three pulses at each; the second and third pulse of a place differ by rounding."""
+    _, along, formed, own = case(208)
+    some = np.repeat([10, 40, 70, 100], 3)
+    asked = []
+
+    def run(pulse):
+        asked.append(pulse // 3)
+        return formed[some[pulse]][some]
+
+    got = anchored(run, along[some] + np.tile([0, 1e-15, 1e-9], 4), anchors=anchors, tolerance=1e-6)
+    assert sorted(asked) == [0, 1, 2, 3] and len(got.pulses) == 4
+    assert error(got.samples, own[some]) < 1e-4 and got.predicted_error < 1e-4
+
+
 def test_few_pulses_become_anchors_all():
     _, along, formed, own = case(207)
     some = [0, 20, 60, 61, 119]

@@ -37,11 +37,13 @@ class MeshLines:
     areas      of faces across x, y and z, exactly, for the same
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours
+    gap        width, m, of gaps between parallel facets in which no node lies; None: there are none
     """
 
     intervals: tuple[Intervals, Intervals, Intervals]
     areas: tuple[FaceAreas, FaceAreas, FaceAreas]
     volume: np.ndarray
+    gap: float | None
 
 
 @dataclass(frozen=True, eq=False)
@@ -92,11 +94,15 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
         between = -(-start // mesh.unit) > end // mesh.unit  # no node lies in these
         entered, left = (_facet_at(mesh, found, line[between], at[between]) for at in (start, end))
         thin.add_pairs(entered, left, _points(lattice, mesh, axis, line[between], start[between]))
+        # gaps on a line between two stretches of it, up to the next node
+        gap = np.flatnonzero((line[1:] == line[:-1]) & ((end[:-1] // mesh.unit + 1) * mesh.unit >= start[1:]))
+        left, entered = (_facet_at(mesh, found, line[gap], at) for at in (end[gap], start[gap + 1]))
+        thin.add_gaps(left, entered, axis, (start[gap + 1] - end[gap]) / mesh.unit)
     x, y, z = intervals
     box = Box.around(lattice, intervals)
     thin.check(nodes_inside(box, x), box.low)
     across_x, across_y, across_z = (face_areas(lattice, mesh, axis) for axis in range(3))
-    return MeshLines((x, y, z), (across_x, across_y, across_z), np.array(volume))
+    return MeshLines((x, y, z), (across_x, across_y, across_z), np.array(volume), thin.gap)
 
 
 def _crossings(lattice: Lattice, mesh: ClosedMesh, axis: int) -> _Crossings:

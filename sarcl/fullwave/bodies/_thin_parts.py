@@ -4,7 +4,11 @@ Between nodes a plate or a wire is transparent: no edge of the grid lies in it. 
 thinner than a cell as well, however small the cells are. A part is refused, therefore, where
 
 - a line enters and leaves between two nodes through facets that are parallel, or
-- no node is inside within REACH cells.
+- no node is inside within REACH cells, or
+- the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
+
+Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Seams of
+meshes are closed on purpose. Therefore such gaps are measured, and the caller decides.
 """
 
 from __future__ import annotations
@@ -18,6 +22,7 @@ from ._closed_mesh import ClosedMesh
 REACH = 4  # cells
 PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edges are taken as plates
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
+SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
 SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
 
 
@@ -30,6 +35,7 @@ class ThinParts:
         self._inwards /= np.maximum(np.linalg.norm(self._inwards, axis=1), 1e-300)[:, None]
         self._points = [(np.arange(len(self.corners)), self.corners.mean(axis=1))]
         self._bad: list[tuple[np.ndarray, np.ndarray]] = []
+        self._gaps: list[np.ndarray] = []
 
     def add(self, facet: np.ndarray, place: np.ndarray) -> None:
         """Points on facets (n,), in nodes (n, 3)."""
@@ -37,13 +43,35 @@ class ThinParts:
 
     def add_pairs(self, entered: np.ndarray, left: np.ndarray, place: np.ndarray) -> None:
         """Facets (n,) through which lines enter, in nodes (n, 3), and leave again before the next node."""
-        plate = (self._inwards[entered] * self._inwards[left]).sum(axis=1) < -PARALLEL
+        plate = self._parallel(entered, left)
         self._bad.append((entered[plate], place[plate]))
+
+    def add_gaps(self, left: np.ndarray, entered: np.ndarray, axis: int, length: np.ndarray) -> None:
+        """Facets (n,) through which lines along an axis leave, and enter again before the next node; lengths, cells."""
+        width = (length * np.abs(self._inwards[left, axis]))[self._parallel(left, entered)]
+        self._gaps.append(width[width > SEALED])
+
+    @property
+    def gap(self) -> float | None:
+        """Width, m, of the gaps in which no node lies: their median; None: there are none."""
+        widths = np.concatenate(self._gaps)
+        return float(np.median(widths)) * self.lattice.cell if len(widths) else None
+
+    def _parallel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
+        """Which facets (n,) are parallel, and face opposite ways."""
+        return np.asarray((self._inwards[first] * self._inwards[second]).sum(axis=1) < -PARALLEL)
 
     def check(self, inside: np.ndarray, low: np.ndarray) -> None:
         """TooThin, a ValueError, where parts are too thin; inside: which nodes are, from node `low` (3,) on."""
         from scipy.ndimage import maximum_filter
 
+        size = self.lattice.cell * float(np.ptp(self.corners.reshape(-1, 3), axis=0).max())
+        if size < self.lattice.cell:
+            raise TooThin(
+                f"triangles reach over {size:.2g} m, less than a cell of {self.lattice.cell:g} m, too small for the "
+                f"grid; give cells of at most {SHARE * size:.2g} m, or triangles in metres",
+                SHARE * size,
+            )
         near = maximum_filter(np.pad(inside, REACH), size=2 * REACH + 1, mode="constant", cval=False)
         for facet, place in self._points:
             node = np.rint(place).astype(int) - low + REACH

@@ -3,10 +3,11 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ...base.errors import TooThin
 from ...base.validation import number
 from ..lattice import Lattice
 from ..target import Target, material_edges
@@ -41,7 +42,7 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
     made, found = Target.nothing(), None
     if metal:
         found = mesh_lines(lattice, np.concatenate(metal))
-        made = conductor(lattice, found.intervals, found.areas)
+        made = replace(conductor(lattice, found.intervals, found.areas), gap=found.gap)
     if len(metal) == len(parts):
         return made
     wavenumber, fine, dielectric = number("k", k, above=0), halved(lattice), []
@@ -54,14 +55,17 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
     made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, wavenumber))
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
-        made.faces, made.weight, made.resting,
+        made.faces, made.weight, made.resting, made.gap,
     )  # fmt: skip
 
 
 def _named(name: str, lattice: Lattice, triangles: np.ndarray) -> MeshLines:
-    """`mesh_lines`, whose errors name the part."""
+    """`mesh_lines` on cells of half the size, whose errors name the part."""
     try:
         return mesh_lines(lattice, triangles)
+    except TooThin as thin:
+        cell = None if thin.cell is None else 2 * thin.cell
+        raise TooThin(f"{name}, on cells of half the size: {thin}", cell) from thin
     except ValueError as error:
         raise ValueError(f"{name}: {error}") from error
 

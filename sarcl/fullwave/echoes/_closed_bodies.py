@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...scene.material import Material
 from ...scene.scene import Scene
 
 LEAST_INSIDE = 6.0  # cells per wavelength in a body; the run that predicts the error of the grid then has 4
@@ -34,10 +35,9 @@ def check_bodies(scene: Scene) -> None:
             "conductivity, such as sarcl.Material(eps_r=3, conductivity=0.01), or reflectivity 1",
         ))  # fmt: skip
     for material in scene.materials:
-        name = repr(material.name) if material.name else "of a Material"
         if material.height or material.diagram not in ("smooth", "sinc"):
             raise ValueError(said.format(
-                f"a material {name} with roughness finer than a facet", "give one with height 0 and diagram 'smooth'"
+                f"{_named(material)} with roughness finer than a facet", "give one with height 0 and diagram 'smooth'"
             ))  # fmt: skip
 
 
@@ -50,13 +50,16 @@ def check_wavelengths(scene: Scene, cells: float, highest: float) -> None:
             continue
         shorter = float(np.abs(np.sqrt(material.permittivity(highest))))
         if cells / shorter < LEAST_INSIDE:
-            name = repr(material.name) if material.name else "of a Material"
             raise ValueError(
-                f"cells is {cells:g}, which leaves {cells / shorter:.2g} cells per wavelength in a material {name} of "
+                f"cells is {cells:g}, which leaves {cells / shorter:.2g} cells per wavelength in {_named(material)} of "
                 f"relative permittivity {complex(material.permittivity(highest)):.3g}; give "
                 f'cells={np.ceil(10 * LEAST_INSIDE * shorter) / 10:g}, or material="metal" where waves do not pass '
                 "through the body"
             )
+
+
+def _named(material: Material) -> str:
+    return f"a material {material.name!r}" if material.name else "a material"
 
 
 def parts_of(scene: Scene, frequency: float) -> list[tuple[np.ndarray, complex | None]]:

@@ -36,6 +36,7 @@ def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, m
     """
     request, n_pulses = task.request, len(task.tx)
     anchors = checked_anchors(anchors, n_pulses)
+    task.warn_of_gaps()
     files = None if out is None else AnchorFiles(out, task.fingerprint())
     samples = np.empty((n_pulses, len(request.polarizations), len(task.frequencies)), np.complex64)
     progress = RunProgress(request.report, 1, task.cost.steps)
@@ -133,7 +134,7 @@ class _Sums:
             "grid": " x ".join(map(str, task.lattice.shape)),
             "steps": int(self.steps / self.runs) if self.runs else 0,
             "left": float(f"{self.left:.1e}"),
-            "bytes": task.cost.bytes(task.parts()[0].stop),
+            "bytes": round(task.cost.bytes(task.parts()[0].stop)),
             "seconds_per_run": float(f"{self.seconds / max(self.runs, 1):.3g}"),
             **task.motion,
         }

@@ -11,7 +11,7 @@ import numpy as np
 from ...base import host_memory
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import ToleranceUnreachable, TooThin
+from ...base.errors import ToleranceUnreachable, TooThin, warn
 from ...base.fingerprint import checksum, kernels, leaves
 from ...base.validation import array as numbers
 from ...base.vectors import unit
@@ -111,6 +111,16 @@ class FullwaveTask:
                 raise TooThin(f"{thin}: cells={needed:g}, which are {self.cells:g} now", thin.cell) from None
         return self._targets[0]
 
+    def warn_of_gaps(self) -> None:
+        """SarclWarning where gaps between conductors are closed on the grid, because they are narrower than a cell."""
+        if (gap := self.target().gap) is not None:
+            needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / (runs.RESOLVED * gap)) / 10
+            warn(
+                f"bodies have gaps of about {gap:.2g} m, in which no node of cells of {self.lattice.cell:.3g} m lies: "
+                f"the grid closes them, and what waves do in them is missing, also in report.model_error; give "
+                f"cells={needed:g}, which are {self.cells:g} now, or close the gaps in the mesh"
+            )
+
     def sendings(self) -> Iterator[tuple[str, list[int]]]:
         """The polarisations that are sent, and the indices of the polarisations whose echoes they give."""
         names = self.request.polarizations
@@ -186,6 +196,7 @@ class FullwaveTask:
             "polarizations": ", ".join(self.request.polarizations),
             "frequencies": self.frequencies,
             "grid": [self.cells, self.band, self.lattice, len(self.parts())],
+            "end of runs": self.request.tolerance,
         }
         return checksum(*leaves(parts))
 

@@ -14,6 +14,7 @@ from sarcl.fullwave.bodies._cut_cells import conductor
 from sarcl.fullwave.bodies._mesh_lines import mesh_lines
 from sarcl.fullwave.fields import BLOCK, Fields
 from sarcl.fullwave.lattice import Lattice, lattice_around
+from sarcl.scene.triangles import rotation
 
 CELL = 0.1  # m
 GRID = Lattice(CELL, (30, 30, 32), np.zeros(3))
@@ -60,6 +61,28 @@ def test_the_volume_along_each_axis_approaches_that_of_the_mesh():
     ]
     assert off[0] < 0.05 and off[-1] < 3e-4
     assert off[2] < off[0] / 4 and off[3] < off[1] / 4
+
+
+@pytest.mark.parametrize("axis", [0, 1, 2])
+def test_gaps_between_nodes_are_found_with_their_width(axis):
+    """0.6 cells between 10.2 and 10.8, and 0.6 cells about a node; a surface on a node belongs to its body."""
+
+    def gap(left, right):
+        low, high = np.full(3, 6.0), np.full(3, 16.0)
+        first = box(low, np.where(np.arange(3) == axis, left, high))
+        second = box(np.where(np.arange(3) == axis, right, low), high)
+        return mesh_lines(GRID, np.concatenate([first, second])).gap
+
+    assert np.isclose(gap(10.2, 10.8), 0.6 * CELL, rtol=1e-5)
+    assert np.isclose(gap(10.0, 11.0), CELL, rtol=1e-5)
+    assert gap(9.7, 10.3) is None  # a node lies in it
+    assert gap(10.4, 10.4) is None and gap(10.4, 10.4005) is None  # they touch
+
+
+def test_a_gap_askew_is_found_with_its_width_across():
+    turn = rotation(np.array([0.3, 0.2, 0.5]))
+    halves = [shapes.box((0.5, 1, 1), position=(x, 0, -0.5)).triangles @ turn.T + 1.5 for x in (-0.27, 0.27)]
+    assert np.isclose(mesh_lines(GRID, np.concatenate(halves)).gap, 0.04, rtol=1e-3)
 
 
 def test_a_sphere_has_the_intervals_of_the_formula_within_the_depth_of_its_facets():
