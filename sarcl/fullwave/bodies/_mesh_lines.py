@@ -190,7 +190,8 @@ def _check_outwards(lattice: Lattice, mesh: ClosedMesh, axis: int, whole: _Spans
     if (wrong := whole.winding < 0).any():
         raise ValueError(
             f"triangles are wound inwards on {_lines(lattice, mesh, axis, whole, wrong)}; wanted counter-clockwise "
-            "corners seen from outside: load the mesh with Scene.from_mesh(..., repair=True), or reverse the corners"
+            "corners seen from outside: load the mesh with Scene.from_mesh(..., repair=True), or reverse the corners; "
+            "where it is wound outwards already, it intersects itself: unite its parts in a program for meshes"
         )
 
 

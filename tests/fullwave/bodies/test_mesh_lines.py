@@ -263,6 +263,10 @@ def test_winding_that_is_mixed_or_inwards_is_refused():
     mixed[3] = mixed[3, ::-1]
     refused(mixed, r"opposite winding at 3 of 18 edges.*repair=True")
     refused(body[:, ::-1], r"wound inwards on 169 of 169 grid lines along x.*repair=True")
+    ball = shapes.sphere(0.6, facets=500, position=(1.5, 1.5, 1.5)).triangles
+    corners, label = np.unique(ball.reshape(-1, 3).round(9), axis=0, return_inverse=True)
+    noisy = corners + np.random.default_rng(0).normal(scale=0.2, size=corners.shape)
+    refused(noisy[label.reshape(-1, 3)], r"wound inwards on .* wound outwards already, it intersects itself: unite")
     # one of two bodies
     refused(np.concatenate([body, box((2, 2, 2), (6, 6, 6))[:, ::-1]]), r"wound inwards on 25 of 194 grid lines")
 
