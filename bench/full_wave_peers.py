@@ -15,8 +15,6 @@ sarcl updates cells inside the sphere and ahead of the wave only where it must: 
 from __future__ import annotations
 
 import argparse
-import datetime
-import json
 import os
 import resource
 import subprocess
@@ -26,6 +24,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
+import full_wave_page
 import numpy as np
 
 FREQUENCIES = 50
@@ -44,10 +43,11 @@ def main() -> None:
     parser.add_argument("--json", type=Path)
     asked = parser.parse_args()
 
-    import sarcl
+    from sarcl.bench import backproject
     from sarcl.opencl.choose_device import open_device
 
     device = open_device(None)
+    document = backproject.header([device])
     names = [name for name in STEPS if asked.opencl or "OpenCL" not in name]
     n_cells = asked.cells**2 * (-(-asked.cells // 16) * 16)
     ours = Ours(device, asked.cells)
@@ -62,21 +62,15 @@ def main() -> None:
             best[name] = np.minimum(best[name], np.where(per_step > 0, per_step, np.inf))
     rates = {name: {"Mcells/s": n_cells / wall / 1e6, "Mcells per two CPU s": 2 * n_cells / cpu / 1e6}
              for name, (wall, cpu) in best.items()}  # fmt: skip
-    base = rates["sarcl"]
-    print("| solver | Mcells/s | Mcells per two CPU s | sarcl is faster by, clock | CPU |\n|---|---|---|---|---|")
-    for name, rate in rates.items():
-        ratios = (f"{base[key] / value:.1f}" if value else "not measured" for key, value in rate.items())
-        print(f"| {name} | {' | '.join(f'{value:.0f}' for value in rate.values())} | {' | '.join(ratios)} |")
+    document |= {
+        "kind": "full wave", "cells": [asked.cells, asked.cells, n_cells // asked.cells**2], "frequencies": FREQUENCIES,
+        "rounds": asked.rounds, "resting": ours.resting, "peers": [about(asked.peer)],
+        "rates": rates,
+    }  # fmt: skip
+    document["machine"]["load"] += backproject.load()
+    print(full_wave_page.section("full wave", document))
     if asked.json:
-        versions = {"sarcl": sarcl.__version__, "gprMax": peer_version(asked.peer)}
-        about = {
-            "cells": [asked.cells, asked.cells, n_cells // asked.cells**2], "frequencies": FREQUENCIES,
-            "versions": versions, "device": device.info.name, "date": datetime.date.today().isoformat(),
-            "load": os.getloadavg()[0], "rounds": asked.rounds, "resting share": ours.resting,
-            "error": "sarcl: sphere of radius 1 m up to ka 10 at 10 cells per wavelength 0.05 dB rms against Mie "
-                     "(docs/theory/full_wave.md); gprMax: not measured, its sphere is made of whole cells",
-        }  # fmt: skip
-        asked.json.write_text(json.dumps({**about, "rates": rates}, indent=1) + "\n")
+        backproject.write(document, asked.json)
 
 
 class Ours:
@@ -147,10 +141,11 @@ def _children() -> float:
     return used.ru_utime + used.ru_stime
 
 
-def peer_version(python: str) -> str:
-    """The version of gprMax."""
-    code = "import importlib.metadata as m; print(m.version('gprMax'))"
-    return subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.strip()
+def about(python: str) -> dict[str, str]:
+    """The version of gprMax, and of Python that runs it."""
+    code = "import importlib.metadata as m, platform as p; print(m.version('gprMax'), p.python_version())"
+    said = subprocess.run([python, "-c", code], capture_output=True, text=True, check=True).stdout.split()
+    return {"name": "gprMax", "version": said[0], "python": said[1], "backend": "OpenMP, OpenCL"}
 
 
 if __name__ == "__main__":

@@ -9,6 +9,7 @@ from typing import Any
 
 import channels_page
 import echo_page
+import full_wave_page
 import spaceborne_page
 
 from sarcl.bench import pareto, ratios, tables
@@ -22,7 +23,10 @@ figures are measured: [benchmarks](../developers/benchmarks.md).
 
 """
 # Documents that are not about run times of images
-OTHER = {"echo": echo_page.section, "channels": channels_page.section, "spaceborne": spaceborne_page.section}
+OTHER = {
+    "echo": echo_page.section, "channels": channels_page.section, "spaceborne": spaceborne_page.section,
+    "full wave": full_wave_page.section,
+}  # fmt: skip
 README_HEAD = ["tolerance", "error achieved", "predicted", "seconds", "Gbp/s", "share in kernels"]
 
 

@@ -451,6 +451,27 @@ def test_documents_of_channels_become_tables(tmp_path):
     assert "Carriers of 900 MHz in all x 101 pulses" in text and "One carrier" not in text
 
 
+def test_documents_of_full_wave_runs_become_tables(tmp_path):
+    """A document of bench/full_wave_peers.py: rates of the solvers, and ratios."""
+    from sarcl.bench import backproject
+
+    peer = {"name": "gprMax", "version": "4.0.1", "python": "3.11.7", "backend": "OpenMP, OpenCL"}
+    rates = {
+        "sarcl": {"Mcells/s": 450.0, "Mcells per two CPU s": 500.0},
+        "gprMax OpenMP": {"Mcells/s": 150.0, "Mcells per two CPU s": 125.0},
+    }
+    document = backproject.header([]) | {
+        "kind": "full wave", "cells": [200, 200, 208], "frequencies": 50, "rounds": 2, "resting": 0.185,
+        "peers": [peer], "rates": rates,
+    }  # fmt: skip
+    (tmp_path / "results").mkdir()
+    backproject.write(document, tmp_path / "results" / "6-full-wave.json")
+    page.write(tmp_path / "results", tmp_path)
+    text = (tmp_path / "results.md").read_text()
+    assert "200 x 200 x 208 cells, 50 frequencies; 18% of the cells" in text and "- peer gprMax 4.0.1" in text
+    assert "| gprMax OpenMP | 150 | 125 | 3.0 | 4.0 |" in text
+
+
 def test_documents_of_a_spaceborne_pass_become_tables(tmp_path):
     """A document of bench/spaceborne.py: cost of the stages, theory beside both images."""
     from sarcl.bench import backproject
