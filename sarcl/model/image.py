@@ -300,7 +300,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
 def _checked_gain(gain: Any, grid: ImageGrid) -> float | NDArray[np.floating]:
     """A gain as a number, or as a read-only array of the grid's shape; ValueError for one that cannot be."""
-    if np.ndim(gain) == 0:
+    if validation.ndim("image gain", gain) == 0:
         return validation.number("image gain", gain, above=0)
     kind = np.float32 if getattr(gain, "dtype", None) == np.float32 else np.float64
     own = isinstance(gain, np.ndarray) and gain.dtype == kind and not gain.flags.writeable and gain.shape == grid.shape
