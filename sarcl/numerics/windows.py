@@ -4,15 +4,20 @@ from __future__ import annotations
 
 import inspect
 from collections.abc import Sequence
-from typing import Any
+from typing import Any, Literal
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import NDArray
 
 from ..base import validation
 
 # of one direction: a name, (name, parameters) or an array; or a pair of these, or None, for range and cross-range
-OneWindow = str | Sequence[str | float | Sequence[float]] | ArrayLike
+WindowName = Literal[
+    "none", "taylor", "hamming", "barthann", "bartlett", "blackman", "blackmanharris", "bohman", "boxcar", "chebwin",
+    "cosine", "dpss", "exponential", "flattop", "gaussian", "general_cosine", "general_gaussian", "general_hamming",
+    "hann", "kaiser", "kaiser_bessel_derived", "lanczos", "nuttall", "parzen", "triang", "tukey",
+]  # fmt: skip
+OneWindow = WindowName | Sequence[WindowName | float | Sequence[float]] | NDArray[Any]
 Window = OneWindow | Sequence[OneWindow | None]
 KNOWN = (
     "None, 'hamming', ('taylor', sidelobe_db, nbar) such as ('taylor', 35, 5), the names in scipy.signal.windows such "

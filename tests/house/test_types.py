@@ -224,7 +224,7 @@ MISTAKES = """
 sarcl.echo(scene, chirp, track, polarization="HX")  # Argument "polarization" to "echo"
 sarcl.echo(scene, chirp, track, skip={"beams"})  # Literal['beams']
 sarcl.backproject(raw, grid, windo="hamming")  # Unexpected keyword argument "windo"
-sarcl.backproject(raw, grid, window="haming")  # No overload variant of "backproject"
+sarcl.backproject(raw, grid, window="haming")  # Argument "window" to "backproject"
 sarcl.backproject(raw, grid, out=3)  # No overload variant of "backproject"
 sarcl.Trajectory.line(start=None, velocity=(0, 1, 0), prf=1.0, n_pulses=2)  # Argument "start"
 sarcl.PhaseHistory(object(), frequency=1e9, frequency_step=1e6, tx=[(0, 0, 0)], reference_range=1.0)  # Argument 1
