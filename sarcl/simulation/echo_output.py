@@ -21,6 +21,12 @@ COPIES = 3  # of the rows' geometry, while a PhaseHistory is made of it: 320 byt
 SHARE = 0.25  # of max_bytes, for samples that are about to be written to a file
 
 
+def check_name(out: Any) -> None:
+    """TypeError where `out` is no name of a file, nor None."""
+    if out is not None and not isinstance(out, (str, os.PathLike)):
+        raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
+
+
 class EchoOutput:
     """Samples (n_pulses, ..., n_samples), complex64; a row is the last axis.
 
@@ -29,8 +35,7 @@ class EchoOutput:
     """
 
     def __init__(self, shape: tuple[int, ...], out: Any, budget: float, window: tuple[float, float]) -> None:
-        if out is not None and not isinstance(out, (str, os.PathLike)):
-            raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
+        check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
         n_rows = shape[0] * self.a_pulse

@@ -152,6 +152,7 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
         (BOX, {"anchors": [0, 0]}, ValueError, r"anchors is \[0, 0\]; give numbers of pulses from 0 to 0, each once"),
         (BOX, {"anchors": "all"}, ValueError, "anchors is 'all'; choose one of 'auto'"),
         (BOX, {"range_window": (-0.1, 0.1)}, ValueError, "does not hold the scene, from .* give a wider window"),
+        (BOX, {"out": 3}, TypeError, "out is a int; give the name of a file such as 'raw.h5', or None"),
         (shapes.box((90, 90, 1)), {}, ValueError, "track position 0 is 40 m from .* reaches 63.64 m"),
     ],
 )  # fmt: skip

@@ -18,7 +18,7 @@ from ...model.waveform import Waveform
 from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
 from ...simulation.echo import Polarization, echo_request
-from ...simulation.echo_output import EchoOutput
+from ...simulation.echo_output import EchoOutput, check_name
 from ._formed_samples import FormedSamples, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
 
@@ -105,6 +105,7 @@ def fullwave_echo(
         scene, waveform, track, request, receiver=receiver, reference=reference, range_window=range_window,
         compressed=flag("compressed", compressed), cells=cells, max_bytes=max_bytes,
     )  # fmt: skip
+    check_name(out)
     if out is not None:
         formats.writer_functions(out, "phase history")
         output_paths.check_writable(out)
