@@ -28,7 +28,7 @@ def test_unit_points_of_a_strip_map_read_0_dbsm_wherever_all_of_their_rows_are(s
         assert np.linalg.norm(seen.position - point) <= 0.02
         rows = strip_map.seen(point[None])[0].sum()
         across = 0.886 * SPEED_OF_LIGHT / strip_map.CARRIER / 2 / (2 * np.sin(strip_map.ANGLE / 2))
-        # each row stands for one step: the aperture is longer than from the first to the last by one
+        # rows are the middles of their steps: the aperture is one step longer than from the first row to the last
         assert seen.irw[1] == pytest.approx(across * (rows - 1) / rows, rel=0.01)
     # what was seen at -12.99 dBsm: divided by the weights of all rows instead of those that saw the point
     whole = scene.report.plan and strip_map.N_ROWS * 256

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import errno
 import logging
 import os
 import signal
@@ -18,6 +19,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.fullwave.echoes._anchor_files import AnchorFiles
+from sarcl.fullwave.runs import RunEnd
 from sarcl.reference import mie
 
 RADIUS = 0.1  # m
@@ -206,6 +208,17 @@ def test_an_interrupted_task_continues_from_its_finished_anchors(tmp_path, monke
     assert len(done) == 3 and caplog.text.count("is damaged: this anchor is computed again") == 2
     assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples)) and not kept[0].parent.exists()
     assert sarcl.read(out).report.plan["anchors"] == whole.report.plan["anchors"] == [0, 1]
+
+
+def test_anchors_that_find_no_room_are_warned_of_and_the_task_goes_on(tmp_path, monkeypatch):
+    def full(*_):
+        raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    files = AnchorFiles(tmp_path / "raw.h5", "0" * 32)
+    monkeypatch.setattr(os, "replace", full)
+    with pytest.warns(sarcl.SarclWarning, match=r"raw\.h5\.anchors \(No space left on device\): the task goes on"):
+        files.keep(3, "H", np.zeros((4, 1, 8), np.complex64), RunEnd(10, 1e-5))
+    assert not list(files.folder.iterdir())
 
 
 @pytest.mark.parametrize(

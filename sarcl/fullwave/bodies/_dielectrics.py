@@ -1,6 +1,6 @@
 """Permittivities of the edges of a grid in dielectric and lossy bodies.
 
-Nine lines about an edge, half a cell apart, stand for the cell about it. Where the surface lies along an axis of the
+The cell about an edge is sampled along nine lines, half a cell apart. Where the surface lies along an axis of the
 grid (ALIGNED), an edge has the mean over these lines of the harmonic mean along each: fields along a boundary see the
 mean of both permittivities, to a quarter of a cell, and fields across it the harmonic mean. Where the surface is askew,
 no number per edge is right for both. There an edge has the permittivity of what fills most of its cell: of all

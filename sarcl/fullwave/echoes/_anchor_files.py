@@ -10,12 +10,15 @@ import json
 import logging
 import os
 import secrets
+from contextlib import suppress
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
+from ...base.errors import warn
 from ...base.fingerprint import as_bytes, checker
+from ...base.text import size_text
 from ..runs import RunEnd
 
 log = logging.getLogger(__name__)
@@ -58,8 +61,7 @@ class AnchorFiles:
         return np.frombuffer(values, np.complex64).reshape(shape), RunEnd(head["steps"], head["left"])
 
     def keep(self, pulse: int, sent: str, echoes: np.ndarray, ended: RunEnd) -> None:
-        """Write the echoes of an anchor, complex64, completely or not at all."""
-        self.folder.mkdir(exist_ok=True)
+        """Write the echoes of an anchor, complex64, completely or not at all; a warning where there is no room."""
         text = json.dumps({"mark": self.mark, "steps": ended.steps, "left": ended.left}).encode()
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
         parts: tuple[Any, ...] = (
@@ -69,14 +71,26 @@ class AnchorFiles:
             as_bytes(echoes.astype(np.complex64, copy=False)),
         )
         try:
+            self.folder.mkdir(exist_ok=True)
             with open(temporary, "wb") as file:
                 for part in parts:
                     file.write(part)
                 file.write(checker(*parts).digest())
             os.replace(temporary, self._path(pulse, sent))
+        except OSError as error:  # the echoes are in memory: the task goes on
+            self._remove(temporary)
+            warn(
+                f"the echoes of an anchor, {size_text(echoes.nbytes)}, could not be kept in {self.folder} "
+                f"({error.strerror or error}): the task goes on, but once killed it computes this anchor again; make "
+                "room there"
+            )
         except BaseException:
-            temporary.unlink(missing_ok=True)
+            self._remove(temporary)
             raise
+
+    def _remove(self, path: Path) -> None:
+        with suppress(OSError):
+            path.unlink()
 
     def clear(self) -> None:
         """Remove the files of this task, and the folder where nothing is left in it."""

@@ -50,7 +50,7 @@ def _measured(device: Device) -> RunSpeed:
     phase = device.copied(np.zeros((BLOCK, FREQUENCIES, 2), np.float32))
     sums = device.zeros(8 * FREQUENCIES * fields.edges.count)
     summed = _seconds(device, lambda: fields.transform(fields.edges, phase, sums, BLOCK, FREQUENCIES))
-    summed /= BLOCK * PERIODS[0]  # a sample of the residuals stands for several steps
+    summed /= BLOCK * PERIODS[0]  # the residuals are sampled once in several steps
     return RunSpeed(CELLS**3 / step, LISTED * FREQUENCIES / summed)
 
 
