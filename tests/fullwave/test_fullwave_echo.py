@@ -61,6 +61,18 @@ def test_a_sphere_has_the_amplitude_and_phase_of_mie_in_every_direction(sphere):
         assert np.linalg.norm(cross) < 3e-3 * np.linalg.norm(wanted)
 
 
+def test_another_reference_has_the_phases_that_echo_gives_a_point():
+    given = {"reference": (0.3, -0.2, 0.1), "range_window": (-1.5, 1.5)}
+    track = around(20, height=15.0)
+    raw = sarcl.fullwave_echo(SPHERE, CHIRP, track, cells=14, model_error=False, **given)
+    point = sarcl.echo(sarcl.Scene.points([SPHERE.center]), CHIRP, track, tolerance=1e-5, **given)
+    got, k = samples(raw)
+    wanted = np.array([mie.conducting_sphere(RADIUS, x)[0] for x in k]) * samples(point)[0][0, 0]
+    assert np.array_equal(raw.reference_range, point.reference_range)
+    assert np.ptp(np.angle(samples(point)[0])) > 1
+    assert difference(got[0, 0], wanted) < 0.04
+
+
 @pytest.mark.slow
 def test_all_polarisations_are_those_of_runs_for_each(sphere):
     track = around(20, 65, height=15.0)
