@@ -23,7 +23,7 @@
 #include "pixel_weights.clh"
 
 // |T - x| - R0
-inline dv difference(dv a, dv q, double R0, double inverse) {
+static inline dv difference(dv a, dv q, double R0, double inverse) {
 #if ORDER == 0
     dv numerator = fma((dv)(-2 * R0), a, q);
     return numerator / (sqrt(fma((dv)R0, (dv)R0, numerator)) + (dv)R0);
@@ -42,7 +42,7 @@ inline dv difference(dv a, dv q, double R0, double inverse) {
 }
 
 // -1 in lanes whose point lies inside the range window of pulse p, else 0; decided in pairs, whatever the rest is done in
-inline lv in_window(__global const double *restrict pulse, size_t n, size_t p, pair delta) {
+static inline lv in_window(__global const double *restrict pulse, size_t n, size_t p, pair delta) {
     int spread = 1;
     dv sign = delta.hi < 0 ? (dv)1 : (dv)-1;
     pair room = pair_add(make_pair(PULSE(P_LIMIT), PULSE(P_LIMIT_LOW)), make_pair(sign * delta.hi, sign * delta.lo));

@@ -42,7 +42,7 @@ enum { V_X, V_Y, V_Z, V_RANGE, V_SHIFT, V_BASE };               // of a point
 enum { O_OFFSET, O_START };                                     // of an element, over times
 enum { P_X, P_Y, P_Z, P_KAPPA, P_BETA, P_START };               // of an element, over points
 
-inline void unit_circle(wv cycles, rv *sine, rv *cosine) {
+static inline void unit_circle(wv cycles, rv *sine, rv *cosine) {
 #if DOUBLE
     wv rest = cycles - rint(cycles);
     *sine = sinpi(rest + rest);
@@ -54,7 +54,7 @@ inline void unit_circle(wv cycles, rv *sine, rv *cosine) {
 }
 
 // Tables are [tile][element][re, im][width]: what a work-item of `add` reads lies together.
-inline size_t entry(int i, int k, int n, int width) {
+static inline size_t entry(int i, int k, int n, int width) {
     size_t at = (size_t)i * VW;
     return (at / width * n + k) * 2 * width + at % width;
 }
@@ -107,7 +107,7 @@ __kernel void paths(__global const stored *restrict entries, int step, __global 
 }
 
 // sum + error += x
-inline void add_to(rv *sum, rv *error, rv x) {
+static inline void add_to(rv *sum, rv *error, rv x) {
     rv s = *sum + x, t = s - *sum;
     *error += (*sum - (s - t)) + (x - t);
     *sum = s;

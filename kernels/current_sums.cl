@@ -22,12 +22,12 @@
 #define TILE 32   // cells whose paths are kept for all blocks of frequencies
 
 // D of a cell
-inline fv longer(fv x, fv y, fv z, fv inverse, float4 cell) {
+static inline fv longer(fv x, fv y, fv z, fv inverse, float4 cell) {
     fv m = fma(x, (fv)cell.x, fma(y, (fv)cell.y, fma(z, (fv)cell.z, (fv)(-cell.w) * inverse)));
     return (fv)(-2.0f) * m / ((fv)1.0f + sqrt(fmax(fma((fv)(-2.0f) * m, inverse, (fv)1.0f), (fv)0.0f)));
 }
 
-inline void wave(fv cycles, fv *re, fv *im) {
+static inline void wave(fv cycles, fv *re, fv *im) {
     fv s;
     sincos_cycles(cycles - nearest(cycles), &s, re);
     *im = -s;

@@ -35,7 +35,7 @@ __kernel void incident(__global float *restrict field, __global const int *restr
     enter(first + (int)get_global_id(0), field, at, from, rest, amount, u + u_at, n_points, quiet_below, quiet_above);
 }
 
-inline float sum_lanes(lanes v) {
+static inline float sum_lanes(lanes v) {
 #if LANES == 1
     return v;
 #else

@@ -32,8 +32,8 @@
 #include "fdtd_lists.clh"
 
 // The step of the layers in one vector. memory points to psi_b, `size` floats before psi_c.
-inline void absorb(__global float *memory, int size, lanes beta, lanes gamma, lanes d_c, lanes d_b, lanes *curl_b,
-                   lanes *curl_c) {
+static inline void absorb(__global float *memory, int size, lanes beta, lanes gamma, lanes d_c, lanes d_b, lanes *curl_b,
+                          lanes *curl_c) {
     lanes psi_b = fma(gamma, d_c, beta * LOAD_LANES(memory)), psi_c = fma(gamma, d_b, beta * LOAD_LANES(memory + size));
     STORE_LANES(psi_b, memory);
     STORE_LANES(psi_c, memory + size);
@@ -42,11 +42,11 @@ inline void absorb(__global float *memory, int size, lanes beta, lanes gamma, la
 }
 
 // Number of a layer, from place p among n: -1 between the layers.
-inline int layer_of(int p, int n, int thick) { return p < thick ? p : p >= n - thick ? p - n + 2 * thick : -1; }
+static inline int layer_of(int p, int n, int thick) { return p < thick ? p : p >= n - thick ? p - n + 2 * thick : -1; }
 
 // First vector of a row that the wave has reached, and the first one after these; the front is `ahead` cells away along the
 // direction of the wave from the first cell of the row.
-inline int2 reached(float ahead, float along_z, int n_vectors) {
+static inline int2 reached(float ahead, float along_z, int n_vectors) {
     int block = (int)floor(clamp(ahead / along_z, -16.0f, 1e6f) / 16), vectors = 16 / LANES;
     return along_z > 0 ? (int2)(0, min((block + 1) * vectors, n_vectors)) : (int2)(max(block, 0) * vectors, n_vectors);
 }

@@ -41,21 +41,21 @@ typedef float16 taps_v;
 #define STRIDE (TILE + TAPS - 2 + PAIRS)
 
 // Samples first ... last of a line whose position on one axis, middle + n step, may lie in [low, high].
-inline void clip(float low, float high, float middle, float step, int *first, int *last) {
+static inline void clip(float low, float high, float middle, float step, int *first, int *last) {
     float slope = step == 0 ? 1e-30f : step, a = (low - middle) / slope, b = (high - middle) / slope;
     *first = max(*first, (int)floor(clamp(fmin(a, b), -1e9f, 1e9f)));
     *last = min(*last, (int)ceil(clamp(fmax(a, b), -1e9f, 1e9f)));
 }
 
 // Periods of m cells in which a line's samples first ... last may meet [low, high].
-inline void periods(float low, float high, float middle, float step, int m, int first, int last, int *from, int *to) {
+static inline void periods(float low, float high, float middle, float step, int m, int first, int last, int *from, int *to) {
     float a = fma((float)first, step, middle), b = fma((float)last, step, middle);
     *from = (int)ceil((fmin(a, b) - high) / m - 1e-3f);
     *to = (int)floor((fmax(a, b) - low) / m + 1e-3f);
 }
 
 // First tap of sample n on one axis, counted from the row's whole cell, and where it lies between taps.
-inline int first_cell(float n, float rest, float high, float low, float *z) {
+static inline int first_cell(float n, float rest, float high, float low, float *z) {
     float whole = n * high, cell = floor(whole), position = (whole - cell) + fma(n, low, rest), more = floor(position);
     *z = position - more - 0.5f;
     return (int)cell + (int)more - TAPS / 2 + 1;

@@ -20,7 +20,7 @@
 
 #define DEPTH 12
 
-inline int any_bits(int8 m, int8 value) {
+static inline int any_bits(int8 m, int8 value) {
     int8 b = m & value;
     int4 c = b.lo | b.hi;
     return c.s0 | c.s1 | c.s2 | c.s3;
@@ -29,7 +29,7 @@ inline int any_bits(int8 m, int8 value) {
 #define BITS ((int8)(1, 2, 4, 8, 16, 32, 64, 128))
 
 // children of a node whose boxes, a little enlarged on the host, the ray touches
-inline int touched(__global const float *node, float3 p, float3 inverse) {
+static inline int touched(__global const float *node, float3 p, float3 inverse) {
     float8 ax = (vload8(0, node) - p.x) * inverse.x, bx = (vload8(3, node) - p.x) * inverse.x;
     float8 ay = (vload8(1, node) - p.y) * inverse.y, by = (vload8(4, node) - p.y) * inverse.y;
     float8 az = (vload8(2, node) - p.z) * inverse.z, bz = (vload8(5, node) - p.z) * inverse.z;
@@ -39,7 +39,7 @@ inline int touched(__global const float *node, float3 p, float3 inverse) {
 }
 
 // does any of eight facets cross the line from p along d, before the eye?
-inline int crossed(__global const float *leaf, float3 p, float3 d, int z, float shrink) {
+static inline int crossed(__global const float *leaf, float3 p, float3 d, int z, float shrink) {
     int x = z == 2 ? 0 : z + 1, y = x == 2 ? 0 : x + 1;
     float px = x == 0 ? p.x : x == 1 ? p.y : p.z, py = y == 0 ? p.x : y == 1 ? p.y : p.z;
     float pz = z == 0 ? p.x : z == 1 ? p.y : p.z, dx = x == 0 ? d.x : x == 1 ? d.y : d.z;
@@ -55,8 +55,8 @@ inline int crossed(__global const float *leaf, float3 p, float3 d, int z, float 
     return any_bits(inside & ahead, (int8)(1));
 }
 
-inline int blocked(__global const float *leaf, __global const float *node, __constant const int *base, int depth,
-                   float3 p, float3 eye, float shrink) {
+static inline int blocked(__global const float *leaf, __global const float *node, __constant const int *base, int depth,
+                          float3 p, float3 eye, float shrink) {
     float3 d = (eye - p) * shrink, size = fabs(d);
     int z = size.x >= size.y && size.x >= size.z ? 0 : size.y >= size.z ? 1 : 2;
     // a ray along a wall of boxes: large, not infinite, so that zero times it is zero

@@ -36,7 +36,7 @@
 #define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
 #define BRIGHT 2
 
-inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
+static inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
     STORE(scale * a.re, 2 * channel, out);
     STORE(scale * a.im, 2 * channel + 1, out);
 }

@@ -23,7 +23,7 @@
 #define NONE -1e30f
 
 // number of the interval of increasing values that v lies in, 0 ... n - 2; `guess` is near it
-inline int interval_of(__global const float *value, int n, float v, float guess) {
+static inline int interval_of(__global const float *value, int n, float v, float guess) {
     int i = clamp((int)guess, 0, n - 2);
     while (i > 0 && value[i] > v) i--;
     while (i < n - 2 && value[i + 1] <= v) i++;
@@ -31,7 +31,7 @@ inline int interval_of(__global const float *value, int n, float v, float guess)
 }
 
 // a/b, the same on every device: OpenCL allows its division some rounding
-inline float ratio(float a, float b) {
+static inline float ratio(float a, float b) {
     float q = a / b;
     return q + fma(-q, b, a) / b;
 }
@@ -43,7 +43,7 @@ typedef struct {
     float per_across, ref, eye, eye_z;
 } Grid;
 
-inline float zeta(Grid g, float height, float at) { return height + (height - g.eye_z) * ratio(g.ref - at, at - g.eye); }
+static inline float zeta(Grid g, float height, float at) { return height + (height - g.eye_z) * ratio(g.ref - at, at - g.eye); }
 
 // Where a line of sight meets an edge of the terrain: height low + u (high - low) at along + u wide, u = share/whole.
 // No division: whole > 0, and there is nothing to meet unless 0 <= share <= whole.
@@ -51,15 +51,15 @@ typedef struct {
     float low, high, share, whole;
 } Edge;
 
-inline Edge edge_of(float low, float high, float share, float whole) {
+static inline Edge edge_of(float low, float high, float share, float whole) {
     Edge e = {low, high, whole < 0 ? -share : share, fabs(whole)};
     return e;
 }
 
-inline int met(Edge e) { return e.share >= 0 && e.share <= e.whole && e.whole > 0; }
+static inline int met(Edge e) { return e.share >= 0 && e.share <= e.whole && e.whole > 0; }
 
 // column i, `at` across
-inline Edge column_edge(Grid g, int i, float at) {
+static inline Edge column_edge(Grid g, int i, float at) {
     int r = interval_of(g.across, g.n_across, at, (at - g.across[0]) * g.per_across);
     __global const float *z = g.z + (size_t)r * g.n_along + i;
     return edge_of(z[0], z[g.n_along], at - g.across[r], g.across[r + 1] - g.across[r]);
@@ -67,7 +67,7 @@ inline Edge column_edge(Grid g, int i, float at) {
 
 // between columns i and i + 1, of a line that passes `from` across at the first and `rise` more at the second: the diagonals
 // of the cells at both ends, k = 0 and 1, and the grid line between them, k = 2
-inline Edge gap_edge(Grid g, int i, float from, float rise, int ra, int rb, int k) {
+static inline Edge gap_edge(Grid g, int i, float from, float rise, int ra, int rb, int k) {
     int r = k == 0 ? ra : k == 1 ? rb : max(ra, rb);
     float there = g.across[r];
     __global const float *z = g.z + (size_t)r * g.n_along + i;
@@ -105,7 +105,7 @@ __kernel void sweep(__global const float *restrict z, __global const float *rest
 }
 
 // does the terrain rise above the line from (x, y, z) between columns i and i + 1, on the eye's side of x?
-inline int gap_above(Grid g, int i, float x, float y, float z, float slope, float climb, int step) {
+static inline int gap_above(Grid g, int i, float x, float y, float z, float slope, float climb, int step) {
     if (i < 0 || i > g.n_along - 2) return 0;
     float a = g.along[i], wide = g.along[i + 1] - a, from = y + slope * (a - x), rise = slope * wide;
     float here = z + climb * (a - x), more = climb * wide, back = (a - x) * step, past = (a - g.eye) * step;
@@ -121,9 +121,9 @@ inline int gap_above(Grid g, int i, float x, float y, float z, float slope, floa
     return 0;
 }
 
-inline int behind(float3 p, float3 eye, __global const float *grid_x, __global const float *grid_y,
-                  __global const float *z_rows, __global const float *z_columns, int nx, int ny, float per_x, float per_y,
-                  __global const float *number, __global const int *whole, __global const float *table) {
+static inline int behind(float3 p, float3 eye, __global const float *grid_x, __global const float *grid_y,
+                         __global const float *z_rows, __global const float *z_columns, int nx, int ny, float per_x, float per_y,
+                         __global const float *number, __global const int *whole, __global const float *table) {
     int transposed = fabs(p.y - eye.y) * per_y > fabs(p.x - eye.x) * per_x;
     float x = transposed ? p.y : p.x, y = transposed ? p.x : p.y, ex = transposed ? eye.y : eye.x, ey = transposed ? eye.x : eye.y;
     int s = 2 * transposed + (x < ex);

@@ -16,7 +16,7 @@
 #include "range_phase.clh"
 #include "line_geometry.clh"
 
-inline void put_direction(__global float *records, int first, int low, point d, wv r) {
+static inline void put_direction(__global float *records, int first, int low, point d, wv r) {
     fv R0 = w_float(r);
     // an antenna on the reference point has no direction: any will do, R0 = 0 says so
     wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
@@ -102,7 +102,7 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
 }
 
 // A column's step (0) or a row's (1), m.
-inline point load_step(__global const float *axes, int which) {
+static inline point load_step(__global const float *axes, int which) {
     point step;
     step.x = w_load1(axes, 3 * which, 6);
     step.y = w_load1(axes, 3 * which + 1, 6);
@@ -111,7 +111,7 @@ inline point load_step(__global const float *axes, int which) {
 }
 
 // Projections of the direction to an antenna on the steps of columns and rows, in wide numbers.
-inline void project(__global float *out, int first, point d, wv r, __global const float *axes, wv *along_x, wv *along_y) {
+static inline void project(__global float *out, int first, point d, wv r, __global const float *axes, wv *along_x, wv *along_y) {
     fv R0 = w_float(r);
     wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
     *along_x = w_mul(w_dot(d, load_step(axes, 0)), inverse);
@@ -123,7 +123,7 @@ inline void project(__global float *out, int first, point d, wv r, __global cons
 }
 
 // Writes cycles less whole ones, in two parts: a multiple of 2^-14, whose products with integers up to 2^10 are exact, and the rest.
-inline void put_cycles(__global float *out, int component, wv cycles) {
+static inline void put_cycles(__global float *out, int component, wv cycles) {
     iv whole;
     fv part = w_split(cycles, &whole), high = nearest(part * 16384.0f) * (1.0f / 16384.0f);
     wv lost = w_sub(w_sub(cycles, w_make(TO_FLOAT_INT(whole), (fv)0)), w_make(part, (fv)0));  // by rounding to float

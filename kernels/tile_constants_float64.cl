@@ -10,7 +10,7 @@
 
 #include "geometry_float64.clh"
 
-inline void put_direction(__global double *records, int first, int length, point d, pair r) {
+static inline void put_direction(__global double *records, int first, int length, point d, pair r) {
     // an antenna on the reference point has no direction: any will do, R0 = 0 says so
     dv inverse = r.hi > 0 ? (dv)1 / r.hi : (dv)0;
     put(records, N_CONST, first, d.x * inverse);
@@ -23,8 +23,8 @@ inline void put_direction(__global double *records, int first, int length, point
 #if BEAM
 // Looks at a tile, a sphere of `radius` about a point at d = T - x, of length r, through the beams of VW pulses: moves
 // `state` on from what the range window says.
-inline dv beam_state(__global const double *restrict pulse, size_t n, size_t p, point d, dv r, double radius, int skip,
-                     dv state) {
+static inline dv beam_state(__global const double *restrict pulse, size_t n, size_t p, point d, dv r, double radius, int skip,
+                            dv state) {
     dv along;
     beam_edge(pulse, n, p, 0, d, r, &along);
     dv across = sqrt(fmax(fma(r, r, -along * along), (dv)0)), cosine = LOAD(p, pulse + (P_BX + 3) * (size_t)n);

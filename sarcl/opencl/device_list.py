@@ -10,8 +10,10 @@ from typing import Any
 import numpy as np
 
 from ..base.text import first_line
-from . import _after_fork, _cache_folder, _trial_record
+from . import _after_fork, _cache_folder, _queries, _trial_record
 from ._programs import quiet
+
+NOT_TRIED = "not tried"
 
 
 @dataclass(frozen=True)
@@ -24,6 +26,10 @@ class DeviceInfo:
     vector_width                  lanes per work-item: 1 on GPUs, 8 on CPUs
     memory, max_alloc             bytes of the device and of its largest buffer
     units, driver                 compute units; driver version
+    local_memory                  bytes of local memory per work-group
+    max_group                     most work-items of a work-group; a kernel may allow fewer (Device.max_group)
+    warp                          work-items that run in step: a warp of NVIDIA, a wave of AMD; 1 on CPUs
+    fast_fp64                     fp64, and a float64 operation takes at most 6 times as long as one in float32
     """
 
     index: int
@@ -38,6 +44,10 @@ class DeviceInfo:
     max_alloc: int
     units: int
     driver: str
+    local_memory: int
+    max_group: int
+    warp: int
+    fast_fp64: bool
 
 
 def devices() -> tuple[DeviceInfo, ...]:
@@ -66,35 +76,12 @@ def listed() -> tuple[tuple[DeviceInfo, Any], ...]:
 
 @functools.cache
 def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
-    import pyopencl
-
-    try:
-        platforms = pyopencl.get_platforms()
-    except pyopencl.Error:  # the loader finds no platform
-        return ()
-    kinds = {pyopencl.device_type.GPU: "gpu", pyopencl.device_type.CPU: "cpu"}
     found: list[tuple[DeviceInfo, Any]] = []
-    for platform in platforms:
-        try:
-            handles = platform.get_devices()
-        except pyopencl.Error:
-            continue
+    for platform, _, handles in _queries.platforms():
         for handle in handles:
-            kind = next((name for flag, name in kinds.items() if handle.type & flag), "accelerator")
-            info = DeviceInfo(
-                index=len(found),
-                platform=platform.name.strip(),
-                name=handle.name.strip(),
-                kind=kind,
-                works=False,
-                why="not tried",
-                fp64=False,
-                vector_width=8 if kind == "cpu" else 1,
-                memory=handle.global_mem_size,
-                max_alloc=handle.max_mem_alloc_size,
-                units=handle.max_compute_units,
-                driver=handle.driver_version.strip(),
-            )
+            facts = _queries.facts(handle)._asdict()
+            facts["why"] = facts["why"] or NOT_TRIED
+            info = DeviceInfo(index=len(found), platform=platform, works=False, fp64=False, fast_fp64=False, **facts)
             found.append((info, handle))
     return tuple(found)
 
@@ -103,22 +90,25 @@ def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
 def tried(index: int) -> DeviceInfo:
     """Device `index` with the result of its trial: the recorded one, or that of a trial now."""
     info, handle = listed()[index]
+    if info.why != NOT_TRIED:
+        return info
     fp64 = _trial_record.find(key := _key(info, handle))
     if fp64 is None:
         why = _trial(handle, np.float32)
         if why:
             return replace(info, why=why)
-        offered = bool(handle.double_fp_config)
+        offered = bool(_queries.asked(handle, "double_fp_config"))
         fp64 = offered and not _trial(handle, np.float64)
         if fp64 == offered:  # a trial in float64 may have failed by chance: the next process repeats it
             _trial_record.keep(key, fp64)
-    return replace(info, works=True, why="", fp64=fp64)
+    return replace(info, works=True, why="", fp64=fp64, fast_fp64=fp64 and info.kind == "cpu")
 
 
 def _key(info: DeviceInfo, handle: Any) -> str:
     """What the result of a trial depends on: the device, both versions and the kernel of the trial."""
     kernel = hashlib.sha256(_TRIAL.encode()).hexdigest()[:16]
-    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {handle.platform.version}, trial {kernel}"
+    version = _queries.text_of(_queries.asked(handle, "platform"), "version")
+    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {version}, trial {kernel}"
 
 
 _TRIAL = """

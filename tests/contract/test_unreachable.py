@@ -345,6 +345,7 @@ MAY_CATCH = {
     "bench/_wait_idle.py": "/proc/stat of a system that has none",
     "base/validation.py": "what numpy, float and int say of input",
     "opencl/_trial_record.py": "text that is no JSON",
+    "opencl/_queries.py": "a driver that refuses a question, however it does so",
     "opencl/device_list.py": "a driver's trial: whatever it raises, the device does not work",
     "cli/parser.py": "text of a command line; the last resort of a program",
     "simulation/echo_output.py": "numpy's sizes that overflow",

@@ -151,7 +151,8 @@ def test_the_record_lies_in_the_cache_folder_of_the_user_and_nowhere_else(monkey
 
 def two_devices(monkeypatch, works):
     """A graphics card and a processor, of which those in `works` work; opened, a device is its index."""
-    common = dict(works=False, why="not tried", fp64=False, vector_width=1, memory=1, max_alloc=1, units=4, driver="1")
+    common = dict(works=False, why="not tried", fp64=False, vector_width=1, memory=1, max_alloc=1, units=4, driver="1",
+                  local_memory=1, max_group=1, warp=1, fast_fp64=False)  # fmt: skip
     platform = SimpleNamespace(version="1")
     infos = [
         DeviceInfo(index=i, platform="P", name=f"{k} of P", kind=k, **common) for i, k in enumerate(("gpu", "cpu"))
