@@ -1,4 +1,4 @@
-"""Drivers that refuse questions or give answers that cannot be true: their devices are passed over, the rest is used."""
+"""Drivers that refuse questions, or whose answers cannot be true: their devices are passed over, the rest is used."""
 
 from types import SimpleNamespace
 
@@ -16,7 +16,7 @@ NEEDED = ("global_mem_size", "max_mem_alloc_size")
 
 
 class OddHandle:
-    """The handle of a working device, whose driver refuses the questions in `refused`, and gives `answers` to others."""
+    """The handle of a working device, whose driver refuses questions and gives `answers` to others."""
 
     def __init__(self, handle, refused=(), **answers):
         self._handle, self._refused, self._answers = handle, refused, answers
