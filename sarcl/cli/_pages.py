@@ -17,7 +17,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     from ..experiments.fda import experiment
     from ..experiments.fda import page as fda_page
     from ..experiments.fda.file import load
-    from ..experiments.fda.text import conclusion, setting, verdicts
+    from ..experiments.fda.text import conclusion, rule, setting, verdicts
     from ..figures import plots
     from ..opencl.choose_device import open_device
 
@@ -42,6 +42,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
             job.say(f"  {verdict}")
     for line in conclusion(results):
         job.say(line)
+    job.say(f"Two points are resolved where the image has {rule()}.")
     job.say(f"wrote {output} and {numbers}")
     return 0
 

@@ -416,5 +416,5 @@ def test_arrays_of_more_than_a_hundred_elements(tmp_path):
     row, last = rows_of(large)["N 450, 2 MHz: two points resolved"], apparent["dips"][-1]
     assert apparent["told_apart"] is None and row["value"] == [None, 0.3] and not row["holds"]
     assert last["separation"] == 0.3 and last["dip_db"] > 20 and last["shift"] > 0.1 and last["false_db"] > -3
-    assert row["measured"].startswith("at no separation tried") and "0.133 m from their points" in row["why"]
+    assert row["measured"].startswith("at no separation tried") and "displaced by 0.133 m" in row["why"]
     assert large["finished"] and not large["quick"]

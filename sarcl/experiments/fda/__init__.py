@@ -17,7 +17,19 @@ For this folder alone:
 
 from ._sweep import sweep
 from .case import Case
-from .experiment import CONVENTIONAL, collected, cut, dip, measure, pair, response, run, spatial_frequencies, told_apart
+from .experiment import (
+    CONVENTIONAL,
+    collected,
+    cut,
+    dip,
+    is_resolved,
+    measure,
+    pair,
+    response,
+    run,
+    spatial_frequencies,
+    told_apart,
+)
 
 __all__ = [
     "CONVENTIONAL",
@@ -28,6 +40,7 @@ __all__ = [
     "dip",
     "experiment",
     "file",
+    "is_resolved",
     "measure",
     "page",
     "pair",

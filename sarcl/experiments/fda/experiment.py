@@ -21,14 +21,28 @@ from ...opencl.device import DeviceChoice
 from ._sweep import sweep
 from .case import RAW, REACH, Case
 
-__all__ = ["CONVENTIONAL", "RAW", "Case", "cut", "dip", "measure", "response", "run", "sweep", "told_apart"]
+__all__ = [
+    "CONVENTIONAL",
+    "RAW",
+    "Case",
+    "cut",
+    "dip",
+    "is_resolved",
+    "measure",
+    "pair",
+    "response",
+    "run",
+    "sweep",
+    "told_apart",
+]
 
 CONVENTIONAL = "conventional"
 STEPS = 24  # samples of a cut per null of the conventional antenna
 DRAWN = 2000  # spatial frequencies that are kept, for plots
-RESOLVED = 3.0  # dB, dip between two points that are resolved
+RESOLVED = 3.0  # dB: least dip between two points that are resolved, and of other peaks below the lower of the two
 ALIKE = 0.2  # dB; dips that differ by less count as equal
 NEAR = 0.25  # of the null: distance from two points within which their peaks must lie
+WEAK = -6.0  # dB of a unit point in focus: a weaker peak is a side lobe, or of a smeared point
 
 
 def run(
@@ -49,9 +63,10 @@ def run(
 
 
 def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
-    """Responses of every point, dips at every separation and spatial frequencies, for every mapping that applies.
+    """Responses of every point, pairs at every separation and spatial frequencies, for every mapping that applies.
 
-    "not_applicable" holds the other mappings, with the reason; "collected" the spatial frequencies of the channels.
+    "not_applicable" holds the other mappings, with the reason; "collected" the spatial frequencies of the channels;
+    "resolved_if" the limits of what `pair` measures within which two points are resolved (`is_resolved`).
     """
     rows: dict[str, dict[str, Any]] = {}
     refused: dict[str, str] = {}
@@ -65,13 +80,15 @@ def measure(case: Case, device: DeviceChoice | None = None) -> dict[str, Any]:
     for separation in case.separations:
         for name, raw in _mapped(case, [-separation / 2, separation / 2], refused, device):
             at, values = cut(raw, case, 0.0, device)
-            rows[name]["dips"].append({"separation": separation, **pair(at, values, separation)})
+            found = pair(at, values, separation)
+            rows[name]["dips"].append({"separation": separation, **found, "resolved": is_resolved(found, case.null)})
     for row in rows.values():
         row["told_apart"] = told_apart(row["dips"], case.null)
     setting = {name: getattr(case, name) for name in Case.__dataclass_fields__}
     derived = {"bandwidth": case.bandwidth, "middle": case.middle, "spacing": case.step, "null": case.null}
+    limits = {"dip_db": RESOLVED, "shift": NEAR * case.null, "false_db": -RESOLVED, "level_db": WEAK}
     more = {"swept": dict(case.swept), "is_wide": case.is_wide, "not_applicable": refused, "collected": collected(case)}
-    return {**setting, **derived, **more, "mapped": rows}
+    return {**setting, **derived, "resolved_if": limits, **more, "mapped": rows}
 
 
 def _mapped(
@@ -158,37 +175,69 @@ def _crossing(x: np.ndarray, power: np.ndarray, i: int, side: int) -> float:
 
 def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
     """How far the image falls between two points, dB below the lower of their peaks; 0 where there is only one peak."""
-    return pair(at, values, separation)["dip_db"]
+    return float(pair(at, values, separation)["dip_db"])
 
 
-def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, float]:
-    """Two points about 0: the `dip`, dB; shift, the larger distance of their peaks from the points, m; false_db, the
-    highest other peak relative to the lower of the two, dB. Zeros where there is only one peak."""
+def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, Any]:
+    """What a cut, m (n,) and amplitudes of a unit point (n,), shows of two points `separation` m apart about 0.
+
+    dip_db    the `dip`, dB;  level_db  the lower of the two peaks, dB
+    shift     larger distance of the two peaks from their points, m
+    false_db  highest other peak relative to the lower of the two, dB
+    peaks     positions, m, of all peaks that are at most 3 dB below the lower of the two
+
+    Where there are not two peaks, one on each side and nearer to its point than the other point is, dip_db is 0, shift
+    and false_db are None, and level_db and peaks refer to the highest value. An end of the cut counts as a peak where
+    the level rises towards it.
+    """
+    around = np.concatenate([[-1.0], values, [-1.0]])
+    peaks = np.flatnonzero((values > around[:-2]) & (values >= around[2:]))
     found = []
     for side in (-1, 1):
         near = np.flatnonzero((side * at >= separation / 8) & (side * at <= separation))
         peak = int(near[values[near].argmax()])
         if peak in (near[0], near[-1]):  # no peak: the level only rises, towards the middle or outwards
-            return {"dip_db": 0.0, "shift": 0.0, "false_db": 0.0}
+            break
         found.append(peak)
-    lower, between = float(values[found].min()), float(values[found[0] : found[1] + 1].min())
-    peaks = np.flatnonzero((values[1:-1] > values[:-2]) & (values[1:-1] > values[2:])) + 1
-    others = values[np.setdiff1d(peaks, found)].max(initial=1e-6 * lower)
-    return {
-        "dip_db": float(20 * np.log10(lower / max(between, 1e-6 * lower))),
-        "shift": max(abs(_vertex(at, values, i) - s * separation / 2) for i, s in zip(found, (-1, 1), strict=True)),
-        "false_db": float(20 * np.log10(others / lower)),
+    two = len(found) == 2
+    lower = max(float(values[found].min() if two else values.max()), 1e-300)
+    out: dict[str, Any] = {
+        "dip_db": 0.0,
+        "shift": None,
+        "false_db": None,
+        "level_db": float(20 * np.log10(lower)),
+        "peaks": [_vertex(at, values, int(i)) for i in peaks[values[peaks] >= lower * 10 ** (-RESOLVED / 20)]],
     }
+    if two:
+        between = float(values[found[0] : found[1] + 1].min())
+        others = values[np.setdiff1d(peaks, found)].max(initial=1e-6 * lower)
+        points = -separation / 2, separation / 2
+        out["dip_db"] = float(20 * np.log10(lower / max(between, 1e-6 * lower)))
+        out["shift"] = max(abs(_vertex(at, values, i) - x) for i, x in zip(found, points, strict=True))
+        out["false_db"] = float(20 * np.log10(others / lower))
+    return out
 
 
-def told_apart(dips: Sequence[Mapping[str, float]], null: float, least: float = RESOLVED) -> float | None:
-    """The smallest separation, m, from which on two points are resolved; None: not even at the largest.
+def is_resolved(found: Mapping[str, Any], null: float, least: float = RESOLVED) -> bool:
+    """Whether a cut shows two points resolved: as many peaks as points, each in its place.
 
-    Resolved: a dip of `least` dB, peaks within a quarter of `null`, m, of the points, no other peak within 3 dB.
+    There is a dip of `least` dB between two peaks, each within a quarter of `null`, m, of its point and at most 6 dB
+    below a unit point in focus, and every other peak is 3 dB or more below the lower of the two. found: from `pair`
     """
+    return bool(
+        found["dip_db"] >= least
+        and found["shift"] <= NEAR * null
+        and found["false_db"] <= -RESOLVED
+        and found["level_db"] >= WEAK
+    )
+
+
+def told_apart(dips: Sequence[Mapping[str, Any]], null: float, least: float = RESOLVED) -> float | None:
+    """The smallest separation, m, from which on two points are resolved at all that were tried; None: not even at the
+    largest. dips: from `pair`, with "separation"; null, m, and least: as for `is_resolved`."""
     out = None
     for row in sorted(dips, key=lambda d: -d["separation"]):
-        if row["dip_db"] < least or row["shift"] > NEAR * null or row["false_db"] > -RESOLVED:
+        if not is_resolved(row, null, least):
             break
         out = row["separation"]
     return out

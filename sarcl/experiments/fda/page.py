@@ -8,8 +8,8 @@ from typing import Any
 from ...figures.html import Block, heading, page, plot, table, terms, words
 from ...figures.html import listed as bullets
 from . import _trends
-from .experiment import CONVENTIONAL, NEAR, RESOLVED
-from .text import conclusion, setting, verdicts
+from .experiment import CONVENTIONAL, RESOLVED
+from .text import conclusion, decibels, rule, setting, verdicts
 
 __all__ = ["html", "section", "setting", "verdicts"]
 
@@ -29,9 +29,9 @@ TERMS = (
     ("PSLR, ISLR", "Highest side lobe over the peak (peak side-lobe ratio), and energy of all side lobes over that of "
      "the main lobe (integrated side-lobe ratio), dB."),
     ("dip", "How far the image of two equal points falls between their peaks, dB below the lower peak."),
-    ("resolved", f"Two points are resolved where the dip is {RESOLVED:g} dB or more, both peaks lie within "
-     f"{NEAR:g} times the null of their points, and every other peak is {RESOLVED:g} dB or more below the lower of the "
-     "two; the same must hold at every larger separation tried."),
+    ("resolved", f"Two points are resolved where the image has {rule()}. Peaks are those of the cut across, through "
+     "both points. A separation from which on they are resolved is one of those tried; the same holds at every larger "
+     "one that was tried."),
     ("spatial frequencies", "f/c times the sum of the unit vectors from the scene's centre to the transmitter and to "
      "the receiver, in cycles/m. Their spread across sets the resolution across. Collected: those of the echoes. "
      "Implied: those of the positions from which the echoes are focused."),
@@ -80,7 +80,7 @@ def section(result: Result, level: int = 2) -> list[Block]:
         heading(result["name"], level),
         words(setting(result)),
         bullets(verdicts(result)),
-        plot(dips, "separation, m", "dip, dB", "Dip between two points against their separation, up to 40 dB."),
+        plot(dips, "separation, m", "dip, dB", _caption_of_dips(rows)),
         *_supports(result),
         table(
             ["mapping", "aperture, m", "gap, m", "spread of spatial frequencies, cycles/m", *WIDTHS],
@@ -93,17 +93,26 @@ def section(result: Result, level: int = 2) -> list[Block]:
     if len(points) > 1:
         blocks.append(table(
             ["mapping", "y, m", "error of position, m", "peak, dB", *WIDTHS],
-            [[name, f"{p['place']:g}", f"{p['error']:+.3f}", f"{p['level_db']:.1f}", *_widths(p)]
+            [[name, f"{p['place']:g}", f"{round(p['error'], 3) + 0.0:+.3f}", decibels(p["level_db"])[:-3], *_widths(p)]
              for i in range(1, len(points)) for name, row in rows.items() for p in [row["points"][i]]],
             "Points elsewhere, each focused alone.",
         ))  # fmt: skip
     blocks.append(table(
         ["mapping", *(f"{s:g} m apart" for s in separations)],
-        [[name, *(_dip(d, row["told_apart"]) for d in row["dips"])] for name, row in rows.items()],
-        "Two equal points in phase about the centre: dip between their peaks, dB. * marks a dip of "
-        f"{RESOLVED:g} dB or more between points that are not resolved all the same.",
+        [[name, *(_dip(d, result["resolved_if"]["shift"]) for d in row["dips"])] for name, row in rows.items()],
+        "Two equal points in phase about the centre: dip between their peaks, dB, and whether they are resolved; where "
+        "the dip alone would resolve them, the number of peaks, or their largest error of position, or their level. "
+        f"Resolved here: {rule(result['null'])}.",
     ))  # fmt: skip
     return blocks
+
+
+def _caption_of_dips(rows: Mapping[str, Any]) -> str:
+    text = "Dip between two points against their separation, up to 40 dB."
+    deep = {name: [f"{d['separation']:g}" for d in row["dips"] if d["dip_db"] >= RESOLVED and not d["resolved"]]
+            for name, row in rows.items()}  # fmt: skip
+    some = "; ".join(f"{name} at {', '.join(at)} m" for name, at in deep.items() if at)
+    return f"{text} Not resolved in spite of their dip: {some}." if some else text
 
 
 def _supports(result: Result) -> list[Block]:
@@ -130,6 +139,13 @@ def _widths(point: Mapping[str, float]) -> list[str]:
     return [f"{point['null']:.4f}", f"{point['irw']:.4f}", f"{point['pslr_db']:.2f}", f"{point['islr_db']:.2f}"]
 
 
-def _dip(found: Mapping[str, float], resolved_from: float | None) -> str:
-    resolved = resolved_from is not None and found["separation"] >= resolved_from
-    return f"{found['dip_db']:.1f}{'' if resolved or found['dip_db'] < RESOLVED else '*'}"
+def _dip(found: Mapping[str, Any], near: float) -> str:
+    """A dip, and whether the points are resolved; near: allowed error of position, m."""
+    text = f"{found['dip_db']:.1f}"
+    if found["resolved"]:
+        return f"{text} resolved"
+    if found["dip_db"] < RESOLVED:
+        return text
+    if len(found["peaks"]) != 2:
+        return f"{text}, {len(found['peaks'])} peaks"
+    return f"{text}, {found['shift']:.3f} m off" if found["shift"] > near else f"{text}, at {found['level_db']:.1f} dB"

@@ -7,15 +7,46 @@ from typing import Any
 
 import numpy as np
 
-from .experiment import CONVENTIONAL, NEAR, RESOLVED, nearer
+from .experiment import CONVENTIONAL, NEAR, RESOLVED, WEAK, is_resolved, nearer
 
 SAME = 0.02  # relative difference below which two widths count as equal
-WEAK = -6.0  # dB of a unit point: a weaker peak is not the main lobe of a focused point
+DISPLACED = 0.1  # of the null: smaller errors of position are not worth a sentence
 RECEIVERS = {
     "reference": "One receiver, at the reference element.",
     "own": "Every element receives its own channel.",
     "all": "Every element receives every channel; the channels are kept separate.",
 }
+
+
+def rule(null: float | None = None) -> str:
+    """What two points that are resolved are, with its tolerances; null: of the conventional antenna, m."""
+    place = f"{NEAR:g} times the conventional antenna's null" if null is None else f"{NEAR * null:.3f} m"
+    return (
+        f"as many peaks as points: a dip of {RESOLVED:g} dB or more between two peaks, each within {place} of its "
+        f"point and at most {-WEAK:g} dB below a unit point in focus, and every other peak {RESOLVED:g} dB or more "
+        "below the lower of the two"
+    )
+
+
+def unresolved(found: Mapping[str, Any], null: float) -> list[str]:
+    """Every reason why a pair of points (`fda.pair`) is not resolved, in words; empty where it is.
+
+    null: of the conventional antenna, m
+    """
+    count = f"{len(found['peaks'])} peak{'s' if len(found['peaks']) > 1 else ''}"
+    where = f"{count} within {RESOLVED:g} dB for 2 points, at {', '.join(f'{x:+.3f}' for x in found['peaks'])} m"
+    if found["shift"] is None:
+        return [where if len(found["peaks"]) > 1 else "1 peak for 2 points"]
+    out = []
+    if found["dip_db"] < RESOLVED:
+        out.append(f"the dip is {found['dip_db']:.1f} dB ({RESOLVED:g} dB are needed)")
+    if found["shift"] > NEAR * null:
+        out.append(f"a peak is displaced by {found['shift']:.3f} m ({NEAR * null:.3f} m are allowed)")
+    if found["false_db"] > -RESOLVED:
+        out.append(f"another peak reaches {decibels(found['false_db'])} of the lower of the two: {where}")
+    if found["level_db"] < WEAK:
+        out.append(f"the lower peak is at {decibels(found['level_db'])} ({WEAK:g} dB are needed)")
+    return out
 
 
 def conclusion(results: Sequence[Mapping[str, Any]]) -> list[str]:
@@ -147,7 +178,7 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
             "end of the cut."
         )
     narrower = 1 - first["null"] / usual["null"]
-    change = "as far from the peak as" if abs(narrower) < SAME else (
+    change = f"as far from the peak, to {100 * SAME:g} %, as" if abs(narrower) < SAME else (
         f"{100 * abs(narrower):.0f} % {'closer to the peak than' if narrower > 0 else 'farther from the peak than'}"
     )  # fmt: skip
     text = (
@@ -159,7 +190,7 @@ def _verdict(row: Mapping[str, Any], plain: Mapping[str, Any], null: float) -> s
     if first["level_db"] < WEAK:
         text += " So weak a peak is smeared, or its main lobe is not on this cut."
     worst_point = max(row["points"], key=lambda p: abs(p["error"]))
-    if abs(worst_point["error"]) > 0.1 * usual["null"]:
+    if abs(worst_point["error"]) > DISPLACED * usual["null"]:
         text += f" The point at {worst_point['place']:g} m is displaced by {worst_point['error']:+.3f} m."
     else:
         text += f" No point is displaced along its cut by more than {at_most(worst_point['error'])} m."
@@ -182,21 +213,20 @@ def _apart(row: Mapping[str, Any]) -> str:
     least = row["told_apart"]
     if least is None:
         return "at no separation tried"
-    last = least == max(d["separation"] for d in row["dips"])
-    return f"at {least:g} m, the largest separation tried" if last else f"from {least:g} m on"
+    largest = max(d["separation"] for d in row["dips"])
+    if least == largest:
+        return f"at {least:g} m, the largest separation tried"
+    return f"at all separations tried from {least:g} m to {largest:g} m"
 
 
 def _spoiled(row: Mapping[str, Any], null: float) -> str:
-    """Why a dip of enough decibels does not resolve two points: the first such dip."""
-    dips: Sequence[Mapping[str, float]] = row["dips"]
-    for found in dips:
-        resolved = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
-        if found["dip_db"] < RESOLVED or resolved:
+    """Why a dip of enough decibels does not resolve two points: all reasons, of the first such dip."""
+    for found in row["dips"]:
+        counted = row["told_apart"] is not None and found["separation"] >= row["told_apart"]
+        if found["dip_db"] < RESOLVED or counted:
             continue
-        start = f" At {found['separation']:g} m there is a dip of {found['dip_db']:.1f} dB, but "
-        if found["false_db"] > -RESOLVED:
-            return f"{start}another peak reaches {decibels(found['false_db'])} of the lower of the two peaks."
-        if found["shift"] > null * NEAR:
-            return f"{start}a peak is displaced by {found['shift']:.3f} m."
-        return f"{start}the points are not resolved at a larger separation."
+        why = ["the points are not resolved at a larger separation"]
+        if not is_resolved(found, null):
+            why = unresolved(found, null)
+        return f" At {found['separation']:g} m there is a dip of {found['dip_db']:.1f} dB, but {'; '.join(why)}."
     return ""

@@ -3,18 +3,16 @@
 from __future__ import annotations
 
 from dataclasses import replace
+from typing import Any
 
 from ...experiments.fda import experiment, page
+from ...experiments.fda.text import rule, unresolved
 from ..paper import Section
 from ._lab import Lab, system
 
 PLACES = (0.0, 2.0, 2.25)  # m across
 SEPARATIONS = (0.125, 0.2, 0.25, 0.3)  # m
 MAPPINGS = ("corrected", "apparent", "channels")
-RULE = (
-    f"as many peaks as points, a dip of {experiment.RESOLVED:g} dB between them, each within {experiment.NEAR:g} nulls "
-    f"of its point, every other peak {experiment.RESOLVED:g} dB or more below the lower of the two"
-)  # fmt: skip
 
 
 def section(lab: Lab) -> Section:
@@ -55,7 +53,7 @@ def section(lab: Lab) -> Section:
             f"{_from(least[0])}; conventional antenna: {_from(least[1])}",
             experiment.nearer(apparent, plain, result["null"]) == 1,
             f"{largest}. At {SEPARATIONS[0]:g} m the dip is {dips[0]:.1f} dB, conventional {dips[1]:.1f} dB", least,
-            rule="resolved at a smaller separation than by the conventional antenna. Resolved: " + RULE,
+            rule="resolved at a smaller separation than by the conventional antenna. Resolved: " + rule(result["null"]),
             cause="interpretation",
         )  # fmt: skip
         spans = [row["claimed"] for row in (own, apparent, plain)]
@@ -72,15 +70,11 @@ def section(lab: Lab) -> Section:
     return out
 
 
-def _reason(found: dict[str, float], null: float) -> str:
-    """Dip, places and other peaks of a pair of points, in words."""
+def _reason(found: dict[str, Any], null: float) -> str:
+    """Whether a pair of points is resolved, and why not, in words."""
+    why = unresolved(found, null)
     text = f"at {found['separation']:g} m the dip is {found['dip_db']:.1f} dB"
-    if not found["dip_db"]:
-        return f"{text}: one peak alone"
-    return (
-        f"{text}, the two peaks lie up to {found['shift']:.3f} m from their points ({experiment.NEAR * null:.3f} m are "
-        f"allowed), and another peak reaches {found['false_db']:+.1f} dB of the lower of the two"
-    )
+    return f"{text} and the points are {'not resolved: ' + '; '.join(why) if why else 'resolved'}"
 
 
 def _from(separation: float | None) -> str:
