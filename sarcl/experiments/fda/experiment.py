@@ -7,7 +7,7 @@ same phase centres, band and track. Array and track: case.py; quantities: docs/g
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from typing import Any, cast
+from typing import Any, TypedDict, cast
 
 import numpy as np
 
@@ -43,6 +43,22 @@ RESOLVED = 3.0  # dB: least dip between two points that are resolved, and of oth
 ALIKE = 0.2  # dB; dips that differ by less count as equal
 NEAR = 0.25  # of the null: distance from two points within which their peaks must lie
 WEAK = -6.0  # dB of a unit point in focus: a weaker peak is a side lobe, or of a smeared point
+
+
+class Pair(TypedDict):
+    """What a cut shows of two points: see `pair`."""
+
+    dip_db: float
+    shift: float | None
+    false_db: float | None
+    level_db: float
+    peaks: list[float]
+
+
+class PairApart(Pair):
+    """A `Pair`, and the distance of its points, m."""
+
+    separation: float
 
 
 def run(
@@ -178,7 +194,7 @@ def dip(at: np.ndarray, values: np.ndarray, separation: float) -> float:
     return float(pair(at, values, separation)["dip_db"])
 
 
-def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, Any]:
+def pair(at: np.ndarray, values: np.ndarray, separation: float) -> Pair:
     """What a cut, m (n,) and amplitudes of a unit point (n,), shows of two points `separation` m apart about 0.
 
     dip_db    the `dip`, dB;  level_db  the lower of the two peaks, dB
@@ -201,7 +217,7 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, Any
         found.append(peak)
     two = len(found) == 2
     lower = max(float(values[found].min() if two else values.max()), 1e-300)
-    out: dict[str, Any] = {
+    out: Pair = {
         "dip_db": 0.0,
         "shift": None,
         "false_db": None,
@@ -218,21 +234,19 @@ def pair(at: np.ndarray, values: np.ndarray, separation: float) -> dict[str, Any
     return out
 
 
-def is_resolved(found: Mapping[str, Any], null: float, least: float = RESOLVED) -> bool:
+def is_resolved(found: Pair, null: float, least: float = RESOLVED) -> bool:
     """Whether a cut shows two points resolved: as many peaks as points, each in its place.
 
     There is a dip of `least` dB between two peaks, each within a quarter of `null`, m, of its point and at most 6 dB
     below a unit point in focus, and every other peak is 3 dB or more below the lower of the two. found: from `pair`
     """
-    return bool(
-        found["dip_db"] >= least
-        and found["shift"] <= NEAR * null
-        and found["false_db"] <= -RESOLVED
-        and found["level_db"] >= WEAK
-    )
+    if found["shift"] is None or found["false_db"] is None:
+        return False
+    in_place = found["shift"] <= NEAR * null and found["level_db"] >= WEAK
+    return in_place and found["dip_db"] >= least and found["false_db"] <= -RESOLVED
 
 
-def told_apart(dips: Sequence[Mapping[str, Any]], null: float, least: float = RESOLVED) -> float | None:
+def told_apart(dips: Sequence[PairApart], null: float, least: float = RESOLVED) -> float | None:
     """The smallest separation, m, from which on two points are resolved at all that were tried; None: not even at the
     largest. dips: from `pair`, with "separation"; null, m, and least: as for `is_resolved`."""
     out = None

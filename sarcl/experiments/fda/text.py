@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from .experiment import CONVENTIONAL, NEAR, RESOLVED, WEAK, is_resolved, nearer
+from .experiment import CONVENTIONAL, NEAR, RESOLVED, WEAK, Pair, is_resolved, nearer
 
 SAME = 0.02  # relative difference below which two widths count as equal
 DISPLACED = 0.1  # of the null: smaller errors of position are not worth a sentence
@@ -28,14 +28,14 @@ def rule(null: float | None = None) -> str:
     )
 
 
-def unresolved(found: Mapping[str, Any], null: float) -> list[str]:
+def unresolved(found: Pair, null: float) -> list[str]:
     """Every reason why a pair of points (`fda.pair`) is not resolved, in words; empty where it is.
 
     null: of the conventional antenna, m
     """
     count = f"{len(found['peaks'])} peak{'s' if len(found['peaks']) > 1 else ''}"
     where = f"{count} within {RESOLVED:g} dB for 2 points, at {', '.join(f'{x:+.3f}' for x in found['peaks'])} m"
-    if found["shift"] is None:
+    if found["shift"] is None or found["false_db"] is None:
         return [where if len(found["peaks"]) > 1 else "1 peak for 2 points"]
     out = []
     if found["dip_db"] < RESOLVED:

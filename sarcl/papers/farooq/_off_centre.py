@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 from dataclasses import replace
-from typing import Any
 
 from ...experiments.fda import experiment, page
 from ...experiments.fda.text import rule, unresolved
@@ -70,7 +69,7 @@ def section(lab: Lab) -> Section:
     return out
 
 
-def _reason(found: dict[str, Any], null: float) -> str:
+def _reason(found: experiment.PairApart, null: float) -> str:
     """Whether a pair of points is resolved, and why not, in words."""
     why = unresolved(found, null)
     text = f"at {found['separation']:g} m the dip is {found['dip_db']:.1f} dB"
