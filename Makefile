@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz mutants bench results architecture lint clean ready ready-dev
+.PHONY: help demo test test-all fuzz mutants gpu-static bench results architecture lint clean ready ready-dev
 
 ARGS ?=
 PYTEST = .venv/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
@@ -26,6 +26,10 @@ fuzz: ready  ## read 10000 mutated files of every format; SARCL_FUZZ_SEED repeat
 
 mutants: ready  ## make each wrong sign, unit or factor of tests/mutants/mutations.toml: a test must fail
 	@.venv/bin/python tests/mutants/run.py $(ARGS)
+
+gpu-static:  ## compile every kernel for GPUs that are not here, and compare with the figures recorded
+	@PYTHON='$(PYTHON)' sh .ci/setup.sh gpu-static gpu-static
+	@.venv/bin/python tests/gpu_static/run.py $(ARGS)
 
 bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
 	@.venv/bin/sarcl bench backproject $(ARGS)

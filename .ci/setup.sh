@@ -2,7 +2,7 @@
 # Make this checkout ready to run: a virtual environment in .venv, the package in it (editable),
 # and an OpenCL device that can build a kernel. POSIX sh; `make demo` and `make test` call it.
 #
-#   .ci/setup.sh [EXTRA] [GOAL]     EXTRA: test (default) or dev; GOAL: the make goal to name in messages
+#   .ci/setup.sh [EXTRA] [GOAL]     EXTRA: test (default), dev or gpu-static; GOAL: the make goal to name in messages
 #   PYTHON=/path/to/python3.12      the Python to build .venv from (3.11 or newer)
 #
 # A second run only looks. When it cannot go on it says in one paragraph what is missing and the
@@ -305,9 +305,26 @@ processor: the package is called pocl or pocl-opencl-icd; or the one of your gra
     have_device || still_no_device
 }
 
+# ---------------------------------------------------------------- compilers for GPUs that are not here
+
+# Figures of kernels are recorded with these versions. Oclgrind, which runs kernels for tests, is no part of them: where
+# there is none, its tests are skipped.
+need_compilers() {
+    for package in clang-19 libclc-19; do
+        installed $package || need_package 1 $package "compiling kernels for GPUs that are not here needs $package" \
+            "clang 19 with libclc" "about 100 MB with what it needs"
+    done
+    installed oclgrind || ! command -v apt-get >/dev/null 2>&1 || ! become_root ||
+        apt_get install -y --no-install-recommends oclgrind ||
+        say "apt-get could not install oclgrind; tests that run kernels under Oclgrind are skipped"
+}
+
 # ---------------------------------------------------------------- go
 
-case $extra in test | dev) ;; *) echo "'$extra' is no extra of this package: test or dev" | stop 1 ;; esac
+case $extra in
+    test | dev | gpu-static) ;;
+    *) echo "'$extra' is no extra of this package: test, dev or gpu-static" | stop 1 ;;
+esac
 
 # Two runs at once (make demo beside make test) take turns; the lock is this file, so nothing is left behind.
 exec 9<.ci/setup.sh
@@ -317,4 +334,4 @@ if command -v flock >/dev/null 2>&1 && ! flock -n 9; then
 fi
 
 ready || install_package
-need_device
+if [ "$extra" = gpu-static ]; then need_compilers; else need_device; fi

@@ -130,7 +130,7 @@ def test_no_folder_is_full():
 
 def test_tests_mirror_the_rooms():
     rooms = {p.name for p in PACKAGE.iterdir() if p.is_dir() and (p / "__init__.py").exists()}
-    others = {"contract", "helpers", "house", "mutants", "published"}
+    others = {"contract", "gpu_static", "helpers", "house", "mutants", "published"}
     folders = {p.name for p in (ROOT / "tests").iterdir() if p.is_dir() and p.name != "__pycache__"}
     assert folders <= rooms | others
     assert not list((ROOT / "tests").glob("test_*.py"))

@@ -361,9 +361,22 @@ def test_a_folder_that_cannot_be_written_is_named(machine):
     assert status == 1 and "cannot be written by somebody" in said
 
 
+def test_compilers_for_gpus_are_installed_without_asking_where_we_are_root(machine):
+    machine.user(0)
+    status, said = machine.setup("gpu-static", "gpu-static")
+    assert status == 0, said
+    words = " ".join(machine.calls()).split()
+    assert {"clang-19", "libclc-19", "oclgrind"} <= set(words)
+
+
+def test_compilers_for_gpus_that_are_missing_are_named_with_the_line_that_installs_them(machine):
+    status, said = machine.setup("gpu-static", "gpu-static")
+    assert status == 1 and "sudo apt-get install -y clang-19" in said and "'make gpu-static' again" in said
+
+
 def test_an_unknown_extra_is_refused(machine):
     status, said = machine.setup("tests")
-    assert status == 1 and "'tests' is no extra of this package: test or dev" in said
+    assert status == 1 and "'tests' is no extra of this package: test, dev or gpu-static" in said
 
 
 @pytest.mark.parametrize("script, shell", [(".ci/setup.sh", "sh"), (".ci/run", "bash")])

@@ -1,0 +1,160 @@
+"""Which programs sarcl's plans build for a GPU: plans are made, and run on a device of paper.
+
+The device of paper computes nothing. It records each program that would be built, and the sizes of each launch; every
+number that is read back from it is 1. So tasks take the time of the host's part alone, and no OpenCL driver is needed.
+"""
+
+from __future__ import annotations
+
+import os
+import re
+import warnings
+from collections.abc import Callable, Iterator, Mapping
+from contextlib import contextmanager
+from dataclasses import dataclass, field, replace
+from types import SimpleNamespace
+from typing import Any
+from unittest import mock
+
+import numpy as np
+
+from sarcl import ToleranceMissed
+from sarcl.opencl import choose_device, fft
+from sarcl.opencl._programs import names_in, source
+from sarcl.opencl.device import Device
+from sarcl.opencl.device_list import DeviceInfo
+
+KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\(")
+PAPER = DeviceInfo(
+    index=0, platform="paper", name="GPU of paper", kind="gpu", works=True, why="", fp64=True, vector_width=1,
+    memory=16 * 2**30, max_alloc=4 * 2**30, units=132, driver="none", local_memory=48 * 1024, max_group=256, warp=32,
+    fast_fp64=True,
+)  # fmt: skip
+WITHOUT_FP64 = replace(PAPER, fp64=False, fast_fp64=False)
+
+
+@dataclass(frozen=True, order=True)
+class Variant:
+    """A program: a file of kernels/, and the macros that the file names, by name."""
+
+    file: str
+    macros: tuple[tuple[str, int], ...]
+
+    @property
+    def name(self) -> str:
+        """File and macros, as figures and messages name the variant."""
+        return " ".join([self.file, *(f"{name}={value}" for name, value in self.macros)])
+
+    @classmethod
+    def named(cls, name: str) -> Variant:
+        """The variant of a name."""
+        file, *macros = name.split()
+        return cls(file, tuple(sorted((k, int(v)) for k, v in (macro.split("=") for macro in macros))))
+
+
+@dataclass
+class Use:
+    """What plans do with a variant: tasks that build it, and the launches of each kernel.
+
+    groups  work-items per group of each kernel; 0 where the driver chooses
+    """
+
+    tasks: list[str] = field(default_factory=list)
+    groups: dict[str, set[int]] = field(default_factory=dict)
+
+
+def kernels_in(text: str) -> list[str]:
+    """Names of the kernels in source text."""
+    return KERNEL.findall(text)
+
+
+class PaperDevice(Device):
+    """A GPU that records programs and launches in `found`, and computes nothing."""
+
+    def __init__(self, info: DeviceInfo, found: dict[Variant, Use]) -> None:
+        self.info, self.found, self.task = info, found, ""
+        self._raw = self.context = self.queue = None
+        self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
+
+    def begin(self, task: str) -> None:
+        """Name the task that the programs built from now on are for."""
+        self.task = task
+        self._kernels.clear()
+
+    def _build(self, file: str, macros: dict[str, int]) -> dict[str, Any]:
+        text = source(file)
+        known = names_in(text)
+        variant = Variant(file, tuple(sorted((k, int(v)) for k, v in macros.items() if k in known)))
+        use = self.found.setdefault(variant, Use())
+        use.tasks.append(self.task)
+        return {name: SimpleNamespace(function_name=name, use=use) for name in kernels_in(text)}
+
+    def upload(self, array: np.ndarray) -> Any:
+        return self.empty(array.nbytes)
+
+    def zeros(self, nbytes: int) -> Any:
+        return self.empty(nbytes)
+
+    def empty(self, nbytes: int) -> Any:
+        self._check_size(nbytes)
+        return SimpleNamespace(size=nbytes)
+
+    def write(self, buffer: Any, values: np.ndarray) -> None:
+        pass
+
+    def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
+        out[...] = 1
+        return out
+
+    def run(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any) -> None:
+        items = 0 if group is None else int(np.prod(group))
+        kernel.use.groups.setdefault(kernel.function_name, set()).add(items)
+
+    def finish(self) -> None:
+        pass
+
+    def max_group(self, kernel: Any) -> int:
+        return self.info.max_group
+
+
+@contextmanager
+def on_paper(device: PaperDevice) -> Iterator[None]:
+    """Context in which sarcl finds one device, which is made of paper."""
+    with (
+        mock.patch.object(choose_device, "listed", lambda: ((device.info, None),)),
+        mock.patch.object(choose_device, "tried", lambda index: device.info),
+        mock.patch.object(choose_device, "devices", lambda: (device.info,)),
+        mock.patch.object(choose_device, "_open", lambda index: device),
+        mock.patch.object(fft, "_reikna", lambda device, data, inverse: data),
+        mock.patch.dict(os.environ),
+        warnings.catch_warnings(),
+        np.errstate(all="ignore"),
+    ):
+        os.environ.pop("SARCL_DEVICE", None)
+        warnings.simplefilter("ignore")
+        yield
+
+
+def collected(tasks: Mapping[str, Callable[[], Any]], info: DeviceInfo = PAPER) -> dict[Variant, Use]:
+    """Variants that tasks build on a GPU as `info` describes it, and what they do with them.
+
+    RuntimeError names tasks that fail for another reason than that numbers of paper miss a tolerance.
+    """
+    found: dict[Variant, Use] = {}
+    device = PaperDevice(info, found)
+    failed = []
+    with on_paper(device):
+        for name, task in tasks.items():
+            device.begin(name)
+            try:
+                task()
+            except ToleranceMissed:
+                pass
+            except Exception as exc:
+                failed.append(f"{name!r}: {type(exc).__name__}: {str(exc)[:300]}")
+    if failed:
+        raise RuntimeError(
+            "tasks whose plans are wanted failed on a device that computes nothing; leave out what cannot run there "
+            "(tests/gpu_static/tasks.py), or mend PaperDevice (tests/gpu_static/collect.py):\n" + "\n".join(failed)
+        )
+    return found

@@ -1,0 +1,73 @@
+"""What compilers say of the kernels on GPUs, without a GPU.
+
+    python tests/gpu_static/run.py --count FILE [MACRO=VALUE ...]    count one program: figures of every target, loops
+    options: --text PATH (source text to compile in place of kernels/FILE), --keep FOLDER (PTX, cubin, listing)
+
+docs/developers/gpu_static.md says what is counted, and how.
+"""
+
+from __future__ import annotations
+
+import argparse
+import sys
+import tempfile
+from pathlib import Path
+
+ROOT = Path(__file__).resolve().parents[2]
+sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "bench")]
+
+from gpu_static import compilers, hot_loops, sass  # noqa: E402
+from gpu_static.collect import Variant, kernels_in  # noqa: E402
+
+from sarcl.opencl._programs import source  # noqa: E402
+
+
+def count(file: str, macros: list[str], text: str, folder: Path) -> int:
+    """Print the figures of one program. 1 where a target's compiler refuses it."""
+    variant = Variant(file, tuple(sorted((k, int(v)) for k, v in (m.split("=") for m in macros))))
+    figures = compilers.compiled(variant, folder, text)
+    refused = {target: found["error"] for target, found in figures.items() if "error" in found}
+    for target, words in refused.items():
+        print(f"{target}: {words}")
+    listing = "" if "sm_90" in refused else compilers.listing("sm_90", folder)
+    (folder / "sm_90.sass").write_text(listing)
+    for kernel in kernels_in(text):
+        print(kernel)
+        for target in compilers.TARGETS:
+            if target not in refused:
+                print(f"  {target}: " + ", ".join(f"{name} {value}" for name, value in figures[target][kernel].items()))
+        if not listing:
+            continue
+        code = sass.code_of(listing, kernel)
+        try:
+            cost = hot_loops.cost(code, hot_loops.HOT.get((file, kernel)), dict(variant.macros))
+        except hot_loops.NotCounted as exc:
+            print(f"  not counted: {exc}")
+        else:
+            print(f"  sm_90: {cost.each:.1f} instructions per {cost.unit} ({cost.trip:.0f} per trip of the hot loop)")
+            print("  per trip: " + ", ".join(f"{name} {n:g}" for name, n in cost.by_kind.items()))
+        print(f"  loops: {hot_loops.described(code) or 'none'}")
+    return 1 if refused else 0
+
+
+def main() -> int:
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), required=True)
+    parser.add_argument("--text", type=Path, help="source text to compile in place of kernels/FILE, #include expanded")
+    parser.add_argument("--keep", type=Path, help="folder for PTX, machine code and nvdisasm's listing")
+    args = parser.parse_args()
+    try:
+        print(", ".join(f"{name} {version}" for name, version in compilers.versions().items()))
+    except FileNotFoundError as exc:
+        print(exc, file=sys.stderr)
+        return 2
+    file, *macros = args.count
+    text = args.text.read_text() if args.text else source(file)
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = args.keep or Path(scratch)
+        folder.mkdir(parents=True, exist_ok=True)
+        return count(file, macros, text, folder)
+
+
+if __name__ == "__main__":
+    sys.exit(main())
