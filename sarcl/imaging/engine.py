@@ -10,11 +10,15 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base.stage_timer import Clock
-from ..numerics import range_profiles
+from ..numerics import device_profiles, range_profiles
+from ..numerics.device_profiles import DeviceProfiles
 from ..numerics.interpolation import Interpolator
 from ..opencl.device import Device
+from ..opencl.pipeline import Pipeline
 from .focusing_task import FocusingTask
 from .tiling.tiling import Run, Tiling
+
+UPLOAD = 2**26  # bytes of samples of a block on a GPU: while it computes with these, the host uploads as many
 
 
 @dataclass(frozen=True)
@@ -115,8 +119,11 @@ class DirectEngine(Engine):
 class RowProfiles:
     """Range profiles of a task's rows on a device, for an interpolator.
 
-    length  samples of a profile; pad: samples that repeat its other end, on each side; stride: both together
-    dtype   complex64 or complex128
+    length    samples of a profile; pad: samples that repeat its other end, on each side; stride: both together
+    dtype     complex64 or complex128
+    pipeline  of the blocks of rows: a block's profiles are made, and its other arrays uploaded, after `new_block`
+
+    On a GPU samples are uploaded and the device makes the profiles; on a CPU the host does, in the same memory.
     """
 
     def __init__(
@@ -128,15 +135,38 @@ class RowProfiles:
         self.stride = length + 2 * self.pad
         correction = range_profiles.correction(interpolator, task.raw.n_samples, length)
         self.sample_weight = task.sample_weight * correction
+        self.pipeline = Pipeline(device)
+        self._maker: DeviceProfiles | None = None
+        if device_profiles.possible(device, length, dtype):
+            self._maker = DeviceProfiles(device, self.sample_weight, length, self.pad, dtype)
 
-    @property
-    def row_bytes(self) -> float:
-        """Bytes of the profile of a row."""
-        return float(np.dtype(self.dtype).itemsize * self.stride)
+    def nbytes(self, rows: int) -> float:
+        """Bytes on the device for the profiles of a block of so many rows."""
+        return self._maker.nbytes(rows) if self._maker else self._row_bytes * rows
+
+    def rows_in(self, nbytes: float) -> int:
+        """Rows of a block whose profiles take this many bytes at most."""
+        return self._maker.rows_in(nbytes) if self._maker else int(nbytes / self._row_bytes)
+
+    def most_rows(self, on_cpu: int, on_others: int) -> int:
+        """Most rows of a block, whatever the memory: as given, and on GPUs about UPLOAD bytes of samples."""
+        if self.device.is_cpu:
+            return on_cpu
+        sample_bytes = self.task.raw.samples.dtype.itemsize * self.task.raw.n_samples
+        return max(1, min(on_others, UPLOAD // sample_bytes))
 
     def upload(self, start: int, stop: int) -> Any:
         """Buffer of the profiles (stop - start, stride) of rows start ... stop - 1."""
-        weights = self.task.row_weight[start:stop, None] * self.sample_weight
+        along = self.task.row_weight[start:stop]
         samples = self.task.raw.read(start, stop)
+        if self._maker and self._maker.holds(samples, along):
+            given = self.pipeline.upload(samples), samples.dtype, self.pipeline.upload(self._maker.weights(along))
+            return self._maker.make(*given, stop - start)
+        weights = along[:, None] * self.sample_weight
         made = range_profiles.from_samples(self.device, samples, weights, self.length, self.pad, self.dtype)
-        return self.device.upload(made)
+        return self.pipeline.upload(made)
+
+    @property
+    def _row_bytes(self) -> float:
+        """Bytes of the profile of a row."""
+        return float(np.dtype(self.dtype).itemsize * self.stride)

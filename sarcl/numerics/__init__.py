@@ -3,6 +3,7 @@
 For other folders:
 
     cost_model              measured costs by which plans are compared
+    device_profiles         range profiles made on a device from samples that were uploaded
     double_double           double-double arithmetic: sums, products and quotients with their rounding errors
     error_bounds            error bounds of the kernels
     interpolation           interpolation kernels for range profiles
@@ -18,6 +19,7 @@ For other folders:
 
 __all__ = [
     "cost_model",
+    "device_profiles",
     "double_double",
     "error_bounds",
     "interpolation",

@@ -7,6 +7,7 @@ For other folders:
     device_list    OpenCL devices of this machine, tried with a small kernel before they are used
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
     memory_budget  bytes that a computation may take on a device
+    pipeline       blocks of work on a device: the upload of one while the device works on the one before
 
 For this folder alone:
 
@@ -17,4 +18,4 @@ For this folder alone:
     _programs      source texts of kernels, and precautions for building programs
 """
 
-__all__ = ["choose_device", "device", "device_list", "fft", "memory_budget"]
+__all__ = ["choose_device", "device", "device_list", "fft", "memory_budget", "pipeline"]

@@ -129,6 +129,51 @@ class Device:
         with self._explain("a copy", values.nbytes):
             pyopencl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
 
+    def another_queue(self) -> Any:
+        """A queue of commands beside the device's own, for `write_behind`."""
+        import pyopencl
+
+        with self._explain("a queue"):
+            return pyopencl.CommandQueue(self.context, self.queue.device)
+
+    def page_locked(self, queue: Any, nbytes: int) -> np.ndarray:
+        """Memory of the host, uint8 (nbytes,), from which the driver copies without the processor's help."""
+        import pyopencl
+
+        memory = pyopencl.mem_flags
+        with self._explain("page-locked memory", nbytes):
+            held = pyopencl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
+            write, byte = pyopencl.map_flags.WRITE, np.dtype(np.uint8)
+            return np.asarray(pyopencl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
+
+    def write_behind(self, queue: Any, buffer: Any, values: np.ndarray) -> Any:
+        """Copy `values` into a buffer on a queue of `another_queue`, while the device's own queue goes on.
+
+        Returns at once an event that ends with the copy. What is enqueued on the device after this call waits for it.
+        The event keeps `values`; an event that is dropped is waited for.
+        """
+        import pyopencl
+
+        with self._explain("a copy", values.nbytes):
+            copied = pyopencl.enqueue_copy(queue, buffer, values, is_blocking=False)
+            queue.flush()
+            pyopencl.enqueue_barrier(self.queue, wait_for=[copied])
+            return copied
+
+    def mark(self) -> Any:
+        """An event that ends with everything enqueued so far, which begins to run now."""
+        import pyopencl
+
+        with self._explain("running"):
+            event = pyopencl.enqueue_marker(self.queue)
+            self.queue.flush()
+            return event
+
+    def wait(self, event: Any) -> None:
+        """Wait for an event of `mark`."""
+        with self._explain("running"):
+            event.wait()
+
     def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
         """Copy a buffer, from byte `offset` on, into `out` and return it."""
         import pyopencl

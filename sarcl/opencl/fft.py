@@ -30,9 +30,7 @@ def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engi
     if device is None:
         engine = "scipy"
     elif engine is None:
-        length = data.shape[1]
-        double = data.dtype == np.complex128 and device.info.fp64 and length & (length - 1) == 0
-        engine = "reikna" if not device.is_cpu and (data.dtype == np.complex64 or double) else "scipy"
+        engine = "reikna" if on_device(device, data.shape[1], data.dtype) else "scipy"
     if device is not None and engine == "reikna":
         return _reikna(device, data, inverse)
     import scipy.fft
@@ -41,6 +39,29 @@ def rows(device: Device | None, data: np.ndarray, *, inverse: bool = False, engi
     if inverse:
         return scipy.fft.ifft(data, axis=1, norm="forward", workers=threads())
     return scipy.fft.fft(data, axis=1, workers=threads())
+
+
+def on_device(device: Device, length: int, dtype: Any) -> bool:
+    """Whether `rows` of this length and complex type are transformed on the device, and not on the host."""
+    double = device.info.fp64 and length & (length - 1) == 0
+    return not device.is_cpu and (dtype == np.complex64 or double)
+
+
+def in_place(device: Device, buffer: Any, shape: tuple[int, int], dtype: Any) -> None:
+    """Enqueue the FFT of every row of a buffer of `shape`, complex64 or complex128, not normalised, in its place.
+
+    Where `on_device`. The first call for a shape builds programs; a plan holds `temporary_bytes` for each row.
+    """
+    thread, compiled = _plan(device, shape, np.dtype(dtype).char)
+    rows = thread.array(shape, np.dtype(dtype), base=buffer)
+    compiled(rows, rows)
+
+
+def temporary_bytes(length: int, dtype: Any) -> int:
+    """Bytes per row, at most, that `in_place` takes on the device beside the row itself."""
+    power = 1 << (length - 1).bit_length()
+    longest = power if power == length else 2 * power  # other lengths are convolved with a chirp, in powers of two
+    return 2 * longest * np.dtype(dtype).itemsize
 
 
 def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:

@@ -3,10 +3,12 @@
 from __future__ import annotations
 
 import functools
+from dataclasses import replace
 
 import pytest
 
 from sarcl.opencl.choose_device import REMEDY, open_device
+from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
 
 # Methods that make each twin, as far as they change a device. The first twin compiles, together with the device itself,
@@ -48,3 +50,9 @@ def opened(param):
     for method in methods:
         device = getattr(device, method)()
     return device
+
+
+@functools.cache
+def as_gpu(device):
+    """A device of its own that runs all that a GPU runs: one lane, reikna's FFT, uploads beside the computation."""
+    return Device(replace(device.info, kind="gpu", vector_width=1), device._raw)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -84,7 +85,7 @@ class Direct(DirectEngine):
 
         Profiles get more where they need it, half of nbytes at most.
         """
-        least, chunk = (self.profiles.row_bytes * n for n in (self.kernels.least_rows, self.kernels.chunk))
+        least, chunk = (self.profiles.nbytes(n) for n in (self.kernels.least_rows, self.kernels.chunk))
         if least > nbytes / 2:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profiles of {self.kernels.least_rows} rows, the "
@@ -129,29 +130,32 @@ class Direct(DirectEngine):
         device, raw, kernels, stride = self.device, self.task.raw, self.kernels, self.profiles.stride
         for_rows, _, for_constants = self._shares(budget)
         # on a CPU few rows at a time, so that the samples that neighbouring tiles read stay in its caches
-        most = min(128 if device.is_cpu else 4096, int(for_rows / self.profiles.row_bytes))
+        most = min(self.profiles.most_rows(128, 4096), self.profiles.rows_in(for_rows))
+        most = max(most, kernels.least_rows)
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
         image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
         on = kernels.ready(tiles, self.task.skip_flags)
         apertures = self.taper.apertures(tiles.positions + self.tiling.center) if self.task.taper is not None else None
         clock.lap("prepare")
-        for start in range(0, raw.n_rows, rows):
-            stop = min(start + rows, raw.n_rows)
-            block = self.profiles.upload(start, stop)
-            packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
-            pulses = device.upload(packed), packed.shape[2], stop - start
-            weights = self.taper.arguments(apertures, start, stop)
-            if self.antenna:
-                weights = self.antenna.arguments(start, stop)
-            clock.lap("profiles")
-            at_once = int(for_constants / (4 * kernels.components * packed.shape[2]))
-            step = max(1, min(tiles.n_tiles, at_once))
-            for tile in range(0, tiles.n_tiles, step):
-                end = min(tile + step, tiles.n_tiles)
-                kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights)
-                if end < tiles.n_tiles:  # frees the constants of these tiles before the next are made
-                    device.finish()
-            device.finish()
-            clock.lap("backproject")
-            on_progress(stop)
+        with self.profiles.pipeline as pipeline:
+            for start in range(0, raw.n_rows, rows):
+                stop = min(start + rows, raw.n_rows)
+                pipeline.new_block()
+                block = self.profiles.upload(start, stop)
+                packed = self.task.antennas.packed(self.tiling.center, self.plan.length, start, stop, self.lanes)
+                pulses = pipeline.upload(packed), packed.shape[2], stop - start
+                weights = self.taper.arguments(apertures, start, stop)
+                if self.antenna:
+                    weights = self.antenna.arguments(start, stop)
+                clock.lap("profiles")
+                at_once = int(for_constants / (4 * kernels.components * packed.shape[2] * pipeline.held))
+                step = max(1, min(tiles.n_tiles, at_once))
+                for tile in range(0, tiles.n_tiles, step):
+                    end = min(tile + step, tiles.n_tiles)
+                    kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights)
+                    if end < tiles.n_tiles:  # the constants of these tiles are freed before many more are made
+                        pipeline.step()
+                pipeline.step(partial(on_progress, stop))
+                clock.lap("backproject")
+        clock.lap("backproject")
         return image, on.skipped()

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base import text
+from ..engine import RowProfiles
 from ..tiling.tiling import Part, Tiling
 from ..tiling.tree import Tree
 from .plan import FactorPlan
@@ -22,7 +23,7 @@ class MemoryPlan:
     """Sizes of what a plan keeps on one device, and the blocks that fit.
 
     strides        complex samples of the profile of a tile, for each level
-    source_stride  complex samples of the profile of a row
+    profiles       of the rows
     last_kept      kept pulses of the last level, with padding
     components     floats of a (leaf, kept pulse) record
     max_alloc      bytes of the largest buffer
@@ -32,7 +33,7 @@ class MemoryPlan:
     tiling: Tiling
     n_rows: int
     strides: list[int]
-    source_stride: int
+    profiles: RowProfiles
     last_kept: int
     components: int
     max_alloc: float
@@ -66,11 +67,11 @@ class MemoryPlan:
         first, last = self.blocks(nbytes)[0]
         roots, pixels = self.tiling.part_size(next(self.parts(first, last, nbytes)), self.plan.factors[0])
         rows = min(self.rows(nbytes), self.n_rows)
-        return self.n_bytes(roots, pixels) + 8.0 * self.source_stride * rows + 2 * min(AT_ONCE, nbytes / 8)
+        return self.n_bytes(roots, pixels) + self.profiles.nbytes(rows) + 2 * min(AT_ONCE, nbytes / 8)
 
     def rows(self, nbytes: float) -> int:
         """Rows per block of the first level."""
-        return max(16, min(ROWS, int(nbytes / 16 // (8 * self.source_stride)) // 16 * 16))
+        return max(16, min(ROWS, self.profiles.rows_in(nbytes / 16) // 16 * 16))
 
     def n_bytes(self, roots: int, pixels: int) -> float:
         """Bytes of the profiles of so many roots, and of so many pixels."""
@@ -93,7 +94,7 @@ class MemoryPlan:
     def _least(self) -> float:
         """The smallest number of bytes: for 16 rows, and for one root, of a plane cut to one band."""
         pixels = self.tiling.root_leaves(self.plan.factors[0], 1) * self.tiling.per_tile
-        return max(8.0 * 16 * 8 * self.source_stride, 2 * self.n_bytes(1, pixels))
+        return max(8.0 * self.profiles.nbytes(16), 2 * self.n_bytes(1, pixels))
 
     def parts(self, first: int, last: int, nbytes: float) -> Iterator[Part]:
         """Bands first ... last - 1 in parts that fit: runs of roots, or one of them cut."""

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -93,7 +94,7 @@ class Factorized(Engine):
         self.profiles = RowProfiles(device, self.task, plan.first, plan.length, pad)
         self.least_pixels = 1000.0 * plan.length
         self.memory = MemoryPlan(
-            plan, tiling, task.raw.n_rows, self.strides, self.profiles.stride, self.kept[-1][1],
+            plan, tiling, task.raw.n_rows, self.strides, self.profiles, self.kept[-1][1],
             self.leaves.components, device.info.max_alloc, device.is_cpu,
         )  # fmt: skip
 
@@ -219,37 +220,39 @@ class Factorized(Engine):
         nowhere = device.upload(np.zeros(roots, np.int32))
         blocks, n_shift = level.decimation.blocks, 2 + 2 * plan.first.taps
         rows = self.memory.rows(budget)
-        for start in range(0, raw.n_rows, rows):
-            stop = min(start + rows, raw.n_rows)
-            source = self.profiles.upload(start, stop)
-            packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
-            pulse, n, used = device.upload(packed), packed.shape[2], stop - start
-            clock.lap("profiles")
-            # blocks of pulses between the same kept pulses, cut at the ends of this block of rows
-            begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
-            cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
-            step = max(1, int(min(budget / 8, device.info.max_alloc) / (4 * n_shift * used)))
-            records = device.empty(4 * n_shift * used * min(step, high - low))
-            in_use = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
-            for tile, count, without_rows in same_coverage(left_out, low, high, step):
-                seen = cut if without_rows is None else without(cut, without_rows[start:stop])
-                if len(seen) == 0:
-                    continue
-                cut_buffer = device.upload(seen.astype(np.int32))
-                in_use.append(cut_buffer)
-                device.run(
-                    shifts, (n // self.lanes, count), None,
-                    pulse, centers, roots, centers, nowhere, self.tables[0], n, used, roots, tile, level.reach,
-                    self.strides[0], stride, stride // 2, records,
-                )  # fmt: skip
-                device.run(
-                    merge, (self._spans(0), count), None,
-                    source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
-                    level.reach, tile, low, self.kept[0][2], self.strides[0], out,
-                )  # fmt: skip
-            device.finish()
-            clock.lap("backproject")
-            on_progress(stop)
+        with self.profiles.pipeline as pipeline:
+            for start in range(0, raw.n_rows, rows):
+                stop = min(start + rows, raw.n_rows)
+                pipeline.new_block()
+                source = self.profiles.upload(start, stop)
+                packed = task.antennas.packed(self.tiling.center, plan.length, start, stop, self.lanes)
+                pulse, n, used = pipeline.upload(packed), packed.shape[2], stop - start
+                clock.lap("profiles")
+                # blocks of pulses between the same kept pulses, cut at the ends of this block of rows
+                begin, end = np.maximum(blocks[:, 0], start), np.minimum(blocks[:, 0] + blocks[:, 1], stop)
+                cut = np.stack([begin - start, end - begin, blocks[:, 2], begin - blocks[:, 0]], axis=1)[end > begin]
+                step = max(1, int(min(budget / 8 / pipeline.held, device.info.max_alloc) / (4 * n_shift * used)))
+                records = device.empty(4 * n_shift * used * min(step, high - low))
+                in_use = []  # on a CPU a buffer is memory of the host: it must exist until the kernel has read it
+                for tile, count, without_rows in same_coverage(left_out, low, high, step):
+                    seen = cut if without_rows is None else without(cut, without_rows[start:stop])
+                    if len(seen) == 0:
+                        continue
+                    cut_buffer = device.upload(seen.astype(np.int32))
+                    in_use.append(cut_buffer)
+                    device.run(
+                        shifts, (n // self.lanes, count), None,
+                        pulse, centers, roots, centers, nowhere, self.tables[0], n, used, roots, tile, level.reach,
+                        self.strides[0], stride, stride // 2, records,
+                    )  # fmt: skip
+                    device.run(
+                        merge, (self._spans(0), count), None,
+                        source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
+                        level.reach, tile, low, self.kept[0][2], self.strides[0], out,
+                    )  # fmt: skip
+                pipeline.step(partial(on_progress, stop))
+                clock.lap("backproject")
+        clock.lap("backproject")
 
     def _spans(self, level: int) -> int:
         return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -44,7 +45,7 @@ class DirectFloat64(DirectEngine):
 
     def tiles_at_once(self, nbytes: float) -> int:
         """See DirectEngine: positions and totals take half of nbytes at most, and range profiles the rest."""
-        least = 2 * self.profiles.row_bytes
+        least = 2 * self.profiles.nbytes(1)
         if nbytes < least:
             raise MemoryError(
                 f"max_bytes is {text.size_text(nbytes)} but the range profile of one row needs half of "
@@ -86,9 +87,8 @@ class DirectFloat64(DirectEngine):
         """Pixels (n_tiles, per_tile) at positions, m (n_tiles, per_tile, 3), and rows left out of each (2, n_tiles)."""
         device, raw, plan, n_tiles = self.device, self.task.raw, self.plan, len(positions)
         # on a CPU few rows at a time, so that the samples that neighbouring tiles read stay in its caches
-        most = (2 if device.is_cpu else 64) * CHUNK
-        fit = int(budget / 4 / self.profiles.row_bytes)
-        rows = min(most, fit // CHUNK * CHUNK or max(1, fit))
+        fit = min(self.profiles.most_rows(2 * CHUNK, 64 * CHUNK), self.profiles.rows_in(budget / 4))
+        rows = fit // CHUNK * CHUNK or max(1, fit)
         references = (positions.min(axis=1) + positions.max(axis=1)) / 2
         radius = np.linalg.norm(positions - references[:, None], axis=-1).max(axis=-1)
         pixels = positions.shape[0] * positions.shape[1]
@@ -98,30 +98,33 @@ class DirectFloat64(DirectEngine):
         tile, reach = device.upload(references.T), device.upload(radius)
         stride, wrap = self.profiles.stride, plan.length if self.task.wrap else 0
         clock.lap("prepare")
-        for start in range(0, raw.n_rows, rows):
-            stop = min(start + rows, raw.n_rows)
-            block = self.profiles.upload(start, stop)
-            pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
-            pulse, n = device.upload(pulse_host), pulse_host.shape[1]
-            weights = self.taper.arguments(apertures, start, stop)
-            clock.lap("profiles")
-            step = max(1, min(n_tiles, int(min(budget / 4, device.info.max_alloc) / (8 * N_CONST * n))))
-            constants = device.empty(8 * N_CONST * n * step)
-            for at in range(0, n_tiles, step):
-                count = min(step, n_tiles - at)
-                device.run(
-                    self.constants, (n // self.lanes, count), None,
-                    pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, wrap, constants,
-                )  # fmt: skip
-                items = positions.shape[1] // self.lanes
-                device.run(
-                    self.kernel, (items, count), (items, 1) if items <= self.group else None,
-                    block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
-                    where, image, np.uint64(pixels), missed, *weights,
-                )  # fmt: skip
-            device.finish()
-            clock.lap("backproject")
-            on_progress(stop)
+        with self.profiles.pipeline as pipeline:
+            for start in range(0, raw.n_rows, rows):
+                stop = min(start + rows, raw.n_rows)
+                pipeline.new_block()
+                block = self.profiles.upload(start, stop)
+                pulse_host = packed(raw, self.task.antennas, plan.length, start, stop, self.lanes)
+                pulse, n = pipeline.upload(pulse_host), pulse_host.shape[1]
+                weights = self.taper.arguments(apertures, start, stop)
+                clock.lap("profiles")
+                at_once = min(budget / 4 / pipeline.held, device.info.max_alloc)
+                step = max(1, min(n_tiles, int(at_once / (8 * N_CONST * n))))
+                constants = device.empty(8 * N_CONST * n * step)
+                for at in range(0, n_tiles, step):
+                    count = min(step, n_tiles - at)
+                    device.run(
+                        self.constants, (n // self.lanes, count), None,
+                        pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, wrap, constants,
+                    )  # fmt: skip
+                    items = positions.shape[1] // self.lanes
+                    device.run(
+                        self.kernel, (items, count), (items, 1) if items <= self.group else None,
+                        block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
+                        where, image, np.uint64(pixels), missed, *weights,
+                    )  # fmt: skip
+                pipeline.step(partial(on_progress, stop))
+                clock.lap("backproject")
+        clock.lap("backproject")
         made = download_sums(device, image, pixels, np.float64).reshape(positions.shape[:2])
         return made, device.download(missed, np.empty((2, n_tiles), np.int32)).astype(np.int64)
 
