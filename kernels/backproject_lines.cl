@@ -113,9 +113,12 @@ static inline int fits(group pulses, line_geometry line, float limit_cycles, flo
     return cycles <= limit_cycles && position <= limit_position;
 }
 
+// As calls these functions end in a segmentation fault on PoCL 3.1, seen with several programs in a process.
+#define INLINED static inline __attribute__((always_inline))
+
 // Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
 // steep line, or have no spacing, as where the range is the same along a line.
-static inline int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
+INLINED int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
     if (fabs(line.along) < LEAST_STEP) return 0;
     fv lane = lanes();
     float samples_of_T = FINE / line.along, farthest = 0;  // samples of T per sample of the profile
@@ -157,7 +160,7 @@ static inline int weigh_lines(group pulses, line_geometry line, __global const f
 }
 
 // T of a pulse: its profile at the step of a line, carrier included. Sample FINE k + a is stored at T[a][k - from].
-static inline void take_samples(line_geometry line, __global const float *restrict row, int stride, int origin,
+INLINED void take_samples(line_geometry line, __global const float *restrict row, int stride, int origin,
                                 __global const float *restrict table, int from, int vectors, __local float *T) {
     fv lane = lanes();
     for (int a = 0; a < FINE; a++)
@@ -172,7 +175,7 @@ static inline void take_samples(line_geometry line, __global const float *restri
 }
 
 // Makes T, W and the positions `at` of a pulse, number `made` of its group; 0 where the pulse must be added pixel by pixel.
-static inline int make_lines(group pulses, line_geometry line, int made, __global const float *restrict row, int stride, int origin,
+INLINED int make_lines(group pulses, line_geometry line, int made, __global const float *restrict row, int stride, int origin,
                              __global const float *restrict table, __global const float *restrict weights, float limit_cycles,
                              float limit_position, float limit_step, __local float *T, __local float *W, __local int *at) {
     iv n_i[VECS];
@@ -229,7 +232,7 @@ static inline int make_lines(group pulses, line_geometry line, int made, __globa
 
 // SUMS vectors of pixels of line r from pixel j0 on, both counted from 0: the `made` pulses of the group, then the rest_ij
 // that they share.
-static inline void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
+INLINED void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
                             __local const int *at, fv *re, fv *im) {
     EACH(BEGIN)
 #if SLOPE
@@ -273,7 +276,7 @@ static inline void sum_line(group pulses, int r, int j0, int made, __local const
 }
 
 // One pulse at VW pixels of line i, each at a position and phase of its own.
-static inline void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
+INLINED void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
                               int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
     line_geometry line = load_line(record, pulses.transposed);
     fv q = q_of(pulses, i, j), bend = curvature_at(line, i, j, q), sample_re, sample_im, sine, cosine;
@@ -300,7 +303,7 @@ static inline void add_pixels(group pulses, __global const float *restrict recor
 }
 
 // total[i], total[i + step], ... += x, as add_compensated
-static inline void add_with_step(__global float *total, __global float *error, size_t i, int step, fv x) {
+INLINED void add_with_step(__global float *total, __global float *error, size_t i, int step, fv x) {
     float hi[VW], lo[VW];
 #pragma unroll
     for (int l = 0; l < VW; l++) hi[l] = total[i + l * step];
