@@ -46,7 +46,7 @@ DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
 
 #if SLOPE
 // Derivatives of the weights by z.
-inline void line_slopes(fv z, __global const float *restrict weights, fv *w) {
+static inline void line_slopes(fv z, __global const float *restrict weights, fv *w) {
     fv z2 = z * z;
 #pragma unroll
     for (int k = 0; k < LINE_TAPS / 2; k++) {
@@ -62,7 +62,7 @@ inline void line_slopes(fv z, __global const float *restrict weights, fv *w) {
 }
 #endif
 
-inline fv lanes(void) {
+static inline fv lanes(void) {
 #if VW == 8
     return (float8)(0, 1, 2, 3, 4, 5, 6, 7);
 #elif VW == 16
@@ -73,7 +73,7 @@ inline fv lanes(void) {
 }
 
 // i times cycles per pixel in two parts (line_geometry.clh), less whole cycles of the first part
-inline fv cycles_of(fv i, float cycles, float cycles_low) {
+static inline fv cycles_of(fv i, float cycles, float cycles_low) {
     fv product = i * cycles;
     return fma(i, (fv)cycles_low, product - nearest(product));
 }
@@ -85,14 +85,14 @@ typedef struct {
     int transposed;
 } group;
 
-inline fv q_of_line(group pulses, fv i) { return i * i * (pulses.step_i * pulses.step_i); }
-inline fv q_of(group pulses, fv i, fv j) {
+static inline fv q_of_line(group pulses, fv i) { return i * i * (pulses.step_i * pulses.step_i); }
+static inline fv q_of(group pulses, fv i, fv j) {
     return fma(j * j, (fv)(pulses.step_j * pulses.step_j), q_of_line(pulses, i));
 }
 
 // Whether rest_ij of a pulse may be that of the group's middle pulse: compared where it is largest, at the corners of the
 // tile and half-way between them.
-inline int fits(group pulses, line_geometry line, float limit_cycles, float limit_position) {
+static inline int fits(group pulses, line_geometry line, float limit_cycles, float limit_position) {
     float cycles = 0, position = 0;  // largest differences
     for (int corner = 0; corner < 6; corner += VW) {
         fv i, j, none = 0;
@@ -113,9 +113,12 @@ inline int fits(group pulses, line_geometry line, float limit_cycles, float limi
     return cycles <= limit_cycles && position <= limit_position;
 }
 
+// As calls these functions end in a segmentation fault on PoCL 3.1, seen with several programs in a process.
+#define INLINED static inline __attribute__((always_inline))
+
 // Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
 // steep line, or have no spacing, as where the range is the same along a line.
-inline int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
+INLINED int weigh_lines(group pulses, line_geometry line, __global const float *restrict weights, __local float *W, iv *n_i) {
     if (fabs(line.along) < LEAST_STEP) return 0;
     fv lane = lanes();
     float samples_of_T = FINE / line.along, farthest = 0;  // samples of T per sample of the profile
@@ -157,7 +160,7 @@ inline int weigh_lines(group pulses, line_geometry line, __global const float *r
 }
 
 // T of a pulse: its profile at the step of a line, carrier included. Sample FINE k + a is stored at T[a][k - from].
-inline void take_samples(line_geometry line, __global const float *restrict row, int stride, int origin,
+INLINED void take_samples(line_geometry line, __global const float *restrict row, int stride, int origin,
                                 __global const float *restrict table, int from, int vectors, __local float *T) {
     fv lane = lanes();
     for (int a = 0; a < FINE; a++)
@@ -172,7 +175,7 @@ inline void take_samples(line_geometry line, __global const float *restrict row,
 }
 
 // Makes T, W and the positions `at` of a pulse, number `made` of its group; 0 where the pulse must be added pixel by pixel.
-inline int make_lines(group pulses, line_geometry line, int made, __global const float *restrict row, int stride, int origin,
+INLINED int make_lines(group pulses, line_geometry line, int made, __global const float *restrict row, int stride, int origin,
                              __global const float *restrict table, __global const float *restrict weights, float limit_cycles,
                              float limit_position, float limit_step, __local float *T, __local float *W, __local int *at) {
     iv n_i[VECS];
@@ -229,7 +232,7 @@ inline int make_lines(group pulses, line_geometry line, int made, __global const
 
 // SUMS vectors of pixels of line r from pixel j0 on, both counted from 0: the `made` pulses of the group, then the rest_ij
 // that they share.
-inline void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
+INLINED void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
                             __local const int *at, fv *re, fv *im) {
     EACH(BEGIN)
 #if SLOPE
@@ -273,7 +276,7 @@ inline void sum_line(group pulses, int r, int j0, int made, __local const float 
 }
 
 // One pulse at VW pixels of line i, each at a position and phase of its own.
-inline void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
+INLINED void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
                               int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
     line_geometry line = load_line(record, pulses.transposed);
     fv q = q_of(pulses, i, j), bend = curvature_at(line, i, j, q), sample_re, sample_im, sine, cosine;
@@ -300,7 +303,7 @@ inline void add_pixels(group pulses, __global const float *restrict record, fv i
 }
 
 // total[i], total[i + step], ... += x, as add_compensated
-inline void add_with_step(__global float *total, __global float *error, size_t i, int step, fv x) {
+INLINED void add_with_step(__global float *total, __global float *error, size_t i, int step, fv x) {
     float hi[VW], lo[VW];
 #pragma unroll
     for (int l = 0; l < VW; l++) hi[l] = total[i + l * step];
