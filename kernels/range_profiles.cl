@@ -11,6 +11,8 @@
 //           FROM64  number type of the samples: 1 float64, where the device has it, 0 float32
 // reference: sarcl/numerics/range_profiles.py:from_samples
 
+#undef VW
+#define VW 1  // for pairs of single numbers, on every device
 #include "common.clh"
 
 #if FROM64

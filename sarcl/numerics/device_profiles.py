@@ -82,7 +82,7 @@ class DeviceProfiles:
         samples     buffer (rows, n_samples) of `kind`, complex64 or complex128;  row_weight  buffer of `weights`
         """
         device = self.device
-        macros = {"VW": 1, "REAL64": int(self._double), "FROM64": int(kind == np.complex128)}
+        macros = {"REAL64": int(self._double), "FROM64": int(kind == np.complex128)}
         weigh, pad = (device.kernel("range_profiles.cl", name, **macros) for name in ("weigh", "pad"))
         self._reserve(rows)
         batch = min(self._at_once, self._rows)
