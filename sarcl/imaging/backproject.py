@@ -30,11 +30,12 @@ from .collection import collection
 from .engine import Skipped
 from .focus_options import FocusKeywords, FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip
+from .forecast import speed
 from .pixel_taper import PixelTaper
 from .run.checkpoint import Checkpoint
 from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
-from .run.workers import BLOCKS_EACH, LocalWorkers, WorkerPool
+from .run.workers import LocalWorkers, WorkerPool
 from .tiling.tiling import Run
 
 if TYPE_CHECKING:
@@ -267,7 +268,9 @@ def _open_workers(task: FocusingTask, options: FocusOptions, cluster: Any) -> tu
     budgets = [options.budget(d) for d in devices]
     chosen = options.choose(task, devices)
     engines = [chosen.on(d, task) for d in devices]
-    return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows), chosen
+    kinds = {(d.info.platform, d.info.name, d.info.units) for d in devices}
+    rates = [speed(d) for d in devices] if len(kinds) > 1 else [1.0 for _ in devices]
+    return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates), chosen
 
 
 def _fill(
@@ -302,13 +305,12 @@ def _fill(
     def output_for(first: int, last: int) -> Any:
         return BandBuffer(tiling, first, last, chosen.dtype) if output is None else output.flat
 
-    pixels = total / max(n_rows, 1)
-    most = pixels / (BLOCKS_EACH * workers.size) if workers.size > 1 else pixels
+    most = float("inf")
     if checkpoint and checkpoint.resume is not False:
-        most = min(most, max(pixels / MOST_FILES, workers.least_pixels))
+        most = max(total / max(n_rows, 1) / MOST_FILES, workers.least_pixels)
     clock.lap("files")
     made = []
-    with closing(workers.work(workers.blocks(todo, most, chosen.unit), output_for, clock, on_progress)) as work:
+    with closing(workers.work(todo, most, chosen.unit, output_for, clock, on_progress)) as work:
         for first, last, flat, missed in work:
             made.append((first, last))
             skipped += missed

@@ -140,6 +140,11 @@ class RowProfiles:
         if device_profiles.possible(device, length, dtype):
             self._maker = DeviceProfiles(device, self.sample_weight, length, self.pad, dtype)
 
+    @property
+    def on_device(self) -> bool:
+        """Whether the device makes the profiles, and not the host."""
+        return self._maker is not None
+
     def nbytes(self, rows: int) -> float:
         """Bytes on the device for the profiles of a block of so many rows."""
         return self._maker.nbytes(rows) if self._maker else self._row_bytes * rows

@@ -77,8 +77,10 @@ class Direct(DirectEngine):
             weights=self.antenna.macros if self.antenna else self.taper.macros,
         )  # fmt: skip
         self.profiles = RowProfiles(device, task, plan.interpolator, plan.length)
-        # per row, making the range profile costs a tenth of adding it to this many pixels
-        self.least_pixels = (400 if device.is_cpu else 50_000) * plan.length
+        # per row, making the range profile costs a tenth of adding it to this many pixels: on a CPU, on a GPU, and on a
+        # GPU whose profiles the host makes. For GPUs they are inferred from 2e11 pixels/s: none was measured
+        each = 400 if device.is_cpu else 3000 if self.profiles.on_device else 50_000
+        self.least_pixels = float(each * plan.length)
 
     def _shares(self, nbytes: float) -> tuple[float, float, float]:
         """Bytes for range profiles, pixels and constants of tiles: a quarter, a half and a quarter of nbytes.

@@ -6,10 +6,11 @@ For other folders:
     dask_workers   tiles computed by the workers of a dask.distributed cluster
     image_output   destination of pixels: memory, an array of the caller's, or a file
     tile_files     finished tiles in files beside the image, so that a stopped run can be continued
-    workers        one device, or several that take blocks of tiles from one queue
+    workers        one device, or several that take their shares
 
 For this folder alone:
 
+    _shares        which device makes which bands of an image
     _fingerprint   everything an image's pixels depend on, as text and checksums
 """
 

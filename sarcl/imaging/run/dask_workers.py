@@ -29,6 +29,8 @@ from ..tiling.tiling import Run
 from .image_output import BandBuffer
 from .workers import FinishedBlock, OutputFor, cut
 
+BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowest
+
 
 @dataclass(frozen=True, eq=False)
 class WorkerTask:
@@ -57,16 +59,17 @@ class DaskWorkers:
         raw = replace(task.raw, samples=portable(task.raw.samples))
         self.worker_task = WorkerTask(replace(task, raw=raw), chosen, device, max_bytes, secrets.token_hex(8))
 
-    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """See WorkerPool."""
-        return cut(self.tiling, todo, most, set(), unit)
-
     def work(
-        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
-    ) -> Generator[FinishedBlock, None, None]:
+        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        on_progress: Callable[[int], None],
+    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
+        pixels = sum(self.tiling.count(*run) for run in todo)
+        if self.size > 1:
+            most = min(most, pixels / (BLOCKS_EACH * self.size))
+        blocks = cut(self.tiling, todo, most, set(), unit)
         on_progress(0)
         if not blocks:
             return

@@ -1,4 +1,4 @@
-"""The workers that focus blocks of tiles: one device, or several that take blocks from one queue."""
+"""The workers that focus blocks of tiles: one device, or several that take their shares."""
 
 from __future__ import annotations
 
@@ -12,10 +12,10 @@ import numpy as np
 from ...base.stage_timer import Clock
 from ..engine import Engine, Skipped
 from ..tiling.tiling import Run, Tiling
+from ._shares import Shares
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
 OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
-BLOCKS_EACH = 4  # blocks per worker, so that no worker waits long for the slowest
 
 
 class WorkerPool(Protocol):
@@ -35,15 +35,12 @@ class WorkerPool(Protocol):
     @property
     def least_pixels(self) -> float: ...
 
-    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """The bands of `todo` in blocks of about `most` pixels at most, which begin at multiples of `unit` bands if
-        possible."""
-        ...
-
     def work(
-        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
-    ) -> Generator[FinishedBlock, None, None]:
-        """Focus all blocks, each into output_for(first, last); yields each when it is finished, in any order.
+        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        on_progress: Callable[[int], None],
+    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
+        """Focus the bands of `todo`, in blocks of about `most` pixels at most, which begin at multiples of `unit` bands
+        if possible, each into output_for(first, last); yields each when it is finished, in any order.
 
         on_progress  called from the caller's thread with the number of (row, pixel) pairs done so far
         """
@@ -69,27 +66,31 @@ def cut(tiling: Tiling, todo: list[Run], most: float, ends: set[int], unit: int 
 class LocalWorkers:
     """Engines of this process, each on its own device: see WorkerPool."""
 
-    def __init__(self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int) -> None:
+    def __init__(
+        self, engines: list[Engine], budgets: list[float], names: list[str], n_rows: int, rates: list[float]
+    ) -> None:
+        """rates  speeds of the devices, relative to one another, as far as they are known before the work"""
         self.engines, self.budgets, self.names, self.n_rows = engines, budgets, names, n_rows
-        self.size = len(engines)
+        self.size, self.rates = len(engines), rates
         self.least_pixels = max(float(engine.least_pixels) for engine in engines)
 
-    def blocks(self, todo: list[Run], most: float, unit: int) -> list[Run]:
-        """See WorkerPool; each block is one that every engine can take."""
-        each = zip(self.engines, self.budgets, strict=True)
-        ends = {last for engine, budget in each for _, last in engine.blocks(budget)}
-        return cut(self.engines[0].tiling, todo, most, ends, unit)
-
     def work(
-        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
-    ) -> Generator[FinishedBlock, None, None]:
+        self, todo: list[Run], most: float, unit: int, output_for: OutputFor, clock: Clock,
+        on_progress: Callable[[int], None],
+    ) -> Generator[FinishedBlock, None, None]:  # fmt: skip
         """See WorkerPool."""
+        each = zip(self.engines, self.budgets, strict=True)
+        ends = [{last for _, last in engine.blocks(budget)} for engine, budget in each]
+        tiling = self.engines[0].tiling
         if self.size > 1:
-            yield from self._together(blocks, output_for, clock, on_progress)
+            least = [float(engine.least_pixels) for engine in self.engines]
+            shares = Shares(tiling, todo, most=most, unit=unit, ends=ends, least=least, rates=self.rates)
+            pixels = sum(tiling.count(*run) for run in todo)
+            yield from self._together(shares, pixels, output_for, clock, on_progress)
             return
         before = 0
         on_progress(0)
-        for first, last in blocks:
+        for first, last in cut(tiling, todo, most, ends[0], unit):
             done, before = self._one(0, first, last, output_for, clock, before, on_progress)
             on_progress(before)
             yield done
@@ -114,12 +115,9 @@ class LocalWorkers:
         return (first, last, flat, skipped), before + self.n_rows * pixels
 
     def _together(
-        self, blocks: list[Run], output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
+        self, shares: Shares, pixels: int, output_for: OutputFor, clock: Clock, on_progress: Callable[[int], None]
     ) -> Generator[FinishedBlock, None, None]:
         """One thread per device; the caller's thread reports progress and yields finished blocks."""
-        waiting: queue.SimpleQueue[Run] = queue.SimpleQueue()
-        for block in blocks:
-            waiting.put(block)
         finished: queue.SimpleQueue[FinishedBlock | BaseException] = queue.SimpleQueue()
         stop = threading.Event()
         pairs = [0] * self.size  # each thread writes its own
@@ -129,15 +127,15 @@ class LocalWorkers:
                 if stop.is_set():
                     raise _Stop
                 pairs[k] = done
+                shares.made(k, done / self.n_rows)
 
             own_clock = Clock()
             try:
                 while not stop.is_set():
-                    try:
-                        first, last = waiting.get_nowait()
-                    except queue.Empty:
+                    block = shares.take(k)
+                    if block is None:
                         return
-                    done, pairs[k] = self._one(k, first, last, output_for, own_clock, pairs[k], own_progress)
+                    done, pairs[k] = self._one(k, *block, output_for, own_clock, pairs[k], own_progress)
                     finished.put(done)
             except _Stop:
                 pass
@@ -149,7 +147,7 @@ class LocalWorkers:
         for thread in threads:
             thread.start()
         try:
-            left = len(blocks)
+            tiling, left = self.engines[0].tiling, pixels
             while left:
                 try:
                     done = finished.get(timeout=0.1)
@@ -158,7 +156,7 @@ class LocalWorkers:
                     continue
                 if isinstance(done, BaseException):
                     raise done
-                left -= 1
+                left -= tiling.count(done[0], done[1])
                 clock.lap("backproject")
                 on_progress(sum(pairs))
                 yield done
