@@ -105,8 +105,11 @@ def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: fl
     difference = np.exp(1j * (other - phase))
     most = min(n / 2, MOST_BINS)
     slopes = 2 * np.pi / max(float(np.ptp(moves[:, 0])), 1e-300) * np.arange(-most, most, 0.25)
-    parts = np.array_split(slopes, 32)
-    close = np.concatenate([np.abs(np.exp(-1j * np.outer(part, moves[:, 0])) @ difference) for part in parts])
+    # slope width a + b: exp(-j s m) is a product of one factor for each, which takes far fewer exponentials
+    width = int(np.ceil(np.sqrt(len(slopes))))
+    steps = np.exp(-1j * np.outer(moves[:, 0], slopes[:width] - slopes[0]))
+    starts = np.exp(-1j * np.outer(slopes[::width], moves[:, 0])) * difference
+    close = np.abs(starts @ steps).ravel()[: len(slopes)]
     limit = np.array([np.inf, reach])
     best, closest = phase, -1.0
     # two starts: the best of finely spaced shifts, robust to noise; a fit to the unwrapped difference, also in range
