@@ -2,21 +2,23 @@
 
 For other folders:
 
-    range_doppler   range_doppler(): the image, and its error against backprojection; plan_range_doppler()
+    range_doppler     range_doppler(): the image, and its error against backprojection; plan_range_doppler()
 
 For this folder alone:
 
-    _doppler        Doppler band that an image needs, Doppler centroid
-    _extent         rows and columns of the image, the range window and the pulse rate they need
-    _focus          the work: azimuth FFT, secondary range compression, migration, azimuth compression
-    _ground         positions at zero-Doppler times and slant ranges, at a height or on an elevation model
-    _looks          two looks of an image along the track
-    _map_drift      Doppler rate from the displacement of two looks
-    _plan           rows, columns, Doppler bins, range blocks and the predicted error
-    _range_window   slant ranges that lie in the range window of every row
-    _task           arguments checked; track, ground, extent and plan of one image
-    _track          an evenly sampled smooth track
-    _velocity       ranges from a track to points as hyperbolas: effective velocity at several slant ranges
+    _aperture_window  a window over the beam, as weights of Doppler bins
+    _doppler          Doppler band that an image needs, Doppler centroid
+    _extent           rows and columns of the image, the range window and the pulse rate they need
+    _focus            the work: azimuth FFT, secondary range compression, migration, azimuth compression
+    _gain             gain of each pixel: the sum of the weights of the rows that see it
+    _ground           positions at zero-Doppler times and slant ranges, at a height or on an elevation model
+    _looks            two looks of an image along the track
+    _map_drift        Doppler rate from the displacement of two looks
+    _plan             rows, columns, Doppler bins, range blocks and the predicted error
+    _range_window     slant ranges that lie in the range window of every row
+    _task             arguments checked; track, ground, extent and plan of one image
+    _track            an evenly sampled smooth track
+    _velocity         ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """
 
 __all__ = ["range_doppler"]

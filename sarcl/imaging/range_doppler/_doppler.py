@@ -12,6 +12,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
+from ._aperture_window import ApertureWindow
 
 STEEPEST = 0.98  # largest sine of a squint angle
 MOST_ROWS = 2048  # rows from which a Doppler centroid is estimated
@@ -23,12 +24,17 @@ LEAST_ZONES = 1.5  # Fresnel widths of a taper, at least
 
 @dataclass(frozen=True)
 class Band:
-    """Sines of squint angles low ... high, of weight 1; the width of the tapers beyond, and the error they cause."""
+    """Sines of squint angles low ... high, of weight 1 or of a window; the tapers beyond, and the error they cause.
+
+    taper   width of the fall from 1 to 0 beyond each end
+    window  over the beam, where there is one; its own ends are within low ... high unless no row sees them
+    """
 
     low: float
     high: float
     taper: float
     error: float
+    window: ApertureWindow | None = None
 
     @classmethod
     def tapered(
@@ -43,19 +49,34 @@ class Band:
         zones = max(LEAST_ZONES, float(ringing / allowed) ** (1 / 3))
         return cls(low, high, zones * zone, float(ringing) / zones**3)
 
+    @classmethod
+    def windowed(cls, window: ApertureWindow, corners: tuple[float, float], pixel_band: float, zone: float,
+                 allowed: float) -> Band:  # fmt: skip
+        """The band of a window over the beam; it is cut off, with tapers, where no row sees the image, at `corners`."""
+        low, high = window.ends
+        used = max(low, corners[0]), min(high, corners[1])
+        if used == (low, high):
+            return cls(low, high, 1e-3 * zone, window.error, window)
+        cut = cls.tapered(*used, pixel_band, zone, allowed, False)
+        return cls(*used, cut.taper, cut.error + window.error, window)
+
     def weight(self, sines: np.ndarray) -> np.ndarray:
-        """Weights of Doppler bins at sines (...): 1 in the band, falling smoothly to 0 over the tapers."""
+        """Weights of Doppler bins at sines (...): 1 or the window in the band, falling to 0 over the tapers."""
         rise = self._rise(sines)
-        return np.asarray(rise**3 * (10 - 15 * rise + 6 * rise * rise))
+        made = np.asarray(rise**3 * (10 - 15 * rise + 6 * rise * rise))
+        return made if self.window is None else made * self.window.weight(sines)
 
     def row_weight(self, sines: np.ndarray, zones: np.ndarray | float) -> np.ndarray:
         """Weights, complex (...), that rows have at sines of squint angles where Doppler bins have `weight`.
 
         zones  widths of the Fresnel zone as sines. The next term of the stationary phase after the weight itself is
-               -j zone^2 cos^3/(4 pi) times its second derivative: nothing within the band
+               -j zone^2 cos^3/(4 pi) times its second derivative: nothing within the band without a window
         """
-        rise = self._rise(sines)
-        curvature = 60 * rise * (1 - rise) * (1 - 2 * rise) / self.taper**2
+        if self.window is None:
+            rise = self._rise(sines)
+            curvature = 60 * rise * (1 - rise) * (1 - 2 * rise) / self.taper**2
+        else:  # no row lies in the tapers beyond it
+            curvature = self.window.bend(sines)
         cosine = np.sqrt(1 - np.minimum(np.asarray(sines) ** 2, 1))
         return np.asarray(self.weight(sines) - 1j * (np.asarray(zones) ** 2 * cosine**3 / (4 * np.pi)) * curvature)
 

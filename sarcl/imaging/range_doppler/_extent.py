@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -13,6 +14,8 @@ from ...base.text import size_text
 from ...base.validation import number
 from ...model.image_grid import pair
 from ...model.phase_history import PhaseHistory
+from ...numerics import windows
+from ._aperture_window import ApertureWindow
 from ._doppler import STEEPEST, Band, delay, fresnel, sine
 from ._range_window import RangeWindow
 from ._track import REMEDY, Track
@@ -56,13 +59,14 @@ class Extent:
 def choose_extent(
     raw: PhaseHistory, track: Track, positions: Positions, speed: float, centroid: float, beam: float | None,
     times: tuple[float, float] | None, ranges: tuple[float, float] | None, spacing: object, least: float,
-    allowed: float,
+    allowed: float, over_beam: Any = None,
 ) -> Extent:  # fmt: skip
     """The extent asked for, or the default: see `range_doppler`.
 
     speed     effective velocity, m/s
     centroid  sine of the squint angle of the Doppler centroid;  beam  full angle, rad, or None
     least     shortest slant range that reaches the ground, m;  allowed  error of the ends of the Doppler band
+    over_beam  window over the rows that see a pixel; the band has it unless all rows see all pixels
     ValueError: a pulse rate below the Doppler bandwidth, ranges outside the range window, empty images.
     """
     if abs(centroid) > STEEPEST:
@@ -114,7 +118,12 @@ def choose_extent(
             "give times= there, or doppler='data'"
         )
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
-    band = Band.tapered(*used, pixel_band, sight.zone(float(r[0])), allowed, beam is not None)
+    zone = sight.zone(float(r[0]))
+    if over_beam is not None and used != (corners.min(), corners.max()):
+        taper_of_beam = ApertureWindow.over(*sight.sines, windows.table(over_beam), zone, allowed)
+        band = Band.windowed(taper_of_beam, (float(corners.min()), float(corners.max())), pixel_band, zone, allowed)
+    else:
+        band = Band.tapered(*used, pixel_band, zone, allowed, beam is not None)
     return Extent(u, r, finer, band, pixel_band, track.times, speed, beam is not None)
 
 

@@ -226,7 +226,7 @@ class _Bins:
         level = f / (root * np.sqrt(root))
         sines = bend / f
         low, high = float(sines.min()), float(sines.max())
-        if low < band.low or high > band.high:
+        if band.window is not None or low < band.low or high > band.high:
             level = level * band.weight(sines).astype(np.float32)
         phase = (cycles - np.rint(cycles)) * np.float32(2 * np.pi)
         out = np.empty(phase.shape, np.complex64)

@@ -47,7 +47,8 @@ class TwoLooks:
         kept = [
             _middle(axis, most) for axis, most in zip((self.extent.times, self.extent.ranges), MOST_PIXELS, strict=True)
         ]
-        extent = replace(self.extent, times=kept[0], ranges=kept[1])
+        band = replace(self.extent.band, window=None)  # with a window the middles of the looks would lie elsewhere
+        extent = replace(self.extent, times=kept[0], ranges=kept[1], band=band)
         plan = make_plan(self.raw, self.track, extent, fit, 0.0, TOLERANCE)
         speeds = fit.at(extent.ranges)[0]
         speed = float(speeds.mean())

@@ -14,6 +14,7 @@ from ...base.validation import array, instance, number
 from ...base.validation import tolerance as allowed_error
 from ...earth.elevation import ElevationModel
 from ...model.phase_history import PhaseHistory
+from ...numerics import windows
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import Device
@@ -96,7 +97,7 @@ def make_task(
             raise ValueError(f"raw.{name} differs between rows, and the FFT along the track needs one; {REMEDY}")
     if raw.n_samples < 2:
         raise ValueError("raw has one sample per row: without bandwidth there is no range; give at least 2 samples")
-    sample_weight, row_weight = weigh(raw, window, weights)
+    windows.check(window)
     track = Track.of(raw, 0.02 * tolerance)
     ground = Ground.of(track, heights, track.side(raw, side))
     smooth = ground.smooth().positions
@@ -117,8 +118,10 @@ def make_task(
     extent = choose_extent(
         raw, track, smooth, speed, centroid, None if beam is None else _beam(beam),
         _pair("times", times), _pair("ranges", ranges), spacing, least,
-        EDGES * tolerance,
+        EDGES * tolerance, None if beam is None else windows.both(window)[1],
     )  # fmt: skip
+    over_rows = window if extent.band.window is None else (windows.both(window)[0], None)
+    sample_weight, row_weight = weigh(raw, over_rows, weights)
     fit = hyperbolas(
         raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
         extent.rows_of(extent.middle_time),

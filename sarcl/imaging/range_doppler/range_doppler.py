@@ -22,6 +22,7 @@ from ..collection import collection
 from ..forecast import Forecast, speed
 from ._doppler import fresnel, sine
 from ._focus import focus
+from ._gain import gain_of
 from ._plan import FocusPlan
 from ._task import RangeDopplerTask, make_task
 from ._track import Track
@@ -56,7 +57,8 @@ def range_doppler(
     side       "left" or "right" of the track, seen from above; None: where the origin is, if the echoes contain it
     tolerance  L2 error allowed against `backproject` at the same positions, relative to the larger of the norm of the
                image and the norm of the same contributions with random phases
-    window, weights   as `backproject` takes them
+    window, weights   as `backproject` takes them. With a beam the window along the track is over the rows that see a
+               pixel in the beam, as a weight of Doppler frequencies: a pixel at the end of the track has a part of it
     max_bytes  for blocks on the device, as `backproject` takes it; arrays of all pulses or Doppler bins that are larger
                than a third of it, or of half the machine's memory, are temporary files
     times      (first, last) zero-Doppler time, s; None: those of the rows, less where a pixel's Doppler band and the
@@ -77,9 +79,11 @@ def range_doppler(
     progress   called as progress(stage, done, total), in thousandths
 
     Returns an Image whose grid lists positions, and knows `times` and `ranges`. Gain, carrier and phase are those of
-    `backproject` on image.grid. The report names the errors by cause, and the centroid and rate of the geometry where
-    others are used. ValueError: bad input, a pulse rate below the Doppler bandwidth, ranges that the range window does
-    not hold in all rows, echoes that do not tell a rate. ToleranceUnreachable: a track that is not straight enough for
+    `backproject` on image.grid; with a beam the gain has a value per pixel where the pixels are seen by more rows or
+    fewer, and pixels with less than `tolerance` of the largest are zero. The report names the errors by cause, and the
+    centroid and rate of the geometry where others are used. ValueError: bad input, a pulse rate below the Doppler
+    bandwidth, ranges that the range window does not hold in all rows, echoes that do not tell a rate.
+    ToleranceUnreachable: a track that is not straight enough for
     the tolerance. ToleranceMissed: the check measured an error above the tolerance.
     Source: Cumming and Wong, "Digital Processing of Synthetic Aperture Radar Data", 2005, chapter 6;
     docs/theory/range_doppler.md.
@@ -98,18 +102,20 @@ def range_doppler(
             progress("range Doppler", round(1000 * share), 1000)
 
     data = focus(task.device, plan, raw, track, weight, task.budget, clock, on_progress)
+    gain = float(task.sample_weight.sum() * task.row_weight.sum())
+    if task.extent.has_beam:
+        gain = gain_of(plan, track, *weight, task.tolerance)
+        if isinstance(gain, np.ndarray):
+            data[gain == 0] = 0
     measured = None
     exact_seconds = 128 * raw.n_rows * raw.n_samples * 3e-8
     if check or (check is None and exact_seconds < 0.02 * sum(clock.seconds.values())):
         measured = _measure_error(raw, task, grid, data)
         clock.lap("check")
-    seen = _row_weights(
-        track, plan, np.array([task.extent.middle_time]), plan.ranges[[len(plan.ranges) // 2]], task.wavelength
-    ).real
     image = Image(
         data,
         grid,
-        gain=float(task.sample_weight.sum() * (seen[0] * task.row_weight).sum()),
+        gain=gain,
         frequency=SPEED_OF_LIGHT / task.wavelength,
         **collection(raw, grid, window),
         report=Report(
