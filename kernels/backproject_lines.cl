@@ -32,34 +32,19 @@
 #include "interp.clh"
 #include "range_phase.clh"
 #include "line_geometry.clh"
+#include "line_group.clh"
 
 #define VECS (SIDE / VW)
 #define PARTS (SLOPE ? 4 : 2)       // of a weight: re, im, and of its slope
 #define MOST (2 * SIDE + 2 * VW)    // samples of T per FINE-th phase
-#define LEAST_STEP 1e-30f           // samples per pixel; one over less may be no float32
 // of one pulse, in local memory: T[FINE][re, im][MOST], W[LINE_TAPS][PARTS][SIDE], at[SIDE][LINE_TAPS]
 #define T_SIZE (FINE * 2 * MOST)
 #define W_SIZE (LINE_TAPS * PARTS * SIDE)
 #define AT_SIZE (SIDE * LINE_TAPS)
 
 DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
-
 #if SLOPE
-// Derivatives of the weights by z.
-static inline void line_slopes(fv z, __global const float *restrict weights, fv *w) {
-    fv z2 = z * z;
-#pragma unroll
-    for (int k = 0; k < LINE_TAPS / 2; k++) {
-        __global const float *c = weights + k * 2 * LINE_TERMS;
-        fv even = (fv)((2 * LINE_TERMS - 1) * c[2 * LINE_TERMS - 1]), odd = (fv)(2 * (LINE_TERMS - 1) * c[LINE_TERMS - 1]);
-#pragma unroll
-        for (int i = LINE_TERMS - 2; i >= 0; i--) even = fma(even, z2, (fv)((2 * i + 1) * c[LINE_TERMS + i]));
-#pragma unroll
-        for (int i = LINE_TERMS - 2; i >= 1; i--) odd = fma(odd, z2, (fv)(2 * i * c[i]));
-        w[k] = fma(z, odd, even);
-        w[LINE_TAPS - 1 - k] = fma(z, odd, -even);
-    }
-}
+DEFINE_SLOPES(line_slopes, LINE_TAPS, LINE_TERMS)
 #endif
 
 static inline fv lanes(void) {
@@ -71,50 +56,6 @@ static inline fv lanes(void) {
     return 0;
 #endif
 }
-
-// i times cycles per pixel in two parts (line_geometry.clh), less whole cycles of the first part
-static inline fv cycles_of(fv i, float cycles, float cycles_low) {
-    fv product = i * cycles;
-    return fma(i, (fv)cycles_low, product - nearest(product));
-}
-
-// A group of pulses: the one in its middle, and the steps of pixels, m: `step_i` from line to line, `step_j` along a line.
-typedef struct {
-    line_geometry middle;
-    float step_i, step_j;
-    int transposed;
-} group;
-
-static inline fv q_of_line(group pulses, fv i) { return i * i * (pulses.step_i * pulses.step_i); }
-static inline fv q_of(group pulses, fv i, fv j) {
-    return fma(j * j, (fv)(pulses.step_j * pulses.step_j), q_of_line(pulses, i));
-}
-
-// Whether rest_ij of a pulse may be that of the group's middle pulse: compared where it is largest, at the corners of the
-// tile and half-way between them.
-static inline int fits(group pulses, line_geometry line, float limit_cycles, float limit_position) {
-    float cycles = 0, position = 0;  // largest differences
-    for (int corner = 0; corner < 6; corner += VW) {
-        fv i, j, none = 0;
-#pragma unroll
-        for (int l = 0; l < VW; l++) {
-            ((float *)&i)[l] = ((corner + l) % 3 - 1) * (SIDE / 2);
-            ((float *)&j)[l] = ((corner + l) / 3 % 2 ? 1 : -1) * (SIDE / 2);
-        }
-        fv q_line = q_of_line(pulses, i), q = q_of(pulses, i, j), centre = curvature_at(line, i, none, q_line);
-        fv rest = curvature_at(line, i, j, q) - centre;
-        fv rest_middle = curvature_at(pulses.middle, i, j, q) - curvature_at(pulses.middle, i, none, q_line);
-        fv difference = fma((fv)line.kappa, rest, (fv)(-pulses.middle.kappa) * rest_middle);
-        cycles = fmax(cycles, largest(fabs(difference)));
-        // half of the mean of rest_ij at a line's ends is in the line's position
-        fv in_position = 0.25f * (rest + curvature_at(line, i, -j, q) - centre);
-        position = fmax(position, largest(fmax(fabs(rest - in_position), fabs(in_position)) * fabs(line.sigma)));
-    }
-    return cycles <= limit_cycles && position <= limit_position;
-}
-
-// As calls these functions end in a segmentation fault on PoCL 3.1, seen with several programs in a process.
-#define INLINED static inline __attribute__((always_inline))
 
 // Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
 // steep line, or have no spacing, as where the range is the same along a line.
@@ -273,33 +214,6 @@ INLINED void sum_line(group pulses, int r, int j0, int made, __local const float
         im[v] = fma(re[v], sine, im[v] * cosine);
         re[v] = rotated;
     }
-}
-
-// One pulse at VW pixels of line i, each at a position and phase of its own.
-INLINED void add_pixels(group pulses, __global const float *restrict record, fv i, fv j, __global const float *restrict row,
-                              int stride, int origin, __global const float *restrict table, fv *re, fv *im) {
-    line_geometry line = load_line(record, pulses.transposed);
-    fv q = q_of(pulses, i, j), bend = curvature_at(line, i, j, q), sample_re, sample_im, sine, cosine;
-    fv from_tile = fma(bend, (fv)line.sigma, fma(i, (fv)line.across, j * line.along));
-    fv cycles = cycles_of(i, line.cycles_across, line.cycles_across_low) + cycles_of(j, line.cycles_along, line.cycles_along_low);
-    cycles = fma(bend, (fv)line.kappa, cycles + line.cycles);
-    iv inside = (from_tile >= (fv)record[L_NEAR]) & (from_tile <= (fv)record[L_FAR]);
-#if BEAM
-    // (x - T).b - |x - T| cos alpha
-    fv along_u = fma((fv)line.u.y, i, (fv)line.u.x * j);
-    fv margin = fma((fv)record[L_BY - pulses.transposed], i, (fv)record[L_BX + pulses.transposed] * j);
-    margin = fma((fv)-record[L_COS], curvature(line.u, along_u, q) - along_u, margin) + (fv)record[L_EDGE];
-    inside = inside & (margin >= 0);
-#endif
-    if (as_int(record[L_STATE]) == INSIDE) inside = -1;
-    // outside, the position is moved to delay 0, which every profile has
-    look_up(row, stride, origin, inside ? (iv)line.base : (iv)0, inside ? from_tile + line.frac : (fv)0.0f, table,
-            &sample_re, &sample_im);
-    sincos_cycles(cycles - nearest(cycles), &sine, &cosine);
-    sample_re = inside ? sample_re : (fv)0.0f;
-    sample_im = inside ? sample_im : (fv)0.0f;
-    *re = fma(sample_re, cosine, fma(-sample_im, sine, *re));
-    *im = fma(sample_re, sine, fma(sample_im, cosine, *im));
 }
 
 // total[i], total[i + step], ... += x, as add_compensated

@@ -7,6 +7,7 @@
 // symbols   delta, kappa, sigma, u, R0   as in geometry.clh;  beta   as in line_geometry.clh
 // macros    VW, FP64, BISTATIC, BEAM as in the headers;  RANGE  1: records hold low parts too; 0: they need none
 //           LOCAL  1: every tile has profiles of its own, about its reference point (factorised); 0: pulses' own
+//           SHARED  as in line_geometry.clh
 // reference: sarcl/reference/geometry.py:half_path
 
 #define ORDER 0
@@ -131,6 +132,21 @@ static inline void put_cycles(__global float *out, int component, wv cycles) {
     put(out, N_LINE, component + 1, (part - high) + w_float(lost));
 }
 
+#if SHARED
+// Writes a number in two parts: one of 12 digits, whose products with integers below 2^12 are exact, and the rest.
+static inline void put_parts(__global float *out, int component, wv value) {
+    fv high = AS_FLOAT(AS_INT(w_float(value)) & (iv)0xFFFFF000);
+    put(out, N_LINE, component, high);
+    put(out, N_LINE, component + 1, w_float(w_sub(value, w_make(high, (fv)0))));
+}
+
+// a/b times FINE; where b is 0, some number that is not used.
+static inline wv ratio_of(wv a, wv b, int fine) {
+    b = w_add(b, w_make(w_float(b) != 0 ? (fv)0 : (fv)1, (fv)0));
+    return w_mul(w_div(a, b), w_make((fv)fine, (fv)0));
+}
+#endif
+
 // Constants that the lines of a tile share, for VW pulses per work-item: as tile_constants, with one radius, m, for all tiles.
 //   axes    (2, 6)    a column's and a row's step, m, hi and lo parts
 //   wrap    M > 0: profiles repeat every M samples; 0: they do not
@@ -183,6 +199,13 @@ __kernel void line_constants(__global const float *restrict pulse, __global cons
     put_cycles(out, L_CYCLES_Y, cycles_y);
     put_cycles(out, L_FINE_X, w_mul(cycles_x, part));
     put_cycles(out, L_FINE_Y, w_mul(cycles_y, part));
+#if SHARED
+    wv fine_sigma = w_mul(sigma, part);
+    put_parts(out, L_STEP, w_mul(along_x, fine_sigma));
+    put_parts(out, L_STEP + 2, w_mul(along_y, fine_sigma));
+    put_parts(out, L_RATIO, ratio_of(along_y, along_x, fine));
+    put_parts(out, L_RATIO + 2, ratio_of(along_x, along_y, fine));
+#endif
 
 #if LOCAL
     iv state = INSIDE;

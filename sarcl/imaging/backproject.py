@@ -260,9 +260,9 @@ def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
 def _open_workers(task: FocusingTask, options: FocusOptions, cluster: Any) -> tuple[WorkerPool, MethodChoice]:
     """The workers that make the image, and the one method and plan for all of them."""
     if cluster is not None:
-        from .run.dask_workers import DaskWorkers, have_lanes
+        from .run.dask_workers import DaskWorkers, device_class
 
-        chosen = choose(task, options.method, options.tolerance, have_lanes(cluster, options.device))
+        chosen = choose(task, options.method, options.tolerance, device_class(cluster, options.device))
         return DaskWorkers(cluster, task, chosen, options.device, options.max_bytes), chosen
     devices = open_devices(options.device)
     budgets = [options.budget(d) for d in devices]

@@ -11,6 +11,7 @@ from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import reachable, rounded_up
 from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
+from ..numerics.cost_model import CPU, DeviceClass
 from ..numerics.plan import LEAST_TOLERANCE
 from ..opencl.device import Device
 from . import antenna_beam, profile_energy
@@ -62,10 +63,10 @@ class MethodChoice:
         return self.engine(device, task, self.plan, self.tiling)
 
 
-def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True, float64: bool = True) -> MethodChoice:
+def choose(task: FocusingTask, method: str, tolerance: float, on: DeviceClass = CPU, float64: bool = True) -> MethodChoice:
     """The cheapest plan that meets `tolerance` with `method`, or with any method for "auto".
 
-    lanes    the devices work on vectors of pixels, as CPUs do
+    on       the devices that follow the plan
     float64  the devices have float64, for tolerances that complex64 cannot meet
     ToleranceUnreachable names the best tolerance that can be met. ValueError for samples or paths with which no
     tolerance can.
@@ -77,8 +78,8 @@ def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True
                 "cross-range with a beam does, or an Antenna as beam: take method='direct' or 'auto', or "
                 "window=(range, None) and a beam of an angle"
             )
-        return _factorized(task, tolerance, lanes, float64)
-    direct = _direct(task, tolerance, lanes, float64)
+        return _factorized(task, tolerance, on, float64)
+    direct = _direct(task, tolerance, on, float64)
     if (
         method == "direct"
         or task.taper is not None
@@ -87,7 +88,7 @@ def choose(task: FocusingTask, method: str, tolerance: float, lanes: bool = True
     ):
         return direct
     try:
-        merged = _Float32(task, tolerance).factorized(lanes)
+        merged = _Float32(task, tolerance).factorized(on)
     except ToleranceUnreachable:
         return direct
     return merged if merged.cost < cost_model.MERGING_PAYS * direct.cost else direct
@@ -121,20 +122,20 @@ class _Float32:
         left = np.sqrt(max(tolerance**2 - self.coordinates**2, 0.0))
         self.inner = float(left - self.rounding - self.gains) / self.near
 
-    def direct(self, lanes: bool) -> MethodChoice:
+    def direct(self, on: DeviceClass) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
         self._must_round_less("in complex64", self._best())
         try:
-            made = direct_method.make_plan(self.task, self.inner, lanes)
+            made = direct_method.make_plan(self.task, self.inner, on)
         except ToleranceUnreachable as refused:
             raise refused.restated(self.tolerance, self._best()) from None
         return self._offer("direct", made, direct_method.Direct)
 
-    def factorized(self, lanes: bool) -> MethodChoice:
+    def factorized(self, on: DeviceClass) -> MethodChoice:
         """With sub-apertures. ToleranceUnreachable gives the reason, but no best tolerance, which takes a search."""
         self._must_round_less("with sub-apertures", None)
         try:
-            made = factorized_plan.make_plan(self.task, self.inner, lanes)
+            made = factorized_plan.make_plan(self.task, self.inner, on)
         except ToleranceUnreachable as refused:
             raise refused.restated(self.tolerance, None) from None
         return self._offer("factorized", made, Factorized)
@@ -171,38 +172,38 @@ class _Float32:
         return MethodChoice(name, *made, engine, error, made[0].cost)
 
 
-def _direct(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
+def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
     """The direct method, in complex64 where that meets the tolerance, else in complex128 where the devices can."""
     if tolerance >= LEAST_TOLERANCE:
         try:
-            return _Float32(task, tolerance).direct(lanes)
+            return _Float32(task, tolerance).direct(on)
         except ToleranceUnreachable:
             if not float64 or task.antenna is not None or float64_plan.too_long(task):
                 raise
     elif task.antenna is not None:
-        best = reachable(lambda t: _Float32(task, t).direct(lanes), LEAST_TOLERANCE)
+        best = reachable(lambda t: _Float32(task, t).direct(on), LEAST_TOLERANCE)
         raise ToleranceUnreachable(
             tolerance, best, "float32 gains of the antenna", "give the beam an angle", how="with an antenna"
         )
     elif not float64:
-        best = reachable(lambda t: _direct(task, t, lanes, False), LEAST_TOLERANCE)
+        best = reachable(lambda t: _direct(task, t, on, False), LEAST_TOLERANCE)
         raise ToleranceUnreachable(tolerance, best, "float32", float64_direct.remedy(), how="without float64")
     return _float64(task, tolerance)
 
 
-def _factorized(task: FocusingTask, tolerance: float, lanes: bool, float64: bool) -> MethodChoice:
+def _factorized(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
     """Sub-apertures, in complex64 alone. Where they cannot meet the tolerance, the best one is found by a search."""
     try:
         if tolerance < LEAST_TOLERANCE:
             raise ToleranceUnreachable(tolerance, None, "float32 range profiles", how="with sub-apertures")
-        return _Float32(task, tolerance).factorized(lanes)
+        return _Float32(task, tolerance).factorized(on)
     except ToleranceUnreachable as refused:
         try:
-            _direct(task, tolerance, lanes, float64)
+            _direct(task, tolerance, on, float64)
             remedy = "method='direct' can"
         except ToleranceUnreachable:
             remedy = ""
-        best = _search(lambda t: _Float32(task, t).factorized(lanes), max(tolerance, LEAST_TOLERANCE))
+        best = _search(lambda t: _Float32(task, t).factorized(on), max(tolerance, LEAST_TOLERANCE))
         raise refused.restated(tolerance, best, remedy) from None
 
 

@@ -13,6 +13,7 @@ from ..base.validation import choice, flag, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics.cost_model import DeviceClass
 from ..numerics.windows import Window
 from ..opencl.device import Device, DeviceChoice
 from ..opencl.memory_budget import budget
@@ -73,8 +74,8 @@ class FocusOptions:
 
     def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
         """The method for these devices together; tolerance: another one than asked for."""
-        lanes, float64 = all(d.info.vector_width > 1 for d in devices), all(d.info.fp64 for d in devices)
-        return choose(task, self.method, self.tolerance if tolerance is None else tolerance, lanes, float64)
+        on, float64 = DeviceClass.of(d.info for d in devices), all(d.info.fp64 for d in devices)
+        return choose(task, self.method, self.tolerance if tolerance is None else tolerance, on, float64)
 
     def budget(self, device: Device) -> float:
         """Bytes that blocks may take on a device."""

@@ -18,6 +18,7 @@ from ..base.stage_timer import Clock
 from ..base.text import duration, size_text
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics.cost_model import DeviceClass
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
@@ -164,7 +165,7 @@ def speed(device: Device) -> float:
     side = 128
     while True:
         task = make_task(raw, ImageGrid.plane(shape=(side, side), spacing=0.3), None, None, False, True)
-        made, tiling = direct.make_plan(task, 0.1, lanes=False)
+        made, tiling = direct.make_plan(task, 0.1, DeviceClass(lanes=False))
         engine, out = direct.Direct(device, task, made, tiling), np.empty((side, side), np.complex64)
         clock = Clock()
         engine.fill(0, tiling.n_bands, out, 2**28, clock, lambda rows: None)  # builds the kernels, warms up

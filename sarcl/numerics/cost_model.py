@@ -9,6 +9,9 @@ The unit "contribution" is one row at one pixel, or one scatterer in one row, wi
 
 from __future__ import annotations
 
+from collections.abc import Iterable
+from typing import Any, NamedTuple
+
 import numpy as np
 
 # Range profiles in float32, in contributions (2026-11-21).
@@ -27,6 +30,15 @@ LINE_SAMPLE = 1.2  # per sample of a line's profile
 LINE_WEIGHTS = 1.0  # per line and pulse: weights of its taps
 LINE_PULSE = 30.0  # per tile and pulse
 LINE_GROUP = 0.4  # per pixel and group of pulses
+
+# Lines that a work-group shares (kernels/backproject_shared_lines.cl), in instructions of one lane on sm_90.
+SHARED_TAP = 4.0  # per contribution and tap, of the weights and of their slopes
+SHARED_READ = 1.0  # per sample of a line's profile that a work-item reads
+SHARED_PULSE = 40.0  # per work-item and pulse, of 16 contributions
+SHARED_SAMPLE, SHARED_SAMPLE_TAP = 60.0, 12.0  # per sample of a line's profile, and per tap from the range profile to it
+SHARED_LINE, SHARED_LINE_TAP = 90.0, 35.0  # per line and pulse, and per tap of its weights
+SHARED_TURN = 60.0  # per contribution over the pulses of a group
+GATHERED = 74.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
 # Merging of sub-apertures, in contributions (2026-11-21).
 # Per sample that is moved to a new tile: per tap of the interpolation, per tap of the filter that decimates pulses.
@@ -76,6 +88,41 @@ SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 0.05  # per scatterer and function of aspe
 SPECTRAL_PLANES = 0.4  # per facet: numbers for the kernel of the amplitudes
 SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map
 SPECTRAL_SAMPLE = 0.35  # per wavenumber along the track and frequency: transforms, and the samples read from them
+
+
+class DeviceClass(NamedTuple):
+    """What plans must know of the devices that follow them.
+
+    lanes         they work on vectors of pixels, as CPUs do
+    local_memory  bytes of local memory that the work-items of a group share; 0: they share nothing
+    """
+
+    lanes: bool
+    local_memory: int = 0
+
+    @classmethod
+    def of(cls, infos: Iterable[Any]) -> DeviceClass:
+        """Of devices (DeviceInfo) that follow one plan together."""
+        infos = list(infos)
+        lanes = [info.vector_width > 1 for info in infos]
+        return cls(all(lanes), 0 if any(lanes) else min(min(info.local_memory, MOST_LOCAL) for info in infos))
+
+
+MOST_LOCAL = 48 * 1024  # bytes of local memory that each NVIDIA device gives to a work-group
+CPU = DeviceClass(lanes=True)
+
+
+def shared_lines(side: int, fine: int, taps: int, slope_taps: int, group: int, profile_taps: int, samples: float) -> float:
+    """Cost per contribution of lines that a work-group shares.
+
+    side      pixels along a side of a tile;  fine  samples of a line's profile per pixel;  samples  of that profile
+    taps, slope_taps, profile_taps   of the weights of lines, of their slopes, and from the range profile to the line's
+    group     pulses that share a curvature
+    """
+    reads = (3 * fine + taps) / 4 if fine < taps else taps
+    pair = SHARED_TAP * (taps + slope_taps) + SHARED_READ * (reads + (taps + slope_taps) / 8) + SHARED_PULSE / 16
+    tile = samples * (SHARED_SAMPLE + SHARED_SAMPLE_TAP * profile_taps) + side * (SHARED_LINE + SHARED_LINE_TAP * taps)
+    return (pair + tile / side**2 + SHARED_TURN / group) / GATHERED
 
 
 def profile(length: int) -> float:

@@ -63,6 +63,16 @@ def position_rounding(radius: float, bandwidth: float, wide: bool) -> float:
     return 0.0 if wide else 2 * np.pi * cycles * 6 * FLOAT32.unit
 
 
+def two_part_position_rounding(radius: float, distance: float, bandwidth: float) -> float:
+    """Phase error, rad, at the band's edge where steps of a line are products of whole numbers and two float32 parts.
+
+    Only fractions of a sample of the range profile and of the line's profile are rounded, by four units each; the band's
+    edge is at most half a cycle per sample. The curvature, at most radius^2/(2 distance), is rounded as any position.
+    """
+    bend = min(radius**2 / (2 * max(distance, 1e-300)), radius)
+    return 2 * 4 * np.pi * FLOAT32.unit + position_rounding(bend, bandwidth, False)
+
+
 def series_error(radius: float, distance: float, frequency: float, order: int) -> float:
     """Phase error, rad, of the range series cut after `order` (2, 3 or 4; 0 is exact) for points within `radius` m.
 

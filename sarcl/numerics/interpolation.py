@@ -103,6 +103,16 @@ def line_interpolator(taps: int, oversample: float) -> Interpolator:
 
 
 @functools.lru_cache(maxsize=256)
+def slope_error(made: Interpolator) -> float:
+    """Largest error of the weights' derivatives by position, over the derivative at the band's edge."""
+    z, nu = np.linspace(-0.5, 0.5, 65), np.linspace(0, 0.5 / made.oversample, 33)
+    waves = np.exp(2j * np.pi * nu[:, None, None] * (_positions(made.taps) - z[:, None]))
+    found = (waves * _slopes(made.table, z)).sum(axis=-1)
+    wanted = 2j * np.pi * nu[:, None]
+    return MARGIN * float(np.abs(found - wanted).max() / np.abs(wanted).max())
+
+
+@functools.lru_cache(maxsize=256)
 def _least_squares(taps: int, oversample: float) -> Interpolator:
     z = chebyshev(0, 1, 48)
     weights = least_squares_weights(taps, oversample, z).T
@@ -155,6 +165,15 @@ def _weights(table: np.ndarray, z: np.ndarray) -> np.ndarray:
     powers = (z[..., None] ** 2) ** np.arange(table.shape[-1])
     even, odd = (np.tensordot(powers, table[:, i].astype(np.float64), axes=(-1, -1)) for i in (0, 1))
     odd = odd * z[..., None]
+    return np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=-1)
+
+
+def _slopes(table: np.ndarray, z: np.ndarray) -> np.ndarray:
+    """Derivatives of `_weights` by z."""
+    n = np.arange(table.shape[-1])
+    z = z[..., None]
+    even = np.tensordot(2 * n * z ** np.maximum(2 * n - 1, 0), table[:, 0].astype(np.float64), axes=(-1, -1))
+    odd = np.tensordot((2 * n + 1) * z ** (2 * n), table[:, 1].astype(np.float64), axes=(-1, -1))
     return np.concatenate([even + odd, (even - odd)[..., ::-1]], axis=-1)
 
 

@@ -285,7 +285,7 @@ def test_where_float32_fails_a_bug_in_float64_is_not_hidden(monkeypatch):
     raw = noise_history()
     sarcl.backproject(raw, PLANE, tolerance=1e-6)
 
-    def refuse(task, tolerance, lanes=True):
+    def refuse(task, tolerance, on=None):
         raise ToleranceUnreachable(tolerance, None, "test")
 
     monkeypatch.setattr("sarcl.imaging.direct.direct.make_plan", refuse)

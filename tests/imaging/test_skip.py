@@ -17,6 +17,7 @@ from sarcl.imaging.engine import Skipped
 from sarcl.imaging.focusing_task import SKIPS, make_task
 from sarcl.imaging.tiling._points import PointTiling
 from sarcl.model.image_grid import ImageGrid
+from sarcl.numerics.cost_model import DeviceClass
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.backproject import backproject as exact
 
@@ -100,7 +101,7 @@ def test_both_kernels_see_the_same_beam_and_window(lanes, tolerance, bistatic):
     counts, images = {}, {}
     for skip in (True, False, {"beam"}, {"range window"}):
         task = make_task(raw, PLANE, None, None, False, skip, beam)
-        plan, tiling = direct.make_plan(task, tolerance, lanes)
+        plan, tiling = direct.make_plan(task, tolerance, DeviceClass(lanes))
         data = np.empty(PLANE.shape, np.complex64)
         engine = direct.Direct(device, task, plan, tiling)
         skipped = engine.fill(0, tiling.n_bands, data, 2**28, Clock(), lambda rows: None)

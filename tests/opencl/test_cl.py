@@ -325,7 +325,8 @@ MACROS = {
     "NODES": 1, "PULSE_NODES": 1, "TILE": 32, "HH": 1, "HV": 1, "VH": 1, "VV": 1, "METAL": 0, "DISPERSIVE": 1,
     "ROUGH": 1, "DIAGRAM_ISOTROPIC": 0, "DIAGRAM_COS": 1, "DIAGRAM_COS2": 2, "DIAGRAM_EXP": 3,
     "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1, "SEGMENT": 64,
-    "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64, "FROM64": 0,
+    "SHARED": 1, "ITEMS": 16, "SLOPE_TAPS": 2, "SLOPE_TERMS": 2, "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64,
+    "FROM64": 0,
 }  # fmt: skip
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 

@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
+from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
@@ -20,24 +21,28 @@ from ..pixel_taper import TaperOnDevice
 from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import Tiling
-from . import line_plan
+from . import line_plan, shared_line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, kernel_of
 
 
-def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[Plan | LinePlan, Tiling]:
+def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tuple[Plan | LinePlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`, and the tiling of the grid that it uses.
 
-    lanes  the devices work on vectors of pixels, so that lines of pixels may be faster
+    on  the devices that follow the plan
     ToleranceUnreachable names the best tolerance that can be met.
     """
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
-    lined = None
-    if not task.weighs_pixels and line_plan.possible(grid, lanes):  # lines share the weights of their pulses
-        lined = line_plan.choose(
-            tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
-        )
+    lined: LinePlan | None = None
+    numbers = {"n_samples": raw.n_samples, "bandwidth": bandwidth, "highest": highest}
+    if not task.weighs_pixels and grid.is_plane:  # lines share the weights of their pulses
+        if on.lanes:
+            lined = line_plan.choose(tolerance, grid, task.antennas, **numbers)
+        elif on.local_memory:
+            lined = shared_line_plan.choose(
+                tolerance, grid, task.antennas, **numbers, local_memory=on.local_memory
+            )
     if lined is not None and lined.cost < 0.9:  # no other plan costs less
         return lined, LineTiling(grid, lined.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}

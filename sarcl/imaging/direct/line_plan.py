@@ -13,6 +13,7 @@ from ...base.errors import ToleranceUnreachable
 from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
 from ..tiling.plane import outline
@@ -91,9 +92,9 @@ class LinePlan:
         }
 
 
-def possible(grid: ImageGrid, lanes: bool) -> bool:
+def possible(grid: ImageGrid, on: DeviceClass) -> bool:
     """Whether a plan by lines may be faster: pixels lie on lines, and the devices work on vectors of pixels."""
-    return lanes and grid.is_plane
+    return on.lanes and grid.is_plane
 
 
 def steps(grid: ImageGrid) -> np.ndarray:
@@ -152,6 +153,56 @@ def sampled_groups(n_rows: int, group: int, most: int = 24) -> np.ndarray:
     return starts[spread_over(len(starts), most)]
 
 
+@dataclass(frozen=True)
+class GroupCurvature:
+    """How much the curvature of the pulses of a group differs, over sampled tiles and groups.
+
+    radius   of a tile, m
+    cycles   largest difference of phases from that of the middle pulse, with a margin
+    off      largest part of the curvature that no shift of a line holds, m, with a margin
+    step     largest change of the range from one pixel to the next, m
+    """
+
+    radius: float
+    cycles: float
+    off: float
+    step: float
+
+    @classmethod
+    def of(
+        cls, grid: ImageGrid, antennas: PulseGeometry, points: np.ndarray, side: int, group: int, highest: float
+    ) -> GroupCurvature:
+        """Of tiles about `points`, with so many pixels along a side, and groups of so many pulses."""
+        assert grid.spacing is not None
+        n_rows = len(antennas.tx)
+        starts = sampled_groups(n_rows, group)
+        rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
+        directions = SampledDirections.at(points, antennas.tx[rows], antennas.rx[rows], steps(grid))
+        rest = directions.rest(side, grid.spacing).reshape(len(points), len(starts), -1, 5)
+        kappa = 2 * highest / SPEED_OF_LIGHT
+        cycles = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
+        radius = side / 2 * float(np.hypot(*grid.spacing))
+        return cls(radius, cycles, 1.1 * unmodelled_shift(rest), directions.largest_step())
+
+    @property
+    def phase_error(self) -> float:
+        """Phase error, rad, of the curvature that the pulses of a group share."""
+        return 2 * np.pi * self.cycles
+
+    def shift(self, bandwidth: float) -> float:
+        """Phase error, rad, at the band's edge of positions that are not shifted pixel by pixel."""
+        return 2 * np.pi * self.off * bandwidth / SPEED_OF_LIGHT
+
+    def cells(self, bandwidth: float) -> float:
+        """Resolution cells per pixel; where every pulse sees all pixels at one range they are added pixel by pixel."""
+        return max(self.step * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT, LEAST_CELLS)
+
+    def limits(self, bandwidth: float, oversample: float) -> tuple[float, float, float]:
+        """limit_cycles, limit_position and limit_step of a plan with profiles `oversample` times finer than a cell."""
+        sigma = 2 * bandwidth / SPEED_OF_LIGHT * oversample
+        return self.cycles, max(self.off * sigma, 1e-6), self.cells(bandwidth) * oversample * (1 + 1e-5)
+
+
 def choose(
     tolerance: float,
     grid: ImageGrid,
@@ -171,20 +222,12 @@ def choose(
     """
     assert grid.spacing is not None
     distance = antennas.distance(grid.bounds)
-    spacing, n_rows = grid.spacing, len(antennas.tx)
     best: LinePlan | None = None
     for side, group in ((s, g) for s in sides for g in GROUP_SIZES if s * g <= 512):
-        radius = side / 2 * float(np.hypot(*spacing))
+        radius = side / 2 * float(np.hypot(*grid.spacing))
         if 4 * radius > distance or (side > sides[-1] and min(grid.shape) <= side / 2):
             continue
-        starts = sampled_groups(n_rows, group)
-        rows = np.minimum(starts[:, None] + np.arange(0, group + 1, group // 4), n_rows - 1).ravel()
-        points = outline(grid)
-        directions = SampledDirections.at(points, antennas.tx[rows], antennas.rx[rows], steps(grid))
-        rest = directions.rest(side, spacing).reshape(len(points), len(starts), -1, 5)
-        kappa = 2 * highest / SPEED_OF_LIGHT
-        bend_cycles = 1.5 * kappa * float(np.abs(rest - rest[:, :, 2:3]).max())
-        off = 1.1 * unmodelled_shift(rest)
+        curvature = GroupCurvature.of(grid, antennas, outline(grid), side, group, highest)
         order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
         fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.position_rounding(
             radius, bandwidth, False
@@ -193,10 +236,8 @@ def choose(
         fixed += error_bounds.curvature_rounding(radius, distance, highest)
         if fixed > 0.7 * tolerance:
             continue
-        fixed += 2 * np.pi * bend_cycles + error_bounds.sum_rounding(group, n_samples)
-        position_phase = 2 * np.pi * off * bandwidth / SPEED_OF_LIGHT  # rad at the band's edge
-        # resolution cells per pixel; where every pulse sees all pixels at one range they are added pixel by pixel
-        cells = max(directions.largest_step() * 1.02 * 2 * bandwidth / SPEED_OF_LIGHT, LEAST_CELLS)
+        fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
+        position_phase, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
         for fine, taps, slope in itertools.product(FINES, interpolation.LINE_TERMS, (False, True)):
             size = 4 * group * (fine * 2 * (2 * side + 16) + taps * (5 if slope else 3) * side)
             if cells * 1.2 >= fine or size > LOCAL_BYTES:
@@ -223,9 +264,8 @@ def choose(
                 if made.error > tolerance - error:
                     continue
             if best is None or per_pair < best.cost:
-                sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
                 best = LinePlan(
-                    side, fine, group, line, made, length, order, slope, bend_cycles, max(off * sigma, 1e-6),
-                    cells * length / n_samples * (1 + 1e-5), error + made.error, per_pair,
+                    side, fine, group, line, made, length, order, slope,
+                    *curvature.limits(bandwidth, length / n_samples), error + made.error, per_pair,
                 )  # fmt: skip
     return best

@@ -1,4 +1,4 @@
-"""The two kernels that add a block of pulses to tiles of pixels, with their buffers on the device.
+"""The kernels that add a block of pulses to tiles of pixels, with their buffers on the device.
 
 Both serve the direct method, where each pulse has one range profile, and the factorised method (`local`), where every
 tile has profiles of its own, relative to its reference point.
@@ -18,8 +18,9 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
-from . import line_plan
+from . import line_plan, shared_line_plan
 from .line_plan import LinePlan, steps
+from .shared_line_plan import SharedLinePlan
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
@@ -125,6 +126,63 @@ class LineKernel:
         )  # fmt: skip
 
 
+class SharedLineKernel:
+    """Backprojection of square tiles of a plane by lines that a work-group shares: kernels/backproject_shared_lines.cl."""
+
+    chunk = shared_line_plan.CHUNK
+
+    def __init__(
+        self, device: Device, plan: SharedLinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
+        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
+    ) -> None:  # fmt: skip
+        if weights["WEIGHT"]:
+            raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
+        self.device, self.tiling, self.beam, self.plan = device, tiling, beam, plan
+        self.least_rows, self.n_line = plan.group, line_plan.components(beam) + 8
+        self.components = self.n_line + 5  # and a pulse's share of its group's record
+        geometry = {"BISTATIC": int(bistatic), "BEAM": int(beam)}
+        macros = plan.macros(bistatic, wrap, local) | geometry
+        self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=0, RANGE=0, SHARED=1)
+        self.wrap_and_fine = plan.length if wrap else 0, plan.fine
+        self.schedule = device.kernel("backproject_shared_lines.cl", "schedule_pulses", **macros)
+        self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **macros)
+        tables = (plan.interpolator, plan.line, plan.slopes or plan.line)
+        self.tables = [device.upload(made.table) for made in tables]
+        self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
+        self.limits = [np.float32(v) for v in (plan.limit_cycles, plan.limit_position, plan.limit_step)]
+
+    def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
+        """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
+        return TilesOnDevice(
+            self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
+        )
+
+    def add(
+        self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
+        offset: int, image: Any, *weights: Any,
+    ) -> None:  # fmt: skip
+        """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
+        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
+        assert self.tiling.grid.spacing is not None
+        dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
+        groups, items = -(-used // self.plan.group), self.plan.items
+        constants = device.empty(4 * self.n_line * n * (high - low))
+        schedule = device.empty(16 * (1 + self.plan.group) * groups * (high - low))
+        device.run(
+            self.constants, (n, high - low), None,
+            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
+            *self.wrap_and_fine, self.axes, constants,
+        )  # fmt: skip
+        device.run(
+            self.schedule, (groups, high - low), None, constants, n, used, dx, dy, *self.limits, schedule
+        )
+        device.run(
+            self.kernel, (items, high - low), (items, 1),
+            source, stride, origin, *self.tables, n, used, constants, schedule, dx, dy, low, tiles.n_tiles, image,
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed,
+        )  # fmt: skip
+
+
 class TilesOnDevice:
     """Tiles on the device, with the buffers of a kernel, and two counts per tile: the pulses whose range window misses
     the tile, and those whose beam does."""
@@ -140,9 +198,13 @@ class TilesOnDevice:
         return np.stack([counts[0], counts[-1] if self.beam else np.zeros_like(counts[0])]).astype(np.int64)
 
 
-def kernel_of(device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: Any) -> GatherKernel | LineKernel:
+def kernel_of(
+    device: Device, plan: Plan | LinePlan, tiling: Tiling, **how: Any
+) -> GatherKernel | LineKernel | SharedLineKernel:
     """The kernel for a plan; how: bistatic, wrap, local, beam, weights."""
     if isinstance(plan, LinePlan):
         assert isinstance(tiling, LineTiling)
+        if isinstance(plan, SharedLinePlan):
+            return SharedLineKernel(device, plan, tiling, **how)
         return LineKernel(device, plan, tiling, **how)
     return GatherKernel(device, plan, tiling, **how)

@@ -12,6 +12,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.plan import Plan, cheapest
 from ...numerics.pulse_geometry import PulseGeometry
@@ -89,10 +90,10 @@ class FactorPlan:
         }
 
 
-def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple[FactorPlan, Tiling]:
+def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tuple[FactorPlan, Tiling]:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
-    lanes  the devices work on vectors of pixels, so that lines of pixels may be faster
+    on  the devices that follow the plan
     ToleranceUnreachable where sub-apertures cannot meet it, with the reason, but without a best tolerance, which takes
     a search.
     """
@@ -100,7 +101,7 @@ def make_plan(task: FocusingTask, tolerance: float, lanes: bool = True) -> tuple
     track = replace(task.antennas.picked(order), runs=tuple(runs))
     reason = ""
     # near an antenna, lines are curved too much
-    for lines in (True, False) if line_plan.possible(task.grid, lanes) else (False,):
+    for lines in (True, False) if line_plan.possible(task.grid, on) else (False,):
         case = _Case(task, track, order, tolerance, lines)
         tried = sorted(case.candidates(), key=lambda c: c[0])[:TRIES]
         for _, choice in tried:

@@ -19,9 +19,11 @@ import numpy as np
 from ...base.stage_timer import Clock
 from ...io import sarcl_hdf5
 from ...model.lazy_rows import Picked, Stacked
+from ...numerics.cost_model import DeviceClass
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
+from ...opencl.device_list import DeviceInfo
 from ..choose_method import MethodChoice
 from ..engine import Engine, Skipped
 from ..focusing_task import FocusingTask
@@ -93,8 +95,8 @@ class DaskWorkers:
             self.client.cancel(futures)
 
 
-def have_lanes(client: Any, device: Any) -> bool:
-    """Whether the devices of all workers work on vectors of pixels, as CPUs do. Opens the devices.
+def device_class(client: Any, device: Any) -> DeviceClass:
+    """What plans must know of the devices of all workers together. Opens the devices.
 
     ImportError without dask, TypeError for another kind of client, RuntimeError where it has no workers.
     """
@@ -107,8 +109,8 @@ def have_lanes(client: Any, device: Any) -> bool:
     places = _places(client)
     if not places:
         raise RuntimeError("cluster has no workers; start some, and client.wait_for_workers(1)")
-    widths = [client.submit(_width, device, place, workers=[w], pure=False) for w, place in places.items()]
-    return all(width > 1 for width in client.gather(widths))
+    infos = [client.submit(_info, device, place, workers=[w], pure=False) for w, place in places.items()]
+    return DeviceClass.of(client.gather(infos))
 
 
 def _places(client: Any) -> dict[str, int]:
@@ -163,10 +165,10 @@ def _open(choice: Any, place: int) -> Device:
     return open_device(choices[place % len(choices)])
 
 
-def _width(choice: Any, place: int) -> int:
-    """In a worker: the vector width of its device, pixels."""
+def _info(choice: Any, place: int) -> DeviceInfo:
+    """In a worker: what is known of its device."""
     with _lock:
-        return _open(choice, place).info.vector_width
+        return _open(choice, place).info
 
 
 def _make(run: Run, *, worker_task: WorkerTask, places: dict[str, int]) -> tuple[np.ndarray, Skipped, str]:

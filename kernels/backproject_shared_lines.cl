@@ -1,0 +1,395 @@
+// Direct backprojection onto square tiles of a plane, a line of pixels at a time, shared by a work-group: the sums of
+// backproject_lines.cl for devices with one lane per work-item (GPUs).
+//
+//   delta(i, j) = A_i + j beta + rest_ij,    I_ij += sum_b W_b(i) T(n_i + b + FINE j)
+//
+// A work-group adds up a tile. For each pulse its items make T and the weights of all lines in local memory, then each item
+// adds LINE_TAPS products to each of its pixels, which stay in registers: no gather, sine, cosine or wide number per pixel.
+//
+// source    backproject_lines.cl, also for pulses that are added pixel by pixel. The sums are kept without the rest_ij of a
+//           group of pulses, that of its middle pulse: where groups change, and after CHUNK pulses, sums are turned by the
+//           difference of the phases. T is stored by periods of the items' pixels, so that neighbouring items read
+//           neighbouring numbers of local memory, and the places of all samples that an item reads are constants.
+// symbols   T, W, n_i, rest_ij, beta   as in backproject_lines.cl
+// macros    FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM, SIDE, FINE, LINE_TAPS, LINE_TERMS, GROUP as in
+//           backproject_lines.cl;  SHARED 1, see line_geometry.clh
+//           ITEMS     work-items of a group;  CHUNK  pulses added in float32 before they join the compensated total
+//           SLOPE_TAPS, SLOPE_TERMS  of the slopes of the weights, by which rest_ij moves each pixel's position; 0: none
+// reference: sarcl/reference/backproject.py:backproject
+
+#undef VW
+#define VW 1
+#define RANGE 0
+#include "common.clh"
+#include "doubleword.clh"
+#include "geometry.clh"
+#include "interp.clh"
+#include "range_phase.clh"
+#include "line_geometry.clh"
+#include "line_group.clh"
+
+#define PIXELS 4                                // neighbouring pixels of a line that belong to a work-item
+#define ACROSS (SIDE / PIXELS)                  // work-items that share a line
+#define AT_ONCE (ITEMS / ACROSS)                // lines that the work-group adds to at a time
+#define LINES (SIDE / AT_ONCE)                  // lines that a work-item adds to, every AT_ONCE-th
+#define PERIOD (FINE * PIXELS)                  // samples of T from a work-item's first pixel to its neighbour's
+#define READ ((PIXELS - 1) * FINE + LINE_TAPS)  // samples of T over which a work-item's pixels of a line reach
+// Sample m of T is stored at row m % PERIOD, column m / PERIOD, and again PERIOD rows and one column before: so the samples
+// that an item reads lie in one column, whichever comes first.
+#define ROWS (PERIOD + READ - 1)
+#define MOST (FINE * (2 * SIDE + 16))
+#define COLUMNS (MOST / PERIOD + 1)
+
+DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
+#if SLOPE_TAPS
+DEFINE_SLOPES(line_slopes, SLOPE_TAPS, SLOPE_TERMS)
+#define OUTER ((LINE_TAPS - SLOPE_TAPS) / 2)  // taps on either side that have no slopes
+#endif
+
+// Records of a group of pulses, in int32: a head, then one entry per pulse. Entries of pulses by lines come first, those of
+// pulses pixel by pixel from the end on.
+enum { H_LINES, H_PIXELS, H_MIDDLE, H_OUTSIDE, N_HEAD };  // pulses by lines, pixel by pixel; middle; outside + 65536 unlit
+enum { E_PULSE, E_FROM, E_COUNT, E_UNUSED, N_ENTRY };    // pulse; first sample of T about the reference pixel; samples of T
+#define N_GROUP (N_HEAD + N_ENTRY * GROUP)
+
+static inline group group_of(__global const float *restrict middle, float step_x, float step_y) {
+    group pulses;
+    // lines run along the axis on which the range grows faster
+    pulses.transposed = fabs(middle[L_STEP_Y]) > fabs(middle[L_STEP_X]);
+    pulses.step_i = pulses.transposed ? step_x : step_y;
+    pulses.step_j = pulses.transposed ? step_y : step_x;
+    pulses.middle = load_line(middle, pulses.transposed);
+    return pulses;
+}
+
+// Half of the mean of the curvature at a line's ends, and half of that in its middle, m: what is in the line's position.
+static inline float in_position_of(group pulses, line_geometry line, float i, float centre) {
+    float end = SIDE / 2, q = q_of(pulses, i, end);
+    return 0.25f * (curvature_at(line, i, end, q) + curvature_at(line, i, -end, q)) + 0.5f * centre;
+}
+
+// First of the samples of T that the lines of a pulse read, counted about the reference pixel, and their number; 0 where
+// they are too many to be stored, as for a steep pulse, or have no spacing.
+static inline int samples_needed(group pulses, line_geometry line, int *from) {
+    if (!(fabs(line.along) >= LEAST_STEP)) return 0;
+    float position[5], lowest = INFINITY, highest = -INFINITY, bend = 0, samples_of_T = FINE / line.along;
+#pragma unroll
+    for (int k = 0; k < 5; k++) {
+        float i = (k - 2) * (SIDE / 4), centre = curvature_at(line, i, 0, q_of_line(pulses, i));
+        position[k] = fma(in_position_of(pulses, line, i, centre), line.sigma, i * line.across) * samples_of_T;
+        lowest = fmin(lowest, position[k]);
+        highest = fmax(highest, position[k]);
+    }
+    // positions are a cubic of i: between two of five, no one lies farther outside than 3/8 of the largest second difference
+#pragma unroll
+    for (int k = 1; k < 4; k++) bend = fmax(bend, fabs(position[k - 1] - 2 * position[k] + position[k + 1]));
+    lowest -= fma(0.5f, bend, 2.0f);
+    highest += fma(0.5f, bend, 2.0f);
+    if (!(highest - lowest < MOST && fabs(lowest) < MOST)) return 0;
+    *from = (int)floor(lowest) - LINE_TAPS / 2 - FINE * (SIDE / 2);
+    int count = (int)ceil(highest) + LINE_TAPS / 2 + FINE * (SIDE / 2) - *from;
+    return count <= MOST ? count : 0;
+}
+
+// What is done with each pulse of a group, at each tile. global size (groups, tiles of this block)
+//   constants   (tiles, n, N_LINE)      from tile_constants.cl:line_constants
+//   schedule    (tiles, groups, N_GROUP)
+__kernel void schedule_pulses(__global const float *restrict constants, int n, int n_used, float step_x, float step_y,
+                              float limit_cycles, float limit_position, float limit_step,
+                              __global int *restrict schedule) {
+    int start = get_global_id(0) * GROUP, stop = min(start + GROUP, n_used);
+    __global const float *records = constants + get_global_id(1) * (size_t)n * N_LINE;
+    __global int *head = schedule + (get_global_id(1) * get_global_size(0) + get_global_id(0)) * N_GROUP;
+    __global int *entries = head + N_HEAD;
+    int inside = 0, crossing = 0, outside = 0, any = start;
+    for (int p = start; p < stop; p++) {
+        int state = as_int(records[(size_t)p * N_LINE + L_STATE]);
+        inside += state == INSIDE;
+        outside += state == OUTSIDE ? 1 : state == UNLIT ? 65536 : 0;
+        if (state == CROSSING && !crossing++) any = p;
+    }
+    int middle = any, before = inside / 2, n_lines = 0, n_pixels = 0;
+    for (int p = start; p < stop && inside; p++)
+        if (as_int(records[(size_t)p * N_LINE + L_STATE]) == INSIDE && !before--) middle = p;
+    group pulses = group_of(records + (size_t)middle * N_LINE, step_x, step_y);
+    for (int p = start; p < stop && inside + crossing; p++) {
+        __global const float *record = records + (size_t)p * N_LINE;
+        int state = as_int(record[L_STATE]), from = 0, count = 0;
+        if (state != INSIDE && state != CROSSING) continue;
+        line_geometry line = load_line(record, pulses.transposed);
+        if (state == INSIDE && fabs(line.along) <= limit_step && fits(pulses, line, limit_cycles, limit_position))
+            count = samples_needed(pulses, line, &from);
+        __global int *entry = entries + N_ENTRY * (count ? n_lines++ : GROUP - ++n_pixels);
+        entry[E_PULSE] = p;
+        entry[E_FROM] = from;
+        entry[E_COUNT] = count;
+    }
+    head[H_LINES] = n_lines;
+    head[H_PIXELS] = n_pixels;
+    head[H_MIDDLE] = middle;
+    head[H_OUTSIDE] = outside;
+}
+
+// Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
+static inline void weigh_line(group pulses, __global const float *restrict record, int r, int from, int count,
+                              __global const float *restrict weights, __global const float *restrict slopes,
+                              __local float2 *W, __local float2 *V, __local int *at) {
+    line_geometry line = load_line(record, pulses.transposed);
+    __global const float *ratio = record + L_RATIO + 2 * pulses.transposed;
+    float i = r - SIDE / 2, samples_of_T = FINE / line.along, weight[LINE_TAPS];
+    float centre = curvature_at(line, i, 0, q_of_line(pulses, i));
+    // i times the ratio of steps, in two parts: the first product is exact
+    float product = i * ratio[0], whole = nearest(product), rest = fma(i, ratio[1], product - whole);
+    float shift = in_position_of(pulses, line, i, centre) * line.sigma;
+    float t = fma(shift, samples_of_T, rest) - 0.5f * (LINE_TAPS - 1), first = nearest(t), z = t - first;
+    line_weights(z, weights, weight);
+#if SLOPE_TAPS
+    float slope[SLOPE_TAPS], per_metre = samples_of_T * line.sigma;
+    line_slopes(z, slopes, slope);
+#endif
+    first += whole;
+    float cycles = fma(centre, line.kappa, cycles_of(i, line.cycles_across, line.cycles_across_low) + line.cycles);
+    cycles -= nearest(cycles);
+    cycles -= cycles_of(first, line.fine_cycles, line.fine_cycles_low);
+    cycles -= nearest(cycles);
+#pragma unroll
+    for (int b = 0; b < LINE_TAPS; b++) {
+        float of_tap = cycles - b * line.fine_cycles, sine, cosine;
+        of_tap = of_tap - b * line.fine_cycles_low;
+        sincos_cycles(of_tap - nearest(of_tap), &sine, &cosine);
+        W[r * LINE_TAPS + b] = (float2)(weight[b] * cosine, weight[b] * sine);
+#if SLOPE_TAPS
+        if (b >= OUTER && b < OUTER + SLOPE_TAPS) {
+            float v = slope[b - OUTER] * per_metre;
+            V[r * SLOPE_TAPS + b - OUTER] = (float2)(v * cosine, v * sine);
+        }
+#endif
+    }
+    // no rounding, however unlikely, may lead outside of T
+    int m = clamp((int)first - from - FINE * (SIDE / 2), 0, count - FINE * (SIDE - 1) - LINE_TAPS);
+    at[r] = m % PERIOD * COLUMNS + m / PERIOD;
+}
+
+// Sample number k of T, which begins with sample `from`: the profile of a pulse at a place of a line, carrier included.
+static inline void take_sample(__global const float *restrict record, int transposed, int k, int from,
+                               __global const float *restrict row, int stride, int origin,
+                               __global const float *restrict table, __local float2 *T) {
+    __global const float *step = record + L_STEP + 2 * transposed;
+    float m = k + from, re, im, sine, cosine;
+    // m times the step, in two parts: the first product is exact
+    float product = m * step[0], whole = nearest(product);
+    float t = fma(m, step[1], product - whole) + record[L_FRAC];
+    look_up(row, stride, origin, as_int(record[L_BASE]) + (int)whole, t, table, &re, &im);
+    sincos_cycles(cycles_of(m, record[L_FINE_X + 2 * transposed], record[L_FINE_X_LOW + 2 * transposed]), &sine, &cosine);
+    float2 sample = (float2)(fma(re, cosine, -im * sine), fma(re, sine, im * cosine));
+    int at = k % PERIOD * COLUMNS + k / PERIOD;
+#pragma unroll
+    for (int copy = 0; copy * PERIOD < ROWS; copy++)
+        if (k % PERIOD + copy * PERIOD < ROWS && k / PERIOD >= copy) T[at + copy * (PERIOD * COLUMNS - 1)] = sample;
+}
+
+// The sums of a work-item, without the rest_ij of the pulses so far.
+typedef struct {
+    float re[LINES][PIXELS], im[LINES][PIXELS];
+#if SLOPE_TAPS
+    float slope_re[LINES][PIXELS], slope_im[LINES][PIXELS];
+#endif
+} sums;
+
+#define CLEAR(what)                                 \
+    _Pragma("unroll") for (int l = 0; l < LINES; l++) \
+        _Pragma("unroll") for (int c = 0; c < PIXELS; c++) what[l][c] = 0;
+
+// Adds one pulse to a work-item's pixels: `lane` counts items along a line, `r0` is the first line.
+static inline void sum_lines(sums *s, int r0, int lane, __local const float2 *T, __local const float4 *W,
+                             __local const float4 *V, __local const int *at) {
+#pragma unroll
+    for (int l = 0; l < LINES; l++) {
+        int r = r0 + l * AT_ONCE;
+        __local const float2 *t = T + at[r] + lane;
+        float2 w[LINE_TAPS];
+#pragma unroll
+        for (int b = 0; b < LINE_TAPS; b += 2) {
+            float4 two = W[r * (LINE_TAPS / 2) + b / 2];
+            w[b] = two.xy;
+            w[b + 1] = two.zw;
+        }
+#if SLOPE_TAPS
+        float2 v[SLOPE_TAPS];
+#pragma unroll
+        for (int b = 0; b < SLOPE_TAPS; b += 2) {
+            float4 two = V[r * (SLOPE_TAPS / 2) + b / 2];
+            v[b] = two.xy;
+            v[b + 1] = two.zw;
+        }
+#endif
+#pragma unroll
+        for (int k = 0; k < READ; k++) {
+            float2 u = t[k * COLUMNS];
+#pragma unroll
+            for (int c = 0; c < PIXELS; c++) {
+                int b = k - FINE * c;
+                if (b < 0 || b >= LINE_TAPS) continue;
+                s->re[l][c] = fma(u.x, w[b].x, fma(-u.y, w[b].y, s->re[l][c]));
+                s->im[l][c] = fma(u.x, w[b].y, fma(u.y, w[b].x, s->im[l][c]));
+#if SLOPE_TAPS
+                b -= OUTER;
+                if (b < 0 || b >= SLOPE_TAPS) continue;
+                s->slope_re[l][c] = fma(u.x, v[b].x, fma(-u.y, v[b].y, s->slope_re[l][c]));
+                s->slope_im[l][c] = fma(u.x, v[b].y, fma(u.y, v[b].x, s->slope_im[l][c]));
+#endif
+            }
+        }
+    }
+}
+
+// Gives the sums the rest_ij of the pulses so far, whose middle pulse is `from`, and takes that of the next ones, of the
+// middle pulse `to`, from them; to 0: nothing is taken.
+static inline void turn(sums *s, __global const float *restrict from, __global const float *restrict to, float step_x,
+                        float step_y, int r0, int lane) {
+    group now = group_of(from, step_x, step_y), next = now;
+    if (to) next.middle = load_line(to, now.transposed);
+#pragma unroll
+    for (int l = 0; l < LINES; l++) {
+        float i = r0 + l * AT_ONCE - SIDE / 2, q_line = q_of_line(now, i);
+        float centre = curvature_at(now.middle, i, 0, q_line), centre_next = curvature_at(next.middle, i, 0, q_line);
+#if SLOPE_TAPS
+        float in_position = in_position_of(now, now.middle, i, centre) - centre;
+#endif
+#pragma unroll
+        for (int c = 0; c < PIXELS; c++) {
+            float j = lane * PIXELS + c - SIDE / 2, q = q_of(now, i, j), sine, cosine;
+            float rest = curvature_at(now.middle, i, j, q) - centre, cycles = rest * now.middle.kappa;
+            cycles -= nearest(cycles);
+            if (to) {
+                float other = (curvature_at(next.middle, i, j, q) - centre_next) * next.middle.kappa;
+                cycles -= other - nearest(other);
+                cycles -= nearest(cycles);
+            }
+            float re = s->re[l][c], im = s->im[l][c];
+#if SLOPE_TAPS
+            re = fma(s->slope_re[l][c], rest - in_position, re);
+            im = fma(s->slope_im[l][c], rest - in_position, im);
+#endif
+            sincos_cycles(cycles, &sine, &cosine);
+            s->re[l][c] = fma(re, cosine, -im * sine);
+            s->im[l][c] = fma(re, sine, im * cosine);
+        }
+    }
+#if SLOPE_TAPS
+    CLEAR(s->slope_re)
+    CLEAR(s->slope_im)
+#endif
+}
+
+// global size (ITEMS, tiles of this block), local size (ITEMS, 1). Arguments as of `backproject`; constants as in
+// tile_constants.cl:line_constants, schedule from schedule_pulses; step_x, step_y: m per pixel along j and i;
+// weights, slopes: of LINE_TAPS and SLOPE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
+__kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1))) void
+backproject_shared_lines(__global const float *restrict profiles, int stride, int origin,
+                         __global const float *restrict table, __global const float *restrict weights,
+                         __global const float *restrict slopes, int n, int n_used,
+                         __global const float *restrict constants, __global const int *restrict schedule, float step_x,
+                         float step_y, int first, int n_tiles, __global float *restrict image, ulong pixels,
+                         __global int *restrict skipped) {
+    __local float2 T[2][ROWS * COLUMNS];
+    __local float4 W[2][SIDE * LINE_TAPS / 2];
+#if SLOPE_TAPS
+    __local float4 V[2][SIDE * SLOPE_TAPS / 2];
+#else
+    __local float4 V[2][1];
+#endif
+    __local int at[2][SIDE];
+    int item = get_local_id(0), lane = item % ACROSS, r0 = item / ACROSS, tile = first + get_global_id(1);
+    int groups = (n_used + GROUP - 1) / GROUP, chunk = 0, by_lines = 0, by_pixels = 0, made = 0, transposed = 0;
+    int missed = 0, unlit = 0;
+    __global const float *records = constants + get_global_id(1) * (size_t)n * N_LINE, *middle = records;
+    schedule += get_global_id(1) * (size_t)groups * N_GROUP;
+    profiles += 2 * origin;
+    sums s;
+    CLEAR(s.re)
+    CLEAR(s.im)
+#if SLOPE_TAPS
+    CLEAR(s.slope_re)
+    CLEAR(s.slope_im)
+#endif
+    for (int g = 0; g <= groups; g++) {
+        __global const int *head = schedule + (size_t)min(g, groups - 1) * N_GROUP, *entries = head + N_HEAD;
+        int n_lines = g < groups ? head[H_LINES] : 0, n_pixels = g < groups ? head[H_PIXELS] : 0;
+        __global const float *next = records + (size_t)head[H_MIDDLE] * N_LINE;
+        group pulses = group_of(next, step_x, step_y);
+        barrier(CLK_GLOBAL_MEM_FENCE);  // lines may run along the other axis than before: pixels change hands
+        int turned = n_lines && by_lines && pulses.transposed != transposed;
+        if (g == groups || (g - chunk) * GROUP >= CHUNK || turned) {
+            if (by_lines) {
+                turn(&s, middle, 0, step_x, step_y, r0, lane);
+#pragma unroll
+                for (int l = 0; l < LINES; l++) {
+#pragma unroll
+                    for (int c = 0; c < PIXELS; c++) {
+                        int r = r0 + l * AT_ONCE, j = lane * PIXELS + c;
+                        size_t pixel = (size_t)tile * (SIDE * SIDE) + (transposed ? j * SIDE + r : r * SIDE + j);
+                        add_compensated(image, image + 2 * pixels, pixel, s.re[l][c]);
+                        add_compensated(image + pixels, image + 3 * pixels, pixel, s.im[l][c]);
+                    }
+                }
+                CLEAR(s.re)
+                CLEAR(s.im)
+            }
+            // pulses pixel by pixel: rows and columns of the image, each item at the pixels of its sums
+            for (int k = 0; by_pixels && k < LINES * PIXELS; k++) {
+                int r = r0 + k / PIXELS * AT_ONCE, j = lane * PIXELS + k % PIXELS;
+                int y = transposed ? j : r, x = transposed ? r : j;
+                float re = 0, im = 0;
+                group plain = group_of(records, step_x, step_y);
+                plain.transposed = 0;
+                plain.step_i = step_y;
+                plain.step_j = step_x;
+                for (int h = chunk; h < g; h++) {
+                    __global const int *entry = schedule + (size_t)(h + 1) * N_GROUP - N_ENTRY;
+                    for (int f = schedule[(size_t)h * N_GROUP + H_PIXELS]; f > 0; f--, entry -= N_ENTRY)
+                        add_pixels(plain, records + (size_t)entry[E_PULSE] * N_LINE, y - SIDE / 2, x - SIDE / 2,
+                                   profiles + 2 * (size_t)entry[E_PULSE] * stride, stride, origin, table, &re, &im);
+                }
+                size_t pixel = (size_t)tile * (SIDE * SIDE) + y * SIDE + x;
+                add_compensated(image, image + 2 * pixels, pixel, re);
+                add_compensated(image + pixels, image + 3 * pixels, pixel, im);
+            }
+            chunk = g;
+            by_lines = by_pixels = 0;
+        }
+        if (n_lines) {
+            if (by_lines) turn(&s, middle, next, step_x, step_y, r0, lane);
+            middle = next;
+            transposed = pulses.transposed;
+        }
+        by_lines += n_lines;
+        by_pixels += n_pixels;
+        if (g < groups) {
+            missed += head[H_OUTSIDE] & 65535;
+            unlit += head[H_OUTSIDE] >> 16;
+        }
+        for (int f = 0; f < n_lines; f++) {
+            int side = made++ & 1, pulse = entries[N_ENTRY * f + E_PULSE], from = entries[N_ENTRY * f + E_FROM];
+            int count = entries[N_ENTRY * f + E_COUNT];
+            __global const float *record = records + (size_t)pulse * N_LINE;
+            for (int k = item; k < SIDE + count; k += ITEMS) {
+                if (k < SIDE)
+                    weigh_line(pulses, record, k, from, count, weights, slopes, (__local float2 *)W[side],
+                               (__local float2 *)V[side], at[side]);
+                else
+                    take_sample(record, transposed, k - SIDE, from, profiles + 2 * (size_t)pulse * stride, stride, origin,
+                                table, T[side]);
+            }
+            // the other halves of T, W and V may still be read: they are not written before the next barrier
+            barrier(CLK_LOCAL_MEM_FENCE);
+            sum_lines(&s, r0, lane, T[side], W[side], V[side], at[side]);
+        }
+    }
+    if (item == 0) {
+        skipped[tile] += missed;
+#if BEAM
+        skipped[n_tiles + tile] += unlit;
+#endif
+    }
+}
