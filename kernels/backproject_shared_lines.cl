@@ -243,15 +243,23 @@ static inline void sum_lines(sums *s, int r0, int lane, __local const float2 *T,
     }
 }
 
-// Gives the sums the rest_ij of the pulses so far, whose middle pulse is `from`, and takes that of the next ones, of the
-// middle pulse `to`, from them; to 0: nothing is taken.
+// Where the sums of a tile go: image as of the kernel, from its first pixel on.
+typedef struct {
+    __global float *image;
+    ulong pixels;
+    int transposed;
+} place;
+
+// Gives the sums the rest_ij of the pulses so far, whose middle pulse is `from`. With `to`, the middle pulse of the next
+// ones, that one's rest_ij is taken from them; without, they are added to the image and begin anew.
 static inline void turn(sums *s, __global const float *restrict from, __global const float *restrict to, float step_x,
-                        float step_y, int r0, int lane) {
+                        float step_y, int r0, int lane, place out) {
     group now = group_of(from, step_x, step_y), next = now;
     if (to) next.middle = load_line(to, now.transposed);
-#pragma unroll
-    for (int l = 0; l < LINES; l++) {
-        float i = r0 + l * AT_ONCE - SIDE / 2, q_line = q_of_line(now, i);
+    // the lines take turns in the registers of the first, which a loop can name
+#pragma unroll 1
+    for (int r = r0; r < r0 + SIDE; r += AT_ONCE) {
+        float i = r - SIDE / 2, q_line = q_of_line(now, i);
         float centre = curvature_at(now.middle, i, 0, q_line), centre_next = curvature_at(next.middle, i, 0, q_line);
 #if SLOPE_TAPS
         float in_position = in_position_of(now, now.middle, i, centre) - centre;
@@ -266,20 +274,35 @@ static inline void turn(sums *s, __global const float *restrict from, __global c
                 cycles -= other - nearest(other);
                 cycles -= nearest(cycles);
             }
-            float re = s->re[l][c], im = s->im[l][c];
+            float re = s->re[0][c], im = s->im[0][c];
 #if SLOPE_TAPS
-            re = fma(s->slope_re[l][c], rest - in_position, re);
-            im = fma(s->slope_im[l][c], rest - in_position, im);
+            re = fma(s->slope_re[0][c], rest - in_position, re);
+            im = fma(s->slope_im[0][c], rest - in_position, im);
 #endif
             sincos_cycles(cycles, &sine, &cosine);
-            s->re[l][c] = fma(re, cosine, -im * sine);
-            s->im[l][c] = fma(re, sine, im * cosine);
+            float turned_re = fma(re, cosine, -im * sine), turned_im = fma(re, sine, im * cosine);
+            if (!to) {
+                size_t at = out.transposed ? (lane * PIXELS + c) * SIDE + r : r * SIDE + lane * PIXELS + c;
+                add_compensated(out.image, out.image + 2 * out.pixels, at, turned_re);
+                add_compensated(out.image + out.pixels, out.image + 3 * out.pixels, at, turned_im);
+                turned_re = turned_im = 0;
+            }
+#pragma unroll
+            for (int l = 0; l < LINES - 1; l++) {
+                s->re[l][c] = s->re[l + 1][c];
+                s->im[l][c] = s->im[l + 1][c];
+#if SLOPE_TAPS
+                s->slope_re[l][c] = s->slope_re[l + 1][c];
+                s->slope_im[l][c] = s->slope_im[l + 1][c];
+#endif
+            }
+            s->re[LINES - 1][c] = turned_re;
+            s->im[LINES - 1][c] = turned_im;
+#if SLOPE_TAPS
+            s->slope_re[LINES - 1][c] = s->slope_im[LINES - 1][c] = 0;
+#endif
         }
     }
-#if SLOPE_TAPS
-    CLEAR(s->slope_re)
-    CLEAR(s->slope_im)
-#endif
 }
 
 // global size (ITEMS, tiles of this block), local size (ITEMS, 1). Arguments as of `backproject`; constants as in
@@ -321,21 +344,8 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
         barrier(CLK_GLOBAL_MEM_FENCE);  // lines may run along the other axis than before: pixels change hands
         int turned = n_lines && by_lines && pulses.transposed != transposed;
         if (g == groups || (g - chunk) * GROUP >= CHUNK || turned) {
-            if (by_lines) {
-                turn(&s, middle, 0, step_x, step_y, r0, lane);
-#pragma unroll
-                for (int l = 0; l < LINES; l++) {
-#pragma unroll
-                    for (int c = 0; c < PIXELS; c++) {
-                        int r = r0 + l * AT_ONCE, j = lane * PIXELS + c;
-                        size_t pixel = (size_t)tile * (SIDE * SIDE) + (transposed ? j * SIDE + r : r * SIDE + j);
-                        add_compensated(image, image + 2 * pixels, pixel, s.re[l][c]);
-                        add_compensated(image + pixels, image + 3 * pixels, pixel, s.im[l][c]);
-                    }
-                }
-                CLEAR(s.re)
-                CLEAR(s.im)
-            }
+            place out = {image + (size_t)tile * (SIDE * SIDE), pixels, transposed};
+            if (by_lines) turn(&s, middle, 0, step_x, step_y, r0, lane, out);
             // pulses pixel by pixel: rows and columns of the image, each item at the pixels of its sums
             for (int k = 0; by_pixels && k < LINES * PIXELS; k++) {
                 int r = r0 + k / PIXELS * AT_ONCE, j = lane * PIXELS + k % PIXELS;
@@ -351,15 +361,15 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
                         add_pixels(plain, records + (size_t)entry[E_PULSE] * N_LINE, y - SIDE / 2, x - SIDE / 2,
                                    profiles + 2 * (size_t)entry[E_PULSE] * stride, stride, origin, table, &re, &im);
                 }
-                size_t pixel = (size_t)tile * (SIDE * SIDE) + y * SIDE + x;
-                add_compensated(image, image + 2 * pixels, pixel, re);
-                add_compensated(image + pixels, image + 3 * pixels, pixel, im);
+                add_compensated(out.image, out.image + 2 * pixels, y * SIDE + x, re);
+                add_compensated(out.image + pixels, out.image + 3 * pixels, y * SIDE + x, im);
             }
             chunk = g;
             by_lines = by_pixels = 0;
         }
         if (n_lines) {
-            if (by_lines) turn(&s, middle, next, step_x, step_y, r0, lane);
+            place none = {image, pixels, 0};
+            if (by_lines) turn(&s, middle, next, step_x, step_y, r0, lane, none);
             middle = next;
             transposed = pulses.transposed;
         }

@@ -38,6 +38,7 @@ SHARED_PULSE = 40.0  # per work-item and pulse, of 16 contributions
 SHARED_SAMPLE, SHARED_SAMPLE_TAP = 60.0, 12.0  # per sample of a line's profile, and per tap from the range profile to it
 SHARED_LINE, SHARED_LINE_TAP = 90.0, 35.0  # per line and pulse, and per tap of its weights
 SHARED_TURN = 60.0  # per contribution over the pulses of a group
+SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
 GATHERED = 74.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
 # Merging of sub-apertures, in contributions (2026-11-21).

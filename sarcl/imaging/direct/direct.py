@@ -10,6 +10,7 @@ import numpy as np
 
 from ...base import text
 from ...base.stage_timer import Clock
+from ...numerics import cost_model
 from ...numerics.cost_model import CPU, DeviceClass
 from ...numerics.plan import Plan, cheapest
 from ...numerics.tiles import Tiles
@@ -39,7 +40,7 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
     if not task.weighs_pixels and grid.is_plane:  # lines share the weights of their pulses
         if on.lanes:
             lined = line_plan.choose(tolerance, grid, task.antennas, **numbers)
-        elif on.local_memory:
+        elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
             lined = shared_line_plan.choose(
                 tolerance, grid, task.antennas, **numbers, local_memory=on.local_memory
             )

@@ -1,0 +1,193 @@
+"""Lines of pixels that a work-group shares: right at every tolerance, beside every edge, and with pulses that no line holds."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+from helpers.cases import image_error, noise_history, noise_on, straight
+from helpers.devices import opened, variants
+
+import sarcl
+from sarcl.base.stage_timer import Clock
+from sarcl.imaging.direct import direct, shared_line_plan, tile_kernels
+from sarcl.imaging.direct.shared_line_plan import SharedLinePlan
+from sarcl.imaging.focusing_task import make_task
+from sarcl.numerics import cost_model, error_bounds, interpolation
+from sarcl.numerics.cost_model import DeviceClass
+
+SLOW = pytest.mark.slow
+WIDE = DeviceClass(lanes=False, local_memory=cost_model.MOST_LOCAL)
+PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(65, 70), spacing=(0.3, 0.2))
+
+
+@pytest.fixture(params=variants(("no-fp64",)))
+def wide(request):
+    """Every device as GPUs are, with one lane per work-item; also without float64."""
+    device = opened(request.param)
+    return device.one_lane() if device.info.vector_width > 1 else device
+
+
+def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, **changes):
+    """A task, its plan by shared lines with some of its fields changed, and the tiling."""
+    task = make_task(raw, grid, None, None, wrap, skip, beam)
+    made = shared_line_plan.choose(
+        tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=float(raw.bandwidth.max()),
+        highest=task.highest, local_memory=cost_model.MOST_LOCAL,
+    )  # fmt: skip
+    assert isinstance(made, SharedLinePlan), "no plan by shared lines meets the tolerance"
+    made = replace(made, **changes)
+    return task, made, direct.LineTiling(grid, made.side)
+
+
+def focused(device, task, plan, tiling):
+    """The image of a plan, and the pairs that were skipped."""
+    data = np.empty(task.grid.shape, np.complex64)
+    skipped = direct.Direct(device, task, plan, tiling).fill(0, tiling.n_bands, data, 2**28, Clock(), lambda rows: None)
+    return sarcl.Image(data, task.grid), skipped
+
+
+def spaceborne(n_rows=40, squint=0.0, bistatic=False, **fields):
+    """Pulses from 770 km, as near to one another as 11 000 are that resolve a pixel of 0.25 m."""
+    tx = straight(n_rows, aperture=4.3 * n_rows, distance=770e3, squint=squint)
+    rx = tx + [3e4, 5e4, 0.0] if bistatic else None
+    return noise_on(tx, rx, **{"bandwidth": 600e6, "n_samples": 128, **fields})
+
+
+CASES = {
+    "1e-1": (lambda: spaceborne(), 1e-1, {}),
+    "1e-2 squinted, columns": (lambda: spaceborne(squint=1.0), 1e-2, {}),
+    "1e-3": (lambda: spaceborne(), 1e-3, {}),
+    "1e-4 bistatic": (lambda: spaceborne(bistatic=True), 1e-4, {}),
+    "3e-5, slopes": (lambda: spaceborne(), 3e-5, {}),
+    "1e-5": (lambda: spaceborne(seed=3), 1e-5, {}),
+    "10 km, slopes": (lambda: noise_history(arc=0.002), 1e-3, {}),
+    "3 km bistatic, groups of 8": (lambda: noise_history(distance=3e3, bistatic=True, n_rows=70, arc=0.03), 1e-2, {}),
+    "wrap": (lambda: spaceborne(n_samples=16), 1e-3, {"wrap": True}),
+    "window": (lambda: spaceborne(n_samples=32), 1e-3, {}),
+    "window, nothing skipped": (lambda: spaceborne(n_samples=32), 1e-3, {"skip": False}),
+    "short last group": (lambda: spaceborne(n_rows=67), 1e-3, {}),
+}
+QUICK = ("1e-3", "10 km, slopes", "window")
+
+
+@pytest.mark.parametrize("name", [pytest.param(n, marks=[] if n in QUICK else SLOW) for n in CASES])
+def test_shared_lines_meet_what_is_predicted(wide, name):
+    make, tolerance, options = CASES[name]
+    raw = make()
+    task, plan, tiling = planned(raw, PLANE, tolerance, **options)
+    image, _ = focused(wide, task, plan, tiling)
+    error = image_error(image, raw, most=600, wrap=options.get("wrap", False))
+    assert error <= plan.predicted_error <= tolerance
+    if "slopes" in name:
+        assert plan.slopes is not None
+
+
+@SLOW
+@pytest.mark.parametrize("tolerance", [1e-1, 1e-3])
+def test_shared_lines_in_a_beam_leave_out_what_no_pixel_needs(wide, tolerance):
+    raw = noise_history(arc=0.002, n_samples=64)
+    angle = 2 * np.arctan(7.0 / 10e3)
+    toward = np.array([1.0, 2, 0]) + np.linspace(-9, 9, 40)[:, None] * [0, 1, 0] - raw.tx
+    task, plan, tiling = planned(raw, PLANE, tolerance, beam=(angle, toward))
+    image, skipped = focused(wide, task, plan, tiling)
+    assert image_error(image, raw, most=600, beam=(angle, toward)) <= plan.predicted_error
+    assert skipped.beam > 0
+    task, plan, tiling = planned(raw, PLANE, tolerance, beam=(angle, toward), skip=False)
+    whole, none = focused(wide, task, plan, tiling)
+    assert (none.window, none.beam) == (0, 0)
+    assert np.linalg.norm(whole.data - image.data) <= 1e-5 * np.linalg.norm(image.data)
+
+
+def pixel_by_pixel(monkeypatch):
+    """A list that gets, per launch, how many pulses of all tiles are added by lines and how many pixel by pixel."""
+    counts, add = [], tile_kernels.SharedLineKernel.add
+
+    def counted(kernel, on, low, high, pulses, *rest):
+        buffers, run = {}, kernel.device.run
+
+        def keep(made, size, group, *args):
+            buffers[made.function_name] = args[-1], size
+            run(made, size, group, *args)
+
+        with monkeypatch.context() as patch:
+            patch.setattr(kernel.device, "run", keep)
+            add(kernel, on, low, high, pulses, *rest)
+        schedule, (groups, tiles) = buffers["schedule_pulses"]
+        heads = kernel.device.download(schedule, np.empty((groups * tiles, 4 * (1 + kernel.plan.group)), np.int32))
+        counts.append((int(heads[:, 0].sum()), int(heads[:, 1].sum())))
+
+    monkeypatch.setattr(tile_kernels.SharedLineKernel, "add", counted)
+    return counts
+
+
+FALLBACKS = {
+    "curvature": {"limit_cycles": 0.0},
+    "step": {"limit_step": 1e-9},
+    "some": {"limit_cycles": 3e-7},
+}
+
+
+@pytest.mark.parametrize("name", ["some", *(pytest.param(n, marks=SLOW) for n in ("curvature", "step"))])
+def test_pulses_that_no_line_holds_are_added_pixel_by_pixel_and_counted(wide, monkeypatch, name):
+    raw = spaceborne(n_rows=30)
+    counts = pixel_by_pixel(monkeypatch)
+    task, plan, tiling = planned(raw, PLANE, 1e-3, **FALLBACKS[name])
+    image, _ = focused(wide, task, plan, tiling)
+    assert image_error(image, raw, most=600) <= plan.predicted_error
+    by_lines, by_pixels = np.sum(counts, axis=0)
+    assert by_lines + by_pixels == 30 * 4 and by_pixels > 0  # of four tiles
+    assert (by_lines > 0) == (name == "some")
+
+
+@SLOW
+def test_pulses_from_everywhere_run_their_lines_along_rows_and_along_columns(wide, monkeypatch):
+    # a whole circle: lines change their axis four times, and pulses where the axis changes are steep for their groups
+    angle = np.linspace(0, 2 * np.pi, 512, endpoint=False)
+    tx = 770e3 * np.stack([0.7 * np.cos(angle), 0.7 * np.sin(angle), np.full(512, 0.714)], axis=1)
+    raw = noise_on(tx, bandwidth=600e6, n_samples=512)
+    task, plan, tiling = planned(raw, PLANE, 1e-1)
+    counts = pixel_by_pixel(monkeypatch)
+    image, _ = focused(wide, task, plan, tiling)
+    assert image_error(image, raw, most=300) <= plan.predicted_error
+    assert np.sum(counts, axis=0)[0] > 0.5 * 512 * 4
+
+
+@SLOW
+def test_energy_at_the_bands_edge_and_wide_tiles_keep_90_db(wide):
+    # positions in a tile of 64 pixels, rounded to float32, would have an error above this
+    raw = spaceborne(n_rows=24, n_samples=512)
+    samples = np.zeros_like(raw.samples)
+    samples[:, [0, -1]] = 1
+    grid = sarcl.ImageGrid.plane(shape=(64, 64), spacing=0.25)
+    task, plan, tiling = planned(replace(raw, samples=samples), grid, 3e-5)
+    assert plan.side == 64 and error_bounds.position_rounding(tiling.radius, 600e6, False) > 3e-5
+    image, _ = focused(wide, task, plan, tiling)
+    assert image_error(image, replace(raw, samples=samples)) <= plan.predicted_error <= 3e-5
+
+
+def test_devices_with_one_lane_take_shared_lines_where_they_pay_and_their_memory_holds_them():
+    raw = spaceborne(n_rows=64)
+    grid = sarcl.ImageGrid.plane(shape=(600, 600), spacing=0.25)
+    task = make_task(raw, grid, None, None, False, True)
+    plan, tiling = direct.make_plan(task, 1e-3, WIDE)
+    assert isinstance(plan, SharedLinePlan) and tiling.side == plan.side
+    assert plan.local_bytes <= WIDE.local_memory
+    small, _ = direct.make_plan(task, 1e-3, WIDE._replace(local_memory=plan.local_bytes - 1))
+    assert small.cost > plan.cost
+    assert not isinstance(direct.make_plan(task, 1e-3, WIDE._replace(local_memory=0))[0], SharedLinePlan)
+    few = make_task(spaceborne(n_rows=8), PLANE, None, None, False, True)
+    assert few.pairs < cost_model.SHARING_PAYS
+    assert not isinstance(direct.make_plan(few, 1e-3, WIDE)[0], SharedLinePlan)
+
+
+def test_slopes_of_weights_are_their_derivatives():
+    made = interpolation.line_interpolator(4, 4.0)
+    z, h = np.linspace(-0.4, 0.4, 9), 1e-6
+    wanted = (made.weights(z + h) - made.weights(z - h)) / (2 * h)
+    assert np.abs(interpolation._slopes(made.table, z) - wanted).max() < 1e-8
+    # the derivative of the highest frequency, from two neighbours: their difference, x/sin(x) times too small at best
+    x = np.pi / 2 / 4.0
+    assert interpolation.slope_error(interpolation.line_interpolator(2, 4.0)) > (1 - np.sin(x / 2) / (x / 2)) / 2
+    assert interpolation.slope_error(interpolation.line_interpolator(6, 4.0)) < 1e-3
