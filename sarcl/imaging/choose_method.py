@@ -63,7 +63,9 @@ class MethodChoice:
         return self.engine(device, task, self.plan, self.tiling)
 
 
-def choose(task: FocusingTask, method: str, tolerance: float, on: DeviceClass = CPU, float64: bool = True) -> MethodChoice:
+def choose(
+    task: FocusingTask, method: str, tolerance: float, on: DeviceClass = CPU, float64: bool = True
+) -> MethodChoice:
     """The cheapest plan that meets `tolerance` with `method`, or with any method for "auto".
 
     on       the devices that follow the plan

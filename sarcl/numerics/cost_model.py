@@ -35,7 +35,10 @@ LINE_GROUP = 0.4  # per pixel and group of pulses
 SHARED_TAP = 4.0  # per contribution and tap, of the weights and of their slopes
 SHARED_READ = 1.0  # per sample of a line's profile that a work-item reads
 SHARED_PULSE = 40.0  # per work-item and pulse, of 16 contributions
-SHARED_SAMPLE, SHARED_SAMPLE_TAP = 60.0, 12.0  # per sample of a line's profile, and per tap from the range profile to it
+SHARED_SAMPLE, SHARED_SAMPLE_TAP = (
+    60.0,
+    12.0,
+)  # per sample of a line's profile, and per tap from the range profile to it
 SHARED_LINE, SHARED_LINE_TAP = 90.0, 35.0  # per line and pulse, and per tap of its weights
 SHARED_TURN = 60.0  # per contribution over the pulses of a group
 SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
@@ -113,7 +116,9 @@ MOST_LOCAL = 48 * 1024  # bytes of local memory that each NVIDIA device gives to
 CPU = DeviceClass(lanes=True)
 
 
-def shared_lines(side: int, fine: int, taps: int, slope_taps: int, group: int, profile_taps: int, samples: float) -> float:
+def shared_lines(
+    side: int, fine: int, taps: int, slope_taps: int, group: int, profile_taps: int, samples: float
+) -> float:
     """Cost per contribution of lines that a work-group shares.
 
     side      pixels along a side of a tile;  fine  samples of a line's profile per pixel;  samples  of that profile

@@ -1,4 +1,4 @@
-"""Lines of pixels that a work-group shares: right at every tolerance, beside every edge, and with pulses that no line holds."""
+"""Lines of pixels that a work-group shares: right at every tolerance and edge, and with pulses that no line holds."""
 
 from __future__ import annotations
 
@@ -11,8 +11,8 @@ from helpers.devices import opened, variants
 
 import sarcl
 from sarcl.base.stage_timer import Clock
-from sarcl.imaging.direct import direct, shared_line_plan, tile_kernels
-from sarcl.imaging.direct.shared_line_plan import SharedLinePlan
+from sarcl.imaging.direct import _shared_line_plan, direct, tile_kernels
+from sarcl.imaging.direct._shared_line_plan import SharedLinePlan
 from sarcl.imaging.focusing_task import make_task
 from sarcl.numerics import cost_model, error_bounds, interpolation
 from sarcl.numerics.cost_model import DeviceClass
@@ -32,7 +32,7 @@ def wide(request):
 def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, **changes):
     """A task, its plan by shared lines with some of its fields changed, and the tiling."""
     task = make_task(raw, grid, None, None, wrap, skip, beam)
-    made = shared_line_plan.choose(
+    made = _shared_line_plan.choose(
         tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=float(raw.bandwidth.max()),
         highest=task.highest, local_memory=cost_model.MOST_LOCAL,
     )  # fmt: skip
@@ -51,7 +51,7 @@ def focused(device, task, plan, tiling):
 def spaceborne(n_rows=40, squint=0.0, bistatic=False, **fields):
     """Pulses from 770 km, as near to one another as 11 000 are that resolve a pixel of 0.25 m."""
     tx = straight(n_rows, aperture=4.3 * n_rows, distance=770e3, squint=squint)
-    rx = tx + [3e4, 5e4, 0.0] if bistatic else None
+    rx = tx + np.array([3e4, 5e4, 0.0]) if bistatic else None
     return noise_on(tx, rx, **{"bandwidth": 600e6, "n_samples": 128, **fields})
 
 

@@ -22,7 +22,7 @@ from ..pixel_taper import TaperOnDevice
 from ..tiling.lines import LineTiling
 from ..tiling.of_grid import tiling_of
 from ..tiling.tiling import Tiling
-from . import line_plan, shared_line_plan
+from . import _shared_line_plan, line_plan
 from .line_plan import LinePlan
 from .tile_kernels import CHUNK, kernel_of
 
@@ -36,14 +36,16 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
     raw, grid = task.raw, task.grid
     highest, bandwidth = task.highest, float(raw.bandwidth.max())
     lined: LinePlan | None = None
-    numbers = {"n_samples": raw.n_samples, "bandwidth": bandwidth, "highest": highest}
     if not task.weighs_pixels and grid.is_plane:  # lines share the weights of their pulses
         if on.lanes:
-            lined = line_plan.choose(tolerance, grid, task.antennas, **numbers)
-        elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
-            lined = shared_line_plan.choose(
-                tolerance, grid, task.antennas, **numbers, local_memory=on.local_memory
+            lined = line_plan.choose(
+                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest
             )
+        elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
+            lined = _shared_line_plan.choose(
+                tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest,
+                local_memory=on.local_memory,
+            )  # fmt: skip
     if lined is not None and lined.cost < 0.9:  # no other plan costs less
         return lined, LineTiling(grid, lined.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}

@@ -18,9 +18,9 @@ from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
-from . import line_plan, shared_line_plan
+from . import _shared_line_plan, line_plan
+from ._shared_line_plan import SharedLinePlan
 from .line_plan import LinePlan, steps
-from .shared_line_plan import SharedLinePlan
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
@@ -127,9 +127,9 @@ class LineKernel:
 
 
 class SharedLineKernel:
-    """Backprojection of square tiles of a plane by lines that a work-group shares: kernels/backproject_shared_lines.cl."""
+    """Square tiles of a plane by lines that a work-group shares: kernels/backproject_shared_lines.cl."""
 
-    chunk = shared_line_plan.CHUNK
+    chunk = _shared_line_plan.CHUNK
 
     def __init__(
         self, device: Device, plan: SharedLinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
@@ -173,9 +173,7 @@ class SharedLineKernel:
             pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
             *self.wrap_and_fine, self.axes, constants,
         )  # fmt: skip
-        device.run(
-            self.schedule, (groups, high - low), None, constants, n, used, dx, dy, *self.limits, schedule
-        )
+        device.run(self.schedule, (groups, high - low), None, constants, n, used, dx, dy, *self.limits, schedule)
         device.run(
             self.kernel, (items, high - low), (items, 1),
             source, stride, origin, *self.tables, n, used, constants, schedule, dx, dy, low, tiles.n_tiles, image,
