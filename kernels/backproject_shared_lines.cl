@@ -70,7 +70,7 @@ static inline float in_position_of(group pulses, line_geometry line, float i, fl
 
 // First of the samples of T that the lines of a pulse read, counted about the reference pixel, and their number; 0 where
 // they are too many to be stored, as for a steep pulse, or have no spacing.
-static inline int samples_needed(group pulses, line_geometry line, int *from) {
+INLINED int samples_needed(group pulses, line_geometry line, int *from) {
     if (!(fabs(line.along) >= LEAST_STEP)) return 0;
     float position[5], lowest = INFINITY, highest = -INFINITY, bend = 0, samples_of_T = FINE / line.along;
 #pragma unroll
@@ -131,7 +131,7 @@ __kernel void schedule_pulses(__global const float *restrict constants, int n, i
 }
 
 // Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
-static inline void weigh_line(group pulses, __global const float *restrict record, int r, int from, int count,
+INLINED void weigh_line(group pulses, __global const float *restrict record, int r, int from, int count,
                               __global const float *restrict weights, __global const float *restrict slopes,
                               __local float2 *W, __local float2 *V, __local int *at) {
     line_geometry line = load_line(record, pulses.transposed);
@@ -171,7 +171,7 @@ static inline void weigh_line(group pulses, __global const float *restrict recor
 }
 
 // Sample number k of T, which begins with sample `from`: the profile of a pulse at a place of a line, carrier included.
-static inline void take_sample(__global const float *restrict record, int transposed, int k, int from,
+INLINED void take_sample(__global const float *restrict record, int transposed, int k, int from,
                                __global const float *restrict row, int stride, int origin,
                                __global const float *restrict table, __local float2 *T) {
     __global const float *step = record + L_STEP + 2 * transposed;
@@ -201,7 +201,7 @@ typedef struct {
         _Pragma("unroll") for (int c = 0; c < PIXELS; c++) what[l][c] = 0;
 
 // Adds one pulse to a work-item's pixels: `lane` counts items along a line, `r0` is the first line.
-static inline void sum_lines(sums *s, int r0, int lane, __local const float2 *T, __local const float4 *W,
+INLINED void sum_lines(sums *s, int r0, int lane, __local const float2 *T, __local const float4 *W,
                              __local const float4 *V, __local const int *at) {
 #pragma unroll
     for (int l = 0; l < LINES; l++) {
@@ -252,7 +252,7 @@ typedef struct {
 
 // Gives the sums the rest_ij of the pulses so far, whose middle pulse is `from`. With `to`, the middle pulse of the next
 // ones, that one's rest_ij is taken from them; without, they are added to the image and begin anew.
-static inline void turn(sums *s, __global const float *restrict from, __global const float *restrict to, float step_x,
+INLINED void turn(sums *s, __global const float *restrict from, __global const float *restrict to, float step_x,
                         float step_y, int r0, int lane, place out) {
     group now = group_of(from, step_x, step_y), next = now;
     if (to) next.middle = load_line(to, now.transposed);

@@ -67,7 +67,8 @@ def two_part_position_rounding(radius: float, distance: float, bandwidth: float)
     """Phase error, rad, at the band's edge where steps of a line are products of whole numbers and two float32 parts.
 
     Only fractions of a sample of the range profile and of the line's profile are rounded, by four units each; the
-    band's edge is at most half a cycle per sample. The curvature, at most radius^2/(2 distance), is rounded as any position.
+    band's edge is at most half a cycle per sample. The curvature, at most radius^2/(2 distance), is rounded as any
+    position.
     """
     bend = min(radius**2 / (2 * max(distance, 1e-300)), radius)
     return 2 * 4 * np.pi * FLOAT32.unit + position_rounding(bend, bandwidth, False)
