@@ -5,6 +5,10 @@ For other folders:
     direct         plan and engine: every (row, pixel) pair that is not skipped
     line_plan      plan of backprojection by lines of pixels
     tile_kernels   the kernels, pixel by pixel and line by line, and their buffers
+
+For this folder alone:
+
+    _shared_line_plan   plan of backprojection by lines that a work-group shares
 """
 
 __all__ = ["direct", "line_plan", "tile_kernels"]
