@@ -194,7 +194,8 @@ class _Field:
 
     def _kernel(self, name: str, used: int = ROWS) -> Any:
         macros = {"DOUBLE": int(self.plan.double), "ROWS": ROWS, "USED": used, "LANES": self.lane_width}
-        return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK)
+        fp64 = int(self.device.info.fp64)  # where it is slow too: `_wide` gives it as the plan counts its rounding
+        return self.device.kernel("beam.cl", name, **macros, FLUSH=FLUSH, CHUNK=CHUNK, FP64=fp64)
 
     def _wide(self, values: np.ndarray) -> Any:
         """Values (k, n) as wide numbers on the device: float64, or pairs of float32 (k, 2, n)."""

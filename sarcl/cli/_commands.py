@@ -279,7 +279,7 @@ def _show_warning(message: Warning | str, *rest: Any, **more: Any) -> None:
 
 
 def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:
-    """`sarcl.devices()` as a table, a star at the indices `picked`, the reason under what does not work."""
+    """`sarcl.devices()` as a table, a star at the indices `picked`, the reasons under what does not work."""
     from ..base.text import size_text
 
     rows = [HEAD]
@@ -291,8 +291,9 @@ def device_table(devices: Sequence[Any], picked: Sequence[int]) -> str:
     widths = [max(map(len, column)) for column in zip(*rows, strict=True)]
     lines = ["  ".join(f"{cell:{w}}" for cell, w in zip(row, widths, strict=True)).rstrip() for row in rows]
     for n, d in reversed(list(enumerate(devices, 1))):
-        if not d.works:
-            lines.insert(n + 1, f"{'':{widths[0] + widths[1] + 4}}does not work: {d.why}")
+        if d.why:
+            what = "float64 does not work" if d.works else "does not work"
+            lines.insert(n + 1, f"{'':{widths[0] + widths[1] + 4}}{what}: {d.why}")
     if picked:
         lines += ["", "* is used unless --device or SARCL_DEVICE names another"]
     return "\n".join(lines) if devices else "no OpenCL device"

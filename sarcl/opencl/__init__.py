@@ -14,7 +14,8 @@ For this folder alone:
     _after_fork    refusal of OpenCL in a process that was forked after its parent had used it
     _cache_folder  a cache folder that can be written, which drivers need
     _queries       questions to a driver, each guarded
-    _trial_record  devices that passed their trial, on disk
+    _trial         kernels whose results are known, which a device must pass
+    _trial_record  results of devices' trials, on disk
     _programs      source texts of kernels, and precautions for building programs
 """
 

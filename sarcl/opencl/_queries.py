@@ -2,15 +2,22 @@
 
 from __future__ import annotations
 
+import ctypes
+import ctypes.util
+import struct
 from typing import Any, NamedTuple
 
+from ..base import host_memory
 from ..base.text import first_line
 
-GPU_WARP = 32  # work-items, of a GPU that does not tell its own number
+PCI_BUS_INFO = 0x410F  # CL_DEVICE_PCI_BUS_INFO_KHR: domain, bus, device and function
 
 
 class Facts(NamedTuple):
-    """What a driver says of a device; `why` names a question that it must answer and refuses, else it is empty."""
+    """What a driver says of a device, named as the fields of DeviceInfo.
+
+    warp  0 where the driver does not say it;  why  a question that it must answer and refuses, else empty
+    """
 
     name: str
     kind: str
@@ -22,6 +29,7 @@ class Facts(NamedTuple):
     local_memory: int
     max_group: int
     warp: int
+    pci: str
     why: str
 
 
@@ -70,6 +78,8 @@ def facts(handle: Any) -> Facts:
         why = f"its driver does not say how much memory it has: {first_line(exc)}"
     if not why and min(memory, max_alloc) <= 0:
         why = f"its driver says that it has {memory} bytes of memory, and buffers of {max_alloc} bytes"
+    if kind == "cpu":  # some drivers add the swap space
+        memory = int(min(memory, host_memory.installed()))
     return Facts(
         name=text_of(handle, "name"),
         kind=kind,
@@ -80,11 +90,35 @@ def facts(handle: Any) -> Facts:
         driver=text_of(handle, "driver_version"),
         local_memory=max(0, int(asked(handle, "local_mem_size", 0))),
         max_group=max(1, int(asked(handle, "max_work_group_size", 1))),
-        warp=1 if kind == "cpu" else int(_warp(handle)),
+        warp=1 if kind == "cpu" else int(asked(handle, "warp_size_nv") or asked(handle, "wavefront_width_amd") or 0),
+        pci=_pci(handle),
         why=why,
     )
 
 
-def _warp(handle: Any) -> int:
-    """Work-items that a GPU runs in step."""
-    return asked(handle, "warp_size_nv") or asked(handle, "wavefront_width_amd") or GPU_WARP
+def _pci(handle: Any) -> str:
+    """Bus, device and function of a device on the PCI bus: "41:00.0"; empty where the driver does not tell them."""
+    if "cl_khr_pci_bus_info" in str(asked(handle, "extensions", "")).split():
+        found = raw_info(handle, PCI_BUS_INFO, 16)
+        if found:
+            _, bus, device, function = struct.unpack("4I", found)
+            return f"{bus:02x}:{device:02x}.{function:x}"
+    bus, slot = asked(handle, "pci_bus_id_nv"), asked(handle, "pci_slot_id_nv")
+    if bus is not None and slot is not None:
+        return f"{bus:02x}:{slot >> 3:02x}.{slot & 7:x}"
+    place = asked(handle, "topology_amd")
+    if place is not None:
+        return f"{place.bus:02x}:{place.device:02x}.{place.function:x}"
+    return ""
+
+
+def raw_info(handle: Any, question: int, size: int) -> bytes:
+    """Bytes that clGetDeviceInfo answers to a question that pyopencl does not know; none where it refuses."""
+    loader = ctypes.util.find_library("OpenCL")
+    place = asked(handle, "int_ptr")
+    if loader is None or place is None:
+        return b""
+    answer = ctypes.create_string_buffer(size)
+    ask = ctypes.CDLL(loader).clGetDeviceInfo
+    status = ask(ctypes.c_void_p(place), ctypes.c_uint(question), ctypes.c_size_t(size), answer, None)
+    return b"" if status else answer.raw

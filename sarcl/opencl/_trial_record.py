@@ -1,4 +1,4 @@
-"""Devices that passed their trial, on disk: a small file in the user's cache folder.
+"""Results of devices' trials, on disk: a small file in the user's cache folder.
 
 The file only saves time. One that is missing, damaged, a link or another user's is taken for empty, and one that cannot
 be written is not written.
@@ -11,28 +11,31 @@ import functools
 import json
 import os
 import stat
+from dataclasses import asdict
 from pathlib import Path
 
-LARGEST = 2**16  # bytes of a file that is read: an entry has about 200
+from ._trial import Outcome
+
+LARGEST = 2**16  # bytes of a file that is read: an entry has about 400
 
 
-def find(key: str) -> bool | None:
-    """Whether the device of `key` computes in float64; None when its trial is not recorded."""
+def find(key: str) -> Outcome | None:
+    """What the trial of the device of `key` found; None when it is not recorded."""
     return _record().get(key)
 
 
-def keep(key: str, fp64: bool) -> None:
-    """Record that the device of `key` passed its trial, and whether it computes in float64."""
+def keep(key: str, outcome: Outcome) -> None:
+    """Record what the trial of the device of `key` found."""
     import tempfile
 
-    _record()[key] = fp64
+    _record()[key] = outcome
     with contextlib.suppress(OSError):
         path = _path()
         path.parent.mkdir(mode=0o700, parents=True, exist_ok=True)
         descriptor, part = tempfile.mkstemp(dir=path.parent)
         try:
             with open(descriptor, "w") as file:
-                json.dump(_record(), file, indent=1)
+                json.dump({name: asdict(found) for name, found in _record().items()}, file, indent=1)
             os.replace(part, path)
         except BaseException:
             os.unlink(part)
@@ -57,15 +60,21 @@ def _path() -> Path:
 
 
 @functools.cache
-def _record() -> dict[str, bool]:
+def _record() -> dict[str, Outcome]:
     """The entries of the file, read once per process."""
     try:
         entries = json.loads(_text(_path()))
     except (OSError, ValueError, RecursionError):
         return {}
-    if not isinstance(entries, dict) or not all(isinstance(fp64, bool) for fp64 in entries.values()):
+    if not isinstance(entries, dict) or not all(map(_is_outcome, entries.values())):
         return {}
-    return entries
+    return {name: Outcome(**entry) for name, entry in entries.items()}
+
+
+def _is_outcome(entry: object) -> bool:
+    """Whether an entry of the file has the fields of an Outcome, each of its type."""
+    passed = asdict(Outcome())
+    return isinstance(entry, dict) and {k: type(v) for k, v in entry.items()} == {k: type(v) for k, v in passed.items()}
 
 
 def _text(path: Path) -> bytes:

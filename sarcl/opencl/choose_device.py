@@ -8,7 +8,7 @@ from typing import Any
 
 from . import _cache_folder
 from .device import Device, DeviceChoice
-from .device_list import DeviceInfo, devices, listed, tried
+from .device_list import DeviceInfo, devices, distinct, listed, tried
 
 REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
 
@@ -18,7 +18,7 @@ class NoDeviceError(RuntimeError):
 
 
 def open_device(choice: DeviceChoice | None = None) -> Device:
-    """The device to use: `choice`, else SARCL_DEVICE, else the GPU with most compute units, else a CPU.
+    """The device to use: `choice`, else SARCL_DEVICE, else the GPU that is fastest in its trial, else a CPU.
 
     choice  a Device (returned as it is), an index, "cpu", "gpu", or any part of a platform's or device's name.
     SARCL_DEVICE may name several, for `backproject` ("all", or "0,1"): here the first of them that works.
@@ -33,12 +33,12 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
     if source == "SARCL_DEVICE":
         text = str(choice or "all").strip()
         names = [""] if text.lower() == "all" else [name for name in text.split(",") if name.strip()]
-    order = {"gpu": 0, "accelerator": 1, "cpu": 2}
-    for name in names:  # devices are tried in order of preference until one works; the others are not built for
-        matching = [info for info, _ in listed() if _matches(info, name)]
-        for info in sorted(matching, key=lambda i: (order[i.kind], -i.units, i.index)):
-            if tried(info.index).works:
-                return _open(info.index)
+    for name in names:
+        for kind in ("gpu", "accelerator", "cpu"):  # where a device of a kind works, those of the next are not tried
+            matching = [tried(info.index) for info, _ in listed() if info.kind == kind and _matches(info, name)]
+            working = [info for info in matching if info.works]
+            if working:
+                return _open(max(working, key=lambda i: (i.rate, -i.index)).index)
     if not any(info.works for info in devices()):
         remedy = _cache_folder.prepare() or REMEDY
         raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}")
@@ -62,6 +62,8 @@ def _listing() -> str:
 def open_devices(choice: Any) -> list[Device]:
     """Open devices for a choice: one as `open_device` takes it, a list of these, or "all" that work.
 
+    "all" takes a device that several platforms list once, and the CPU once.
+
     The text "0,1" is a list too, as in SARCL_DEVICE. ValueError for a device named twice.
     """
     choices = split_choice(choice)
@@ -80,7 +82,7 @@ def split_choice(choice: Any) -> list[Any]:
     if choice is None:
         choice = os.environ.get("SARCL_DEVICE") or None
     if isinstance(choice, str) and choice.strip().lower() == "all":
-        return [info.index for info in devices() if info.works] or [None]
+        return [info.index for info in distinct(i for i in devices() if i.works)] or [None]
     if isinstance(choice, str) and "," in choice:
         return [name.strip() for name in choice.split(",") if name.strip()]
     return list(choice) if isinstance(choice, (list, tuple)) else [choice]

@@ -26,8 +26,8 @@ GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by
 class Device:
     """An open device: context, queue, programs and buffers. choose_device.open_device gives one.
 
-    info.fp64 chooses the wide number type of every kernel built here; `without_fp64()` gives a twin that uses
-    pairs of float32, to run (or test) what a device without float64 runs.
+    info.fast_fp64 chooses the wide number type of every kernel built here: float64, or pairs of float32 where those are
+    faster. `without_fp64()` gives a twin that has only pairs, to run (or test) what a device without float64 runs.
     """
 
     def __init__(self, info: DeviceInfo, raw: Any) -> None:
@@ -55,7 +55,7 @@ class Device:
 
     def without_fp64(self) -> Device:
         """The same device, its kernels built without float64."""
-        return _twin(self, fp64=False)
+        return _twin(self, fp64=False, fast_fp64=False)
 
     def one_lane(self) -> Device:
         """The same device, its kernels built with one lane per work-item, as GPUs run them."""
@@ -63,7 +63,8 @@ class Device:
 
     def kernel(self, file: str, name: str, **macros: int) -> Any:
         """Kernel `name` of kernels/`file`, built once for each set of integer macros."""
-        macros = {"VW": self.info.vector_width, "FP64": int(self.info.fp64), **macros}
+        wide = self.info.fp64 and self.info.fast_fp64
+        macros = {"VW": self.info.vector_width, "FP64": int(wide), **macros}
         key = (file, *sorted(macros.items()))
         if key not in self._kernels:
             self._kernels[key] = self._build(file, macros)

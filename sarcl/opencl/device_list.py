@@ -3,15 +3,12 @@
 from __future__ import annotations
 
 import functools
-import hashlib
-from dataclasses import dataclass, replace
+from collections.abc import Iterable
+from dataclasses import dataclass, field, replace
 from typing import Any
 
-import numpy as np
-
-from ..base.text import first_line
 from . import _after_fork, _cache_folder, _queries, _trial_record
-from ._programs import quiet
+from ._trial import trial, version
 
 NOT_TRIED = "not tried"
 
@@ -21,15 +18,18 @@ class DeviceInfo:
     """One OpenCL device.
 
     index, platform, name, kind   as the driver lists them; kind is "gpu", "cpu" or "accelerator"
-    works, why                    True when a trial kernel built and gave the right numbers, else the reason
-    fp64                          a float64 kernel built and gave the right numbers
+    works                         the trial's kernels built and gave the right numbers
+    why                           reason why it does not work, or why the float64 that it offers is not used
+    fp64                          float64 kernels built and gave the right numbers
     vector_width                  lanes per work-item: 1 on GPUs, 8 on CPUs
     memory, max_alloc             bytes of the device and of its largest buffer
     units, driver                 compute units; driver version
-    local_memory                  bytes of local memory per work-group
+    local_memory                  bytes of local memory per work-group, at most 64 KiB: as much as the trial used
     max_group                     most work-items of a work-group; a kernel may allow fewer (Device.max_group)
     warp                          work-items that run in step: a warp of NVIDIA, a wave of AMD; 1 on CPUs
     fast_fp64                     fp64, and a float64 operation takes at most 6 times as long as one in float32
+    rate                          float32 multiplications with additions per second in the trial
+    pci                           place on the PCI bus, where the driver tells it
     """
 
     index: int
@@ -48,14 +48,16 @@ class DeviceInfo:
     max_group: int
     warp: int
     fast_fp64: bool
+    rate: float = field(compare=False)  # another in each trial
+    pci: str
 
 
 def devices() -> tuple[DeviceInfo, ...]:
     """Every OpenCL device of this machine with the result of its trial; empty where there is no OpenCL platform.
 
-    A trial that succeeds is recorded in the user's cache folder (sarcl/devices.json) with the versions of driver and
-    platform; later processes do not repeat it. A device whose trial fails, in float32 or in the float64 that it offers,
-    is tried again in each process, and `sarcl devices` tries every device again.
+    The result of a trial is recorded in the user's cache folder (sarcl/devices.json) with the versions of driver,
+    platform and trial; later processes do not repeat it. A trial that ended in an error, which may have been by chance,
+    is repeated in each process, and `sarcl devices` tries every device again.
     """
     return tuple(tried(info.index) for info, _ in listed())
 
@@ -81,7 +83,9 @@ def _listed() -> tuple[tuple[DeviceInfo, Any], ...]:
         for handle in handles:
             facts = _queries.facts(handle)._asdict()
             facts["why"] = facts["why"] or NOT_TRIED
-            info = DeviceInfo(index=len(found), platform=platform, works=False, fp64=False, fast_fp64=False, **facts)
+            info = DeviceInfo(
+                index=len(found), platform=platform, works=False, fp64=False, fast_fp64=False, rate=0, **facts
+            )
             found.append((info, handle))
     return tuple(found)
 
@@ -92,51 +96,49 @@ def tried(index: int) -> DeviceInfo:
     info, handle = listed()[index]
     if info.why != NOT_TRIED:
         return info
-    fp64 = _trial_record.find(key := _key(info, handle))
-    if fp64 is None:
-        why = _trial(handle, np.float32)
-        if why:
-            return replace(info, why=why)
+    found = _trial_record.find(key := _key(info, handle))
+    if found is None:
         offered = bool(_queries.asked(handle, "double_fp_config"))
-        fp64 = offered and not _trial(handle, np.float64)
-        if fp64 == offered:  # a trial in float64 may have failed by chance: the next process repeats it
-            _trial_record.keep(key, fp64)
-    return replace(info, works=True, why="", fp64=fp64, fast_fp64=fp64 and info.kind == "cpu")
+        found = trial(handle, info.vector_width, offered, info.local_memory, info.max_group)
+        if found.settled:
+            _trial_record.keep(key, found)
+    if found.why:
+        return replace(info, why=found.why)
+    return replace(
+        info, works=True, why=found.why64, fp64=found.fp64, fast_fp64=found.fp64 and found.fast_fp64,
+        rate=found.rate, local_memory=found.local_memory, warp=info.warp or found.warp,
+    )  # fmt: skip
+
+
+def distinct(infos: Iterable[DeviceInfo]) -> list[DeviceInfo]:
+    """These devices, of each that several platforms list only that of the highest rate."""
+    infos = list(infos)
+    kept: list[DeviceInfo] = []
+    for info in sorted(infos, key=lambda i: (-i.rate, i.index)):
+        if not any(_same(info, other, infos) for other in kept):
+            kept.append(info)
+    return sorted(kept, key=lambda i: i.index)
+
+
+def _same(a: DeviceInfo, b: DeviceInfo, infos: list[DeviceInfo]) -> bool:
+    """Whether two platforms list one device: by its place on the PCI bus, or where one does not tell it, by its
+    name, kind and memory, and its number among those alike on its platform. All CPU devices are the machine's CPU."""
+    if a.platform == b.platform or a.kind != b.kind:
+        return False
+    if a.kind == "cpu":
+        return True
+    if a.pci and b.pci:
+        return a.pci == b.pci
+    return _alike(a, infos) == _alike(b, infos)
+
+
+def _alike(info: DeviceInfo, infos: list[DeviceInfo]) -> tuple[str, int, int]:
+    """Name and memory of a device, and its number among those of its platform that have the same."""
+    before = [i for i in infos if i.platform == info.platform and i.index < info.index]
+    return info.name, info.memory, sum((i.name, i.memory) == (info.name, info.memory) for i in before)
 
 
 def _key(info: DeviceInfo, handle: Any) -> str:
-    """What the result of a trial depends on: the device, both versions and the kernel of the trial."""
-    kernel = hashlib.sha256(_TRIAL.encode()).hexdigest()[:16]
-    version = _queries.text_of(_queries.asked(handle, "platform"), "version")
-    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {version}, trial {kernel}"
-
-
-_TRIAL = """
-#if FP64
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
-typedef double number;
-#else
-typedef float number;
-#endif
-__kernel void trial(__global number *x) { size_t i = get_global_id(0); x[i] = sqrt(x[i]) + (number)i; }
-"""
-
-
-def _trial(handle: Any, dtype: Any) -> str:
-    """Build and run a kernel on numbers of `dtype`: what went wrong, or nothing."""
-    import pyopencl
-
-    try:
-        context = pyopencl.Context([handle])
-        queue = pyopencl.CommandQueue(context)
-        x = np.arange(1, 9, dtype=dtype) ** 2
-        with quiet():
-            program = pyopencl.Program(context, _TRIAL).build([f"-DFP64={int(dtype is np.float64)}"])
-        buffer = pyopencl.Buffer(context, pyopencl.mem_flags.COPY_HOST_PTR, hostbuf=x)
-        program.trial(queue, x.shape, None, buffer)
-        out = np.empty_like(x)
-        pyopencl.enqueue_copy(queue, out, buffer)
-    except Exception as exc:
-        return first_line(exc)
-    wanted = np.arange(1, 9) + np.arange(8)
-    return "" if np.allclose(out, wanted) else f"a trial kernel gave {out.tolist()}, not {wanted.tolist()}"
+    """What the result of a trial depends on: the device, the versions of driver and platform, and the trial itself."""
+    platform = _queries.text_of(_queries.asked(handle, "platform"), "version")
+    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {platform}, trial {version()}"

@@ -346,7 +346,7 @@ MAY_CATCH = {
     "base/validation.py": "what numpy, float and int say of input",
     "opencl/_trial_record.py": "text that is no JSON",
     "opencl/_queries.py": "a driver that refuses a question, however it does so",
-    "opencl/device_list.py": "a driver's trial: whatever it raises, the device does not work",
+    "opencl/_trial.py": "a driver's trial: whatever it raises, the device does not work",
     "cli/parser.py": "text of a command line; the last resort of a program",
     "simulation/echo_output.py": "numpy's sizes that overflow",
     "experiments/fda/file.py": "the file and case are put before a message, which is raised again",

@@ -21,6 +21,7 @@ from sarcl.fullwave.lattice import Lattice
 from sarcl.fullwave.target import Target
 from sarcl.opencl import _programs, _trial_record, choose_device, device_list, fft
 from sarcl.opencl import device as device_module
+from sarcl.opencl._trial import Outcome
 from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device_list import DeviceInfo
 
@@ -66,11 +67,11 @@ def test_a_name_that_matches_nothing_lists_what_there_is():
 @pytest.fixture
 def record(tmp_path, monkeypatch):
     """An empty record of trials in a folder of its own: its path, a list that grows with each trial, a new process."""
-    path, trials, trial = tmp_path / "cache" / "devices.json", [], device_list._trial
+    path, trials, trial = tmp_path / "cache" / "devices.json", [], device_list.trial
 
-    def counted(handle, dtype):
+    def counted(handle, *offered):
         trials.append(handle)
-        return trial(handle, dtype)
+        return trial(handle, *offered)
 
     def new_process():
         _trial_record._record.cache_clear()
@@ -78,7 +79,7 @@ def record(tmp_path, monkeypatch):
         trials.clear()
 
     monkeypatch.setattr(_trial_record, "_path", lambda: path)
-    monkeypatch.setattr(device_list, "_trial", counted)
+    monkeypatch.setattr(device_list, "trial", counted)
     new_process()
     yield SimpleNamespace(path=path, trials=trials, new_process=new_process)
     new_process()
@@ -88,7 +89,7 @@ def test_a_trial_that_succeeded_is_not_repeated_by_the_next_process(record):
     first = sarcl.devices()
     assert record.trials
     entries = json.loads(record.path.read_text())
-    assert list(entries.values()) == [d.fp64 for d in first if d.works]
+    assert [entry["fp64"] for entry in entries.values() if not entry["why"]] == [d.fp64 for d in first if d.works]
     assert all(any(d.driver in key and d.name in key for d in first) for key in entries)
     assert [p.name for p in record.path.parent.iterdir()] == [record.path.name]
     record.new_process()
@@ -123,7 +124,7 @@ def test_a_record_of_another_user_or_behind_a_link_is_not_believed(record, tmp_p
     record.new_process()
     sarcl.devices()
     assert record.trials and not record.path.is_symlink()
-    assert other.read_text() == record.path.read_text() == entries
+    assert other.read_text() == entries and json.loads(record.path.read_text()).keys() == json.loads(entries).keys()
     monkeypatch.setattr("os.getuid", lambda: os.stat(record.path).st_uid + 1)
     record.new_process()
     sarcl.devices()
@@ -152,7 +153,7 @@ def test_the_record_lies_in_the_cache_folder_of_the_user_and_nowhere_else(monkey
 def two_devices(monkeypatch, works):
     """A graphics card and a processor, of which those in `works` work; opened, a device is its index."""
     common = dict(works=False, why="not tried", fp64=False, vector_width=1, memory=1, max_alloc=1, units=4, driver="1",
-                  local_memory=1, max_group=1, warp=1, fast_fp64=False)  # fmt: skip
+                  local_memory=1, max_group=1, warp=1, fast_fp64=False, rate=0.0, pci="")  # fmt: skip
     platform = SimpleNamespace(version="1")
     infos = [
         DeviceInfo(index=i, platform="P", name=f"{k} of P", kind=k, **common) for i, k in enumerate(("gpu", "cpu"))
@@ -162,11 +163,13 @@ def two_devices(monkeypatch, works):
         monkeypatch.setattr(module, "listed", lambda: listed)
     tried = []
 
-    def trial(handle, dtype):
+    def trial(handle, lanes, fp64, *offered):
         tried.append(handle.kind)
-        return "" if handle.kind in works else "broken"
+        if handle.kind not in works:
+            return Outcome(settled=False, why="broken")
+        return Outcome(fp64=fp64, fast_fp64=fp64)
 
-    monkeypatch.setattr(device_list, "_trial", trial)
+    monkeypatch.setattr(device_list, "trial", trial)
     monkeypatch.setattr(choose_device, "_open", lambda index: index)
     return tried
 
@@ -198,20 +201,36 @@ def test_a_trial_in_float64_that_failed_once_is_repeated_by_the_next_process(rec
         handle.double_fp_config = 63  # both offer float64
     failing, trials = {"gpu"}, []
 
-    def trial(handle, dtype):
-        trials.append((handle.kind, dtype))
-        return "out of memory" if dtype is np.float64 and handle.kind in failing else ""
+    def trial(handle, *offered):
+        trials.append(handle.kind)
+        if handle.kind in failing:
+            return Outcome(settled=False, why64="out of memory")
+        return Outcome(fp64=True)
 
-    monkeypatch.setattr(device_list, "_trial", trial)
-    assert [(d.works, d.fp64) for d in sarcl.devices()] == [(True, False), (True, True)]
+    monkeypatch.setattr(device_list, "trial", trial)
+    assert [(d.works, d.fp64, d.why) for d in sarcl.devices()] == [(True, False, "out of memory"), (True, True, "")]
     assert "gpu" not in record.path.read_text()
     failing.clear()
     record.new_process()
     trials.clear()
     assert [(d.works, d.fp64) for d in sarcl.devices()] == [(True, True), (True, True)]
-    assert trials == [("gpu", np.float32), ("gpu", np.float64)]  # the cpu's verdict was recorded
+    assert trials == ["gpu"]  # the cpu's verdict was recorded
     record.new_process()
-    assert all(d.fp64 for d in sarcl.devices()) and len(trials) == 2
+    assert all(d.fp64 for d in sarcl.devices()) and len(trials) == 1
+
+
+def test_a_device_that_computes_wrong_numbers_is_recorded_as_such_and_not_tried_again(record, monkeypatch):
+    tried = two_devices(monkeypatch, works=("cpu",))
+
+    def trial(handle, *offered):
+        tried.append(handle.kind)
+        return Outcome(why="" if handle.kind == "cpu" else "wrong numbers")
+
+    monkeypatch.setattr(device_list, "trial", trial)
+    for _ in range(2):
+        assert [(d.works, d.why) for d in sarcl.devices()] == [(False, "wrong numbers"), (True, "")]
+        record.new_process()
+    assert tried == ["gpu", "cpu"]
 
 
 def test_a_device_that_offers_no_float64_is_not_tried_again(record, monkeypatch):
@@ -326,7 +345,7 @@ MACROS = {
     "ROUGH": 1, "DIAGRAM_ISOTROPIC": 0, "DIAGRAM_COS": 1, "DIAGRAM_COS2": 2, "DIAGRAM_EXP": 3,
     "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1, "SEGMENT": 64,
     "SHARED": 1, "ITEMS": 16, "SLOPE_TAPS": 2, "SLOPE_TERMS": 2, "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64,
-    "FROM64": 0,
+    "FROM64": 0, "NUMBER64": 0,
 }  # fmt: skip
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 

@@ -1,0 +1,178 @@
+"""The trial of a device: what the kernels that matter compute, compared with NumPy; devices that get it wrong."""
+
+import re
+from dataclasses import replace
+from types import SimpleNamespace
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.opencl import _programs, _trial, choose_device, device_list
+from sarcl.opencl._trial import RESULTS, Outcome
+from sarcl.opencl.choose_device import open_device, open_devices
+
+# A mistake of a driver as a change of the trial's source, and what the trial says of it.
+MISTAKES = {
+    "a struct by pointer is wrong": (r"d->y = w_sub\(T.y, x.y\);", "d->y = w_add(T.y, x.y);", "path_difference"),
+    "sums are simplified": (r"t = s - a;\n", "t = b;\n", "the rounding error of a float32 sum"),
+    "fma rounds twice": (r"fma\(a, b, -p\)", "(a * b - p)", "by fma"),
+    "a square root of nothing": (
+        r"wv w_sqrt\(wv a\) \{", "wv w_sqrt(wv a) { if (1) return w_make((fv)1, (fv)0);", "square root",
+    ),
+    "no rounding to integers": (r"#define MAGIC 12582912.0f", "#define MAGIC 12582911.0f", "cycle"),
+    "no wait at a barrier": (r"shared\[k \* group \+ group - 1 - l\]", "shared[k * group + l]", "past a barrier"),
+}  # fmt: skip
+
+
+def outcome(device, fp64=True):
+    info = device.info
+    return _trial.trial(device._raw, info.vector_width, fp64 and info.fp64, info.local_memory, info.max_group)
+
+
+def test_a_device_that_computes_right_passes(device):
+    found = outcome(device)
+    assert not found.why and not found.why64 and found.settled
+    assert found.fp64 == device.info.fp64
+    assert found.rate > 0 and found.warp >= 1 and 0 <= found.local_memory <= device.info.local_memory
+
+
+@pytest.mark.parametrize("mistake", MISTAKES)
+def test_a_device_that_makes_a_mistake_is_refused_with_what_was_wrong(mistake, monkeypatch):
+    device = open_device()
+    pattern, wrong, said = MISTAKES[mistake]
+    text, n = re.subn(pattern, lambda match: wrong, _programs.source("trial.cl"))
+    assert n, "the mistake is no longer found in the source"
+    monkeypatch.setattr(_trial, "source", lambda file: text)
+    found = outcome(device, fp64=False)
+    assert "a trial kernel" in found.why and "wrong numbers" in found.why and said in found.why
+    assert found.settled
+
+
+def test_not_a_number_is_a_wrong_number():
+    result = _trial.Result("the sum", 1, 1.0, 1.0)
+    right = np.ones(3)
+    assert not _trial.compared(result, np.ones((1, 3), np.float32), right)
+    assert "the sum is nan, not 1" in _trial.compared(result, np.array([[1, np.nan, 1]], np.float32), right)
+
+
+def test_every_result_has_the_rows_that_the_kernel_writes():
+    assert sum(r.rows for r in RESULTS) == 22
+    assert [w.shape for w in _trial.wanted(*_trial._given())] == [(_trial.N,)] * len(RESULTS)
+
+
+def test_local_memory_that_a_driver_refuses_is_offered_in_halves(monkeypatch):
+    """A driver that claims more than its kernels can use: the trial finds what they can."""
+    import pyopencl
+
+    device, asked, true = open_device(), [], pyopencl.LocalMemory
+    if device.info.local_memory < 2**16:
+        pytest.skip("less than 64 KiB of local memory")
+
+    def local(nbytes):
+        asked.append(nbytes)
+        if nbytes > 20000:
+            raise pyopencl.RuntimeError("clEnqueueNDRangeKernel failed: OUT_OF_RESOURCES", -5)
+        return true(nbytes)
+
+    monkeypatch.setattr(pyopencl, "LocalMemory", local)
+    assert outcome(device, fp64=False).local_memory == 2**14
+    assert asked == [2**16, 2**15, 2**14]
+
+
+def test_float64_that_is_claimed_and_wrong_is_not_used_and_said(monkeypatch, capsys):
+    device = open_device()
+    if not device.info.fp64:
+        pytest.skip("no float64")
+    right = _trial._wrong_numbers
+    calls = []
+
+    def wrong(*given):
+        calls.append(given)
+        return right(*given) if len(calls) == 1 else "wrong numbers: float64 is float32"
+
+    monkeypatch.setattr(_trial, "_wrong_numbers", wrong)
+    found = outcome(device)
+    assert not found.why and not found.fp64 and not found.fast_fp64 and found.settled
+    assert found.why64 == "wrong numbers: float64 is float32"
+    from sarcl.cli._commands import device_table
+
+    info = replace(device.info, fp64=False, why=found.why64)
+    assert "float64 does not work: wrong numbers" in device_table([info], [0])
+
+
+@pytest.mark.parametrize("slower, fast", [(2, True), (32, False)])
+def test_float64_is_fast_where_it_was_timed_so(monkeypatch, slower, fast):
+    device = open_device().one_lane()
+    if not device.info.fp64:
+        pytest.skip("no float64")
+    monkeypatch.setattr(_trial, "_rate", lambda q, k, lanes, dtype: 1e12 if dtype is np.float32 else 1e12 / slower)
+    assert outcome(device).fast_fp64 == fast
+
+
+def test_kernels_use_pairs_of_float32_where_float64_is_slow():
+    device = open_device()
+    if not device.info.fp64:
+        pytest.skip("no float64")
+    from sarcl.opencl.device import Device
+
+    slow = Device(replace(device.info, fast_fp64=False), device._raw)
+    slow.kernel("tile_constants.cl", "tile_constants", BISTATIC=0, BEAM=0, LOCAL=0, RANGE=0)
+    assert [dict(key[1:])["FP64"] for key in slow._kernels] == [0]
+    grid = sarcl.ImageGrid.plane(shape=16, spacing=0.2)
+    from helpers.cases import noise_history
+
+    images = [sarcl.backproject(noise_history(), grid, device=d, tolerance=1e-7) for d in (slow, device)]
+    assert np.array_equal(images[0].data, images[1].data)  # float64 is there for what needs it
+
+
+def fake(monkeypatch, *devices, rates=None):
+    """A machine with these devices (platform, name, kind, memory, pci), all of which work; opened, one is its index."""
+    common = dict(works=False, why=device_list.NOT_TRIED, fp64=False, vector_width=1, max_alloc=1, units=4, driver="1",
+                  local_memory=1, max_group=1, warp=1, fast_fp64=False, rate=0.0)  # fmt: skip
+    infos = [
+        device_list.DeviceInfo(index=i, platform=p, name=n, kind=k, memory=m, pci=pci, **common)
+        for i, (p, n, k, m, pci) in enumerate(devices)
+    ]
+    listed = tuple((i, SimpleNamespace(platform=SimpleNamespace(version="1"), index=i.index)) for i in infos)
+    for module in (device_list, choose_device):
+        monkeypatch.setattr(module, "listed", lambda: listed)
+    rates = rates or [1e9] * len(devices)
+    monkeypatch.setattr(device_list, "trial", lambda handle, *offered: Outcome(rate=rates[handle.index]))
+    monkeypatch.setattr(device_list._trial_record, "find", lambda key: None)
+    monkeypatch.setattr(device_list._trial_record, "keep", lambda key, found: None)
+    monkeypatch.setattr(choose_device, "_open", lambda index: index)
+    monkeypatch.delenv("SARCL_DEVICE", raising=False)
+    device_list.tried.cache_clear()
+
+
+@pytest.fixture(autouse=True)
+def other_tests_ask_anew():
+    yield
+    device_list.tried.cache_clear()
+
+
+def test_the_fastest_gpu_is_taken_whatever_its_compute_units(monkeypatch):
+    gpus = [("Intel", "Iris", "gpu", 1, ""), ("NVIDIA", "RTX", "gpu", 2, ""), ("P", "CPU", "cpu", 3, "")]
+    fake(monkeypatch, *gpus, rates=[1e12, 9e12, 99e12])
+    assert open_device() == 1
+    assert open_device("iris") == 0
+
+
+SAME = {
+    "one place on the bus": ([("NVIDIA", "RTX", "gpu", 8, "01:00.0"), ("PoCL", "rtx-cuda", "gpu", 7, "01:00.0")], [1]),
+    "other places": ([("A", "RTX", "gpu", 8, "01:00.0"), ("B", "RTX", "gpu", 8, "02:00.0")], [0, 1]),
+    "name and memory": ([("A", "Xe", "gpu", 8, ""), ("B", "Xe", "gpu", 8, "03:00.0")], [1]),
+    "other memory": ([("A", "Xe", "gpu", 8, ""), ("B", "Xe", "gpu", 16, "")], [0, 1]),
+    "two cards of one platform": ([("A", "RTX", "gpu", 8, "")] * 2, [0, 1]),
+    "two cards of two platforms": ([("A", "X", "gpu", 8, "")] * 2 + [("B", "X", "gpu", 8, "")] * 2, [2, 3]),
+    "the processor": ([("PoCL", "cpu", "cpu", 8, ""), ("Intel", "Xeon", "cpu", 9, "")], [1]),
+    "a processor and a card": ([("A", "APU", "cpu", 8, ""), ("B", "APU", "gpu", 8, "")], [0, 1]),
+}
+
+
+@pytest.mark.parametrize("case", SAME)
+def test_all_takes_one_device_once(monkeypatch, case):
+    devices, wanted = SAME[case]
+    fake(monkeypatch, *devices, rates=[1e9 * (i + 1) for i in range(len(devices))])
+    assert open_devices("all") == wanted
