@@ -1,15 +1,16 @@
-// Range profiles of samples on the device: what comes before and after the FFT of rows.
+// Range profiles of samples on the device, and samples of spread profiles: what comes before and after the FFT of rows.
 //
 //   P_p(m) = sum_n w_p v_n s_p(n) exp(+j 2 pi (n - low) m/length),     low = n_samples/2, rounded down
 //
 // `weigh` lays sample n at bin low - n (modulo length) of a row of zeros, so that the FFT, which has exp(-j ...), needs no
 // normalisation afterwards as an inverse FFT would. `pad` copies the transform to a profile whose padding repeats its
-// other end.
+// other end. For profiles that were spread, `fold` adds the padding to where it was copied from, and `cut` takes the
+// bins of the samples from the transform.
 //
 // symbols   w, v   weights of rows and of samples, pairs of float32: a product is rounded once, as on the host
 // macros    REAL64  number type of the profiles: 1 float64, 0 float32
 //           FROM64  number type of the samples: 1 float64, where the device has it, 0 float32
-// reference: sarcl/numerics/range_profiles.py:from_samples
+// reference: sarcl/numerics/range_profiles.py:from_samples, sarcl/numerics/range_profiles.py:to_samples
 
 #undef VW
 #define VW 1  // for pairs of single numbers, on every device
@@ -61,4 +62,39 @@ __kernel void pad(__global const REAL *restrict from, int length, int padding, i
     size_t source = 2 * (row * length + i), o = 2 * ((first + row) * get_global_size(0) + at);
     out[o] = from[source];
     out[o + 1] = from[source + 1];
+}
+
+// global size (length, rows)
+//   sums  (parts, n_rows, 3, length + 2 padding, 2) from row `first` on: profiles are the sums of all parts, and of planes
+//         1 and 2, a total and its rest
+//   out   (rows, length, 2)
+__kernel void fold(__global const REAL *restrict sums, int parts, int n_rows, int padding, int first,
+                   __global REAL *restrict out) {
+    int bin = get_global_id(0), length = get_global_size(0), stride = length + 2 * padding;
+    size_t row = first + get_global_id(1);
+    pair re = make_pair(0, 0), im = make_pair(0, 0);
+    for (int part = 0; part < parts; part++) {
+        __global const REAL *total = sums + 2 * ((part * (size_t)n_rows + row) * 3 + 1) * stride;
+        __global const REAL *rest = total + 2 * stride;
+        for (int at = (bin + padding) % length; at < stride; at += length) {
+            re = pair_add(re, exact_sum(total[2 * at], rest[2 * at]));
+            im = pair_add(im, exact_sum(total[2 * at + 1], rest[2 * at + 1]));
+        }
+    }
+    size_t o = 2 * (get_global_id(1) * (size_t)length + bin);
+    out[o] = re.hi + re.lo;
+    out[o + 1] = im.hi + im.lo;
+}
+
+// global size (n_samples, rows)
+//   spectra     (rows, length, 2), transforms
+//   correction  (n_samples): factors of the samples
+//   out         (rows, n_samples, 2) from row `first` on
+__kernel void cut(__global const REAL *restrict spectra, int length, __global const REAL *restrict correction, int first,
+                  __global REAL *restrict out) {
+    int n = get_global_id(0), n_samples = get_global_size(0), bin = n - n_samples / 2;
+    size_t row = get_global_id(1), source = 2 * (row * length + (bin < 0 ? bin + length : bin));
+    size_t o = 2 * ((first + row) * n_samples + n);
+    out[o] = correction[n] * spectra[source];
+    out[o + 1] = correction[n] * spectra[source + 1];
 }

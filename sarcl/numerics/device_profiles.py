@@ -1,7 +1,11 @@
-"""Range profiles made on a device, from samples that were uploaded: kernels/range_profiles.cl and an FFT of rows."""
+"""Range profiles made on a device from samples that were uploaded, and samples from profiles that were spread there.
+
+Kernels: kernels/range_profiles.cl, before and after an FFT of rows.
+"""
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -9,12 +13,15 @@ import numpy as np
 from ..base import float_pairs
 from ..opencl import fft
 from ..opencl.device import Device
+from . import range_profiles
+from .interpolation import Interpolator
 from .range_profiles import LARGEST
 
 AT_ONCE = 2**22  # samples of rows that are transformed at a time: enough to fill a GPU
 # An FFT of any length convolves with a chirp, whose sums are larger than those of the profile by length^1.5 at most.
 SPARE = 1e10
 WEIGHTS = 1e18  # largest weights of rows and of samples lie between one over this and this: pairs of float32 hold them
+SINGLE = {"REAL64": 0, "FROM64": 0}  # macros of the kernels
 
 
 def possible(device: Device, length: int, dtype: type[np.complexfloating]) -> bool:
@@ -38,21 +45,21 @@ class DeviceProfiles:
         self.n_samples, self.stride = len(sample_weight), length + 2 * pad
         self._double = dtype == np.complex128
         self._largest = float(np.abs(sample_weight).max())
-        self._across: Any = None
         self._sample_weight = sample_weight
-        self._work: Any = None
+        self._across: Any = None
         self._made: Any = None
-        self._rows = 0
+        self._batches = _Batches(device, length, dtype)
 
     def nbytes(self, rows: int) -> float:
         """Bytes on the device for the profiles of so many rows, and for the samples of two such blocks."""
-        return float(rows * self._row_bytes + min(rows, self._at_once) * self._work_bytes)
+        return float(rows * self._row_bytes + min(rows, self._batches.most) * self._batches.row_bytes)
 
     def rows_in(self, nbytes: float) -> int:
         """Rows whose `nbytes` are this at most."""
-        rows = nbytes / (self._row_bytes + self._work_bytes)
-        if rows > self._at_once:
-            rows = (nbytes - self._at_once * self._work_bytes) / self._row_bytes
+        work, most = self._batches.row_bytes, self._batches.most
+        rows = nbytes / (self._row_bytes + work)
+        if rows > most:
+            rows = (nbytes - most * work) / self._row_bytes
         return int(rows)
 
     def holds(self, samples: np.ndarray, row_weight: np.ndarray) -> bool:
@@ -84,38 +91,97 @@ class DeviceProfiles:
         device = self.device
         macros = {"REAL64": int(self._double), "FROM64": int(kind == np.complex128)}
         weigh, pad = (device.kernel("range_profiles.cl", name, **macros) for name in ("weigh", "pad"))
-        self._reserve(rows)
-        batch = min(self._at_once, self._rows)
-        for first in range(0, rows, batch):
-            # the plan of the FFT is for whole batches: rows left over in the last one are transformed and not used
-            count = min(batch, rows - first)
+        if self._across is None:
+            self._across = device.copied(self.weights(self._sample_weight))
+        if self._batches.reserve(rows):
+            self._made = None  # frees the smaller buffer first
+            self._made = device.empty(np.dtype(self.dtype).itemsize * rows * self.stride)
+        for first, count, work in self._batches.of(rows):
             device.run(
                 weigh, (self.length, count), None,
-                samples, self.n_samples, self._across, row_weight, rows, first, self._work,
+                samples, self.n_samples, self._across, row_weight, rows, first, work,
             )  # fmt: skip
-            fft.in_place(device, self._work, (batch, self.length), self.dtype)
-            device.run(pad, (self.stride, count), None, self._work, self.length, self.pad, first, self._made)
+            self._batches.transform()
+            device.run(pad, (self.stride, count), None, work, self.length, self.pad, first, self._made)
         return self._made
-
-    def _reserve(self, rows: int) -> None:
-        """Buffers for blocks of so many rows."""
-        if self._across is None:
-            self._across = self.device.copied(self.weights(self._sample_weight))
-        if rows > self._rows:
-            size = np.dtype(self.dtype).itemsize
-            self._made = self._work = None  # frees the smaller buffers first
-            self._work = self.device.zeros(size * min(rows, self._at_once) * self.length)
-            self._made = self.device.empty(size * rows * self.stride)
-            self._rows = rows
-
-    @property
-    def _at_once(self) -> int:
-        return max(1, AT_ONCE // self.length)
 
     @property
     def _row_bytes(self) -> float:
         return float(np.dtype(self.dtype).itemsize) * self.stride + 2 * 16.0 * self.n_samples
 
+
+class SpreadSamples:
+    """Samples complex64 of profiles that were spread on a device: the adjoint of `DeviceProfiles`.
+
+    Where the device transforms rows, the samples alone are downloaded; on a CPU range_profiles.to_samples makes them.
+    """
+
+    def __init__(self, device: Device, n_samples: int, interpolator: Interpolator, length: int) -> None:
+        self.device, self.n_samples, self.interpolator, self.length = device, n_samples, interpolator, length
+        self.pad = range_profiles.padding(interpolator)
+        self._batches = _Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
+        self._correction: Any = None
+        self._out: Any = None
+
     @property
-    def _work_bytes(self) -> float:
-        return float(np.dtype(self.dtype).itemsize) * self.length + fft.temporary_bytes(self.length, self.dtype)
+    def row_bytes(self) -> float:
+        """Bytes on the device per row, beside the profiles themselves, at most."""
+        return self._batches.row_bytes + 8.0 * self.n_samples if self._batches else 0.0
+
+    def of(self, sums: Any, parts: int, rows: int) -> np.ndarray:
+        """Samples (rows, n_samples) of a buffer (parts, rows, 3, length + 2 padding), complex64.
+
+        A profile is the sum of all parts, and of planes 1 and 2 of each: a total and its rest.
+        """
+        device = self.device
+        if self._batches is None:
+            stride = self.length + 2 * self.pad
+            made = device.download(sums, np.empty((parts, rows, 3, stride), np.complex64))
+            total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
+            return range_profiles.to_samples(device, total, self.n_samples, self.interpolator)
+        fold, cut = (device.kernel("range_profiles.cl", name, **SINGLE) for name in ("fold", "cut"))
+        if self._correction is None:
+            correction = range_profiles.correction(self.interpolator, self.n_samples, self.length)
+            self._correction = device.copied(correction.astype(np.float32))
+        if self._batches.reserve(rows):
+            self._out = None
+            self._out = device.empty(8 * rows * self.n_samples)
+        for first, count, work in self._batches.of(rows):
+            device.run(fold, (self.length, count), None, sums, parts, rows, self.pad, first, work)
+            self._batches.transform()
+            device.run(cut, (self.n_samples, count), None, work, self.length, self._correction, first, self._out)
+        return device.download(self._out, np.empty((rows, self.n_samples), np.complex64))
+
+
+class _Batches:
+    """Rows of a block that are transformed at a time, in one buffer.
+
+    most       rows at a time;  row_bytes  of the buffer, and of what the FFT takes beside it, per row
+    All transforms are of whole batches, because each number of rows would need an FFT program of its own: of the last
+    batch some rows are not used.
+    """
+
+    def __init__(self, device: Device, length: int, dtype: type[np.complexfloating]) -> None:
+        self.device, self.length, self.dtype = device, length, dtype
+        self.most = max(1, AT_ONCE // length)
+        self.row_bytes = float(np.dtype(dtype).itemsize) * length + fft.temporary_bytes(length, dtype)
+        self._rows = 0
+        self._work: Any = None
+
+    def reserve(self, rows: int) -> bool:
+        """Make room for blocks of so many rows; whether there was less before."""
+        if rows <= self._rows:
+            return False
+        self._work = None
+        self._work = self.device.zeros(np.dtype(self.dtype).itemsize * min(rows, self.most) * self.length)
+        self._rows = rows
+        return True
+
+    def of(self, rows: int) -> Iterator[tuple[int, int, Any]]:
+        """(first row, number of rows, buffer) of each batch of a block."""
+        for first in range(0, rows, self.most):
+            yield first, min(self.most, rows - first), self._work
+
+    def transform(self) -> None:
+        """Enqueue the FFT of all rows of the buffer."""
+        fft.in_place(self.device, self._work, (min(self._rows, self.most), self.length), self.dtype)

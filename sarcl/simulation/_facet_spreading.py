@@ -11,6 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.stage_timer import Clock
 from ..model.waveform import Waveform
 from ..numerics import range_profiles
+from ..numerics.device_profiles import SpreadSamples
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
@@ -118,6 +119,7 @@ class FacetSpreader:
         self.channels = len(nodes) * len(self.made)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
         self.splits = splits(device, len(self.antennas), tiles.n_tiles)
+        self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
 
     def _blocks(self, budget: float) -> tuple[int, int]:
         """Pulses per block, and tiles whose amplitudes are held at once, that keep to the budget, bytes."""
@@ -125,8 +127,8 @@ class FacetSpreader:
         most, spacing = max(64, 16 * device.info.units), self.pulse_nodes.spacing
         if spacing > 1:
             most = max(most, MOST_PULSES)
-        per_pulse = self.constants.nbytes * tiles.n_tiles * (2 if spacing > 1 else 1)
-        per_pulse += 24 * self.stride * self.splits * self.channels
+        per_pulse: float = self.constants.nbytes * tiles.n_tiles * (2 if spacing > 1 else 1)
+        per_pulse += (24 * self.stride * self.splits + self.spectra_of.row_bytes) * self.channels
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
         n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
@@ -143,9 +145,9 @@ class FacetSpreader:
         clock.lap("scene")
         counts, first = Counts(), pulses[0]
         for start, stop, span in self._pulse_blocks(first, pulses[-1] + 1):
-            total, found = self._profiles(start, stop, span)
+            rows, found = self._profiles(start, stop, span)
             clock.lap("echo")
-            spectra = range_profiles.to_samples(self.device, total, self.n_samples, self.plan.interpolator)
+            spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
             spectra = spectra.reshape(stop - start, len(self.made), len(self.basis), self.n_samples)
             for i, name in enumerate(self.wanted):
                 for m, weight in enumerate(self.basis):
@@ -162,9 +164,9 @@ class FacetSpreader:
             for start in range(max(span.first, first), min(span.stop, end), self.at_once):
                 yield start, min(start + self.at_once, span.stop, end), span
 
-    def _profiles(self, start: int, stop: int, span: Span) -> tuple[np.ndarray, np.ndarray]:
-        """Range profiles of pulses start ... stop - 1, complex64 (n channels, stride), and counts of pairs (3,): inside
-        the window, of these from the front, and outside the beam."""
+    def _profiles(self, start: int, stop: int, span: Span) -> tuple[Any, np.ndarray]:
+        """Range profiles of pulses start ... stop - 1 on the device, as `SpreadSamples.of` takes them, and counts of
+        pairs (3,): inside the window, of these from the front, and outside the beam."""
         device, held, tiles, used = self.device, self.tiles, self.tiles.tiles, stop - start
         at, which, shares = self.pulse_nodes.of(start, stop)
         pulse, constants, n = self._constants(np.arange(start, stop), self.gated)
@@ -194,10 +196,8 @@ class FacetSpreader:
                 here, which_here, shares_here, axes, self.reach, held.radius, self.table, held.last, self.flush, rows,
                 self.stride, self.stride // 2, done,
             )  # fmt: skip
-        found = device.download(rows, np.empty((self.splits, used * self.channels, 3, self.stride), np.complex64))
-        total = found[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
-        return total, counts.sum(axis=(1, 2), dtype=np.int64)
+        return rows, counts.sum(axis=(1, 2), dtype=np.int64)
 
     def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
         """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""

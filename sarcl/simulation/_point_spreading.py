@@ -9,6 +9,7 @@ import numpy as np
 from ..base.stage_timer import Clock
 from ..model.waveform import Waveform
 from ..numerics import range_profiles
+from ..numerics.device_profiles import SpreadSamples
 from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
@@ -59,7 +60,8 @@ def spread_points(
 
     stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
     parts = splits(device, len(antennas), tiles.n_tiles)
-    per_pulse = tile_constants.nbytes * tiles.n_tiles + 24 * stride * parts * channels
+    spectra_of = SpreadSamples(device, n_samples, plan.interpolator, plan.length)
+    per_pulse = tile_constants.nbytes * tiles.n_tiles + (24 * stride * parts + spectra_of.row_bytes) * channels
     # enough pulses at once to keep every unit busy, few enough for the progress to be seen
     most = max(64, 16 * device.info.units)
     at_once = max(1, min(most, int(budget / 2 / per_pulse)) // lanes) * lanes
@@ -79,11 +81,9 @@ def spread_points(
             held.planes, ratios, patterns, second, axes, np.float32(weights.range), reach, held.radius, table,
             held.last, flush, rows, stride, stride // 2, done,
         )  # fmt: skip
-        made = device.download(rows, np.empty((parts, used * channels, 3, stride), np.complex64))
+        device.finish()
         clock.lap("echo")
-        total = made[:, :, 1:].sum(axis=(0, 2), dtype=np.complex128).astype(np.complex64)
-        spectra = range_profiles.to_samples(device, total, n_samples, plan.interpolator)
-        spectra = spectra.reshape(used, channels, n_samples)
+        spectra = spectra_of.of(rows, parts, used * channels).reshape(used, channels, n_samples)
         here = samples[start - first : stop - first]
         if channels == 1:
             here += spectra[:, 0]

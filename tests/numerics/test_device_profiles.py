@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 from helpers.devices import as_gpu
 
-from sarcl.numerics import device_profiles, range_profiles
-from sarcl.numerics.device_profiles import DeviceProfiles
+from sarcl.numerics import device_profiles, interpolation, range_profiles
+from sarcl.numerics.device_profiles import DeviceProfiles, SpreadSamples
 
 SINGLE, DOUBLE = np.complex64, np.complex128
 
@@ -85,3 +85,23 @@ def test_the_rows_that_fit_are_the_most_whose_bytes_do(device):
         rows = maker.rows_in(nbytes)
         assert maker.nbytes(rows) <= nbytes < maker.nbytes(rows + 1)
     assert maker.nbytes(1) >= 8 * (2048 + 16 + 2048)
+
+
+@pytest.mark.parametrize("n_samples, length, parts", [(37, 80, 3), (8, 64, 1), (1, 16, 2)])
+def test_samples_of_spread_profiles_are_those_of_the_host(device, n_samples, length, parts, monkeypatch):
+    monkeypatch.setattr(device_profiles, "AT_ONCE", 2 * length)
+    gpu, kernel = as_gpu(device), interpolation.interpolator(4, 2.0)
+    samples = SpreadSamples(gpu, n_samples, kernel, length)
+    stride = length + 2 * range_profiles.padding(kernel)
+    for rows in (5, 3):
+        sums = noise(parts * rows * 3, stride, SINGLE, seed=rows).reshape(parts, rows, 3, stride)
+        sums[:, :, 2] *= np.float32(1e-3)
+        sums[:, :, 1] += 1e3 * (np.arange(parts) - (parts - 1) / 2)[:, None, None]  # parts that cancel
+        total = sums[:, :, 1:].sum(axis=(0, 2), dtype=DOUBLE).astype(SINGLE)
+        wanted = range_profiles.to_samples(None, total, n_samples, kernel)
+        got = samples.of(gpu.upload(sums), parts, rows)
+        assert got.shape == (rows, n_samples) and got.dtype == SINGLE
+        assert np.linalg.norm(got - wanted) <= 5e-7 * np.linalg.norm(wanted)
+        if device.is_cpu:
+            host = SpreadSamples(device, n_samples, kernel, length)
+            assert np.array_equal(host.of(device.upload(sums), parts, rows), wanted) and host.row_bytes == 0
