@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz mutants gpu-static bench results architecture lint clean ready ready-dev
+.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture lint clean ready ready-dev
 
 ARGS ?=
 PYTEST = .venv/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
@@ -23,6 +23,9 @@ test-all: ready  ## all tests, the slow ones too
 
 fuzz: ready  ## read 10000 mutated files of every format; SARCL_FUZZ_SEED repeats a run
 	@SARCL_FUZZ_CASES=$${SARCL_FUZZ_CASES:-10000} .venv/bin/python -m pytest -m slow tests/io/test_fuzz.py -s $(ARGS)
+
+tasks: ready  ## run 10000 random legal tasks over all verbs; SARCL_TASKS_SEED repeats a run
+	@SARCL_TASKS=$${SARCL_TASKS:-10000} .venv/bin/python -m pytest -m slow tests/contract/test_legal_tasks.py -s $(ARGS)
 
 mutants: ready  ## make each wrong sign, unit or factor of tests/mutants/mutations.toml: a test must fail
 	@.venv/bin/python tests/mutants/run.py $(ARGS)

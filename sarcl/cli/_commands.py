@@ -99,6 +99,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         if images:
             print(f"image: {scenario.describe_image()}")
         return 0
+    _check_room(grid, images)
     if scenario.noise is None:  # pulse after pulse into the file
         raw = scenario.simulate(**options, out=output, progress=job.progress)
         job.check()
@@ -112,6 +113,7 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         raw = _compressed(raw, job)
         if grid is None and scenario.needs_grid:
             grid = _default_grid(raw, job, scenario.default_grid_options())
+        _check_room(grid, images)
         _focus(
             lambda out: scenario.focus(raw, grid, out=out, progress=job.progress, **options),
             images,
@@ -162,6 +164,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         print(made)
         return 0
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
+    _check_room(grid, outputs)
     _focus(lambda out: method.image(raw, grid, out, devices, job.progress, **running), outputs, args, job)
     return 0
 
@@ -194,6 +197,17 @@ def measure(args: argparse.Namespace, job: Job) -> int:
         write_png(made.show(), args.plot)
         job.say(f"wrote {args.plot}")
     return 0
+
+
+def _check_room(grid: ImageGrid | None, outputs: list[str]) -> None:
+    """Refuse, before the work, outputs for which the disk has no room, where the size of the image is known."""
+    from ..figures.decibels import picture_bytes
+    from ..io import output_paths
+
+    if grid is not None and len(grid.shape) == 2:
+        pictures, shape = formats.writing("picture"), (grid.shape[0], grid.shape[1])
+        drawn, stored = picture_bytes(shape, grid.spacing), 8.0 * grid.size
+        output_paths.check_room({p: drawn if formats.named(p, pictures) else stored for p in outputs})
 
 
 def _check_scale(args: argparse.Namespace) -> None:

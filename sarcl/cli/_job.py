@@ -82,12 +82,13 @@ class Job:
         self.bar.wipe()
         print(text, flush=True)
 
-    def expect(self, path: Any) -> None:
-        """Register an output path; raises what `output_paths.check_writable` raises where it cannot be written."""
-        output_paths.check_writable(path)
+    def expect(self, path: Any, n_bytes: int = 0) -> None:
+        """Register an output path of at least n_bytes; raises what `output_paths.check_writable` raises where it cannot
+        be written."""
+        output_paths.check_writable(path, n_bytes)
         self.outputs[str(path)] = identity(path)
 
-    def expect_named(self, paths: list[str], among: list[formats.Format], inputs: list[str]) -> None:
+    def expect_named(self, paths: list[str], among: list[formats.Format], inputs: list[str], n_bytes: int = 0) -> None:
         """Refuse outputs that cannot be written, that are inputs, or that are named twice."""
         taken = {Path(p).resolve() for p in inputs}
         for path in paths:
@@ -96,7 +97,7 @@ class Job:
             if formats.named(path, among) is None:
                 wanted = formats.suggested(among)
                 raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
-            self.expect(path)
+            self.expect(path, n_bytes)
         if len({Path(p).resolve() for p in paths}) < len(paths):
             raise ValueError(f"outputs {', '.join(paths)} name one file twice")
 

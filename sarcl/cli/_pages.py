@@ -9,6 +9,8 @@ from typing import Any
 from ..io import formats
 from ._job import Job
 
+SECTION_BYTES = 40_000  # of a section of a page with one figure: the least room that a page needs for each
+
 
 def fda(args: argparse.Namespace, job: Job) -> int:
     """Run an experiment on frequency-diverse apertures: a page and its numbers."""
@@ -24,7 +26,7 @@ def fda(args: argparse.Namespace, job: Job) -> int:
     title, cases = load(args.experiment)
     output = args.output or f"{Path(args.experiment).stem}.html"
     numbers = str(Path(output).with_suffix(".json"))
-    job.expect_named([output], [formats.Format((".html", ".htm"))], [args.experiment])
+    job.expect_named([output], [formats.Format((".html", ".htm"))], [args.experiment], SECTION_BYTES * len(cases))
     job.expect(numbers)
     plots.require("the page of sarcl fda")
     results, sections = [], []
@@ -62,8 +64,8 @@ def papers(args: argparse.Namespace, job: Job) -> int:
     if output.suffix.lower() not in (".html", ".htm"):  # a folder
         output = output / f"{paper.name}.html"
     numbers = output.with_suffix(".json")
-    for path in (output, numbers):
-        job.expect(path)
+    job.expect(output, SECTION_BYTES * len(paper.sections))
+    job.expect(numbers)
     plots.require("the page of sarcl papers")
     lab, sections = shelf.open_lab(paper, args.device, args.quick, output.with_suffix(".runs"), job.progress), []
     for section in paper.run(lab):

@@ -75,9 +75,10 @@ class ElevationModel:
         heights: str | None = None,
         geoid: Geoid = None,
         nodata: float | None = None,
+        external: bool = False,
     ) -> ElevationModel:
         """The elevation model of a file that rasterio reads; arguments and errors as in `Scene.from_dem`."""
-        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external)
         return cls(tile.longitude, tile.latitude, tile.height)
 
     @property

@@ -16,6 +16,7 @@ if TYPE_CHECKING:
 SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
 CURVE = (22, 82, 148)
+PNG_NOISE, PNG_AXES = 2.2, 6e4  # bytes per pixel of noise, and of axes, caption and scale
 PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
 # Levels that tell a scene from an object in front of nothing, dB. FILLED: largest difference of percentile 99.5 and the
 # median in a scene. It is 9 dB for speckle and about 20 with shadows, but over 40 for the side lobes of a lone point.
@@ -112,7 +113,8 @@ def white_level(db: np.ndarray, percentile: float | None = None) -> float:
 
 
 def write_png(picture: Picture, path: Any) -> None:
-    """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises.
+    """Write a PNG that appears whole or not at all; raises what `output_paths.check_writable` raises, and
+    FileExistsError while another run writes the same path.
 
     The file's text entries hold what the picture's `info` does: Title, Description (the caption), top_db, floor_db.
     """
@@ -125,8 +127,14 @@ def write_png(picture: Picture, path: Any) -> None:
     for key, name in (("title", "Title"), ("caption", "Description"), ("top_db", "top_db"), ("floor_db", "floor_db")):
         if key in picture.info:
             text.add_text(name, f"{picture.info[key]}")
-    with output_paths.atomic(path) as part:
+    with output_paths.atomic(path, alone=True) as part:
         picture.save(part, format="PNG", pnginfo=text)
+
+
+def picture_bytes(shape: tuple[int, int], spacing: tuple[float, float] | None) -> float:
+    """About the most bytes of the PNG of an image: noise, of which PNG makes up to 2.1 bytes per pixel."""
+    pixels = min(float(np.prod(shape)), float(np.prod(drawn_shape(shape, spacing))))
+    return PNG_NOISE * pixels + PNG_AXES
 
 
 def drawn_shape(shape: tuple[int, int], spacing: tuple[float, float] | None) -> tuple[int, int]:

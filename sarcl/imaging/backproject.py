@@ -179,6 +179,8 @@ def backproject(
             if piece:  # another run is assembling the image from all tiles
                 return None
             raise
+        if checkpoint:
+            checkpoint.begin()
         bands = 0, chosen.tiling.n_bands
         skipped, kept = _fill(workers, task, chosen, output, checkpoint, bands, clock, progress)
         output.finish()

@@ -20,6 +20,7 @@ For this folder alone:
     _hdf5_safety   what an HDF5 file may do to its reader: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
     _mesh_checks   what a mesh file declares, compared with what it holds
+    _other_files   files that a mesh or an elevation model names: those of its own folder
     _part          files that are being written: random names, locked, removed where no process owns them
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
 """

@@ -49,8 +49,11 @@ def check_readable(path: Any) -> None:
         raise Refused(f"HDF5 crashes on its tables (signal {-done.returncode})")
 
 
-def check_contents(file: Any, file_bytes: int, external: bool) -> None:
-    """Refused where an open file leads into other files, unless `external`, or declares more than it has."""
+def check_contents(file: Any, file_bytes: int, external: bool, how: str = "read(..., external=True)") -> None:
+    """Refused where an open file leads into other files, unless `external`, or declares more than it has.
+
+    how  to allow it, for the message
+    """
     import h5py
 
     def visit(group: Any, depth: int) -> None:
@@ -70,8 +73,8 @@ def check_contents(file: Any, file_bytes: int, external: bool) -> None:
     def leads(what: str, to: str) -> None:
         if not external:
             raise Refused(
-                f"leads into another file: {what} into {to!r}, which sarcl does not follow; read(..., external=True) "
-                "allows it for files that you trust"
+                f"leads into another file: {what} into {to!r}, which sarcl does not follow; {how} allows it "
+                "for files that you trust"
             )
 
     def look(name: str, found: Any) -> None:

@@ -22,17 +22,17 @@ class Unfinished:
     """A file of sarcl's that is being written; `file` is its h5py.File, until `commit` or `abandon`.
 
     kind     what it will hold, for hdf5.sign and in messages;  n_bytes  about its size
-    claim    one run at a time writes this file, and takes over what a killed run left
-    A write that fails, as on a full disk, raises OSError with the remedy. Raises what
-    `output_paths.check_writable` does.
+    resumes  the run that makes it goes on from its tiles, for the message of a full disk
+    One run, or thread, at a time writes a path: FileExistsError tells the others. A write that fails, as on a full
+    disk, raises OSError with the remedy. Raises what `output_paths.check_writable` does.
     """
 
-    def __init__(self, path: Any, kind: str, n_bytes: int, claim: bool = False) -> None:
+    def __init__(self, path: Any, kind: str, n_bytes: int, resumes: bool = False) -> None:
         import h5py
 
-        self.path, self.kind, self.n_bytes, self.claimed = Path(path), kind, n_bytes, claim
+        self.path, self.kind, self.n_bytes, self.resumes = Path(path), kind, n_bytes, resumes
         self._rows: tuple[str, _checksums.RunningSums] | None = None
-        self._part: output_paths.Part | None = output_paths.begin(path, n_bytes, alone=claim)
+        self._part: output_paths.Part | None = output_paths.begin(path, n_bytes, alone=True)
         try:
             with self.writing():
                 # our own lock is held already, and HDF5's would collide with it
@@ -57,7 +57,7 @@ class Unfinished:
             number = int(found[1]) if found else getattr(exc, "errno", None)
             why = os.strerror(number) if number else " ".join(str(exc).split())[:100]
             more = " and give the same call again"
-            if self.claimed:
+            if self.resumes:
                 more += "; it goes on from its tiles where some were kept"
             what = f"the {self.kind.replace('_', ' ')}"
             raise output_paths.no_room(self.path, OSError(number, why), self.n_bytes, what, more) from exc

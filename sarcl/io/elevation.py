@@ -14,7 +14,7 @@ from typing import Any
 import numpy as np
 
 from ..base import errors, validation, wgs84
-from . import input_paths
+from . import _other_files, input_paths
 
 log = logging.getLogger(__name__)
 
@@ -33,18 +33,21 @@ class Tile:
     height: np.ndarray
 
 
-def load(path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None) -> Tile:
+def load(
+    path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None, external: Any = False
+) -> Tile:  # fmt: skip
     """Points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
     path = Path(path)
     name = f"DEM {path.name!r}"
-    with _opened(path, name) as file:
+    external = validation.flag("external", external)
+    with _opened(path, name, external) as file:
         _check_place(file, name)
         above = _reference(file, name, heights, geoid)
         rows, columns = _window(file, name, bounds)
         height = _heights(file, name, rows, columns, nodata)
         longitude, latitude = _places(file, rows, columns)
     if above:
-        height = height + undulation(geoid, longitude, latitude, name, above)
+        height = height + undulation(geoid, longitude, latitude, name, above, external)
     log.info(
         "%s: %d x %d points, longitude %.5f to %.5f, latitude %.5f to %.5f, %d without data, heights above %s",
         name, *height.shape, longitude.min(), longitude.max(), latitude.min(), latitude.max(),
@@ -89,9 +92,10 @@ def local_frame(tile: Tile, center: Any) -> tuple[np.ndarray, np.ndarray]:
 
 
 @contextmanager
-def _opened(path: Path, name: str) -> Iterator[Any]:
+def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
     """A raster, open for reading."""
-    if not path.is_dir():  # some formats are folders
+    is_file = not path.is_dir()  # some formats are folders
+    if is_file:
         input_paths.check(path, "DEM file")
     try:
         import rasterio
@@ -101,7 +105,11 @@ def _opened(path: Path, name: str) -> Iterator[Any]:
     with warnings.catch_warnings():
         warnings.simplefilter("ignore", NotGeoreferencedWarning)  # the code below raises an error for it
         try:
+            if is_file and not external:
+                _other_files.check_raster(path, name)
             with rasterio.open(path) as file:
+                if is_file and not external:
+                    _other_files.check_parts(path, file.driver, file.files, name)
                 yield file
         except RasterioIOError as exc:
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
@@ -234,10 +242,12 @@ def _warped(file: Any) -> bool:
     return not (file.crs.is_geographic and 'DATUM["WGS_1984"' in wkt and degrees)
 
 
-def undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str) -> np.ndarray:
+def undulation(
+    geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: str, above: str, external: bool = False
+) -> np.ndarray:  # fmt: skip
     """Height above the ellipsoid, m, of the geoid called `above`, at points, degrees (n_rows, n_columns)."""
     if isinstance(geoid, (str, Path)):
-        return _raster(Path(geoid), longitude, latitude)
+        return _raster(Path(geoid), longitude, latitude, external)
     if callable(geoid):
         geoid = geoid(longitude, latitude)
     if np.ndim(geoid) == 0:
@@ -251,10 +261,10 @@ def undulation(geoid: Any, longitude: np.ndarray, latitude: np.ndarray, name: st
     return validation.array("geoid", geoid, np.float64, longitude.shape)
 
 
-def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray) -> np.ndarray:
+def _raster(path: Path, longitude: np.ndarray, latitude: np.ndarray, external: bool) -> np.ndarray:
     """A raster of undulations, in degrees, read bilinearly at points."""
     name = f"geoid {path.name!r}"
-    with _opened(path, name) as file:
+    with _opened(path, name, external) as file:
         _check_place(file, name)
         if _warped(file):
             raise ValueError(f"{name} is not in degrees on WGS84; convert it (gdalwarp -t_srs EPSG:4326)")

@@ -4,7 +4,7 @@ A new format is a new file of this folder and one line of FORMATS. That file hol
 
     load(path, make, autofocus)                 the file as make("phase history" or "image", its fields by name)
     EchoWriter(path, n_rows, n_samples, dtype)  as in sarcl_hdf5
-    ImageWriter(path, grid, dtype, claim)       as in sarcl_hdf5
+    ImageWriter(path, grid, dtype, resumes)     as in sarcl_hdf5
     job_of(path)                                where by_blocks is True: the mark of the job that made an image
 
 Nothing here loads NumPy, so that the command line can print its help at once.

@@ -11,7 +11,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
-from . import _mesh_checks, input_paths
+from . import _mesh_checks, _other_files, input_paths
 
 log = logging.getLogger(__name__)
 
@@ -33,10 +33,11 @@ class Mesh:
     unit: float | None = None
 
 
-def load(mesh: Any, repair: bool = True) -> Mesh:
+def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
     """A mesh file, a trimesh.Trimesh or a trimesh.Scene, its parts in place.
 
     repair  drop repeated faces, give neighbours one winding, face closed bodies outwards; the log gives the numbers
+    external  the file may name others outside its folder
     A mesh is closed where every edge belongs to two faces of one winding. FileNotFoundError, IsADirectoryError,
     ValueError: missing, unreadable, no faces, corners not finite. TypeError: no mesh.
     """
@@ -45,7 +46,7 @@ def load(mesh: Any, repair: bool = True) -> Mesh:
     what, declared = "mesh", None
     if isinstance(mesh, (str, Path)):
         what = f"mesh file {Path(mesh).name!r}"
-        mesh, declared = _read(Path(mesh), what)
+        mesh, declared = _read(Path(mesh), what, external)
     if isinstance(mesh, trimesh.Trimesh):
         alone, mesh = mesh, trimesh.Scene()
         mesh.add_geometry(alone, geom_name=alone.metadata.get("name"))
@@ -76,7 +77,7 @@ def _unit(scene: Any, what: str) -> float | None:
     return found.pop()
 
 
-def _read(path: Path, what: str) -> tuple[Any, int | None]:
+def _read(path: Path, what: str, external: bool) -> tuple[Any, int | None]:
     """What trimesh makes of a file, and the number of faces that the file says it has."""
     import trimesh
 
@@ -85,10 +86,13 @@ def _read(path: Path, what: str) -> tuple[Any, int | None]:
     if path.suffix.lower().lstrip(".") not in known:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
     declared = _mesh_checks.declared_faces(path, what)
+    others = _other_files.Resolver(path, external)
+    resolver: Any = others  # what trimesh asks of a resolver, without being one of its classes
     try:
         # process=False: merging and reordering corners is not needed and hides what the file holds
-        return trimesh.load_scene(path, process=False), declared
+        made = trimesh.load_scene(path, process=False, resolver=resolver)
     except Exception as exc:
+        _check_refused(others, what)
         # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
         guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
         why = "neither a whole binary file nor text" if guess else str(exc) or type(exc).__name__
@@ -96,6 +100,15 @@ def _read(path: Path, what: str) -> tuple[Any, int | None]:
             f"{what} cannot be read as {path.suffix} ({why}): it is truncated, damaged or not what its name "
             "says; export it again"
         ) from exc
+    _check_refused(others, what)
+    return made, declared
+
+
+def _check_refused(others: _other_files.Resolver, what: str) -> None:
+    if others.refused:
+        raise ValueError(
+            f"{what} leads to another file: {others.refused[0]!r:.200}, outside its folder, {_other_files.ALLOW}"
+        )
 
 
 def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, list[tuple[str, ...]]]:

@@ -6,7 +6,7 @@ import errno
 import os
 import shutil
 import stat
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
@@ -77,13 +77,29 @@ def no_room(path: Any, cause: OSError | None, n_bytes: float = 0, what: str = "i
     return made
 
 
+def check_room(needs: Mapping[Any, float]) -> None:
+    """OSError where the disks have no room for all of some files: their paths, and about the bytes that each needs.
+
+    For files that are written after the work, so that a full disk is told before it.
+    """
+    wanted: dict[int, float] = {}
+    for path, n_bytes in needs.items():
+        folder = os.path.dirname(os.path.realpath(os.fspath(path)))
+        disk = os.stat(folder).st_dev
+        what = "it" if disk not in wanted else "it, with the outputs before it,"
+        wanted[disk] = wanted.get(disk, 0.0) + n_bytes
+        if wanted[disk] > shutil.disk_usage(folder).free:
+            raise no_room(path, None, wanted[disk], what)
+
+
 @contextmanager
-def atomic(path: Any, n_bytes: int = 0) -> Iterator[Path]:
+def atomic(path: Any, n_bytes: int = 0, alone: bool = False) -> Iterator[Path]:
     """Yield a new, empty file beside `path`; on success it is moved to `path`, on any exception it is removed.
 
+    alone  FileExistsError while another run writes a file for `path`; else the last one stays, whole
     A process that has the old file open continues to read its content. Raises what `check_writable` raises.
     """
-    part = begin(path, n_bytes)
+    part = begin(path, n_bytes, alone)
     try:
         yield part.path
         part.commit()

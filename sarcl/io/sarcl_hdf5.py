@@ -125,17 +125,18 @@ class ImageWriter:
 
     grid   the fields of the ImageGrid by name; the image has the shape grid["shape"]
     dtype  the type of the pixels
-    claim  True: one run at a time makes this file, and takes over the file that a killed run left
+    resumes  the run that makes it goes on from its tiles, for the message of a full disk
     data   of the grid's shape and dtype, read and written in slices like an h5py.Dataset, zero until written; write
            whole rows where you can
 
     `close` puts the file in its place; `abandon` removes it. As a context manager it abandons what was not closed.
-    Raises what `output_paths.check_writable` does, before anything is written.
+    Raises what `output_paths.check_writable` does, before anything is written, and FileExistsError while another run
+    writes the same path.
     """
 
-    def __init__(self, path: Any, grid: Mapping[str, Any], dtype: Any = np.complex64, claim: bool = False) -> None:
+    def __init__(self, path: Any, grid: Mapping[str, Any], dtype: Any = np.complex64, resumes: bool = False) -> None:
         self.path, shape = Path(path), tuple(grid["shape"])
-        self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, claim)
+        self._made = Unfinished(path, "image", math.prod(shape) * np.dtype(dtype).itemsize, resumes)
         try:
             with self._made.writing():
                 _put_group(self._made.file, "grid", grid)

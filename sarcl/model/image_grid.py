@@ -130,10 +130,12 @@ class ImageGrid:
         heights: str | None = None,
         geoid: Geoid = None,
         nodata: float | None = None,
+        external: bool = False,
     ) -> ImageGrid:
         """Points on an elevation model, at even steps north (row) and east (column), m, seen from above.
 
-        dem     a file, read as by `Scene.from_dem` with bounds, heights, geoid and nodata; or a `sarcl.ElevationModel`
+        dem     a file, read as by `Scene.from_dem` with bounds, heights, geoid, nodata and external; or a
+                `sarcl.ElevationModel`
         center, frame   as in `Scene.from_dem`: with the same values the grid lies on the scene's terrain
 
         Between the points of the model heights are bilinear. Cells without data are empty. ValueError, ImportError and
@@ -143,7 +145,9 @@ class ImageGrid:
 
         steps = tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(pair("spacing", spacing)))
         if not isinstance(dem, ElevationModel):
-            dem = ElevationModel.read(dem, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+            dem = ElevationModel.read(
+                dem, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external
+            )
         elif any(option is not None for option in (bounds, heights, geoid, nodata)):
             raise ValueError("bounds, heights, geoid and nodata are for files; an ElevationModel has been read already")
         return cls.points(dem.grid_positions((steps[0], steps[1]), frame, center))

@@ -16,7 +16,7 @@ from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, edges
 from ._facet_sampling import drawn, facets_at
 from .antenna_weights import MOST_NODES
-from .facets import FacetSet
+from .facets import POLARIZATIONS, FacetSet
 
 FACETS, PULSES, FREQUENCIES = 96, 4, 24
 SAFETY = 2.0  # the errors are estimated from samples
@@ -39,6 +39,27 @@ def over_band(
         if found is not None:
             return found
     return {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+
+
+def crossed(
+    scene: Scene, mirror: np.ndarray, edge: float, finest: float, antennas: PulseGeometry, polarizations: Sequence[str],
+    vertical: np.ndarray, frequency: float,
+) -> float:  # fmt: skip
+    """Amplitudes in all polarisations over those in `polarizations`, root mean square over sampled facets and pulses,
+    where only cross-polarised ones are asked for; else 1. Large where little or nothing is sent back in these: rounding
+    in float32 is that of the fields in all of them."""
+    if any(name[0] == name[1] for name in polarizations):
+        return 1.0
+    part, asked, whole = _sample(scene, mirror, edge, finest), 0.0, 0.0
+    some = [POLARIZATIONS.index(name) for name in polarizations]
+    for pulse in spread_over(len(antennas.tx), 16 * PULSES):
+        ends = antennas.tx[pulse], antennas.rx[pulse]
+        made = part.amplitudes(*ends, np.array([frequency]), POLARIZATIONS, vertical)
+        power = (np.abs(made) ** 2).sum(axis=(0, 1))
+        asked, whole = asked + float(power[some].sum()), whole + float(power.sum())
+    if not whole:
+        return 1.0
+    return float(np.sqrt(whole / asked)) if asked else float("inf")
 
 
 def _errors(

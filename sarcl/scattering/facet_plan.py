@@ -20,7 +20,7 @@ from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
-from ._frequency_nodes import over_band
+from ._frequency_nodes import crossed, over_band
 from .antenna_weights import MOST_NODES, WeightError
 
 GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smallest float32 numbers
@@ -29,6 +29,7 @@ SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for rang
 MOST_FACETS = 50_000_000
 # bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
 FACET_BYTES = 512
+DARK = 30.0  # times less in the cross-polarised echoes that are asked for: then that is said
 TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
 
 
@@ -93,12 +94,13 @@ def plan_facets(
     bounds = box(scene.triangles.reshape(-1, 3))
     distance = nearest(scene, antennas, bounds)
     weights = weights or WeightError()
+    dark = crossed(scene, mirror, top, finest, antennas, polarizations, vertical, center)
     best: tuple[float, FacetPlan] | None = None
     least, edge, fine = np.inf, min(top, finest), False
     while True:
         corner = TO_CORNER * edge
         count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
-        fixed = _rounding(edge, highest) + weights.rounding
+        fixed = _rounding(edge, highest) * dark + weights.rounding
         if mirror.any():
             fixed += _spherical(corner, distance, highest) + weights.gradient * corner
         if fixed < SHARE * tolerance and count <= most:
@@ -120,6 +122,12 @@ def plan_facets(
         if settled or not cut or not mirror.any() or count > most:
             break
         edge /= LADDER
+    if best is None and _rounding(0.0, highest) * dark >= SHARE * tolerance and dark > DARK:
+        names = ", ".join(polarizations)
+        raise ToleranceUnreachable(
+            tolerance, None, "float32 integrals over facets", "ask for HH or VV",
+            how=f"in {names}, in which these facets send back {20 * np.log10(dark):.0f} dB less than in HH and VV",
+        )  # fmt: skip
     reach = least / SHARE * (1 + 1e-9) if np.isfinite(least) else None
     if best is None and not cut:
         raise ToleranceUnreachable(

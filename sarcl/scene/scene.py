@@ -171,6 +171,7 @@ class Scene:
         max_edge: float | None = None,
         roughness: float = 0.0,
         repair: bool = True,
+        external: bool = False,
     ) -> Scene:
         """A mesh file that trimesh reads, or a trimesh.Trimesh or .Scene: corner -> rotation(scale corner) + position.
 
@@ -182,6 +183,7 @@ class Scene:
         rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
         repair    remove repeated faces, wind neighbours consistently and closed bodies outwards; what is done is logged
+        external  the file may name others (buffers, materials) outside its folder: for files that you trust
 
         A mesh that is not watertight reflects from both sides of its facets, so that its winding does not
         matter. Raises FileNotFoundError or ValueError for a file that is missing, unreadable or without faces, and for
@@ -193,7 +195,7 @@ class Scene:
             scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)
-        loaded = load(mesh, repair)
+        loaded = load(mesh, repair, validation.flag("external", external))
         parts = part_materials(material, loaded)
         if scale is None:
             scale = 1.0 if loaded.unit is None else loaded.unit
@@ -257,6 +259,7 @@ class Scene:
         materials: Sequence[MaterialLike] | None = None,
         roughness: ArrayLike = 0.0,
         point_roughness: ArrayLike = 0.0,
+        external: bool = False,
     ) -> Scene:
         """Terrain from an elevation model that rasterio reads (GeoTIFF and others), on WGS84: pip install sarcl[dem].
 
@@ -270,13 +273,15 @@ class Scene:
                  heights above the ellipsoid, with a warning
         nodata   height that marks missing data, where the file does not say
         material, materials, roughness, point_roughness   as in from_heights, rows as in the file
+        external  the file may lead to rasters outside its folder, as virtual rasters (.vrt) do, or to a network: for
+                  files that you trust
 
         Cells without data have no facets; their number is logged. Raises FileNotFoundError, ImportError, and ValueError
         where there is no CRS, no vertical reference, nothing in bounds, only nodata, or heights that are not finite.
         """
         from ..io import elevation
 
-        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata)
+        tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external)
         points, up = elevation.place(tile, frame, center)
         return cls.facets(**terrain.surface(points, up, material, materials, roughness, point_roughness))
 

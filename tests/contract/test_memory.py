@@ -1,4 +1,4 @@
-"""Large images need little memory: they are computed in blocks, with raw data and image in files."""
+"""Large images need little memory: they are computed in blocks, with raw data and image in files. No call keeps any."""
 
 from __future__ import annotations
 
@@ -8,6 +8,10 @@ import sys
 from pathlib import Path
 
 import pytest
+
+CALLS = 60
+PER_CALL = 4096  # bytes: an array, a buffer or a file that stays would be more
+NOISE = 2**20  # bytes by which allocators and caches change without any leak
 
 BENCH = Path(__file__).parents[2] / "bench" / "memory.py"
 
@@ -31,3 +35,16 @@ def test_4096_pixels_squared_and_2048_pulses_take_less_than_2_gib():
     result = run("--compare")
     assert result["peak_above_idle_gib"] <= 2.0
     assert result["relative_difference"] <= 1e-6
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(not Path("/proc/self/statm").exists(), reason="Linux alone")
+def test_memory_is_flat_over_many_calls_of_every_verb():
+    command = [sys.executable, "-m", "helpers.memory_calls", str(CALLS)]
+    done = subprocess.run(command, cwd=BENCH.parents[1] / "tests", capture_output=True, text=True, timeout=1800)
+    assert done.returncode == 0, done.stderr
+    found = [json.loads(line) for line in done.stdout.splitlines()]
+    print("\n".join(f"{x['verb']:24} {x['growth'] / 1024:8.0f} KiB over {CALLS // 2} calls" for x in found))
+    assert len(found) > 25
+    leaks = {x["verb"]: x["growth"] for x in found if x["growth"] > NOISE + PER_CALL * CALLS / 2}
+    assert not leaks, leaks

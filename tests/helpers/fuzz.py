@@ -53,9 +53,12 @@ def mutated(data: bytes, seed: int) -> bytes:
     return bytes(out)
 
 
-def outcomes(cases: Iterable[int], judge: Callable[[int], str]) -> Counter[str]:
+def outcomes(
+    cases: Iterable[int], judge: Callable[[int], str], heard: Callable[[int, str], object] = lambda case, said: None
+) -> Counter[str]:
     """How often each outcome: what judge(case) returns, and "crashed: ..." or "hung: ..." with the number of the case.
 
+    heard  called with each case and its outcome, in this process
     judge runs in forked processes, which are ended where a case takes longer than PATIENCE.
     """
     waiting, found = list(cases), Counter[str]()
@@ -66,6 +69,8 @@ def outcomes(cases: Iterable[int], judge: Callable[[int], str]) -> Counter[str]:
             what = "hung" if status == signal.SIGALRM else f"crashed by signal {status}"
             found[f"{what}: case {waiting[len(done)]}"] += 1
             done = [*done, what]
+        for case, said in zip(waiting, done, strict=False):
+            heard(case, said)
         waiting = waiting[len(done) :]
     return found
 

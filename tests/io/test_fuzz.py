@@ -1,12 +1,14 @@
 """Fuzzing: files of every format that is read, mutated. Each is read right, or refused in words that name the file.
 
 `make fuzz` runs the long part: SARCL_FUZZ_CASES mutations per format (10000), from SARCL_FUZZ_SEED on (random). A
-failure gives the number of its case: `SARCL_FUZZ_SEED=123 SARCL_FUZZ_CASES=1` repeats it.
+failure gives the number of its case: `SARCL_FUZZ_SEED=123 SARCL_FUZZ_CASES=1` repeats it. Inputs that fail are also
+saved under SARCL_FUZZ_CORPUS, by default tests/io/corpus/FORMAT: what lies there is read again by the quick tests.
 """
 
 import hashlib
 import logging
 import os
+import sys
 from dataclasses import fields, is_dataclass
 from pathlib import Path
 
@@ -18,6 +20,7 @@ from helpers.scenario_cases import SCENARIO
 from scipy.io import savemat
 
 import sarcl
+from sarcl.experiments.fda import file as experiment
 from sarcl.scenario import scenario
 
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork") or not Path("/proc/self/statm").exists(), reason="Linux alone")
@@ -53,10 +56,68 @@ def gotcha_file(path):
     savemat(path, {"data": data})
 
 
+def raster_file(path):
+    rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
+    driver = {".tif": "GTiff", ".asc": "AAIGrid", ".bil": "EHdr", ".nc": "netCDF"}[path.suffix]
+    made = path.with_name("made.tif")
+    with rasterio.open(
+        made, "w", driver="GTiff", height=6, width=5, count=1, dtype="float32", crs="EPSG:4326", nodata=-9999,
+        transform=rasterio.Affine(0.001, 0, 12, 0, -0.001, 42), compress="deflate" if driver == "GTiff" else None,
+    ) as file:  # fmt: skip
+        file.write(np.linspace(100, 900, 30, dtype="float32").reshape(1, 6, 5))
+    if driver == "GTiff":
+        made.replace(path)
+    else:
+        rasterio.shutil.copy(made, path, driver=driver)
+        made.unlink()
+
+
+def virtual_raster_file(path):
+    raster_file(path.with_name("beside.tif"))
+    path.write_text(VIRTUAL)
+
+
+def read_heights(path):
+    return sarcl.ElevationModel.read(path, heights="ellipsoid")
+
+
 def mesh_file(path, kind=None, **how):
     made = BOX.export(file_type=kind or path.suffix[1:], **how)
     path.write_bytes(made.encode() if isinstance(made, str) else made)
 
+
+EXPERIMENT = """\
+[fda]
+title = "Widths"
+n = 45
+frequency_step = 20e6
+center = 10e9
+distance = 5000.0
+points = [0.0, 2.0]
+mappings = ["unmodified", "corrected"]
+
+[[case]]
+name = "first"
+squint_deg = 10.0
+
+[[case]]
+progression = "planar"
+n = [9, 5]
+frequency_step = [20e6, 1e6]
+mappings = ["channels"]
+
+[sweep]
+aperture = [100.0, 430.0]
+"""
+VIRTUAL = """\
+<VRTDataset rasterXSize="5" rasterYSize="6"><SRS>EPSG:4326</SRS>
+<GeoTransform>12, 0.001, 0, 42, 0, -0.001</GeoTransform>
+<VRTRasterBand dataType="Float32" band="1"><NoDataValue>-9999</NoDataValue><SimpleSource>
+<SourceFilename relativeToVRT="1">beside.tif</SourceFilename><SourceBand>1</SourceBand>
+<SrcRect xOff="0" yOff="0" xSize="5" ySize="6"/><DstRect xOff="0" yOff="0" xSize="5" ySize="6"/>
+</SimpleSource></VRTRasterBand></VRTDataset>
+"""
+CORPUS = Path(os.environ.get("SARCL_FUZZ_CORPUS") or Path(__file__).parent / "corpus")
 
 # name of the file: what writes it, what reads it
 FORMATS = {
@@ -72,6 +133,10 @@ FORMATS = {
     "mesh.glb": (mesh_file, sarcl.Scene.from_mesh),
     "mesh.dae": (mesh_file, sarcl.Scene.from_mesh),
     "scenario.toml": (lambda path: path.write_text(SCENARIO), scenario.load),
+    "experiment.toml": (lambda path: path.write_text(EXPERIMENT), experiment.load),
+    "heights.tif": (raster_file, read_heights),
+    "heights.asc": (raster_file, read_heights),
+    "heights.vrt": (virtual_raster_file, read_heights),
     "orbit.EOF": (
         lambda path: path.write_text(
             "<Earth_Explorer_File><Ref_Frame>EARTH_FIXED</Ref_Frame>"
@@ -104,6 +169,13 @@ def digest(value):
     return found.hexdigest()
 
 
+def kept(name, data):
+    """Save an input that failed, by its checksum, so that later runs read it again."""
+    folder = CORPUS / name
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / f"{hashlib.sha256(data).hexdigest()[:16]}{Path(name).suffix}").write_bytes(data)
+
+
 def fuzzed(folder, name, cases):
     """Read mutated files of a format. Only sarcl's own files have checksums: others may be other data."""
     write, read = FORMATS[name]
@@ -123,13 +195,13 @@ def fuzzed(folder, name, cases):
             return fuzz.refusal(exc, path.name)
         return "right" if found == wanted else "other data"
 
+    allowed = {"right", "refused"} | (set() if name.endswith(".h5") else {"other data"})
     logging.disable(logging.CRITICAL)
     try:
-        found = fuzz.outcomes(cases, judge)
+        found = fuzz.outcomes(cases, judge, lambda case, said: said in allowed or kept(name, fuzz.mutated(whole, case)))
     finally:
         logging.disable(logging.NOTSET)
     print(f"{name}: {len(cases)} mutations from {cases.start}: {dict(found)}")
-    allowed = {"right", "refused"} | (set() if name.endswith(".h5") else {"other data"})
     assert not set(found) - allowed, f"{name}, cases from {cases.start}: {dict(found)}"
 
 
@@ -143,6 +215,45 @@ def test_mutated_files_are_read_right_or_refused(tmp_path, name):
 def test_many_mutated_files_are_read_right_or_refused(tmp_path, name):
     start = int(os.environ.get("SARCL_FUZZ_SEED") or int.from_bytes(os.urandom(5), "little"))
     fuzzed(tmp_path, name, range(start, start + int(os.environ.get("SARCL_FUZZ_CASES", "300"))))
+
+
+def saved_inputs():
+    return sorted(p.relative_to(CORPUS).as_posix() for p in CORPUS.glob("*/*") if p.parent.name in FORMATS)
+
+
+@pytest.mark.parametrize("path", saved_inputs())
+def test_inputs_that_have_failed_are_read_right_or_refused(tmp_path, path):
+    """Those that a run of `make fuzz` has saved. Each is read in a process of its own, which may crash or hang."""
+    name = Path(path).parent.name
+    write, read = FORMATS[name]
+    write(tmp_path / name)  # with what lies beside it
+    (tmp_path / f"mutated-{name}").write_bytes((CORPUS / path).read_bytes())
+
+    def judge(_):
+        try:
+            read(tmp_path / f"mutated-{name}")
+        except BaseException as exc:
+            return fuzz.refusal(exc, f"mutated-{name}")
+        return "read"
+
+    found = fuzz.outcomes([0], judge)
+    assert set(found) <= {"refused"} | (set() if name.endswith(".h5") else {"read"}), f"{path}: {dict(found)}"
+
+
+def test_an_input_that_fails_is_saved_once_and_by_its_content(tmp_path, monkeypatch):
+    monkeypatch.setattr(sys.modules[__name__], "CORPUS", tmp_path / "corpus")
+
+    def broken(path):
+        if path.name.startswith("mutated"):
+            raise KeyError("x")
+
+    monkeypatch.setitem(FORMATS, "scenario.toml", (FORMATS["scenario.toml"][0], broken))
+    for _ in range(2):
+        with pytest.raises(AssertionError, match="bare KeyError"):
+            fuzzed(tmp_path, "scenario.toml", range(3))
+    saved = sorted((tmp_path / "corpus" / "scenario.toml").iterdir())
+    wanted = {fuzz.mutated(SCENARIO.encode(), case) for case in range(3)}
+    assert {path.read_bytes() for path in saved} == wanted and len(saved) == len(wanted)
 
 
 def test_the_harness_sees_crashes_hangs_and_errors_without_a_name():

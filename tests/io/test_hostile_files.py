@@ -1,8 +1,10 @@
 """Files that are damaged or hostile: refused by name and in words; never a crash, never other data in silence."""
 
 import bz2
+import io
 import json
 import os
+import re
 import socket
 import subprocess
 import sys
@@ -17,6 +19,7 @@ import trimesh
 
 import sarcl
 from sarcl.cli.parser import main
+from sarcl.figures import decibels
 from sarcl.io import _checksums, _hdf5_safety, hdf5, output_paths, sarcl_hdf5
 from sarcl.scenario import scenario
 
@@ -388,6 +391,35 @@ def test_a_full_disk_is_named_before_the_work_in_units_that_show_the_need(tmp_pa
     assert main(["demo", "--quick", "--out", str(tmp_path)]) == 2
     said = capsys.readouterr().err
     assert str(tmp_path) in said and "1 kB free" in said and "0.00" not in said
+
+
+def test_room_for_pictures_and_pages_is_looked_for_before_the_work(tmp_path, monkeypatch, capsys):
+    raw = saved(tmp_path / "a.h5", 20, 30)
+    (tmp_path / "e.toml").write_text("".join(f"[[case]]\nn_pulses = {11 + i}\n" for i in range(20)))
+    monkeypatch.setattr(output_paths.shutil, "disk_usage", lambda path: type("Usage", (), {"free": 300_000}))
+    monkeypatch.setattr("sarcl.imaging.backproject.backproject", None)  # no work is begun
+    grid = ["--shape", "900", "900", "--spacing", "0.1"]
+    for command, words in (
+        (["focus", str(tmp_path / "a.h5"), *grid, "-o", str(tmp_path / "a.png")], r"a\.png': it needs 1\.8\d* MB"),
+        (
+            ["focus", str(tmp_path / "a.h5"), "--shape", "170", "170", "--spacing", "0.1", "-o", str(tmp_path / "b.h5"),
+             "-o", str(tmp_path / "b.png")],
+            r"b\.png': it, with the outputs before it, needs 355 kB",
+        ),
+        (["fda", str(tmp_path / "e.toml"), "-o", str(tmp_path / "e.html")], r"e\.html': it needs 800 kB"),
+    ):  # fmt: skip
+        assert main(command) == 2, command
+        assert re.search(words + r", its disk has 300 kB free; make room there", capsys.readouterr().err)
+    assert raw.n_rows == 20 and not list(tmp_path.glob("*.png"))
+
+
+@pytest.mark.parametrize("shape", [(30, 40), (170, 90), (600, 600), (1, 300)])
+def test_a_picture_needs_no_more_room_than_is_looked_for(shape):
+    random = np.random.default_rng(0)
+    noise = 20 * np.log10(np.abs(random.normal(size=shape) + 1j * random.normal(size=shape)))
+    file = io.BytesIO()
+    decibels.picture(noise, (0.1, 0.1)).save(file, format="PNG")
+    assert len(file.getvalue()) <= decibels.picture_bytes(shape, (0.1, 0.1))
 
 
 @pytest.mark.skipif(sys.platform != "linux", reason="/dev/full")

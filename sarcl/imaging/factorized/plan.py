@@ -172,7 +172,7 @@ class _Case:
         sources, total, spaced, ratios = float(n_rows), 0.0, 1.0, []
         for side in chain:
             radius = self.leaves[chain[-1]] * side / chain[-1]
-            resolved = 1 / (2 * fine * max(self.turning, 1e-30) * radius * spaced)
+            resolved = 1 / max(2 * fine * self.turning * radius * spaced, 1e-30)  # of one point, any number
             ratio = int(min(resolved, max(1, sources // 2), MOST_MERGED))
             if ratio < 2:
                 return None

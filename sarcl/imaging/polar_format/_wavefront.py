@@ -62,7 +62,9 @@ def waves_about(raw: PhaseHistory, center: np.ndarray) -> Waves:
         # in float64 the difference has an error of 4e-9 m at 36 000 km: 1e-5 rad at 60 GHz
         wide, known = positions.astype(np.longdouble) - center, raw.reference_range.astype(np.longdouble)
         length = np.sqrt((wide**2).sum(axis=1))
-        shifts.append(((wide**2).sum(axis=1) - known**2) / np.where(length + known > 0, length + known, 1))
+        total = length + known  # not above 0 for a reference range that is negative: there the quotient gains nothing
+        quotient = ((wide**2).sum(axis=1) - known**2) / np.where(total > 0, total, 1)
+        shifts.append(np.where(total > 0, quotient, length - known))
         units.append(away / distance[:, None])
         distances.append(distance)
     return Waves(center, np.stack(units), np.stack(distances), np.mean(shifts, axis=0).astype(np.float64))

@@ -192,9 +192,10 @@ def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance
         cycles = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
         made = made * np.exp(2j * np.pi * cycles)
     largest = float(np.abs(made).max(initial=0.0))
-    if largest > LARGEST[np.complex64] / raw.samples.size:
+    n_samples = raw.n_rows * raw.n_samples
+    if largest > LARGEST[np.complex64] / n_samples:
         raise ValueError(
-            f"samples times weights reach {largest:.1e}; sums of {raw.samples.size} in complex64 hold up to "
+            f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
             f"{LARGEST[np.complex64]:.0e}: scale the samples down"
         )
     return made.astype(np.complex64)

@@ -121,9 +121,9 @@ def _referenced(
     sample_weight, row_weight = weights
     samples = raw.read(start, stop) * np.outer(row_weight[start:stop], sample_weight).astype(np.float32)
     largest = float(np.abs(samples).max(initial=0.0))
-    if largest > range_profiles.LARGEST[np.complex64] / raw.samples.size:
+    if largest > range_profiles.LARGEST[np.complex64] / (raw.n_rows * raw.n_samples):
         raise ValueError(
-            f"samples times weights reach {largest:.1e}; sums of {raw.samples.size} in complex64 hold up to "
+            f"samples times weights reach {largest:.1e}; sums of {raw.n_rows * raw.n_samples} in complex64 hold up to "
             f"{range_profiles.LARGEST[np.complex64]:.0e}: scale the samples down"
         )
     moved = 2 / np.longdouble(SPEED_OF_LIGHT) * (center - raw.reference_range[start:stop].astype(np.longdouble))

@@ -40,7 +40,7 @@ class Checkpoint:
     True   always, also where the run ends in an exception
     None   from PERIOD seconds on, so that a killed run loses no finished tile; a run that ends in an exception before
            WORTH seconds removes the files that it wrote
-    False  never; the files of earlier runs are deleted
+    False  never; the files of earlier runs are deleted by `begin`
 
     The constructor reads all samples where there are tile files, or resume is True. ValueError: the files belong to
     another job. As a context manager it ends with the run: an exception in its block is one that ended the run.
@@ -56,11 +56,14 @@ class Checkpoint:
         self.fresh = True
         self._waiting: list[tuple[int, int, Skipped]] = []
         self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(chosen.tiling.row_shape)
-        if resume is False:
-            discard(self.folder)
-        elif resume or self.folder.exists():
+        if resume is not False and (resume or self.folder.exists()):
             output_paths.check_writable(path)
             self._open()
+
+    def begin(self) -> None:
+        """Delete the files of earlier runs where resume is False: this run alone makes the image now."""
+        if self.resume is False:
+            discard(self.folder)
 
     @property
     def mark(self) -> str | None:

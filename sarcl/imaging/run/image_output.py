@@ -37,7 +37,7 @@ class ImageOutput:
                 ) from None
         elif is_path(out):
             self.writer = formats.writer_functions(out, "image").ImageWriter(
-                out, formats.fields_of(grid), dtype, claim=True
+                out, formats.fields_of(grid), dtype, resumes=True
             )
             stack.callback(self.writer.abandon)  # does nothing once finished
             self.data = self.writer.data

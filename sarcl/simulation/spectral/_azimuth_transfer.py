@@ -143,18 +143,31 @@ def transfer_tables(
     return AzimuthTransfer(aspects, KnownPhase(middle), ranges, frequencies, start, step, tables)
 
 
+@dataclass(frozen=True, eq=False)
+class Brightest:
+    """The scatterers that the pulses see brightest: factors (n, J), places along the track and slant ranges, m (n,)."""
+
+    factors: np.ndarray
+    azimuth: np.ndarray
+    slant_range: np.ndarray
+
+
 def plan_transfer(
     aspects: Aspects, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float],
-    tolerance: float, asked: float,
+    tolerance: float, asked: float, brightest: Brightest | None = None,
 ) -> AzimuthTransfer:  # fmt: skip
     """The smallest tables whose responses differ from the formula by at most `tolerance`.
 
-    factors  of some scatterers (n, J);  asked  the whole tolerance, for the message
+    factors    of some scatterers (n, J);  asked  the whole tolerance, for the message
+    brightest  where a beam weighs aspects: their samples are compared too, at the pulses that there are
     """
     best = np.inf
     for tried in TRIED:
         made = transfer_tables(aspects, functions, *tried)
-        error = SAFETY * response_error(made, functions, factors[:TESTED], track, reach)
+        error = response_error(made, functions, factors[:TESTED], track, reach)
+        if brightest is not None:
+            error = max(error, _seen_error(made, functions, brightest, track, reach))
+        error *= SAFETY
         best = min(best, error)
         if error <= tolerance:
             return replace(made, error=error)
@@ -187,7 +200,6 @@ def _power_and_error(
 ) -> tuple[float, float]:  # fmt: skip
     """Power of the responses at slant range r, m, and frequency f, Hz, and of their error."""
     aspects, grid = made.aspects, doppler_grid(made, track, reach)
-    u, k = grid.wavenumbers, float(wavenumber(f))
     # a period away the response is 0 at all lags at which scatterers of this range are seen
     begin, end = (r * float(tangent(sine)) for sine in aspects.support)
     low_seen, high_seen = (r * float(tangent(sine)) for sine in aspects.seen)
@@ -196,18 +208,46 @@ def _power_and_error(
     n = min(int((last - first) / track.spacing), grid.n_lags)
     if n < 1:
         return 0.0, 0.0
+    response, exact = _responses(made, functions, factors, track, grid, r, f, first, n)
+    span = min(n, track.n_pulses)
+    return _largest_sum(np.abs(exact) ** 2, span), _largest_sum(np.abs(response - exact) ** 2, span)
+
+
+def _seen_error(
+    made: AzimuthTransfer, functions: Functions, seen: Brightest, track: StraightTrack, reach: tuple[float, float]
+) -> float:
+    """Relative error of the samples of the brightest scatterers, at all pulses.
+
+    A short track may see them far below what stretches elsewhere along the track would.
+    """
+    grid, wrong, right = doppler_grid(made, track, reach), 0.0, 0.0
+    n = min(track.n_pulses, grid.n_lags)
+    for f in made.aspects.band:
+        for i, r in enumerate(seen.slant_range.tolist()):
+            response, exact = _responses(
+                made, functions, seen.factors[[i]], track, grid, r, f, -float(seen.azimuth[i]), n
+            )
+            wrong += float((np.abs(response - exact) ** 2).sum())
+            right += float((np.abs(exact) ** 2).sum())
+    return float(np.sqrt(wrong / right)) if right else 0.0
+
+
+def _responses(
+    made: AzimuthTransfer, functions: Functions, factors: np.ndarray, track: StraightTrack, grid: DopplerGrid, r: float,
+    f: float, first: float, n: int,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Responses (n_factors, n) at lags first + i spacing, m, by the tables and by the formula."""
+    u, k = grid.wavenumbers, float(wavenumber(f))
     lag = first + np.arange(n) * track.spacing
-    turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - aspects.middle_range)
+    turn = made.phase.at_middle(u, k) - (made.phase.kappa(u, k) - 2 * k) * (r - made.aspects.middle_range)
     known = np.exp(1j * (turn + u * first)) / grid.period
     shares = made.range_weights(np.array([r]))[:, 0]
     tables = [[made.amplitude(j, q, f, u) for q in range(len(shares))] for j in range(len(made.tables))]
     spectra = (factors @ np.einsum("q,jqu->ju", shares, np.array(tables))) * known
     response = fft.rows(None, grid.folded(spectra), inverse=True)[:, :n]
     distance = np.hypot(r, lag)
-    wave = np.exp(-2j * k * lag**2 / (distance + r)) * aspects.window(lag / distance)
-    exact = (factors @ functions(lag / distance, f)) * wave
-    span = min(n, track.n_pulses)
-    return _largest_sum(np.abs(exact) ** 2, span), _largest_sum(np.abs(response - exact) ** 2, span)
+    wave = np.exp(-2j * k * lag**2 / (distance + r)) * made.aspects.window(lag / distance)
+    return response, (factors @ functions(lag / distance, f)) * wave
 
 
 def _largest_sum(power: np.ndarray, n: int) -> float:

@@ -17,7 +17,7 @@ from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_fu
 from ._aspect_window import aspects
 from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspects
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
-from ._azimuth_transfer import TESTED, doppler_grid, plan_transfer, response_error
+from ._azimuth_transfer import TESTED, Brightest, doppler_grid, plan_transfer, response_error
 from ._edge_map import edge_map, places_of_edges
 from ._facet_factors import FacetFactors
 from ._map_part import MapPart
@@ -159,6 +159,7 @@ def plan_part(
     drawn = some[np.linspace(0, len(some) - 1, min(len(some), MANY)).astype(int)]
     factors = np.stack([expansion.factors(drawn, j) for j in range(len(expansion))], axis=-1)
     factors = factors[:, np.abs(factors).sum(axis=(0, 2)).argmax()]
+    brightest = _brightest(amplitudes, track, drawn, factors, band) if has_beam else None
     factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
     if variant == "saras":
         transfer = stationary_tables(seen_aspects, expansion.functions)
@@ -167,7 +168,7 @@ def plan_part(
         transfer = replace(transfer, error=error)
     else:
         transfer = plan_transfer(
-            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked
+            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, brightest
         )  # fmt: skip
     grid = doppler_grid(transfer, track, reach)
     numbers = range_wavenumbers(transfer, grid)
@@ -185,6 +186,19 @@ def plan_part(
             )
         )  # fmt: skip
     return SpectralPart(amplitudes, some, expansion, tuple(maps), (low, high), outside)
+
+
+def _brightest(
+    amplitudes: ScattererAmplitudes, track: StraightTrack, drawn: np.ndarray, factors: np.ndarray,
+    band: tuple[float, float],
+) -> Brightest:  # fmt: skip
+    """Those of some scatterers (n,), with factors (n, J), that the middle or an end of the track sees brightest."""
+    power = np.zeros(len(drawn))
+    for place in (0.0, track.length / 2, track.length):
+        made = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
+        power = np.maximum(power, (np.abs(made) ** 2).sum(axis=1))
+    best = np.argsort(-power, kind="stable")[:TESTED]
+    return Brightest(factors[best], amplitudes.azimuth[drawn[best]], amplitudes.slant_range[drawn[best]])
 
 
 def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allowed: float, asked: float) -> None:

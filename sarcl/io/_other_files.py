@@ -1,0 +1,136 @@
+"""Other files that a mesh or an elevation model names: those of its folder are read, others where that is allowed."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+from urllib.parse import unquote
+from xml.etree import ElementTree
+
+from . import _hdf5_safety, input_paths
+
+# endings of pictures, which a mesh may name as textures: nothing here needs them
+PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".tif", ".tiff", ".bmp", ".gif", ".dds", ".webp", ".ktx", ".ktx2", ".hdr")
+# GDAL's drivers whose files name others, or addresses of a network; all but GTI are XML or JSON
+CATALOGUES = {
+    "WMS", "WCS", "WMTS", "HTTP", "PLMOSAIC", "EEDA", "EEDAI", "STACIT", "STACTA", "ESRIC", "NGW", "OGCAPI", "GTI",
+}  # fmt: skip
+NESTED = 8  # levels of virtual rasters of virtual rasters
+HDF5 = b"\x89HDF\r\n\x1a\n"
+ALLOW = "which sarcl does not follow; external=True allows it for files that you trust"
+
+
+def beside(path: Path, name: str) -> Path | None:
+    """The file that a name, relative to the folder of `path`, stands for; None where it lies outside that folder."""
+    folder = path.parent.resolve()
+    try:
+        found = (folder / name.strip()).resolve()
+    except (OSError, ValueError, RuntimeError):  # no name of a file, or links in a circle
+        return None
+    return found if found.is_relative_to(folder) else None
+
+
+class Resolver:
+    """What trimesh asks for the files that a mesh names: buffers and materials, from the mesh's own folder.
+
+    external  files elsewhere are read too
+    refused   names of files elsewhere that were asked for
+    """
+
+    def __init__(self, path: Path, external: bool) -> None:
+        self.path, self.external, self.refused = path, external, list[str]()
+        self.file_name, self.file_path = path.name, str(path)
+
+    def get(self, name: str) -> bytes:
+        """The bytes of a file; FileNotFoundError for one that there is not, that is refused, or is a picture."""
+        if name.strip().lower().endswith(PICTURES):
+            raise FileNotFoundError(name)
+        for spelled in dict.fromkeys((name, unquote(name))):
+            found = beside(self.path, spelled)
+            if found is None:
+                if not self.external:
+                    self.refused.append(name)
+                    raise FileNotFoundError(name)
+                found = self.path.parent / spelled.strip()
+            if found.exists():
+                return input_paths.contents(found, "mesh file")
+        raise FileNotFoundError(f"there is no file {name!r} beside it")
+
+    __getitem__ = get
+
+    def keys(self) -> list[str]:
+        """Names of files: none are offered."""
+        return []
+
+    def namespaced(self, namespace: str) -> Resolver:
+        """A resolver for names relative to a folder below."""
+        return Resolver(self.path.parent / namespace / self.path.name, self.external)
+
+
+def check_raster(path: Path, name: str) -> None:
+    """ValueError, beginning with `name`, for a raster that leads to files outside its folder, before GDAL opens it.
+
+    Virtual rasters (VRT) name their sources, HDF5 files (netCDF 4, BAG) may hold external storage and links. Other XML,
+    JSON and indices of tiles (GTI) name files anywhere, or addresses of a network.
+    """
+    with open(path, "rb") as file:
+        head = file.read(512)
+    if head.startswith(HDF5):
+        _check_hdf5(path, name)
+    elif re.match(rb"(\xef\xbb\xbf)?\s*<", head):
+        _check_sources(path, name, 0)
+    elif re.match(rb"(\xef\xbb\xbf)?\s*[{[]", head) or ".gti" in path.name.lower():
+        raise _catalogue(name)
+
+
+def check_parts(path: Path, driver: str, files: list[str], name: str) -> None:
+    """ValueError where an open raster is a catalogue, or one of its files lies outside its folder."""
+    if driver in CATALOGUES:
+        raise _catalogue(name)
+    for file in files:
+        if beside(path, str(Path(file).absolute())) is None:
+            raise ValueError(f"{name} leads to another file: {file!r}, outside its folder, {ALLOW}")
+
+
+def _catalogue(name: str) -> ValueError:
+    return ValueError(f"{name} is a list of rasters elsewhere, and no raster: give one of those, or external=True")
+
+
+def _check_sources(path: Path, name: str, depth: int) -> None:
+    if depth > NESTED:
+        raise ValueError(f"{name} is a virtual raster of virtual rasters, {NESTED} deep; give one of its sources")
+    try:
+        tree = ElementTree.fromstring(input_paths.contents(path, "DEM file"))
+    except (ElementTree.ParseError, ValueError, LookupError) as exc:
+        raise ValueError(f"{name} is XML that cannot be read ({exc}); export it again, or give its sources") from None
+    if tree.tag != "VRTDataset":
+        raise ValueError(
+            f"{name} is XML of the kind {tree.tag!r:.60}, which names a raster elsewhere; give that raster"
+        )
+    for element in tree.iter():
+        source = (element.text or "").strip()
+        if source and re.search("source(dataset|filename|url)|filename|file$|dataset$", element.tag, re.IGNORECASE):
+            found = beside(path, source)
+            if found is None:
+                raise ValueError(f"{name} leads to another file: {source!r}, outside its folder, {ALLOW}")
+            if not found.is_file():
+                raise ValueError(f"{name} names {source!r:.100}, and there is no such file in its folder; put it there")
+            with open(found, "rb") as file:
+                head = file.read(512)
+            if head.startswith(HDF5):
+                _check_hdf5(found, name)
+            elif re.match(rb"(\xef\xbb\xbf)?\s*<", head):
+                _check_sources(found, name, depth + 1)
+
+
+def _check_hdf5(path: Path, name: str) -> None:
+    import h5py
+
+    try:
+        _hdf5_safety.check_readable(path)
+        with h5py.File(path, "r", locking="best-effort") as file:
+            _hdf5_safety.check_contents(file, path.stat().st_size, False, "external=True")
+    except _hdf5_safety.Refused as exc:
+        raise ValueError(f"{name} {exc}") from None
+    except (OSError, RuntimeError, KeyError) as exc:
+        raise ValueError(f"{name} is damaged: its HDF5 tables cannot be read ({exc}); copy it again") from None
