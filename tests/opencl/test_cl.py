@@ -350,11 +350,11 @@ MACROS = {
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 
 
-@pytest.mark.parametrize("file", PROGRAMS)
-def test_pocl_needs_the_short_header_alone(device, monkeypatch, file):
+@pytest.mark.parametrize("file, other", [*((file, {}) for file in PROGRAMS), ("beam.cl", {"DOUBLE": 1})], ids=str)
+def test_pocl_needs_the_short_header_alone(device, monkeypatch, file, other):
     if device.info.platform != _programs.POCL:
         pytest.skip("not PoCL")
-    if not device.info.fp64 and "float64" in file:
+    if not device.info.fp64 and ("float64" in file or other):
         pytest.skip("no float64")
     import pyopencl
 
@@ -366,7 +366,7 @@ def test_pocl_needs_the_short_header_alone(device, monkeypatch, file):
             return super().build(options)
 
     monkeypatch.setattr(pyopencl, "Program", Program)
-    assert device._build(file, {"VW": device.info.vector_width, "FP64": int(device.info.fp64), **MACROS})
+    assert device._build(file, {"VW": device.info.vector_width, "FP64": int(device.info.fp64), **MACROS, **other})
     assert given == [True]
 
 
