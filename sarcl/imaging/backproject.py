@@ -270,7 +270,7 @@ def _open_workers(task: FocusingTask, options: FocusOptions, cluster: Any) -> tu
     budgets = [options.budget(d) for d in devices]
     chosen = options.choose(task, devices)
     engines = [chosen.on(d, task) for d in devices]
-    kinds = {(d.info.platform, d.info.name, d.info.units) for d in devices}
+    kinds = {(d.info.platform, d.info.name, d.info.kind, d.info.units) for d in devices}
     rates = [speed(d) for d in devices] if len(kinds) > 1 else [1.0 for _ in devices]
     return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates), chosen
 

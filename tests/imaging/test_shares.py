@@ -7,8 +7,10 @@ import heapq
 import numpy as np
 import pytest
 from helpers.cases import noise_history
+from helpers.devices import as_gpu
 
 import sarcl
+from sarcl.imaging import backproject as backproject_file
 from sarcl.imaging.engine import RowProfiles
 from sarcl.imaging.run._shares import Shares
 from sarcl.opencl.choose_device import open_device
@@ -121,3 +123,23 @@ def test_two_alike_devices_make_the_profiles_of_each_row_once_each(monkeypatch):
     assert made == {pair[0]: 64, pair[1]: 64}
     one = sarcl.backproject(raw, grid, tolerance=1e-2, method="direct", device=first, check=False)
     assert np.array_equal(both.data, one.data)
+
+
+def test_speeds_are_measured_where_devices_differ(monkeypatch):
+    first, asked = open_device(), []
+    same, other = Device(first.info, first._raw), as_gpu(first)
+
+    class Stop(Exception):
+        pass
+
+    def stop(*given):
+        asked.append(given[-1])
+        raise Stop
+
+    monkeypatch.setattr(backproject_file, "LocalWorkers", stop)
+    monkeypatch.setattr(backproject_file, "speed", {first: 3.0, other: 7.0}.__getitem__)
+    raw, grid = noise_history(), sarcl.ImageGrid.plane(shape=8, spacing=0.03)
+    for pair in ([first, same], [first, other]):
+        with pytest.raises(Stop):
+            sarcl.backproject(raw, grid, device=pair)
+    assert asked == [[1.0, 1.0], [3.0, 7.0]]
