@@ -177,7 +177,6 @@ class _Field:
             self._kernel(name), (many // lanes, -(-n // CHUNK)), self.group,
             numbers[0], many, numbers[1], n, *weights, table, width,
         )  # fmt: skip
-        device.finish()  # `numbers` must live until then: on CPUs buffers use the memory of the arrays
         return table, many
 
     def _sum(self, lane: tuple[Any, int], row: tuple[Any, int], rows: int) -> np.ndarray:
@@ -187,7 +186,7 @@ class _Field:
         out = self.device.empty(self.item * tiles * used * lane[1])
         self.device.run(
             self._kernel("add", used), (lane[1] // self.device.info.vector_width, tiles), self.group,
-            lane[0], row[0], len(self.carriers), lane[1], out,
+            lane[0], row[0], len(self.carriers), lane[1], out, steps=len(self.carriers),
         )  # fmt: skip
         planes = self.device.download(out, np.empty((tiles * used, 2, lane[1]), self.real))
         return np.asarray(planes[:rows, 0] + 1j * planes[:rows, 1])

@@ -126,6 +126,18 @@ def _sums(
     arrays = [device.copied(table) for table in (cells, np.ascontiguousarray(values), bounds)]
     share = 1 if device.is_cpu else blocks
     size = (count // device.info.vector_width, chunks, share)
-    device.run(kernel, size, None, *arrays, *tables, sums, n, n_frequencies, count, *travel.astype(np.float32))
+    device.run(
+        kernel,
+        size,
+        None,
+        *arrays,
+        *tables,
+        sums,
+        n,
+        n_frequencies,
+        count,
+        *travel.astype(np.float32),
+        steps=n / chunks,
+    )
     got = device.download(sums, np.empty((chunks, blocks * BLOCK, 2, count), np.float32)).sum(axis=0, dtype=np.float64)
     return np.asarray(got[:n_frequencies, 0] + 1j * got[:n_frequencies, 1])

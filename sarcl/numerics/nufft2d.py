@@ -202,6 +202,7 @@ class Gridder:
                 self.device.run(
                     self.kernel, (-(-m1 // self.tile), last - first), (1, 1) if self.device.is_cpu else None,
                     samples, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
+                    steps=stop - start,
                 )  # fmt: skip
                 self.device.finish()
                 clock.lap("gridding")

@@ -5,6 +5,7 @@ For other folders:
     choose_device  the device that is used: as asked for, as SARCL_DEVICE says, or the best one that works
     device         an open device: its programs, each built once, its buffers and its queue
     device_list    OpenCL devices of this machine, tried with a small kernel before they are used
+    failures       errors of OpenCL as errors that name the device, the need and the remedy
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
     memory_budget  bytes that a computation may take on a device
     pipeline       blocks of work on a device: the upload of one while the device works on the one before
@@ -13,10 +14,12 @@ For this folder alone:
 
     _after_fork    refusal of OpenCL in a process that was forked after its parent had used it
     _cache_folder  a cache folder that can be written, which drivers need
+    _host_arrays   buffers of CPU devices in the memory of host arrays, which stays until the kernels have ended
+    _launches      launches of kernels on GPUs, cut into parts of about 0.2 s
     _queries       questions to a driver, each guarded
     _trial         kernels whose results are known, which a device must pass
     _trial_record  results of devices' trials, on disk
     _programs      source texts of kernels, and precautions for building programs
 """
 
-__all__ = ["choose_device", "device", "device_list", "fft", "memory_budget", "pipeline"]
+__all__ = ["choose_device", "device", "device_list", "failures", "fft", "memory_budget", "pipeline"]

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import functools
 import re
+import threading
 import time
 import warnings
 from collections.abc import Iterator
@@ -13,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 POCL = "Portable Computing Language"  # name of PoCL's platform
+_building = threading.RLock()  # the filters of warnings belong to all threads
 STALE = 5.0  # s; an older lock on the cache of binaries belongs to a process that was killed
 
 
@@ -59,11 +61,26 @@ def build(context: Any, text: str, options: list[str]) -> Any:
     return pyopencl.Program(context, text).build(options)
 
 
+def kernels_of(program: Any) -> dict[str, Any]:
+    """The kernels of a built program by their names."""
+    import pyopencl
+
+    found = {kernel.function_name: kernel for kernel in program.all_kernels()}
+    if not found:
+        platform = program.get_info(pyopencl.program_info.DEVICES)[0].platform.name
+        where = "POCL_CACHE_DIR or ~/.cache/pocl" if platform == POCL else "its own folder"
+        raise RuntimeError(
+            f"{platform} built a program without kernels: its cache of built programs, in {where}, may be damaged; "
+            "delete that folder"
+        )
+    return found
+
+
 @contextmanager
 def quiet() -> Iterator[None]:
     """Context of every build: no warnings of a compiler that succeeds, and no wait for the lock of a killed process."""
     _drop_stale_lock()
-    with warnings.catch_warnings():
+    with _building, warnings.catch_warnings():
         warnings.simplefilter("ignore")
         yield
 

@@ -16,7 +16,7 @@ import numpy as np
 
 from ..base import float_pairs
 from ..base.text import first_line, size_text
-from ._programs import build, quiet, source
+from ._programs import build, kernels_of, quiet, source
 
 FILE = "trial.cl"
 N = 64  # numbers and points of the trial
@@ -132,7 +132,7 @@ def trial(handle: Any, lanes: int, fp64: bool, local_memory: int, max_group: int
 def _built(queue: Any, lanes: int, fp64: int) -> dict[str, Any]:
     with quiet():
         program = build(queue.context, source(FILE), [f"-DVW={lanes}", f"-DFP64={fp64}", f"-DNUMBER64={fp64}"])
-    return {kernel.function_name: kernel for kernel in program.all_kernels()}
+    return kernels_of(program)
 
 
 def _given() -> tuple[np.ndarray, np.ndarray]:

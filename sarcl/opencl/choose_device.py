@@ -2,12 +2,11 @@
 
 from __future__ import annotations
 
-import functools
 import os
 from typing import Any
 
 from . import _cache_folder
-from .device import Device, DeviceChoice
+from .device import Device, DeviceChoice, once
 from .device_list import DeviceInfo, devices, distinct, listed, tried
 
 REMEDY = "On Debian or Ubuntu: sudo apt-get install -y pocl-opencl-icd"
@@ -88,6 +87,6 @@ def split_choice(choice: Any) -> list[Any]:
     return list(choice) if isinstance(choice, (list, tuple)) else [choice]
 
 
-@functools.cache
+@once
 def _open(index: int) -> Device:
     return Device(tried(index), listed()[index][1])

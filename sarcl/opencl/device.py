@@ -4,8 +4,9 @@ from __future__ import annotations
 
 import functools
 import os
-from collections.abc import Iterator
-from contextlib import contextmanager
+import threading
+from collections.abc import Callable
+from contextlib import suppress
 from dataclasses import replace
 from typing import Any
 
@@ -13,9 +14,11 @@ import numpy as np
 
 from ..base.text import first_line, size_text
 from ..base.threads import threads
-from . import _after_fork
-from ._programs import build, names_in, quiet, source
+from ._host_arrays import HostArrays
+from ._launches import Launches, fixed_axes
+from ._programs import build, kernels_of, names_in, quiet, source
 from .device_list import DeviceInfo
+from .failures import buffer_bytes, explained
 
 # A launch of 17 arguments takes pyopencl 84 us of processor time, and 4 us once it is told the types of the numbers.
 # Telling it takes 0.4 ms, which kernels of few launches do not save.
@@ -28,6 +31,7 @@ class Device:
 
     info.fast_fp64 chooses the wide number type of every kernel built here: float64, or pairs of float32 where those are
     faster. `without_fp64()` gives a twin that has only pairs, to run (or test) what a device without float64 runs.
+    Several threads may use a device: launches take turns, as a kernel's arguments are set before it is enqueued.
     """
 
     def __init__(self, info: DeviceInfo, raw: Any) -> None:
@@ -42,11 +46,24 @@ class Device:
                 raise RuntimeError(
                     f"{info.name} cannot be limited to SARCL_THREADS={threads()} ({first_line(exc)}); unset it"
                 ) from None
-        with self._explain("a context"):
+        with explained(self.info, "a context"):
             self.context = pyopencl.Context([raw])
-            self.queue = pyopencl.CommandQueue(self.context, raw)
+            self.queue = self._timed_queue(raw)
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
-        self._launches: dict[Any, int] = {}  # launches of each kernel
+        self._counts: dict[Any, int] = {}  # launches of each kernel
+        self._fixed: dict[Any, frozenset[int]] = {}  # axes of each kernel along which it must not be cut
+        self._launches, self._arrays, self._lock = Launches(), HostArrays(), threading.RLock()
+        self._last = ""  # kernel that was launched last and the bytes of its buffers, as text: not on CPUs
+
+    def _timed_queue(self, raw: Any) -> Any:
+        """The queue of commands; on devices other than CPUs with a clock for launches, where the driver has one."""
+        import pyopencl
+
+        if not self.is_cpu:
+            with suppress(pyopencl.Error):
+                clock = pyopencl.command_queue_properties.PROFILING_ENABLE
+                return pyopencl.CommandQueue(self.context, raw, properties=clock)
+        return pyopencl.CommandQueue(self.context, raw)
 
     @property
     def is_cpu(self) -> bool:
@@ -66,9 +83,10 @@ class Device:
         wide = self.info.fp64 and self.info.fast_fp64
         macros = {"VW": self.info.vector_width, "FP64": int(wide), **macros}
         key = (file, *sorted(macros.items()))
-        if key not in self._kernels:
-            self._kernels[key] = self._build(file, macros)
-        return self._kernels[key][name]
+        with self._lock:
+            if key not in self._kernels:
+                self._kernels[key] = self._build(file, macros)
+            return self._kernels[key][name]
 
     def _build(self, file: str, macros: dict[str, int]) -> dict[str, Any]:
         import pyopencl
@@ -84,24 +102,27 @@ class Device:
                 f"kernels/{file} does not build on {self.info.name!r} ({self.info.driver}) with {' '.join(options)}: "
                 f"{str(exc).strip()[:2000]}\nChoose another device (sarcl devices) and report this message"
             ) from exc
-        return {k.function_name: k for k in program.all_kernels()}
+        made = kernels_of(program)
+        self._fixed |= dict.fromkeys(made.values(), fixed_axes(text))
+        return made
 
     def upload(self, array: np.ndarray) -> Any:
-        """A read-only buffer with the contents of `array`; on CPUs it shares the array's memory."""
+        """A read-only buffer with the contents of `array`, which must not change while the buffer is used.
+
+        On CPUs it shares the array's memory, and the device keeps the array until the kernels that read it have ended.
+        """
         import pyopencl
 
         array = np.ascontiguousarray(array)
-        memory = pyopencl.mem_flags
-        flags = memory.READ_ONLY | (memory.USE_HOST_PTR if self.is_cpu else memory.COPY_HOST_PTR)
         self._check_size(array.nbytes)
-        with self._explain("a buffer", array.nbytes):
-            return pyopencl.Buffer(self.context, flags, hostbuf=array)
+        with explained(self.info, "a buffer", array.nbytes):
+            if self.is_cpu:
+                return self._arrays.shared(self.context, array)
+            memory = pyopencl.mem_flags
+            return pyopencl.Buffer(self.context, memory.READ_ONLY | memory.COPY_HOST_PTR, hostbuf=array)
 
     def copied(self, array: np.ndarray) -> Any:
-        """A buffer with a copy of `array`, for kernels that may still run when buffer and array are dropped here.
-
-        A buffer of `upload` shares the array's memory on CPUs, which then must live until the kernels have ended.
-        """
+        """A buffer with a copy of `array`, which may change at once, and which kernels may write to."""
         buffer = self.empty(array.nbytes)
         self.write(buffer, array)
         return buffer
@@ -111,8 +132,10 @@ class Device:
         import pyopencl
 
         buffer = self.empty(nbytes)
-        with self._explain("a buffer", nbytes):
-            pyopencl.enqueue_fill_buffer(self.queue, buffer, np.zeros(1, np.uint8), 0, nbytes)
+        with explained(self.info, "a buffer", nbytes):
+            # some drivers fill with one byte at a time; the size must be a multiple of the pattern's
+            pattern = np.zeros(next(n for n in (16, 4, 1) if nbytes % n == 0), np.uint8)
+            pyopencl.enqueue_fill_buffer(self.queue, buffer, pattern, 0, nbytes)
         return buffer
 
     def empty(self, nbytes: int) -> Any:
@@ -120,21 +143,21 @@ class Device:
         import pyopencl
 
         self._check_size(nbytes)
-        with self._explain("a buffer", nbytes):
+        with explained(self.info, "a buffer", nbytes):
             return pyopencl.Buffer(self.context, pyopencl.mem_flags.READ_WRITE, nbytes)
 
     def write(self, buffer: Any, values: np.ndarray) -> None:
         """Copy `values` into a buffer, from its beginning on."""
         import pyopencl
 
-        with self._explain("a copy", values.nbytes):
+        with explained(self.info, "a copy", values.nbytes):
             pyopencl.enqueue_copy(self.queue, buffer, np.ascontiguousarray(values))
 
     def another_queue(self) -> Any:
         """A queue of commands beside the device's own, for `write_behind`."""
         import pyopencl
 
-        with self._explain("a queue"):
+        with explained(self.info, "a queue"):
             return pyopencl.CommandQueue(self.context, self.queue.device)
 
     def page_locked(self, queue: Any, nbytes: int) -> np.ndarray:
@@ -142,7 +165,7 @@ class Device:
         import pyopencl
 
         memory = pyopencl.mem_flags
-        with self._explain("page-locked memory", nbytes):
+        with explained(self.info, "page-locked memory", nbytes):
             held = pyopencl.Buffer(self.context, memory.READ_WRITE | memory.ALLOC_HOST_PTR, nbytes)
             write, byte = pyopencl.map_flags.WRITE, np.dtype(np.uint8)
             return np.asarray(pyopencl.enqueue_map_buffer(queue, held, write, 0, (nbytes,), byte)[0])
@@ -155,7 +178,7 @@ class Device:
         """
         import pyopencl
 
-        with self._explain("a copy", values.nbytes):
+        with explained(self.info, "a copy", values.nbytes):
             copied = pyopencl.enqueue_copy(queue, buffer, values, is_blocking=False)
             queue.flush()
             pyopencl.enqueue_barrier(self.queue, wait_for=[copied])
@@ -165,42 +188,67 @@ class Device:
         """An event that ends with everything enqueued so far, which begins to run now."""
         import pyopencl
 
-        with self._explain("running"):
+        with explained(self.info, "running"):
             event = pyopencl.enqueue_marker(self.queue)
             self.queue.flush()
             return event
 
     def wait(self, event: Any) -> None:
         """Wait for an event of `mark`."""
-        with self._explain("running"):
+        with explained(self.info, "running"):
             event.wait()
 
     def download(self, buffer: Any, out: np.ndarray, offset: int = 0) -> np.ndarray:
         """Copy a buffer, from byte `offset` on, into `out` and return it."""
         import pyopencl
 
-        with self._explain("a copy", out.nbytes):
+        enqueued = self._arrays.enqueued
+        with explained(self.info, "a copy", out.nbytes):
             pyopencl.enqueue_copy(self.queue, out, buffer, src_offset=offset)
+        self._ended(enqueued)
         return out
 
-    def run(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any) -> None:
+    def run(
+        self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any, steps: float = 1
+    ) -> None:
         """Enqueue a kernel; Python ints become int32, buffers and numpy scalars go as they are.
 
         group None: the driver chooses; on CPUs it is GROUP or 1, because PoCL builds a kernel again for each size.
+        steps  about how many steps the longest loop of a work-item has: on devices other than CPUs a launch is cut into
+               parts of 0.2 s (_launches.py), by the time per work-item and step of those before
         """
         if group is None and self.is_cpu:
             group = (1 if size[0] % GROUP else GROUP, *(1 for _ in size[1:]))
         given = [np.int32(a) if isinstance(a, int) else a for a in args]
-        with self._explain(f"kernel {kernel.function_name}"):
-            launches = self._launches[kernel] = self._launches.get(kernel, 0) + 1
-            if launches == MANY_LAUNCHES:
+        with explained(self.info, f"kernel {kernel.function_name}", given), self._lock:
+            count = self._counts[kernel] = self._counts.get(kernel, 0) + 1
+            if count == MANY_LAUNCHES:
                 kernel.set_scalar_arg_dtypes([a.dtype if isinstance(a, np.generic) else None for a in given])
-            kernel(self.queue, size, group, *given)
+            self._arrays.enqueued += 1
+            if self.is_cpu:
+                kernel(self.queue, size, group, *given)
+                return
+            need = size_text(buffer_bytes(given))
+            self._last = f"kernel {kernel.function_name} or those before it, with buffers of {need},"
+
+            def enqueue(size: tuple[int, ...], offset: tuple[int, ...] | None) -> Any:
+                return kernel(self.queue, size, group, *given, global_offset=offset)
+
+            fixed = self._fixed.get(kernel, frozenset(range(len(size))))
+            self._launches.launch(kernel, size, group, fixed, float(steps), enqueue, self.queue.flush)
 
     def finish(self) -> None:
         """Wait until everything enqueued is done."""
-        with self._explain("running"):
+        enqueued = self._arrays.enqueued
+        # some drivers allocate buffers when they are used first, and say only here that they do not fit
+        with explained(self.info, self._last or "running"):
             self.queue.finish()
+        self._ended(enqueued)
+
+    def _ended(self, enqueued: int) -> None:
+        """So many launches have ended."""
+        with self._lock:
+            self._arrays.finished(enqueued)
 
     def max_group(self, kernel: Any) -> int:
         """Most work-items of `kernel` in one group."""
@@ -221,29 +269,25 @@ class Device:
                 "per buffer; pass a smaller max_bytes=..."
             )
 
-    @contextmanager
-    def _explain(self, what: str, nbytes: int = 0) -> Iterator[None]:
-        """Turn an OpenCL error into one that names the device, the need and the remedy."""
-        import pyopencl
-
-        _after_fork.check()
-        try:
-            yield
-        except pyopencl.MemoryError as exc:
-            raise MemoryError(
-                f"{what} of {size_text(nbytes)} does not fit on {self.info.name!r}, which has "
-                f"{size_text(self.info.memory)} ({first_line(exc)}); pass a smaller max_bytes=..."
-            ) from exc
-        except pyopencl.Error as exc:
-            raise RuntimeError(
-                f"{what} failed on {self.info.name!r} ({self.info.platform}, driver {self.info.driver}): "
-                f"{first_line(exc)}; try another device= (sarcl devices lists them)"
-            ) from exc
-
 
 DeviceChoice = Device | int | str  # what `open_device` takes, or None: its own choice
 
 
-@functools.cache
+_opening = threading.RLock()
+
+
+def once(make: Callable[..., Device]) -> Callable[..., Device]:
+    """`make` with its results kept: several threads that ask for one device get one."""
+    kept = functools.cache(make)
+
+    @functools.wraps(make)
+    def found(*args: Any, **options: Any) -> Device:
+        with _opening:
+            return kept(*args, **options)
+
+    return found
+
+
+@once
 def _twin(device: Device, **changes: Any) -> Device:
     return Device(replace(device.info, **changes), device._raw)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import atexit
 import functools
+import threading
 from typing import Any
 
 import numpy as np
@@ -11,6 +12,8 @@ import numpy as np
 from ..base.threads import threads
 from ._programs import quiet
 from .device import Device
+
+_turns = threading.Lock()  # a plan's kernels get their arguments before they are enqueued: one thread at a time
 
 
 def good_length(n: int) -> int:
@@ -52,9 +55,10 @@ def in_place(device: Device, buffer: Any, shape: tuple[int, int], dtype: Any) ->
 
     Where `on_device`. The first call for a shape builds programs; a plan holds `temporary_bytes` for each row.
     """
-    thread, compiled = _plan(device, shape, np.dtype(dtype).char)
-    rows = thread.array(shape, np.dtype(dtype), base=buffer)
-    compiled(rows, rows)
+    with _turns:
+        thread, compiled = _plan(device, shape, np.dtype(dtype).char)
+        rows = thread.array(shape, np.dtype(dtype), base=buffer)
+        compiled(rows, rows)
 
 
 def temporary_bytes(length: int, dtype: Any) -> int:
@@ -65,9 +69,10 @@ def temporary_bytes(length: int, dtype: Any) -> int:
 
 
 def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
-    thread, compiled = _plan(device, data.shape, data.dtype.char)
-    buffer = thread.to_device(np.ascontiguousarray(data))
-    compiled(buffer, buffer, inverse)
+    with _turns:
+        thread, compiled = _plan(device, data.shape, data.dtype.char)
+        buffer = thread.to_device(np.ascontiguousarray(data))
+        compiled(buffer, buffer, inverse)
     out = buffer.get()
     return out * out.real.dtype.type(data.shape[1]) if inverse else out
 

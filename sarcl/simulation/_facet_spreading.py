@@ -194,7 +194,7 @@ class FacetSpreader:
                 self.spread, (used, self.splits), ends,
                 pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, n_offsets, made, marks, first,
                 here, which_here, shares_here, axes, self.reach, held.radius, self.table, held.last, self.flush, rows,
-                self.stride, self.stride // 2, done,
+                self.stride, self.stride // 2, done, steps=here / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)

@@ -79,7 +79,7 @@ def spread_points(
             kernel, (used, parts), (1, 1) if device.is_cpu else None,
             pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, tiles.offsets.shape[1],
             held.planes, ratios, patterns, second, axes, np.float32(weights.range), reach, held.radius, table,
-            held.last, flush, rows, stride, stride // 2, done,
+            held.last, flush, rows, stride, stride // 2, done, steps=tiles.n_tiles / parts,
         )  # fmt: skip
         device.finish()
         clock.lap("echo")

@@ -17,6 +17,7 @@ from sarcl.imaging.tiling.plane import PlaneTiling
 from sarcl.opencl.choose_device import open_device, open_devices
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import devices
+from sarcl.opencl.failures import DeviceFailed
 
 GRID = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(700, 301), spacing=(0.03, 0.02))
 
@@ -113,6 +114,47 @@ def test_a_device_that_fails_ends_the_run_with_its_error(raw, pair, monkeypatch)
     with pytest.raises(RuntimeError, match="unplugged"):
         sarcl.backproject(raw, GRID, method="direct", device=pair)
     assert not [name for name in no_threads_left() if "sarcl" in name]
+
+
+def lost_after(monkeypatch, lost, blocks):
+    """The devices in `lost` fail, each in its block after so many, as where the driver has lost them."""
+    fill, count = Direct.fill, dict.fromkeys(map(id, lost), 0)
+
+    def failing(self, *rest):
+        if id(self.device) in count:
+            count[id(self.device)] += 1
+            if count[id(self.device)] > blocks:
+                raise DeviceFailed("kernel backproject failed: DEVICE_NOT_AVAILABLE")
+        return fill(self, *rest)
+
+    monkeypatch.setattr(Direct, "fill", failing)
+
+
+@pytest.mark.parametrize("blocks", [0, 1])
+def test_the_blocks_of_a_device_that_is_lost_are_made_by_the_others(raw, pair, monkeypatch, caplog, blocks):
+    wanted = sarcl.backproject(raw, GRID, method="direct", device=pair)
+    lost_after(monkeypatch, pair[1:], blocks)
+    image, calls = reported(raw, method="direct", device=pair, max_bytes=4e6)
+    assert np.linalg.norm(image.data - wanted.data) <= 1e-6 * np.linalg.norm(wanted.data)
+    assert image.report.contributions_done == wanted.report.contributions_done
+    assert calls[-1][1:] == (raw.n_rows * GRID.size,) * 2
+    assert "DEVICE_NOT_AVAILABLE; the other devices go on without it" in caplog.text
+    assert not [name for name in no_threads_left() if "sarcl" in name]
+
+
+def test_where_every_device_is_lost_finished_tiles_are_kept_and_the_same_call_continues(
+    raw, pair, monkeypatch, tmp_path
+):
+    options = {"method": "direct", "device": pair, "max_bytes": 4e6, "out": tmp_path / "image.h5", "resume": True}
+    wanted = sarcl.backproject(raw, GRID, method="direct", device=pair)
+    with monkeypatch.context() as during:
+        lost_after(during, pair, 1)
+        with pytest.raises(DeviceFailed, match="DEVICE_NOT_AVAILABLE"):
+            sarcl.backproject(raw, GRID, **options)
+    assert list(tmp_path.glob("image.h5.parts/*.tiles"))
+    image = sarcl.backproject(raw, GRID, **options)
+    assert np.linalg.norm(image.data - wanted.data) <= 1e-6 * np.linalg.norm(wanted.data)
+    assert "bands" in image.report.plan["from files"]
 
 
 def test_an_interrupt_ends_all_devices(raw, pair, tmp_path):

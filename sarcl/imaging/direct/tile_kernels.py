@@ -71,7 +71,7 @@ class GatherKernel:
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
             source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
             tiles.offsets.shape[1], 0 if tiles.shared else tiles.per_tile // self.lanes, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *weights,
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *weights, steps=used,
         )  # fmt: skip
 
 
@@ -123,6 +123,7 @@ class LineKernel:
             self.kernel, (high - low,), (1,),
             source, stride, origin, self.table, self.weights, n, used, constants, dx, dy, low,
             tiles.n_tiles, *self.limits, image, np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
+            steps=used,
         )  # fmt: skip
 
 
@@ -177,7 +178,7 @@ class SharedLineKernel:
         device.run(
             self.kernel, (items, high - low), (items, 1),
             source, stride, origin, *self.tables, n, used, constants, schedule, dx, dy, low, tiles.n_tiles, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed,
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, steps=used,
         )  # fmt: skip
 
 

@@ -248,7 +248,7 @@ class Factorized(Engine):
                     device.run(
                         merge, (self._spans(0), count), None,
                         source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
-                        level.reach, tile, low, self.kept[0][2], self.strides[0], out,
+                        level.reach, tile, low, self.kept[0][2], self.strides[0], out, steps=used,
                     )  # fmt: skip
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
@@ -294,7 +294,7 @@ class Factorized(Engine):
                 merge, (self._spans(level + 1), end - begin), None,
                 source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
                 self.blocks_of[level + 1], len(below.decimation.blocks), self.filters[level + 1], below.reach, begin,
-                begin, n_kept, stride, made,
+                begin, n_kept, stride, made, steps=used,
             )  # fmt: skip
             self._descend(down, level + 1, begin, end, made, begin, within)
             if (begin, end) != whole:

@@ -120,7 +120,7 @@ class DirectFloat64(DirectEngine):
                     device.run(
                         self.kernel, (items, count), (items, 1) if items <= self.group else None,
                         block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
-                        where, image, np.uint64(pixels), missed, *weights,
+                        where, image, np.uint64(pixels), missed, *weights, steps=stop - start,
                     )  # fmt: skip
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")

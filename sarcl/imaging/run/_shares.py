@@ -38,6 +38,7 @@ class Shares:
         self._taken, self._done, self._busy = ([0.0] * len(rates) for _ in range(3))  # pixels, pixels, s
         self._began: list[float | None] = [None] * len(rates)
         self._active = [True] * len(rates)
+        self.lost: set[int] = set()  # devices that have failed
         self._lock = threading.Lock()
 
     def take(self, k: int) -> Run | None:
@@ -52,6 +53,18 @@ class Shares:
             self._taken[k] += self.tiling.count(*block)
             self._began[k] = self._now()
             return block
+
+    def give_back(self, k: int, block: Run) -> None:
+        """Device k has failed in this block and takes no more: the others make it."""
+        with self._lock:
+            self._began[k], self._active[k] = None, False
+            self._left.insert(0, block)
+            others = [j for j in range(len(self._active)) if j != k]
+            for j in others:  # also those that had no more to do
+                self._active[j] = True
+            self.lost.add(k)
+            for j in self.lost:
+                self._active[j] = False
 
     def made(self, k: int, pixels: float) -> None:
         """Device k has made so many pixels, or an equal part of the work on more."""

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 import queue
 import threading
 from collections.abc import Callable, Generator
@@ -10,9 +11,12 @@ from typing import Any, Protocol
 import numpy as np
 
 from ...base.stage_timer import Clock
+from ...opencl.failures import DeviceFailed
 from ..engine import Engine, Skipped
 from ..tiling.tiling import Run, Tiling
 from ._shares import Shares
+
+log = logging.getLogger(__name__)
 
 FinishedBlock = tuple[int, int, Any, Skipped]  # a run of bands, where its pixels are, and pairs skipped
 OutputFor = Callable[[int, int], Any]  # destination of the pixels of a run of bands: a flat image or a BandBuffer
@@ -120,6 +124,7 @@ class LocalWorkers:
         """One thread per device; the caller's thread reports progress and yields finished blocks."""
         finished: queue.SimpleQueue[FinishedBlock | BaseException] = queue.SimpleQueue()
         stop = threading.Event()
+        alive = set(range(self.size))
         pairs = [0] * self.size  # each thread writes its own
 
         def run(k: int) -> None:
@@ -129,23 +134,35 @@ class LocalWorkers:
                 pairs[k] = done
                 shares.made(k, done / self.n_rows)
 
-            own_clock = Clock()
+            own_clock, block = Clock(), None
             try:
                 while not stop.is_set():
-                    block = shares.take(k)
+                    block, before = shares.take(k), pairs[k]
                     if block is None:
                         return
                     done, pairs[k] = self._one(k, *block, output_for, own_clock, pairs[k], own_progress)
                     finished.put(done)
             except _Stop:
                 pass
+            except DeviceFailed as exc:
+                assert block is not None
+                alive.discard(k)
+                if not alive:
+                    finished.put(exc)
+                    return
+                pairs[k] = before
+                log.warning("%s; the other devices go on without it", exc)
+                shares.give_back(k, block)
             except BaseException as exc:
                 finished.put(exc)
 
-        threads = [threading.Thread(target=run, args=(k,), daemon=True) for k in range(self.size)]
-        on_progress(0)
-        for thread in threads:
+        def started(k: int) -> threading.Thread:
+            thread = threading.Thread(target=run, args=(k,), daemon=True)
             thread.start()
+            return thread
+
+        on_progress(0)
+        threads = {k: started(k) for k in range(self.size)}
         try:
             tiling, left = self.engines[0].tiling, pixels
             while left:
@@ -153,6 +170,8 @@ class LocalWorkers:
                     done = finished.get(timeout=0.1)
                 except queue.Empty:
                     on_progress(sum(pairs))
+                    if shares.lost and not any(thread.is_alive() for thread in threads.values()):
+                        threads = {k: started(k) for k in alive}  # a block came back after they had ended
                     continue
                 if isinstance(done, BaseException):
                     raise done
@@ -162,7 +181,7 @@ class LocalWorkers:
                 yield done
         finally:
             stop.set()
-            for thread in threads:
+            for thread in threads.values():
                 thread.join()
 
 
