@@ -5,8 +5,10 @@ from __future__ import annotations
 import functools
 import logging
 import os
+import sqlite3
 import stat
 import tempfile
+from contextlib import closing, suppress
 from pathlib import Path
 
 log = logging.getLogger(__name__)
@@ -14,10 +16,38 @@ log = logging.getLogger(__name__)
 
 @functools.cache
 def prepare() -> str:
-    """Make XDG_CACHE_HOME of this process a folder that can be written, before any OpenCL driver is loaded.
+    """Make XDG_CACHE_HOME of this process a folder that can be written and used, before any OpenCL driver is loaded.
+
+    Returns what is wrong where no folder can be written, for messages; else "".
+    """
+    why = _writable()
+    _drop_damaged()
+    return why
+
+
+def _drop_damaged() -> None:
+    """Remove pyopencl's database of generated code where it is damaged: no kernel could be launched."""
+    import platformdirs
+
+    for path in Path(platformdirs.user_cache_dir("pytools", "pytools")).glob("pdict-*pyopencl*.sqlite"):
+        try:
+            with closing(sqlite3.connect(f"{path.absolute().as_uri()}?mode=ro", uri=True)) as database:
+                if database.execute("PRAGMA quick_check").fetchone() == ("ok",):
+                    continue
+        except sqlite3.OperationalError:  # in use, or not to be read
+            continue
+        except sqlite3.DatabaseError:  # no database at all
+            pass
+        log.warning("%s is damaged and made anew", path)
+        with suppress(OSError):
+            path.unlink()
+
+
+def _writable() -> str:
+    """Make XDG_CACHE_HOME a folder that can be written; what is wrong where there is none.
 
     Where the user's own can be written, nothing changes. Else a folder of this user's in the folder of temporary files
-    is taken, and the log warns of it. Returns what is wrong where neither can be written, for messages; else "".
+    is taken, and the log warns of it.
     """
     import platformdirs
 

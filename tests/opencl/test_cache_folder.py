@@ -66,3 +66,64 @@ def test_a_folder_in_which_others_may_write_is_not_taken(monkeypatch, tmp_path, 
         known.chmod(0o777)
     found = _cache_folder._temporary()
     assert found != str(known) and stat.S_IMODE(os.stat(found).st_mode) == 0o700
+
+
+BEAM = (
+    "import sarcl; array = sarcl.AntennaArray.linear(3, spacing=0.01); "
+    "print(sarcl.beam(array, 1e10, times=[0.0], positions=[[9, 0, 0]]))"
+)
+
+
+def computed(folder):
+    """A field that a new process computes with its caches in `folder`, as text, and what it says beside that."""
+    left = {k: v for k, v in os.environ.items() if k != "POCL_CACHE_DIR"}
+    done = subprocess.run(
+        [sys.executable, "-c", BEAM], env={**left, "XDG_CACHE_HOME": str(folder)}, capture_output=True, text=True,
+        timeout=120,
+    )  # fmt: skip
+    return done.stdout, done.stderr
+
+
+@pytest.mark.slow
+def test_damaged_caches_of_pyopencl_and_sarcl_are_written_again(tmp_path):
+    wanted, _ = computed(tmp_path)
+    folders = [tmp_path / name for name in ("sarcl", "pyopencl", "pytools")]
+    files = [p for folder in folders for p in folder.rglob("*") if p.is_file()]
+    assert "devices.json" in {p.name for p in files} and any(p.suffix == ".sqlite" for p in files)
+    whole = {path: path.read_bytes() for path in files}
+    for damaged in (lambda b: b"", lambda b: os.urandom(300), lambda b: b[: len(b) // 2]):
+        for path in files:
+            path.write_bytes(damaged(whole[path]))
+        assert computed(tmp_path)[0] == wanted != ""
+
+
+@pytest.mark.slow
+def test_empty_programs_in_the_cache_of_pocl_are_named_with_the_remedy(tmp_path):
+    computed(tmp_path)
+    files = [p for p in (tmp_path / "pocl").rglob("program.bc")]
+    if not files:
+        pytest.skip("not PoCL")
+    for path in (tmp_path / "pocl").rglob("*"):
+        if path.is_file():
+            path.write_bytes(b"")
+    (tmp_path / "sarcl" / "devices.json").unlink()
+    out, said = computed(tmp_path)
+    assert (
+        not out
+        and "built a program without kernels: its cache of built programs" in said
+        and "delete that folder" in said
+    )
+
+
+@pytest.mark.slow
+@pytest.mark.skipif(hasattr(os, "getuid") and os.getuid() == 0, reason="root may write anywhere")
+def test_caches_that_can_only_be_read_are_replaced_by_a_temporary_one(tmp_path):
+    wanted, _ = computed(tmp_path)
+    for path in (tmp_path, *tmp_path.rglob("*")):
+        path.chmod(0o555 if path.is_dir() else 0o444)
+    try:
+        out, said = computed(tmp_path)
+    finally:
+        for path in (tmp_path, *tmp_path.rglob("*")):
+            path.chmod(0o755)
+    assert out == wanted and "cannot be written" in said and "set XDG_CACHE_HOME" in said
