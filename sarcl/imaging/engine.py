@@ -173,5 +173,5 @@ class RowProfiles:
 
     @property
     def _row_bytes(self) -> float:
-        """Bytes of the profile of a row."""
-        return float(np.dtype(self.dtype).itemsize * self.stride)
+        """Bytes of the profile of a row that the host makes, for as many blocks as are in memory."""
+        return float(np.dtype(self.dtype).itemsize * self.stride * self.pipeline.held)

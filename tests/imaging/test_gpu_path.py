@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import weakref
 from dataclasses import replace
 
 import numpy as np
@@ -103,3 +104,29 @@ def test_an_interrupt_leaves_nothing_running(device, calls, monkeypatch):
     with pytest.raises(KeyboardInterrupt):
         sarcl.backproject(raw, GRID, tolerance=1e-2, method="direct", device=as_gpu(device), progress=stop)
     assert calls[-1] == "finish" and calls.count("finish") == 1 and calls.count("mark") == 2
+
+
+@pytest.mark.parametrize("case, max_bytes", [("few taps", 1.5e6), ("float64", 2e6)])
+def test_buffers_on_the_device_keep_to_max_bytes(device, case, max_bytes, monkeypatch):
+    import pyopencl
+
+    grid, tolerance, _ = CASES[case]
+    if case == "float64" and not device.info.fp64:
+        pytest.skip("no float64")
+    held, most, whole = [0], [0], pyopencl.Buffer
+
+    class Buffer(whole):
+        def __init__(self, context, flags, size=0, hostbuf=None):
+            super().__init__(context, flags, size, hostbuf)
+            if not flags & pyopencl.mem_flags.ALLOC_HOST_PTR:  # memory of the host
+                nbytes = self.size
+                held[0] += nbytes
+                most[0] = max(most[0], held[0])
+                weakref.finalize(self, lambda: held.__setitem__(0, held[0] - nbytes))
+
+    monkeypatch.setattr(pyopencl, "Buffer", Buffer)
+    raw = noise_on(straight(400), n_samples=256)
+    sarcl.backproject(
+        raw, grid, tolerance=tolerance, method="direct", device=as_gpu(device), max_bytes=max_bytes, check=False
+    )
+    assert max_bytes / 4 < most[0] <= max_bytes
