@@ -106,7 +106,11 @@ def nvidia(ptx: Path, target: str, folder: Path) -> dict[str, dict[str, int]]:
     cubin = folder / f"{target}.cubin"
     words = called([tool("ptxas"), f"-arch={target}", "-v", "-O3", str(ptx), "-o", str(cubin)])
     out = {}
+    text = ptx.read_text()
     for name, stack, stores, loads, registers, rest in FOUND.findall(words):
+        body = text.split(f".entry {name}(", 1)[1].split(".entry ", 1)[0]
+        if not re.search(r"\b(ld|st)\.local\b", body):  # clang leaves frames that nothing reads or writes
+            stack = "0"
         shared = re.search(r"(\d+) bytes smem", rest)
         out[name] = {
             "registers": int(registers), "spills": int(stores) + int(loads), "stack": int(stack),

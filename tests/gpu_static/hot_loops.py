@@ -34,6 +34,11 @@ HOT = {
     ("backproject.cl", "backproject"): Hot("VECTORS * VW", "pulse and pixel"),
     ("backproject_float64.cl", "backproject"): Hot("VW", "pulse and pixel"),
     ("backproject_lines.cl", "backproject_lines"): Hot("VW", "pulse and pixel"),
+    # the loop inside makes SIDE weights of lines and about FINE SIDE + 16 samples: a trip of a work-item makes one of
+    # both, and is counted as if it made both
+    ("backproject_shared_lines.cl", "backproject_shared_lines"): Hot(
+        "SIDE * SIDE / ITEMS", "pulse and pixel", loop="barrier", trips=("(SIDE + FINE * SIDE + 16) / ITEMS",)
+    ),
     ("beam.cl", "add"): Hot("USED * VW", "element and value of the beam"),
     ("beam.cl", "paths"): Hot("VW", "element and entry"),
     ("beam.cl", "times"): Hot("VW", "element and entry"),

@@ -1,5 +1,7 @@
 """What compilers say of the kernels on GPUs, without a GPU.
 
+    python tests/gpu_static/run.py             compile every program that plans build for GPUs, and compare figures
+    python tests/gpu_static/run.py --record    the same, and write figures.json and the tables of the page
     python tests/gpu_static/run.py --count FILE [MACRO=VALUE ...]    count one program: figures of every target, loops
     options: --text PATH (source text to compile in place of kernels/FILE), --keep FOLDER (PTX, cubin, listing)
 
@@ -11,12 +13,13 @@ from __future__ import annotations
 import argparse
 import sys
 import tempfile
+import time
 from pathlib import Path
 
 ROOT = Path(__file__).resolve().parents[2]
 sys.path[:0] = [str(ROOT / "tests"), str(ROOT / "bench")]
 
-from gpu_static import compilers, hot_loops, sass  # noqa: E402
+from gpu_static import compilers, figures, hot_loops, page, ratchet, sass  # noqa: E402
 from gpu_static.collect import Variant, kernels_in  # noqa: E402
 
 from sarcl.opencl._programs import source  # noqa: E402
@@ -50,9 +53,43 @@ def count(file: str, macros: list[str], text: str, folder: Path) -> int:
     return 1 if refused else 0
 
 
+def compare(record: bool) -> int:
+    """Compile everything; compare with the recorded figures, or record. 1 where something is worse or not allowed."""
+    start = time.monotonic()
+
+    def progress(done: int, total: int) -> None:
+        if sys.stderr.isatty():
+            print(f"\r{done} of {total} programs", end="" if done < total else "\n", file=sys.stderr)
+
+    found = figures.figures(progress)
+    wrong = ratchet.limits(found) + ratchet.coverage(found)
+    before = ratchet.recorded() if ratchet.RECORD.exists() else {"tools": {}, "figures": {}}
+    below: list[str] = []
+    if record:
+        now = {"tools": compilers.versions(), "first": figures.first(), "figures": found}
+        ratchet.RECORD.write_text(ratchet.text_of(now))
+        page.PAGE.write_text(page.written(page.PAGE.read_text(), now))
+        gone = sorted(set(before["figures"]) - set(found))
+        print(f"recorded {len(found)} programs, {len(set(found) - set(before['figures']))} new, {len(gone)} gone")
+    elif before["tools"] == compilers.versions():
+        above, below = ratchet.worse(found, before["figures"])
+        wrong += above
+    else:
+        print(f"figures are of {before['tools']}, and are not compared with those of {compilers.versions()}")
+    print("\n".join(wrong))
+    if below and not wrong:
+        print(f"{len(below)} figures are below the recorded ones, such as\n{below[0]}\nKeep what is won: "
+              "make gpu-static ARGS=--record")  # fmt: skip
+    kernels = sum(map(len, found.values()))
+    print(f"{len(found)} programs, {kernels} kernels for {', '.join(compilers.TARGETS)}: {len(wrong)} findings, "
+          f"{time.monotonic() - start:.0f} s. Intel: no compiler without a device in the registries")  # fmt: skip
+    return 1 if wrong else 0
+
+
 def main() -> int:
     parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
-    parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), required=True)
+    parser.add_argument("--record", action="store_true", help="write figures.json and the page's tables")
+    parser.add_argument("--count", nargs="+", metavar=("FILE", "MACRO=VALUE"), help="count one program")
     parser.add_argument("--text", type=Path, help="source text to compile in place of kernels/FILE, #include expanded")
     parser.add_argument("--keep", type=Path, help="folder for PTX, machine code and nvdisasm's listing")
     args = parser.parse_args()
@@ -61,6 +98,8 @@ def main() -> int:
     except FileNotFoundError as exc:
         print(exc, file=sys.stderr)
         return 2
+    if not args.count:
+        return compare(args.record)
     file, *macros = args.count
     text = args.text.read_text() if args.text else source(file)
     with tempfile.TemporaryDirectory() as scratch:

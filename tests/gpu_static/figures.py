@@ -1,0 +1,132 @@
+"""Figures of every program that plans build for a GPU: collected, compiled and counted, each program once."""
+
+from __future__ import annotations
+
+import hashlib
+import json
+import tempfile
+from collections.abc import Callable, Iterable
+from concurrent.futures import ThreadPoolExecutor
+from pathlib import Path
+from typing import Any
+
+import platformdirs
+from gpu_static import compilers, hot_loops, sass, tasks
+from gpu_static.collect import PAPER, WITHOUT_FP64, Use, Variant, collected
+
+from sarcl.opencl._programs import source
+
+ROOT = Path(__file__).resolve().parents[2]
+COUNTED = "sm_90"  # the target whose machine code is counted
+# Figures of one kernel of a variant: {target: {figure: number}}, those that are not zero, or {target: {"error": words}}
+Figures = dict[str, dict[str, Any]]
+
+
+def cache() -> Path:
+    """Folder of what earlier runs found, named by hashes of all that it follows from."""
+    return Path(platformdirs.user_cache_dir("sarcl")) / "gpu_static"
+
+
+def kept(key: Iterable[str], make: Callable[[], Any]) -> Any:
+    """What `make` returns, as JSON: from the cache where a run with the same key has left it there."""
+    digest = hashlib.sha256("\0".join(key).encode()).hexdigest()
+    path = cache() / f"{digest}.json"
+    try:
+        return json.loads(path.read_text())
+    except (OSError, ValueError):
+        made = make()
+    try:
+        path.parent.mkdir(parents=True, exist_ok=True)
+        with tempfile.NamedTemporaryFile("w", dir=path.parent, delete=False) as file:
+            json.dump(made, file)
+        Path(file.name).replace(path)
+    except OSError:  # a cache that cannot be written: the next run computes again
+        pass
+    return made
+
+
+def _text(*names: str) -> list[str]:
+    """Text of files of this folder, on which what they compute depends."""
+    return [Path(__file__).with_name(f"{name}.py").read_text() for name in names]
+
+
+def variants() -> dict[Variant, Use]:
+    """Programs that plans build, and what they do with them, on GPUs with and without float64."""
+    files = [*(ROOT / "sarcl").rglob("*.py"), *(ROOT / "kernels").glob("*.cl*"), ROOT / "bench" / "output_hashes.py"]
+    found = kept([*_text("collect", "tasks"), *(path.read_text() for path in sorted(files))], _collect)
+    return {
+        Variant.named(name): Use(names, {kernel: set(groups) for kernel, groups in launched.items()})
+        for name, (names, launched) in found.items()
+    }
+
+
+def first() -> dict[str, list[str]]:
+    """{task: names of the programs}, of the tasks that the page tells of first: their programs that use pairs."""
+    found = variants()
+    return {
+        name: sorted(v.name for v, use in found.items() if name in use.tasks and v.file.startswith("backproject"))
+        for name in tasks.OWN if name.startswith("spaceborne")
+    }  # fmt: skip
+
+
+def _collect() -> dict[str, Any]:
+    """As `variants`: {name of the variant: [tasks, {kernel: work-items per group}]}."""
+    out: dict[str, Any] = {}
+    for info, chosen in ((PAPER, tasks.tasks()), (WITHOUT_FP64, tasks.without_fp64())):
+        for variant, use in collected(chosen, info, tasks.UNTIL).items():
+            names, launched = out.setdefault(variant.name, [[], {}])
+            names += use.tasks
+            for kernel, groups in use.groups.items():
+                launched[kernel] = sorted({*launched.get(kernel, []), *groups})
+    return out
+
+
+def _counted(variant: Variant) -> dict[str, Figures]:
+    """{kernel: figures} of one program, all kernels of it."""
+    with tempfile.TemporaryDirectory() as scratch:
+        folder = Path(scratch)
+        made = compilers.compiled(variant, folder)
+        out: dict[str, Figures] = {}
+        for target, found in made.items():
+            if "error" in found:
+                out.setdefault("", {})[target] = {"error": found["error"]}
+                continue
+            for kernel, numbers in found.items():
+                out.setdefault(kernel, {})[target] = {k: v for k, v in dict(numbers).items() if v}
+        if "error" not in made[COUNTED]:
+            listing = compilers.listing(COUNTED, folder)
+            for kernel in made[COUNTED]:
+                try:
+                    found = hot_loops.cost(
+                        sass.code_of(listing, kernel), hot_loops.HOT.get((variant.file, kernel)), dict(variant.macros)
+                    )
+                except hot_loops.NotCounted as exc:
+                    out[kernel][COUNTED]["error"] = str(exc)
+                else:
+                    out[kernel][COUNTED]["instructions"] = round(found.each, 1)
+                    out[kernel][COUNTED]["loads"] = round(found.by_kind.get("load global", 0) / found.contributions, 1)
+    return out
+
+
+def figures(progress: Callable[[int, int], None]) -> dict[str, dict[str, Figures]]:
+    """{name of a variant: {kernel: figures}}, of kernels that tasks launch.
+
+    A program that a compiler refuses has its errors under the name of each kernel.
+    """
+    chosen = {variant: use for variant, use in variants().items() if use.groups}
+    versions = json.dumps(compilers.versions())
+    own = _text("compilers", "sass", "hot_loops")
+
+    def one(variant: Variant) -> dict[str, Figures]:
+        return kept([versions, *own, variant.name, source(variant.file)], lambda: _counted(variant))
+
+    out: dict[str, dict[str, Figures]] = {}
+    with ThreadPoolExecutor() as pool:
+        for done, (variant, found) in enumerate(zip(chosen, pool.map(one, chosen), strict=True), 1):
+            refused = found.pop("", {})
+            out[variant.name] = {
+                kernel: {"group": max(groups), **found.get(kernel, {}), **refused}
+                for kernel, groups in sorted(chosen[variant].groups.items())
+            }
+            progress(done, len(chosen))
+    return dict(sorted(out.items()))

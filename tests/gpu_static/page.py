@@ -1,0 +1,139 @@
+"""The tables of docs/developers/gpu_static.md, from recorded figures."""
+
+from __future__ import annotations
+
+from collections import defaultdict
+from typing import Any
+
+from gpu_static import occupancy, wavefronts
+from gpu_static.figures import COUNTED, ROOT
+from gpu_static.hot_loops import HOT
+from gpu_static.ratchet import IN_MEMORY, NOT_ON_GPUS
+
+PAGE = ROOT / "docs" / "developers" / "gpu_static.md"
+BEGIN, END = "<!-- tables: begin, made by `make gpu-static ARGS=--record` -->", "<!-- tables: end -->"
+SHOWN = "TAPS", "LINE_TAPS", "SLOPE_TAPS", "FINE", "RANGE", "FP64"  # macros by which the first table names programs
+# H200, inferred: 132 multiprocessors that issue to 4 x 32 lanes at 1.86 GHz, and pass wavefronts at 1.75 GHz.
+LANE_INSTRUCTIONS, WAVEFRONTS = 31.4e12, 132 * 1.75e9
+# Programs of the gather kernel for the same pulses and pixels, which take what lines cannot hold: the macros by which
+# they are found, and samples of a range profile per pulse as plans would choose them.
+GATHER = {
+    "1e-3": ({"TAPS": "4", "TERMS": "4", "RANGE": "0"}, 49152),
+    "3e-5": ({"TAPS": "6", "TERMS": "5", "RANGE": "1"}, 20480),
+}
+PLAIN = {"BEAM": "0", "BISTATIC": "0", "FP64": "1", "LOCAL": "0", "ORDER": "2", "WEIGHT": "0", "WRAP": "0"}
+
+
+def tables(record: dict[str, Any]) -> str:
+    """The generated part of the page."""
+    tools = ", ".join(f"{name} {version}" for name, version in record["tools"].items())
+    return "\n".join([BEGIN, f"\nMade by {tools}.\n", *_first(record), *_in_memory(record), *_files(record), END])
+
+
+def written(text: str, record: dict[str, Any]) -> str:
+    """The page with new tables."""
+    before, rest = text.split(BEGIN)
+    return before + tables(record) + rest.split(END)[1]
+
+
+def _first(record: dict[str, Any]) -> list[str]:
+    """Direct backprojection of a plane from a satellite: instructions, wavefronts, and the ceilings that follow."""
+    out = [
+        "## Direct backprojection of a plane\n",
+        "8192 x 8192 pixels of 0.25 m from 770 km, X band, 600 MHz: per pulse and pixel on sm_90. Instructions are "
+        "counted, wavefronts replayed; the ceilings in 10^9 pulses times pixels per second on an H200 are inferred "
+        "from both: no GPU has run this.\n",
+        "| tolerance | program | instructions | loads | wavefronts of 32 pairs, range along a line of pixels / across "
+        "| ceiling by instructions, inferred | by wavefronts, inferred |",
+        "|---|---|---|---|---|---|---|",
+    ]
+    rows = [(task.split()[1], name) for task, names in record["first"].items() for name in names]
+    for tolerance, (wanted, _) in GATHER.items():
+        rows += [
+            (tolerance, name) for name in record["figures"]
+            if name.startswith("backproject.cl ") and {**PLAIN, **wanted}.items() <= _macros(name).items()
+        ]  # fmt: skip
+    for tolerance, name in rows:
+        macros, file = _macros(name), name.split()[0]
+        kernel = next(k for k in record["figures"][name] if k.startswith("backproject"))
+        here = record["figures"][name][kernel][COUNTED]
+        fronts = _replayed(tolerance, file, {k: int(v) for k, v in macros.items()}, here["loads"])
+        chosen = ", ".join(f"{k} {macros[k]}" for k in SHOWN if k in macros)
+        ceilings = " / ".join(f"{WAVEFRONTS * 32 / f / 1e9:.0f}" for f in fronts)
+        each, words = here["instructions"], " / ".join(f"{f:.0f}" for f in fronts)
+        out.append(
+            f"| {tolerance} | {file}, {chosen} | {each:g} | {here['loads']:g} | {words} | "
+            f"{LANE_INSTRUCTIONS / each / 1e9:.0f} | {ceilings} |"
+        )
+    return [*out, ""]
+
+
+def _macros(name: str) -> dict[str, str]:
+    """Macros of a variant."""
+    return dict(macro.split("=") for macro in name.split()[1:])
+
+
+def _replayed(tolerance: str, file: str, macros: dict[str, int], loads: float) -> list[float]:
+    """Wavefronts per 32 contributions, with range along a line of pixels and across. Loads whose addresses are not
+    replayed count once: all lanes read one place."""
+    if file == "backproject_shared_lines.cl":
+        names = "SIDE", "ITEMS", "FINE", "LINE_TAPS", "SLOPE_TAPS"
+        return [loads + wavefronts.shared_lines(*(macros[name] for name in names))]
+    taps = macros["TAPS"]
+    samples = wavefronts.samples_of_pixels(2 / 299792458.0 * 600e6 / 8192 * GATHER[tolerance][1])
+    alike = loads - 2 * taps
+    return [alike + wavefronts.gather(s, taps, macros["VECTORS"])[0] for s in (samples, samples.transpose(0, 2, 1))]
+
+
+def _in_memory(record: dict[str, Any]) -> list[str]:
+    """Kernels with private arrays in memory, and programs that no GPU runs."""
+    out = ["## Known exceptions\n"]
+    for file, kernel in sorted(IN_MEMORY):
+        stacks = [
+            k[kernel][COUNTED].get("stack", 0) for name, k in record["figures"].items()
+            if name.split()[0] == file and kernel in k
+        ]  # fmt: skip
+        out.append(f"- `{file}`, kernel `{kernel}`: {max(stacks)} bytes of stack on sm_90: {IN_MEMORY[file, kernel]}.")
+    out += [f"- `{file}` is not compiled: {reason}." for file, reason in sorted(NOT_ON_GPUS.items())]
+    return [*out, ""]
+
+
+def _files(record: dict[str, Any]) -> list[str]:
+    """A table for each kernel, with a line for each variant."""
+    by_kernel: dict[tuple[str, str], list[str]] = defaultdict(list)
+    for name, kernels in record["figures"].items():
+        for kernel in kernels:
+            by_kernel[name.split()[0], kernel].append(name)
+    out = [
+        "## Every kernel and variant\n",
+        "Registers of sm_80 / sm_90; vector registers and waves per SIMD of gfx90a / gfx1100. Local memory, B per "
+        "group, and occupancy are those of sm_90, the latter for groups as launched, or of 256 where the driver "
+        "chooses. "
+        "Instructions and loads from global memory are counted in the hot loop on sm_90.\n",
+    ]
+    for (file, kernel), names in sorted(by_kernel.items()):
+        hot = HOT.get((file, kernel))
+        macros = {name: _macros(name) for name in names}
+        differ = [k for k in macros[names[0]] if len({m.get(k) for m in macros.values()}) > 1]
+        same = " ".join(f"{k}={v}" for k, v in macros[names[0]].items() if k not in differ)
+        unit = f"per {hot.unit}" if hot else "per trip of the largest innermost loop, or per work-item without loops"
+        out += [
+            f"### {file}: {kernel}\n",
+            f"Instructions {unit}.{f' All with {same}.' if same else ''}\n",
+            f"| {', '.join(differ) or 'variant'} | registers | local | occupancy | instructions | loads "
+            "| AMD registers | AMD waves |",
+            "|---|---|---|---|---|---|---|---|",
+        ]
+        for name in names:
+            n = record["figures"][name][kernel]
+            old, new, red, blue = (n[t] for t in ("sm_80", "sm_90", "gfx90a", "gfx1100"))
+            share = occupancy.nvidia("sm_90", new.get("registers", 0), new.get("local memory", 0), n["group"])
+            amd = " / ".join(str(t.get("registers", 0) + t.get("accumulators", 0)) for t in (red, blue))
+            out.append(
+                f"| {', '.join(str(macros[name].get(k)) for k in differ) or 'one'} | "
+                f"{old.get('registers', 0)} / {new.get('registers', 0)} | {new.get('local memory', 0)} | "
+                f"{share:.0%} | {new.get('instructions', 0):g} | {new.get('loads', 0):g} | {amd} | "
+                f"{red.get('waves', 0)} / {blue.get('waves', 0)} |"
+            )
+        out.append("")
+    return out

@@ -1,0 +1,145 @@
+"""Whether figures are no worse than those recorded, and within what every GPU allows."""
+
+from __future__ import annotations
+
+import json
+from pathlib import Path
+from typing import Any
+
+from gpu_static.compilers import TARGETS
+from gpu_static.figures import COUNTED, ROOT
+
+RECORD = Path(__file__).with_name("figures.json")
+REMEDY = (
+    "Make the kernel cheaper; or, if it is worth this, record it with `make gpu-static ARGS=--record` and say why in "
+    "the commit"
+)
+MOST_LOCAL = 48 * 1024  # bytes of local memory per work-group that every GPU has
+# Kernels whose private arrays lie in memory on GPUs, and why that is so.
+IN_MEMORY = {
+    (
+        "current_sums.cl",
+        "current_sums",
+    ): "paths of 32 cells, each read once per eight frequencies; to compute them anew "
+    "would take a fourth more instructions",
+    ("nufft2d.cl", "spread"): "a work-item owns a tile of the grid, which no GPU holds in registers",
+    ("spectral_echo.cl", "spread"): "a work-item owns a tile of the grid, which no GPU holds in registers",
+}
+# Programs that no plan for a GPU builds, and why.
+NOT_ON_GPUS = {
+    "trial.cl": "the trial of a device builds it, no plan does",
+    "backproject_lines.cl": "a work-item owns a tile of pixels; plans for one lane per work-item do not choose it",
+}
+RATCHETED = {"registers": "registers", "accumulators": "registers", "spills": "bytes or registers that spill",
+             "stack": "bytes of stack", "local memory": "bytes of local memory",
+             "instructions": "instructions per contribution"}  # fmt: skip
+
+Record = dict[str, Any]
+
+
+def recorded() -> Record:
+    """{"tools": versions, "figures": {variant: {kernel: figures}}}, as committed."""
+    found: Record = json.loads(RECORD.read_text())
+    return found
+
+
+def text_of(record: Record) -> str:
+    """JSON of a record: a line per target of each kernel."""
+    lines = ["{", f' "tools": {json.dumps(record["tools"])},',
+             f' "first": {json.dumps(record["first"])},', ' "figures": {']  # fmt: skip
+    for i, (variant, kernels) in enumerate(record["figures"].items()):
+        lines.append(f"  {json.dumps(variant)}: {{")
+        for j, (kernel, found) in enumerate(kernels.items()):
+            rows = [f"    {json.dumps(key)}: {json.dumps(value)}" for key, value in found.items()]
+            lines += [f"   {json.dumps(kernel)}: {{", ",\n".join(rows), "   }" + "," * (j + 1 < len(kernels))]
+        lines.append("  }" + "," * (i + 1 < len(record["figures"])))
+    return "\n".join([*lines, " }", "}"]) + "\n"
+
+
+def limits(found: dict[str, Any]) -> list[str]:
+    """Sentences on kernels that do not compile, spill, use a stack or take more local memory than every GPU has."""
+    out = []
+    for variant, kernels in found.items():
+        file = variant.split()[0]
+        for kernel, numbers in kernels.items():
+            for target in TARGETS:
+                here = numbers[target]
+                where = f"{variant}: kernel {kernel} on {target}"
+                if "error" in here:
+                    out.append(f"{where} cannot be compiled or counted: {here['error']}")
+                    continue
+                for name in ("spills", "stack"):
+                    if here.get(name) and (file, kernel) not in IN_MEMORY:
+                        out.append(
+                            f"{where}: {here[name]} {RATCHETED[name]}, wanted none. Keep arrays that are indexed by "
+                            "variables out of the kernel, or give a reason in tests/gpu_static/ratchet.py:IN_MEMORY"
+                        )
+                if here.get("local memory", 0) > MOST_LOCAL:
+                    out.append(
+                        f"{where}: {here['local memory']} bytes of local memory, wanted at most {MOST_LOCAL}. "
+                        "Make the tile or the group smaller"
+                    )
+    return out
+
+
+def coverage(found: dict[str, Any]) -> list[str]:
+    """Sentences on files of kernels/ of which no task builds a program, and on reasons that hold no longer."""
+    built = {variant.split()[0] for variant in found}
+    files = {path.name for path in (ROOT / "kernels").glob("*.cl")}
+    kernels = {(variant.split()[0], kernel) for variant, launched in found.items() for kernel in launched}
+    return [
+        *(f"kernels/{name}: no task of tests/gpu_static/tasks.py launches a kernel of it; add one that does, or give a "
+          "reason in tests/gpu_static/ratchet.py:NOT_ON_GPUS" for name in sorted(files - built - set(NOT_ON_GPUS))),
+        *(f"{name} is launched on GPUs; take it out of tests/gpu_static/ratchet.py:NOT_ON_GPUS"
+          for name in sorted(built & set(NOT_ON_GPUS))),
+        *(f"{file} {kernel} has no stack any more; take it out of tests/gpu_static/ratchet.py:IN_MEMORY"
+          for file, kernel in IN_MEMORY if (file, kernel) in kernels and not _in_memory(found, file, kernel)),
+    ]  # fmt: skip
+
+
+def _in_memory(found: dict[str, Any], file: str, kernel: str) -> bool:
+    numbers = [k[kernel] for variant, k in found.items() if variant.split()[0] == file and kernel in k]
+    return any(n[target].get(name) for n in numbers for target in TARGETS for name in ("spills", "stack"))
+
+
+def worse(found: dict[str, Any], before: dict[str, Any]) -> tuple[list[str], list[str]]:
+    """Sentences on figures above the recorded ones, and on figures below them.
+
+    A variant that is not recorded may cost what the costliest recorded variant of its kernel costs, of those with its
+    FP64. A kernel that is not recorded at all is worse.
+    """
+    above, below = [], []
+    for variant, kernels in found.items():
+        for kernel, numbers in kernels.items():
+            known = before.get(variant, {}).get(kernel)
+            alike = [known] if known else _alike(before, variant, kernel)
+            if not alike:
+                above.append(f"{variant}: kernel {kernel} has no recorded figures. {REMEDY}")
+                continue
+            for target in TARGETS:
+                for name, words in RATCHETED.items():
+                    got = numbers[target].get(name, 0)
+                    wanted = max(other.get(target, {}).get(name, 0) for other in alike)
+                    line = f"{variant}: kernel {kernel} on {target}: {got} {words}, recorded {wanted}"
+                    if got > wanted:
+                        note = "" if known else " at most, for variants of this kernel"
+                        above.append(f"{line}{note}. {REMEDY}")
+                    elif got < wanted and known:
+                        below.append(line)
+    return above, below
+
+
+def _alike(before: dict[str, Any], variant: str, kernel: str) -> list[dict[str, Any]]:
+    """Recorded figures of variants of the same file, kernel and FP64."""
+    file, *macros = variant.split()
+    mark = next((m for m in macros if m.startswith("FP64=")), "")
+    return [
+        kernels[kernel] for name, kernels in before.items()
+        if name.split()[0] == file and kernel in kernels and (not mark or mark in name.split())
+    ]  # fmt: skip
+
+
+def counted(numbers: dict[str, Any]) -> float | None:
+    """Instructions per contribution."""
+    value = numbers[COUNTED].get("instructions")
+    return None if value is None else float(value)

@@ -1,0 +1,113 @@
+"""Tasks whose plans `make gpu-static` compiles: those of bench/output_hashes.py that use a device, and others here.
+
+The others use what output_hashes.py leaves out (range-Doppler, spectral echoes, full wave, beams of antennas), and the
+geometry of a satellite at the tolerances whose figures the page prints first.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+import output_hashes
+
+import sarcl
+from sarcl import shapes
+
+# Tasks of output_hashes.py: those that use no device, run others' plans again, or cannot do with numbers of paper.
+LEFT_OUT = (
+    "command", "scenario", "plan", "pointing", "motion", "waveforms", "antennas", "scenes", "noise", "autofocus",
+    "multilook", "map_aperture", "compress", "echo file", "image file", "ambiguity",
+)  # fmt: skip
+# Tasks that are run on a GPU without float64 too: those that reach kernels or branches of them that differ there.
+WITHOUT_FP64 = (
+    "spaceborne", "direct 1e", "direct points", "direct bistatic", "direct wide", "direct wrap", "direct beam",
+    "factorized 1e-02", "factorized 1e-03", "factorized bistatic", "factorized points", "echo points 1e",
+    "echo points far", "echo points bistatic", "echo antenna pair", "echo facets 1e-4", "echo facets bistatic",
+    "echo terrain tank",
+    "array facets", "beam", "antenna beam", "pixel taper", "spectral_echo",
+)  # fmt: skip
+# Tasks of which the plan alone is wanted: they end at the first launch of a kernel whose name begins so.
+UNTIL = {"spaceborne": "backproject"}
+
+
+def spaceborne(tolerance: float) -> Any:
+    """Direct backprojection of 8192 x 8192 pixels of 0.25 m, from 770 km: X band, 600 MHz, 11 566 pulses.
+
+    The rows of samples share memory, and blocks are small: the task ends at the first of them.
+    """
+    rows, samples = 11566, 8192
+    along = (np.arange(rows) - rows / 2) * 1.5
+    tx = np.stack([np.full(rows, 770e3 * 0.6), along, np.full(rows, 770e3 * 0.8)], axis=1)
+    noise = np.random.default_rng(1).standard_normal(2 * samples).astype(np.float32).view(np.complex64)
+    raw = sarcl.PhaseHistory(
+        np.broadcast_to(noise, (rows, samples)), frequency=9.65e9 - 300e6, frequency_step=600e6 / samples, tx=tx,
+        reference_range=np.linalg.norm(tx, axis=1),
+    )  # fmt: skip
+    grid = sarcl.ImageGrid.plane(shape=(8192, 8192), spacing=0.25)
+    return sarcl.backproject(raw, grid, tolerance=tolerance, method="direct", check=False, max_bytes=2e9)
+
+
+def range_doppler(tolerance: float) -> Any:
+    """Broadside strip at X band, 300 MHz, 10 km."""
+    n = 256
+    y = 60.0 * (np.arange(n) / (n - 1) - 0.5)
+    tx = np.stack([np.full(n, -7e3), y, np.full(n, 7e3)], axis=1)
+    noise = np.random.default_rng(1).standard_normal((n, n)).astype(np.float32).view(np.complex64)
+    raw = sarcl.PhaseHistory(
+        noise, frequency=9.6e9, frequency_step=300e6 / noise.shape[1], tx=tx, time=np.linspace(0, 2.4, n),
+        reference_range=np.linalg.norm(tx, axis=1),
+    )  # fmt: skip
+    return sarcl.range_doppler(raw, tolerance=tolerance, check=False)
+
+
+def spectral(tolerance: float, **options: Any) -> Any:
+    """Rough facets of 1 m in the beam of a straight track, by Fourier transforms."""
+    axis, look = np.linspace(-8, 8, 17), np.radians(50)
+    material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
+    heights = np.random.default_rng(0).normal(size=(17, 17)) * 0.02
+    scene = sarcl.Scene.from_heights(6e3 * np.tan(look) + axis, axis, heights, material=material, **options)
+    line = sarcl.Trajectory.line(start=(0, -60, 6e3), velocity=(0, 100, 0), prf=125, n_pulses=150)
+    track = sarcl.pointing.stripmap(line, look=look, side="right")
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=0.5e-6)
+    return sarcl.spectral_echo(
+        scene, chirp, track, antenna=sarcl.Antenna.gaussian(width=(0.012, 0.3)), max_edge=None, shadows=False,
+        tolerance=tolerance, check=False,
+    )  # fmt: skip
+
+
+def full_wave(**options: Any) -> Any:
+    """A conducting sphere, each pulse with a run of its own or formed from one run."""
+    angle = np.deg2rad([20.0, 21, 22, 23, 24, 25, 26, 27])
+    track = sarcl.Trajectory(None, 40 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1))
+    chirp = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
+    return sarcl.fullwave_echo(shapes.sphere(0.1, edge=0.02), chirp, track, cells=10, **options)
+
+
+def antenna_beam(**options: Any) -> Any:
+    """Direct backprojection, every pulse weighted by an antenna's pattern."""
+    antenna = sarcl.Antenna.gaussian(width=(0.002, 0.003), gain_db=30)
+    return output_hashes.focus(beam=antenna, **options)
+
+
+OWN: dict[str, Callable[[], Any]] = {
+    **{f"spaceborne {t:.0e}".replace("-0", "-"): lambda t=t: spaceborne(t) for t in (1e-3, 3e-5)},
+    "range_doppler": lambda: range_doppler(1e-2),
+    "spectral_echo": lambda: spectral(1e-2),
+    "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),
+    "fullwave_echo": lambda: full_wave(anchors=2),
+    "antenna beam": antenna_beam,
+    "antenna beam window": lambda: antenna_beam(window="hamming"),
+    "pixel taper": lambda: output_hashes.focus(beam=0.0015, window=(None, "hamming")),
+}
+
+
+def tasks() -> dict[str, Callable[[], Any]]:
+    """Every task, by name."""
+    return {**{k: v for k, v in output_hashes.TASKS.items() if not k.startswith(LEFT_OUT)}, **OWN}
+
+
+def without_fp64() -> dict[str, Callable[[], Any]]:
+    """The tasks that are run on a GPU without float64 too."""
+    return {name: task for name, task in tasks().items() if name.startswith(WITHOUT_FP64)}

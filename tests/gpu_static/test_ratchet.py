@@ -1,0 +1,87 @@
+"""What the comparison with recorded figures finds, and what it says; and that page and record agree."""
+
+from __future__ import annotations
+
+import copy
+
+import pytest
+from gpu_static import occupancy, page, ratchet
+from gpu_static.compilers import TARGETS
+
+
+@pytest.fixture
+def figures():
+    """Figures of two variants of a kernel, none wrong."""
+    cheap = {"group": 64, **{target: {"registers": 64} for target in TARGETS}}
+    cheap["sm_90"] = {"registers": 64, "instructions": 74.2}
+    dear = copy.deepcopy(cheap)
+    dear["sm_90"] |= {"registers": 80, "instructions": 101.5}
+    return {"a.cl FP64=1 TAPS=2": {"sum": cheap}, "a.cl FP64=1 TAPS=4": {"sum": dear}}
+
+
+def test_equal_figures_are_neither_worse_nor_better(figures):
+    assert ratchet.worse(figures, copy.deepcopy(figures)) == ([], []) and ratchet.limits(figures) == []
+
+
+@pytest.mark.parametrize("name, words", [("registers", "registers"), ("instructions", "instructions per contribution")])
+def test_a_figure_above_the_recorded_one_names_variant_got_wanted_and_remedy(figures, name, words):
+    before = copy.deepcopy(figures)
+    figures["a.cl FP64=1 TAPS=2"]["sum"]["sm_90"][name] = 90
+    (said,), below = ratchet.worse(figures, before)
+    wanted = before["a.cl FP64=1 TAPS=2"]["sum"]["sm_90"][name]
+    assert said.startswith(f"a.cl FP64=1 TAPS=2: kernel sum on sm_90: 90 {words}, recorded {wanted}.")
+    assert "make gpu-static ARGS=--record" in said and not below
+    above, (better,) = ratchet.worse(before, figures)
+    assert not above and f"recorded {90}" in better
+
+
+def test_a_variant_without_figures_may_cost_what_the_costliest_of_its_kernel_does(figures):
+    before = copy.deepcopy(figures)
+    figures["a.cl FP64=1 TAPS=3"] = copy.deepcopy(figures["a.cl FP64=1 TAPS=4"])
+    assert ratchet.worse(figures, before) == ([], [])
+    figures["a.cl FP64=1 TAPS=3"]["sum"]["sm_90"]["instructions"] = 102
+    (said,), _ = ratchet.worse(figures, before)
+    assert "a.cl FP64=1 TAPS=3" in said and "recorded 101.5 at most, for variants of this kernel" in said
+    (said,), _ = ratchet.worse({"a.cl FP64=0 TAPS=2": figures["a.cl FP64=1 TAPS=2"]}, before)
+    assert "a.cl FP64=0 TAPS=2: kernel sum has no recorded figures" in said
+
+
+@pytest.mark.parametrize(
+    "figure, words",
+    [({"spills": 8}, "8 bytes or registers that spill, wanted none"), ({"stack": 48}, "48 bytes of stack, wanted none"),
+     ({"local memory": 49153}, "49153 bytes of local memory, wanted at most 49152"),
+     ({"error": "no type 'x'"}, "no type 'x'")],
+)  # fmt: skip
+def test_what_no_gpu_should_run_is_named(figures, figure, words):
+    figures["a.cl FP64=1 TAPS=2"]["sum"]["gfx90a"] |= figure
+    (said,) = ratchet.limits(figures)
+    assert said.startswith("a.cl FP64=1 TAPS=2: kernel sum on gfx90a") and words in said
+
+
+def test_files_that_no_task_uses_and_reasons_that_hold_no_longer_are_named(figures):
+    missing = [line for line in ratchet.coverage(figures) if "no task of tests/gpu_static/tasks.py" in line]
+    assert any("kernels/backproject.cl" in line for line in missing)
+    assert not any("backproject_lines.cl" in line for line in missing)
+    built = ratchet.coverage({"backproject_lines.cl VW=1": {}})
+    assert any("backproject_lines.cl is launched on GPUs" in line for line in built)
+    file, kernel = next(iter(ratchet.IN_MEMORY))
+    clean = {f"{file} VW=1": {kernel: {target: {} for target in TARGETS}}}
+    assert any(f"{file} {kernel} has no stack any more" in line for line in ratchet.coverage(clean))
+
+
+def test_the_record_is_json_and_is_what_the_page_shows():
+    record = ratchet.recorded()
+    assert ratchet.RECORD.read_text() == ratchet.text_of(record)
+    text = page.PAGE.read_text()
+    assert page.written(text, record) == text, "type: make gpu-static ARGS=--record"
+    assert ratchet.limits(record["figures"]) == ratchet.coverage(record["figures"]) == []
+
+
+@pytest.mark.parametrize(
+    "registers, local, group, share",
+    [(32, 0, 256, 1.0), (64, 0, 256, 0.5), (80, 0, 256, 0.375), (128, 0, 256, 0.25), (168, 0, 256, 0.125),
+     (32, 0, 16, 0.5), (64, 48 * 1024, 256, 0.5), (32, 64 * 1024, 256, 0.375), (32, 0, 0, 1.0)],
+)  # fmt: skip
+def test_occupancy_follows_registers_local_memory_and_groups(registers, local, group, share):
+    """Values of NVIDIA's occupancy calculator for compute capability 9.0."""
+    assert occupancy.nvidia("sm_90", registers, local, group) == share
