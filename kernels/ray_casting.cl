@@ -18,8 +18,6 @@
 
 #include "facet_points.clh"
 
-#define DEPTH 12
-
 static inline int any_bits(int8 m, int8 value) {
     int8 b = m & value;
     int4 c = b.lo | b.hi;
@@ -64,24 +62,29 @@ static inline int blocked(__global const float *leaf, __global const float *node
     inverse.x = 1 / (size.x < 1e-12f ? 1e-12f : d.x);
     inverse.y = 1 / (size.y < 1e-12f ? 1e-12f : d.y);
     inverse.z = 1 / (size.z < 1e-12f ? 1e-12f : d.z);
-    int todo[DEPTH];
+    // Children to be visited, a bit each: those of this level in the lowest byte, those of the level above in the next,
+    // 16 levels in all. An array indexed by the level would lie in memory on GPUs.
+    ulong todo = touched(node, p, inverse), above = 0;
     int level = 0, at = 0;
-    todo[0] = touched(node, p, inverse);
     while (level >= 0) {
-        if (!todo[level]) {
+        int here = (int)(todo & 255);
+        if (!here) {
             level--;
             at >>= 3;
+            todo = todo >> 8 | above << 56;
+            above >>= 8;
             continue;
         }
-        int child = 31 - clz(todo[level]);
-        todo[level] ^= 1 << child;
+        int child = 31 - clz(here);
+        todo ^= 1UL << child;
         int next = 8 * at + child;
         if (level == depth - 1) {
             if (crossed(leaf + 72 * (size_t)next, p, d, z, shrink)) return 1;
         } else {
             level++;
             at = next;
-            todo[level] = touched(node + 48 * ((size_t)base[level] + at), p, inverse);
+            above = above << 8 | todo >> 56;
+            todo = todo << 8 | (ulong)touched(node + 48 * ((size_t)base[level] + at), p, inverse);
         }
     }
     return 0;
