@@ -24,6 +24,7 @@ from .factorized.plan import FactorPlan
 from .float64 import direct as float64_direct
 from .float64 import plan as float64_plan
 from .focusing_task import FocusingTask
+from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
@@ -127,6 +128,12 @@ class _Float32:
     def direct(self, on: DeviceClass) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
         self._must_round_less("in complex64", self._best())
+        radius = tiling_of(self.task.grid, 8).radius  # of the smallest tiles
+        if not self.task.resolves_beam(radius):
+            raise ToleranceUnreachable(
+                self.tolerance, None, "float32 differences in a beam", "take smaller pixels, or a device with float64",
+                how=f"in complex64: beam is narrower than float32 resolves in tiles of {radius:.3g} m so near a track",
+            )  # fmt: skip
         try:
             made = direct_method.make_plan(self.task, self.inner, on)
         except ToleranceUnreachable as refused:

@@ -28,6 +28,7 @@ Skip = Literal["range window", "beam", "zero weight", "no data"]
 # full angle, rad, and direction of the axis; or an antenna, and its direction or attitude
 BeamCone = float | tuple[float, ArrayLike] | Antenna | tuple[Antenna, ArrayLike | Trajectory]
 SKIPS = ("range window", "beam", "zero weight", "no data")
+BEAM_EDGE = 1e-5  # rad: pixels so near the edge of a beam may count as inside or outside
 
 
 @dataclass(frozen=True, eq=False)
@@ -60,6 +61,20 @@ class FocusingTask:
     def weighs_pixels(self) -> bool:
         """Whether a row has another weight in each pixel."""
         return self.taper is not None or self.antenna is not None
+
+    def resolves_beam(self, radius: float) -> bool:
+        """Whether float32 tells on which side of a beam's edge the pixels of a tile of so many m lie, to BEAM_EDGE rad.
+
+        (x - T).b - |x - T| cos alpha is computed by differences from the tile's middle, up to the radius, whose squares
+        are divided by the distance: roundings of 6e-8 of 2 radius + radius^2/distance.
+        """
+        if self.antennas.beam is None:
+            return True
+        distance = self.antennas.distance(self.grid.bounds)
+        if not distance:
+            return False
+        off = 6e-8 * (2 * radius + radius**2 / distance)
+        return bool(off <= BEAM_EDGE * distance * max(np.sin(self.antennas.beam_angle / 2), BEAM_EDGE))
 
     @property
     def highest(self) -> float:

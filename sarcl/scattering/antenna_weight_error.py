@@ -42,6 +42,8 @@ def weight_error(
         found = _sampled(beam, scene, waveform, polarizations, vertical, pulses, many)
         if found is not None:
             return found
+    if beam.axes is None:  # there is no beam: the facets send nothing back, which is said where echoes are added up
+        return WeightError()
     raise NothingSeen(out_of_beam(beam, scene))
 
 
@@ -89,6 +91,8 @@ def _sampled(
             coefficients = np.abs(2 / len(band) * np.cos(angles) @ values)  # Chebyshev's, of the weights over the band
             tails = np.cumsum(coefficients[::-1], axis=0)[::-1]
             left[1:] += [(power * (2 * tails[n]) ** 2).sum() for n in range(1, MOST_NODES + 1)]
+    if not total and not n_facets:  # points without amplitude, or of another polarisation: nothing to weigh
+        return WeightError()
     if not seen:
         return None
     dim = max(1.0, beam.peak * float(np.sqrt(total / seen)))

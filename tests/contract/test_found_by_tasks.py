@@ -44,6 +44,26 @@ def test_sub_apertures_of_one_place_alone(shape):
     assert image_error(image, raw, most=20) <= image.report.predicted_error <= 1e-2
 
 
+@pytest.mark.parametrize("method", ["direct", "factorized"])
+@pytest.mark.parametrize("spacing", [30.0, 1e3, 13e3])
+def test_pixels_far_apart_lie_in_a_narrow_beam_or_outside(spacing, method, device):
+    # tiles of 32 such pixels are far larger than the distance: float32 did not tell the sides of the beam's edge
+    tx = 303.0 * np.stack([-0.8 + 0 * (t := np.linspace(-0.2, 0.2, 8)), t, 0.6 + 0 * t], axis=1)
+    raw = noise_on(tx, center=17e9, bandwidth=6e5, n_samples=64)
+    grid = sarcl.ImageGrid.plane(shape=(3, 3), spacing=spacing)
+    for angle in (0.003, 0.05, 1.0):
+        try:
+            image = sarcl.backproject(
+                raw, grid, wrap=True, beam=angle, tolerance=1e-2, method=method, check=False, device=device
+            )
+        except sarcl.ToleranceUnreachable as exc:
+            assert "beam is narrower than float32 resolves" in str(exc) or method == "factorized"
+            assert method == "factorized" or not device.info.fp64
+            continue
+        error = image_error(image, raw, wrap=True, beam=(angle, -tx / np.linalg.norm(tx, axis=1)[:, None]))
+        assert error <= image.report.predicted_error <= 1e-2, angle
+
+
 def test_a_beam_that_a_short_track_sees_far_from_its_peak_is_refused_or_right():
     # a track of 14 mm sees each point at one aspect, where the beam's slope is steep: 0.32 was measured at 0.11
     track = sarcl.Trajectory.line(start=(-95, -0.007, 95), velocity=(0, 1, 0), prf=437.0, n_pulses=6)
@@ -62,6 +82,28 @@ def test_a_beam_that_a_short_track_sees_far_from_its_peak_is_refused_or_right():
                 refused += 1
                 assert "use echo" in str(exc) or "aim at the scene" in str(exc), seed
     assert refused
+
+
+def test_points_of_no_amplitude_are_told_as_such_with_a_radar_and_an_antenna_without_a_beam():
+    track = sarcl.Trajectory.line(start=(-700, -5, 700), velocity=(0, 10, 0), prf=16.0, n_pulses=4)
+    chirp = sarcl.Waveform.chirp(center=1e10, bandwidth=1e8, duration=1e-6)
+    options = {"radar": sarcl.Radar(power=100.0), "antenna": sarcl.Antenna.isotropic(gain_db=3.0)}
+    nothing = sarcl.Scene.points([[0.0, 0, 0]], 0.0)
+    assert not sarcl.echo(nothing, chirp, track, skip=False, **options).samples.any()
+    with pytest.raises(ValueError, match="zero reflectivity"):
+        sarcl.echo(nothing, chirp, track, **options)
+    for antenna in (None, options["antenna"]):
+        with pytest.raises(ValueError, match=r"polarization is \('HV',\), in which points send back nothing"):
+            sarcl.echo(
+                sarcl.Scene.points([[0.0, 0, 0]]), chirp, track, polarization="HV", **{**options, "antenna": antenna}
+            )
+
+
+def test_spectral_echo_refuses_tracks_within_a_few_wavelengths():
+    track = sarcl.Trajectory.line(start=(-3, -0.5, 3), velocity=(0, 1, 0), prf=8.0, n_pulses=8)
+    chirp = sarcl.Waveform.chirp(center=2e7, bandwidth=1e6, duration=1e-4)
+    with pytest.raises(ValueError, match=r"a Fresnel zone is so wide that spectral_echo would continue.*use echo"):
+        sarcl.spectral_echo(sarcl.Scene.points([[0.0, 0, 0]]), chirp, track)
 
 
 def test_cross_polarised_echoes_that_are_rounding_alone_are_refused():

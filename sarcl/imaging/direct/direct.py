@@ -46,12 +46,14 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
                 tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest,
                 local_memory=on.local_memory,
             )  # fmt: skip
+    if lined is not None and not task.resolves_beam(LineTiling(grid, lined.side).radius):
+        lined = None
     if lined is not None and lined.cost < 0.9:  # no other plan costs less
         return lined, LineTiling(grid, lined.side)
     tilings = {side**2: tiling_of(grid, side) for side in (32, 16, 8)}
     plan = cheapest(
         tolerance,
-        [(n, tiling.radius) for n, tiling in tilings.items()],
+        [(n, tiling.radius) for n, tiling in tilings.items() if n == 64 or task.resolves_beam(tiling.radius)],
         distance=task.antennas.distance(grid.bounds),
         frequency=highest,
         bandwidth=bandwidth,

@@ -197,6 +197,8 @@ class _Case:
         if first is None:
             return f"interpolation of range profiles with {max(interpolation.TERMS)} taps has an error above its share"
         tiling = LineTiling(grid, chain[-1]) if self.lines else tiling_of(grid, chain[-1])
+        if not self.task.resolves_beam(tiling.radius):
+            return f"beam is narrower than float32 resolves in tiles of {tiling.radius:.3g} m so near a track"
         factors = tuple(side // chain[-1] for side in chain)
         radii = tiling.level_radii(factors)
         decimations: list[Decimation] = []

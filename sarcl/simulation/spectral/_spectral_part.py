@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from ...base.errors import ToleranceUnreachable
+from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...base.tolerances import rounded_up
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
@@ -146,6 +146,12 @@ def plan_part(
     parts = float(np.sqrt(1 + sum(hard)))  # maps whose errors add up
     of_transfer, of_grid = TRANSFER * tolerance / parts, GRID * tolerance / parts
     seen_aspects = aspects(*inner, (nearest, farthest), band, lags, of_transfer / 3, hard)
+    widest = max(abs(sine) for sine in seen_aspects.support)
+    if widest >= 1:
+        raise NotApplicable(
+            f"scatterers are seen from {nearest:.3g} m, where a Fresnel zone is so wide that spectral_echo would "
+            "continue their responses beyond the direction of the track; use echo"
+        )
     ends = [azimuth + ranges * float(tangent(end)) for end in seen_aspects.support]
     reached = (ends[0] <= track.length) & (ends[1] >= 0)
     if amplitudes.edges is not None:
