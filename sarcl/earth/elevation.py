@@ -79,7 +79,10 @@ class ElevationModel:
     ) -> ElevationModel:
         """The elevation model of a file that rasterio reads; arguments and errors as in `Scene.from_dem`."""
         tile = elevation.load(path, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external)
-        return cls(tile.longitude, tile.latitude, tile.height)
+        try:
+            return cls(tile.longitude, tile.latitude, tile.height)
+        except ValueError as exc:  # of a damaged georeference
+            raise ValueError(f"DEM {Path(path).name!r}: {exc}") from None
 
     @property
     def lowest(self) -> float:

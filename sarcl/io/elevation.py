@@ -111,7 +111,7 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
                 if is_file and not external:
                     _other_files.check_parts(path, file.driver, file.files, name)
                 yield file
-        except RasterioIOError as exc:
+        except (RasterioIOError, UnicodeDecodeError) as exc:  # the latter of GDAL's messages about names in the file
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
 
 

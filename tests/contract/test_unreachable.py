@@ -353,7 +353,7 @@ MAY_CATCH = {
     "experiments/fda/_sweep.py": "the values of a sweep are put before a message, which is raised again",
     "base/host_memory.py": "a system that does not say its memory",
     "cli/_methods.py": "text of a command line: a number, or the name of a file",
-    "earth/elevation.py": "numpy's shapes that do not fit together",
+    "earth/elevation.py": "numpy's shapes that do not fit together; the file is put before a message",
     "earth/two_line.py": "text that is no number",
     "io/orbit_files.py": "dates that do not exist",
     "model/_orbit_arguments.py": "numpy's shapes that do not fit together",

@@ -58,7 +58,7 @@ def gotcha_file(path):
 
 def raster_file(path):
     rasterio = pytest.importorskip("rasterio", reason="no rasterio: pip install sarcl[dem]")
-    driver = {".tif": "GTiff", ".asc": "AAIGrid", ".bil": "EHdr", ".nc": "netCDF"}[path.suffix]
+    driver = {".tif": "GTiff", ".asc": "AAIGrid"}[path.suffix]
     made = path.with_name("made.tif")
     with rasterio.open(
         made, "w", driver="GTiff", height=6, width=5, count=1, dtype="float32", crs="EPSG:4326", nodata=-9999,
@@ -68,8 +68,12 @@ def raster_file(path):
     if driver == "GTiff":
         made.replace(path)
     else:
-        rasterio.shutil.copy(made, path, driver=driver)
+        from rasterio.shutil import copy
+
+        copy(made, path, driver=driver)
         made.unlink()
+        prj = path.with_suffix(".prj")  # the CRS lies beside the heights, also beside mutated ones
+        prj.with_name(f"mutated-{prj.name}").write_bytes(prj.read_bytes())
 
 
 def virtual_raster_file(path):
