@@ -5,6 +5,7 @@ from __future__ import annotations
 import ctypes
 import ctypes.util
 import struct
+from pathlib import Path
 from typing import Any, NamedTuple
 
 from ..base import host_memory
@@ -112,9 +113,17 @@ def _pci(handle: Any) -> str:
     return ""
 
 
+def _loader() -> str | None:
+    """The library that finds OpenCL drivers: the system's, else that inside pyopencl's wheel."""
+    import pyopencl
+
+    inside = Path(pyopencl.__file__).parent.parent.glob("pyopencl.libs/libOpenCL*")
+    return ctypes.util.find_library("OpenCL") or next(map(str, inside), None)
+
+
 def raw_info(handle: Any, question: int, size: int) -> bytes:
     """Bytes that clGetDeviceInfo answers to a question that pyopencl does not know; none where it refuses."""
-    loader = ctypes.util.find_library("OpenCL")
+    loader = _loader()
     place = asked(handle, "int_ptr")
     if loader is None or place is None:
         return b""

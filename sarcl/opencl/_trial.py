@@ -105,7 +105,8 @@ def trial(handle: Any, lanes: int, fp64: bool, local_memory: int, max_group: int
     import pyopencl
 
     try:
-        queue = pyopencl.CommandQueue(pyopencl.Context([handle]))
+        context = pyopencl.Context([handle])  # kept by name: Intel's CPU runtime frees one that only a queue holds
+        queue = pyopencl.CommandQueue(context)
         kernels = _built(queue, lanes, 0)
         why = _wrong_numbers(queue, kernels["compute"], lanes)
         if why:

@@ -1,5 +1,6 @@
 """Drivers that refuse questions, or whose answers cannot be true: their devices are passed over, the rest is used."""
 
+import struct
 from types import SimpleNamespace
 
 import pytest
@@ -106,9 +107,31 @@ def test_what_plans_ask_of_a_device_is_sensible_on_every_device():
                 assert info.warp == 1 and info.fast_fp64 == info.fp64
 
 
-def test_the_warp_of_a_gpu_is_asked_of_its_driver():
+def gpu(**answers):
     import pyopencl
 
-    gpu = {"type": pyopencl.device_type.GPU, "name": "G"}
-    for known, warp in (({"warp_size_nv": 32}, 32), ({"wavefront_width_amd": 64}, 64), ({}, _queries.GPU_WARP)):
-        assert _queries.facts(SimpleNamespace(**gpu, **known)).warp == warp
+    return SimpleNamespace(type=pyopencl.device_type.GPU, name="G", **answers)
+
+
+def test_the_warp_of_a_gpu_is_asked_of_its_driver_and_else_of_the_trials_compiler():
+    for known, warp in (({"warp_size_nv": 32}, 32), ({"wavefront_width_amd": 64}, 64), ({}, 0)):
+        assert _queries.facts(gpu(**known)).warp == warp
+
+
+def test_the_place_on_the_bus_is_asked_in_the_three_ways_of_drivers(monkeypatch):
+    nvidia = gpu(pci_bus_id_nv=0x41, pci_slot_id_nv=8)
+    amd = gpu(topology_amd=SimpleNamespace(bus=0x41, device=1, function=0))
+    khronos = gpu(extensions="cl_khr_fp64 cl_khr_pci_bus_info")
+    monkeypatch.setattr(_queries, "raw_info", lambda *question: struct.pack("4I", 0, 0x41, 1, 0))
+    assert [_queries.facts(handle).pci for handle in (nvidia, amd, khronos)] == ["41:01.0"] * 3
+    monkeypatch.setattr(_queries, "raw_info", lambda *question: b"")
+    assert _queries.facts(khronos).pci == _queries.facts(gpu()).pci == ""
+
+
+def test_a_question_that_pyopencl_does_not_know_is_asked_of_the_driver_itself():
+    if _queries._loader() is None:
+        pytest.skip("no library that finds OpenCL drivers")
+    vendor_id, no_question = 0x1001, 0x7FFF
+    for _, handle in device_list.listed():
+        assert struct.unpack("I", _queries.raw_info(handle, vendor_id, 4))[0] == handle.vendor_id
+        assert _queries.raw_info(handle, no_question, 4) == b""
