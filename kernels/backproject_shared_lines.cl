@@ -46,11 +46,29 @@ DEFINE_SLOPES(line_slopes, SLOPE_TAPS, SLOPE_TERMS)
 #define OUTER ((LINE_TAPS - SLOPE_TAPS) / 2)  // taps on either side that have no slopes
 #endif
 
-// Records of a group of pulses, in int32: a head, then one entry per pulse. Entries of pulses by lines come first, those of
-// pulses pixel by pixel from the end on.
+// Records of a group of pulses, in 32 bits each: a head, then one entry per pulse. Entries of pulses by lines come first,
+// those of pulses pixel by pixel from the end on.
 enum { H_LINES, H_PIXELS, H_MIDDLE, H_OUTSIDE, N_HEAD };  // pulses by lines, pixel by pixel; middle; outside + 65536 unlit
-enum { E_PULSE, E_FROM, E_COUNT, E_UNUSED, N_ENTRY };    // pulse; first sample of T about the reference pixel; samples of T
+// The pulse; first sample of T about the reference pixel; samples of T; then float32: what making T takes of line_geometry,
+// and what making W takes, for lines along the group's axis. `samples` are those of T per metre.
+enum {
+    E_PULSE, E_FROM, E_COUNT, E_BASE, E_STEP, E_STEP_LOW, E_FRAC, E_FINE, E_FINE_LOW,
+    E_RATIO, E_RATIO_LOW, E_ACROSS, E_ACROSS_LOW, E_CYCLES, E_KAPPA, E_SAMPLES,
+    E_U_X, E_U_Y, E_U_INVERSE, E_U_R0, E_V_X, E_V_Y, E_V_INVERSE, E_V_R0, N_ENTRY
+};
+// numbers of an entry, four at a time: named by the first of them
+#define FOUR(entry, first) (((__global const float4 *)(entry))[(first) / 4])
 #define N_GROUP (N_HEAD + N_ENTRY * GROUP)
+
+// What the items of a work-group make of a pulse together.
+typedef struct {
+    float4 W[SIDE * LINE_TAPS / 2];
+#if SLOPE_TAPS
+    float4 V[SIDE * SLOPE_TAPS / 2];
+#endif
+    float2 T[ROWS * COLUMNS];
+    int at[SIDE];
+} pulse_lines;
 
 static inline group group_of(__global const float *restrict middle, float step_x, float step_y) {
     group pulses;
@@ -123,6 +141,15 @@ __kernel void schedule_pulses(__global const float *restrict constants, int n, i
         entry[E_PULSE] = p;
         entry[E_FROM] = from;
         entry[E_COUNT] = count;
+        entry[E_BASE] = line.base;
+        int along = 2 * pulses.transposed;
+        float values[N_ENTRY - E_STEP] = {
+            record[L_STEP + along], record[L_STEP + along + 1], line.frac, line.fine_cycles, line.fine_cycles_low,
+            record[L_RATIO + along], record[L_RATIO + along + 1], line.cycles_across, line.cycles_across_low, line.cycles,
+            line.kappa, line.sigma * (FINE / line.along), line.u.x, line.u.y, line.u.inverse, line.u.R0,
+            line.v.x, line.v.y, line.v.inverse, line.v.R0};
+#pragma unroll
+        for (int k = 0; k < N_ENTRY - E_STEP; k++) entry[E_STEP + k] = as_int(values[k]);
     }
     head[H_LINES] = n_lines;
     head[H_PIXELS] = n_pixels;
@@ -131,61 +158,66 @@ __kernel void schedule_pulses(__global const float *restrict constants, int n, i
 }
 
 // Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
-INLINED void weigh_line(group pulses, __global const float *restrict record, int r, int from, int count,
-                              __global const float *restrict weights, __global const float *restrict slopes,
-                              __local float2 *W, __local float2 *V, __local int *at) {
-    line_geometry line = load_line(record, pulses.transposed);
-    __global const float *ratio = record + L_RATIO + 2 * pulses.transposed;
-    float i = r - SIDE / 2, samples_of_T = FINE / line.along, weight[LINE_TAPS];
-    float centre = curvature_at(line, i, 0, q_of_line(pulses, i));
+INLINED void weigh_line(group pulses, __global const float *restrict entry, int r, __global const float *restrict weights,
+                        __global const float *restrict slopes, __local pulse_lines *made) {
+    float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP), ratios = FOUR(entry, E_FINE_LOW);
+    float4 phases = FOUR(entry, E_ACROSS_LOW), u = FOUR(entry, E_U_X), v = FOUR(entry, E_V_X);
+    float fine = steps.w, fine_low = ratios.x, samples_of_T = phases.w;
+    line_geometry line;
+    line.u = (direction){u.x, u.y, 0, u.z, u.w};
+    line.v = (direction){v.x, v.y, 0, v.z, v.w};
+    float i = r - SIDE / 2, centre = curvature_at(line, i, 0, q_of_line(pulses, i)), weight[LINE_TAPS];
     // i times the ratio of steps, in two parts: the first product is exact
-    float product = i * ratio[0], whole = nearest(product), rest = fma(i, ratio[1], product - whole);
-    float shift = in_position_of(pulses, line, i, centre) * line.sigma;
+    float product = i * ratios.y, whole = nearest(product), rest = fma(i, ratios.z, product - whole);
+    float shift = in_position_of(pulses, line, i, centre);
     float t = fma(shift, samples_of_T, rest) - 0.5f * (LINE_TAPS - 1), first = nearest(t), z = t - first;
     line_weights(z, weights, weight);
 #if SLOPE_TAPS
-    float slope[SLOPE_TAPS], per_metre = samples_of_T * line.sigma;
+    float slope[SLOPE_TAPS];
     line_slopes(z, slopes, slope);
 #endif
     first += whole;
-    float cycles = fma(centre, line.kappa, cycles_of(i, line.cycles_across, line.cycles_across_low) + line.cycles);
+    float cycles = cycles_of(i, ratios.w, phases.x) + phases.y;
+    cycles = fma(centre, phases.z, cycles);
     cycles -= nearest(cycles);
-    cycles -= cycles_of(first, line.fine_cycles, line.fine_cycles_low);
+    cycles -= cycles_of(first, fine, fine_low);
     cycles -= nearest(cycles);
+    __local float2 *W = (__local float2 *)made->W + r * LINE_TAPS;
 #pragma unroll
     for (int b = 0; b < LINE_TAPS; b++) {
-        float of_tap = cycles - b * line.fine_cycles, sine, cosine;
-        of_tap = of_tap - b * line.fine_cycles_low;
+        float of_tap = cycles - b * fine, sine, cosine;
+        of_tap = of_tap - b * fine_low;
         sincos_cycles(of_tap - nearest(of_tap), &sine, &cosine);
-        W[r * LINE_TAPS + b] = (float2)(weight[b] * cosine, weight[b] * sine);
+        W[b] = (float2)(weight[b] * cosine, weight[b] * sine);
 #if SLOPE_TAPS
         if (b >= OUTER && b < OUTER + SLOPE_TAPS) {
-            float v = slope[b - OUTER] * per_metre;
-            V[r * SLOPE_TAPS + b - OUTER] = (float2)(v * cosine, v * sine);
+            float per_metre = slope[b - OUTER] * samples_of_T;
+            ((__local float2 *)made->V)[r * SLOPE_TAPS + b - OUTER] = (float2)(per_metre * cosine, per_metre * sine);
         }
 #endif
     }
     // no rounding, however unlikely, may lead outside of T
+    int from = as_int(numbers.y), count = as_int(numbers.z);
     int m = clamp((int)first - from - FINE * (SIDE / 2), 0, count - FINE * (SIDE - 1) - LINE_TAPS);
-    at[r] = m % PERIOD * COLUMNS + m / PERIOD;
+    made->at[r] = m % PERIOD * COLUMNS + m / PERIOD;
 }
 
-// Sample number k of T, which begins with sample `from`: the profile of a pulse at a place of a line, carrier included.
-INLINED void take_sample(__global const float *restrict record, int transposed, int k, int from,
-                               __global const float *restrict row, int stride, int origin,
-                               __global const float *restrict table, __local float2 *T) {
-    __global const float *step = record + L_STEP + 2 * transposed;
-    float m = k + from, re, im, sine, cosine;
+// Sample number k of T: the profile of a pulse at a place of a line, carrier included. row: its profile.
+INLINED void take_sample(__global const float *restrict entry, int k, __global const float *restrict row, int stride,
+                         int origin, __global const float *restrict table, __local float2 *T) {
+    float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP);
+    float m = k + as_int(numbers.y), re, im, sine, cosine;
     // m times the step, in two parts: the first product is exact
-    float product = m * step[0], whole = nearest(product);
-    float t = fma(m, step[1], product - whole) + record[L_FRAC];
-    look_up(row, stride, origin, as_int(record[L_BASE]) + (int)whole, t, table, &re, &im);
-    sincos_cycles(cycles_of(m, record[L_FINE_X + 2 * transposed], record[L_FINE_X_LOW + 2 * transposed]), &sine, &cosine);
+    float product = m * steps.x, whole = nearest(product);
+    float t = fma(m, steps.y, product - whole) + steps.z;
+    look_up(row, stride, origin, as_int(numbers.w) + nearest_int(product), t, table, &re, &im);
+    sincos_cycles(cycles_of(m, steps.w, entry[E_FINE_LOW]), &sine, &cosine);
     float2 sample = (float2)(fma(re, cosine, -im * sine), fma(re, sine, im * cosine));
-    int at = k % PERIOD * COLUMNS + k / PERIOD;
+    uint row_of = (uint)k % PERIOD, column = (uint)k / PERIOD;
+    T += row_of * COLUMNS + column;
 #pragma unroll
     for (int copy = 0; copy * PERIOD < ROWS; copy++)
-        if (k % PERIOD + copy * PERIOD < ROWS && k / PERIOD >= copy) T[at + copy * (PERIOD * COLUMNS - 1)] = sample;
+        if (row_of + copy * PERIOD < ROWS && column >= copy) T[copy * (PERIOD * COLUMNS - 1)] = sample;
 }
 
 // The sums of a work-item, without the rest_ij of the pulses so far.
@@ -201,16 +233,15 @@ typedef struct {
         _Pragma("unroll") for (int c = 0; c < PIXELS; c++) what[l][c] = 0;
 
 // Adds one pulse to a work-item's pixels: `lane` counts items along a line, `r0` is the first line.
-INLINED void sum_lines(sums *s, int r0, int lane, __local const float2 *T, __local const float4 *W,
-                             __local const float4 *V, __local const int *at) {
+INLINED void sum_lines(sums *s, int r0, int lane, __local const pulse_lines *made) {
 #pragma unroll
     for (int l = 0; l < LINES; l++) {
         int r = r0 + l * AT_ONCE;
-        __local const float2 *t = T + at[r] + lane;
+        __local const float2 *t = made->T + made->at[r] + lane;
         float2 w[LINE_TAPS];
 #pragma unroll
         for (int b = 0; b < LINE_TAPS; b += 2) {
-            float4 two = W[r * (LINE_TAPS / 2) + b / 2];
+            float4 two = made->W[r * (LINE_TAPS / 2) + b / 2];
             w[b] = two.xy;
             w[b + 1] = two.zw;
         }
@@ -218,7 +249,7 @@ INLINED void sum_lines(sums *s, int r0, int lane, __local const float2 *T, __loc
         float2 v[SLOPE_TAPS];
 #pragma unroll
         for (int b = 0; b < SLOPE_TAPS; b += 2) {
-            float4 two = V[r * (SLOPE_TAPS / 2) + b / 2];
+            float4 two = made->V[r * (SLOPE_TAPS / 2) + b / 2];
             v[b] = two.xy;
             v[b + 1] = two.zw;
         }
@@ -315,14 +346,7 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
                          __global const float *restrict constants, __global const int *restrict schedule, float step_x,
                          float step_y, int first, int n_tiles, __global float *restrict image, ulong pixels,
                          __global int *restrict skipped) {
-    __local float2 T[2][ROWS * COLUMNS];
-    __local float4 W[2][SIDE * LINE_TAPS / 2];
-#if SLOPE_TAPS
-    __local float4 V[2][SIDE * SLOPE_TAPS / 2];
-#else
-    __local float4 V[2][1];
-#endif
-    __local int at[2][SIDE];
+    __local pulse_lines halves[2];
     int item = get_local_id(0), lane = item % ACROSS, r0 = item / ACROSS, tile = first + get_global_id(1);
     int groups = (n_used + GROUP - 1) / GROUP, chunk = 0, by_lines = 0, by_pixels = 0, made = 0, transposed = 0;
     int missed = 0, unlit = 0;
@@ -380,20 +404,19 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
             unlit += head[H_OUTSIDE] >> 16;
         }
         for (int f = 0; f < n_lines; f++) {
-            int side = made++ & 1, pulse = entries[N_ENTRY * f + E_PULSE], from = entries[N_ENTRY * f + E_FROM];
-            int count = entries[N_ENTRY * f + E_COUNT];
-            __global const float *record = records + (size_t)pulse * N_LINE;
-            for (int k = item; k < SIDE + count; k += ITEMS) {
+            __global const float *entry = (__global const float *)entries + N_ENTRY * f;
+            __local pulse_lines *pulse = &halves[made++ & 1];
+            __global const float *row = profiles + 2 * (size_t)as_int(entry[E_PULSE]) * stride;
+            int tasks = SIDE + as_int(entry[E_COUNT]);
+            for (int k = item; k < tasks; k += ITEMS) {
                 if (k < SIDE)
-                    weigh_line(pulses, record, k, from, count, weights, slopes, (__local float2 *)W[side],
-                               (__local float2 *)V[side], at[side]);
+                    weigh_line(pulses, entry, k, weights, slopes, pulse);
                 else
-                    take_sample(record, transposed, k - SIDE, from, profiles + 2 * (size_t)pulse * stride, stride, origin,
-                                table, T[side]);
+                    take_sample(entry, k - SIDE, row, stride, origin, table, pulse->T);
             }
-            // the other halves of T, W and V may still be read: they are not written before the next barrier
+            // the other half may still be read: it is not written before the next barrier
             barrier(CLK_LOCAL_MEM_FENCE);
-            sum_lines(&s, r0, lane, T[side], W[side], V[side], at[side]);
+            sum_lines(&s, r0, lane, pulse);
         }
     }
     if (item == 0) {

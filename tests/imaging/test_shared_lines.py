@@ -115,7 +115,7 @@ def pixel_by_pixel(monkeypatch):
             patch.setattr(kernel.device, "run", keep)
             add(kernel, on, low, high, pulses, *rest)
         schedule, (groups, tiles) = buffers["schedule_pulses"]
-        heads = kernel.device.download(schedule, np.empty((groups * tiles, 4 * (1 + kernel.plan.group)), np.int32))
+        heads = kernel.device.download(schedule, np.empty((groups * tiles, 4 + tile_kernels.ENTRY * kernel.plan.group), np.int32))
         counts.append((int(heads[:, 0].sum()), int(heads[:, 1].sum())))
 
     monkeypatch.setattr(tile_kernels.SharedLineKernel, "add", counted)

@@ -23,6 +23,7 @@ from ._shared_line_plan import SharedLinePlan
 from .line_plan import LinePlan, steps
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
+ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/backproject_shared_lines.cl
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
@@ -140,7 +141,7 @@ class SharedLineKernel:
             raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
         self.device, self.tiling, self.beam, self.plan = device, tiling, beam, plan
         self.least_rows, self.n_line = plan.group, line_plan.components(beam) + 8
-        self.components = self.n_line + 5  # and a pulse's share of its group's record
+        self.components = self.n_line + ENTRY + 1  # and a pulse's share of its group's record
         geometry = {"BISTATIC": int(bistatic), "BEAM": int(beam)}
         macros = plan.macros(bistatic, wrap, local) | geometry
         self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=0, RANGE=0, SHARED=1)
@@ -168,7 +169,7 @@ class SharedLineKernel:
         dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
         groups, items = -(-used // self.plan.group), self.plan.items
         constants = device.empty(4 * self.n_line * n * (high - low))
-        schedule = device.empty(16 * (1 + self.plan.group) * groups * (high - low))
+        schedule = device.empty(4 * (4 + ENTRY * self.plan.group) * groups * (high - low))
         device.run(
             self.constants, (n, high - low), None,
             pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
