@@ -13,8 +13,10 @@ from ..base.validation import choice, flag, instance
 from ..base.validation import tolerance as allowed_error
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
+from ..numerics import cost_model
 from ..numerics.cost_model import DeviceClass
 from ..numerics.windows import Window
+from ..opencl import native_functions
 from ..opencl.device import Device, DeviceChoice
 from ..opencl.memory_budget import budget
 from .choose_method import METHODS, MethodChoice, choose
@@ -75,6 +77,8 @@ class FocusOptions:
     def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
         """The method for these devices together; tolerance: another one than asked for."""
         on, float64 = DeviceClass.of(d.info for d in devices), all(d.info.fp64 for d in devices)
+        if on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
+            on = on._replace(native_error=max(native_functions.sincos_error(d) for d in devices))
         return choose(task, self.method, self.tolerance if tolerance is None else tolerance, on, float64)
 
     def budget(self, device: Device) -> float:

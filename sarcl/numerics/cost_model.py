@@ -31,18 +31,17 @@ LINE_WEIGHTS = 1.0  # per line and pulse: weights of its taps
 LINE_PULSE = 30.0  # per tile and pulse
 LINE_GROUP = 0.4  # per pixel and group of pulses
 
-# Lines that a work-group shares (kernels/backproject_shared_lines.cl), in instructions of one lane on sm_90.
+# Lines that a work-group shares (kernels/backproject_shared_lines.cl), in instructions of one lane on sm_90, counted on
+# 2026-11-23 (make gpu-static) with polynomials for sine and cosine.
 SHARED_TAP = 4.0  # per contribution and tap, of the weights and of their slopes
-SHARED_READ = 1.0  # per sample of a line's profile that a work-item reads
-SHARED_PULSE = 40.0  # per work-item and pulse, of 16 contributions
-SHARED_SAMPLE, SHARED_SAMPLE_TAP = (
-    60.0,
-    12.0,
-)  # per sample of a line's profile, and per tap from the range profile to it
-SHARED_LINE, SHARED_LINE_TAP = 90.0, 35.0  # per line and pulse, and per tap of its weights
+SHARED_READ = 1.0  # per number of local memory that a work-item reads
+SHARED_PULSE = 41.0  # per work-item and pulse, of 16 contributions
+SHARED_SAMPLE, SHARED_SAMPLE_TAP = 50.0, 14.0  # per sample of a line's profile, and per tap of its interpolation
+SHARED_LINE, SHARED_LINE_TAP = 40.0, 39.0  # per line and pulse, and per tap of its weights
 SHARED_TURN = 60.0  # per contribution over the pulses of a group
+SHARED_TILE = 1500.0  # per tile and pulse: its record and what is done with it
 SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
-GATHERED = 74.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
+GATHERED = 72.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
 # Merging of sub-apertures, in contributions (2026-11-21).
 # Per sample that is moved to a new tile: per tap of the interpolation, per tap of the filter that decimates pulses.
@@ -94,24 +93,60 @@ SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map
 SPECTRAL_SAMPLE = 0.35  # per wavenumber along the track and frequency: transforms, and the samples read from them
 
 
+class Gathering(NamedTuple):
+    """Costs of backprojection pixel by pixel on a class of devices, per contribution with two taps and float32 ranges.
+
+    taps        of 2, 4, 6 and 8 taps
+    range_mode  by range mode of kernels/range_phase.clh
+    """
+
+    taps: tuple[float, float, float, float]
+    range_mode: tuple[float, float, float]
+
+    def of_taps(self, taps: int) -> float:
+        """Cost of so many taps."""
+        return self.taps[taps // 2 - 1]
+
+
+# On a CPU, and from instructions on sm_90 per contribution, on 2026-11-23 (make gpu-static): on GPUs with fast float64,
+# and on GPUs that compute wide numbers in pairs of float32 or with a float64 that is slower than these.
+ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_MODE[1], RANGE_MODE[2]))
+ON_GPU = Gathering((1.0, 1.32, 1.57, 1.99), (1.0, 1.4, 2.4))
+ON_GPU_IN_PAIRS = Gathering((1.0, 1.32, 1.57, 1.99), (1.0, 2.9, 9.4))
+
+
 class DeviceClass(NamedTuple):
     """What plans must know of the devices that follow them.
 
     lanes         they work on vectors of pixels, as CPUs do
     local_memory  bytes of local memory that the work-items of a group share; 0: they share nothing
+    gathering     costs of kernels/backproject.cl
+    native_error  error of the devices' own sine and cosine, rad; infinite: they are not used
     """
 
     lanes: bool
     local_memory: int = 0
+    gathering: Gathering = ON_CPU
+    native_error: float = np.inf
 
     @classmethod
-    def of(cls, infos: Iterable[Any]) -> DeviceClass:
+    def of(cls, infos: Iterable[Any], native_error: float = np.inf) -> DeviceClass:
         """Of devices (DeviceInfo) that follow one plan together."""
         infos = list(infos)
-        lanes = [info.vector_width > 1 for info in infos]
-        return cls(all(lanes), 0 if any(lanes) else min(min(info.local_memory, MOST_LOCAL) for info in infos))
+        if any(info.vector_width > 1 for info in infos):
+            return cls(all(info.vector_width > 1 for info in infos))
+        shared = min(min(info.local_memory, MOST_LOCAL) for info in infos)
+        enough = all(info.max_group >= MOST_ITEMS for info in infos)
+        gathering = ON_GPU if all(info.fp64 and info.fast_fp64 for info in infos) else ON_GPU_IN_PAIRS
+        return cls(False, shared if enough else 0, gathering, native_error)
+
+    def native_pays(self, tolerance: float) -> bool:
+        """Whether the error of the devices' own sine and cosine is small beside a tolerance."""
+        return self.native_error <= NATIVE_SHARE * tolerance
 
 
+NATIVE_SHARE = 0.03  # largest share of a tolerance for the error of one sine and cosine of the device's own
+MOST_ITEMS = 256  # work-items of the largest group of kernels/backproject_shared_lines.cl
 MOST_LOCAL = 48 * 1024  # bytes of local memory that each NVIDIA device gives to a work-group
 CPU = DeviceClass(lanes=True)
 
@@ -125,9 +160,11 @@ def shared_lines(
     taps, slope_taps, profile_taps   of the weights of lines, of their slopes, and from the range profile to the line's
     group     pulses that share a curvature
     """
-    reads = (3 * fine + taps) / 4 if fine < taps else taps
-    pair = SHARED_TAP * (taps + slope_taps) + SHARED_READ * (reads + (taps + slope_taps) / 8) + SHARED_PULSE / 16
+    reads = (3 * fine + taps) / 4 if fine < taps else taps  # by an item with four neighbouring pixels, per pixel
+    reads += (taps + slope_taps) / 8 + 1 / 4
+    pair = SHARED_TAP * (taps + slope_taps) + SHARED_READ * reads + SHARED_PULSE / 16
     tile = samples * (SHARED_SAMPLE + SHARED_SAMPLE_TAP * profile_taps) + side * (SHARED_LINE + SHARED_LINE_TAP * taps)
+    tile += SHARED_TILE
     return (pair + tile / side**2 + SHARED_TURN / group) / GATHERED
 
 

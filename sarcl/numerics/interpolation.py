@@ -251,7 +251,11 @@ def least_error(n_samples: int, carrier: float = 0.0) -> float:
 
 @functools.lru_cache(maxsize=4096)
 def choose_interpolator(
-    error: float, n_samples: int, pairs_per_row: float, carrier: float = 0.0
+    error: float,
+    n_samples: int,
+    pairs_per_row: float,
+    carrier: float = 0.0,
+    gathering: cost_model.Gathering = cost_model.ON_CPU,
 ) -> tuple[Interpolator, int, float]:
     """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
 
@@ -259,6 +263,7 @@ def choose_interpolator(
 
     n_samples      samples of a row before oversampling
     pairs_per_row  contributions read from a row: they weigh the cost of taps against that of the FFT
+    gathering      costs of taps on the devices that read the rows
     carrier        centre frequency in steps between samples, for evenly spaced scatterers: see off_carrier
     The choice never depends on memory, so that results do not.
     ToleranceUnreachable names the smallest error that can be met.
@@ -266,7 +271,7 @@ def choose_interpolator(
 
     def cost(candidate: tuple[int, float, int]) -> float:
         taps, _, length = candidate
-        return pairs_per_row * cost_model.TAPS[taps] + cost_model.profile(length)
+        return pairs_per_row * gathering.of_taps(taps) + cost_model.profile(length)
 
     for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
         if lower_bound(taps, oversample) <= error:

@@ -24,7 +24,8 @@ PROFILES = "float32 range profiles"
 class Plan:
     """How a result is computed: interpolator and profile length, points per tile, range mode and series order.
 
-    cost  per contribution, relative to one with the hat and ranges in float32
+    cost    per contribution, relative to one with the hat and ranges in float32
+    native  sine and cosine are the device's own, in kernels/backproject.cl
     """
 
     interpolator: Interpolator
@@ -34,6 +35,7 @@ class Plan:
     order: int
     predicted_error: float
     cost: float = 1.0
+    native: bool = False
 
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
@@ -75,6 +77,8 @@ def cheapest(
     least_tolerance: float = LEAST_TOLERANCE,
     carrier: float = 0.0,
     image_gain: float = 1.0,
+    gathering: cost_model.Gathering = cost_model.ON_CPU,
+    native_error: float | None = None,
 ) -> Plan:
     """The cheapest plan whose predicted error is at most `tolerance`.
 
@@ -83,20 +87,22 @@ def cheapest(
     chunk        rows or points summed in float32; least_tolerance: a tolerance below it is refused
     carrier      Hz, from which images of the kernel keep away (interpolation.off_carrier); 0: no such condition
     image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
+    gathering    costs on the devices that follow the plan
+    native_error  of their own sine and cosine, rad, which the plan takes; None: it takes polynomials
     ToleranceUnreachable names the smallest tolerance that can be met.
     """
     best: tuple[float, Plan] | None = None
     steps = carrier_steps(carrier, n_samples, bandwidth)
     for per_tile, radius in tiles:
-        for mode, range_cost in cost_model.RANGE_MODE.items():
+        for mode, range_cost in enumerate(gathering.range_mode):
             for order in (2, 3, 0) if mode < 2 else (0,):
                 fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
-                fixed += error_bounds.sum_rounding(chunk, n_samples)
+                fixed += error_bounds.sum_rounding(chunk, n_samples) + (native_error or 0.0)
                 if fixed > FIXED * tolerance:
                     continue
                 try:
                     interpolator, length, cost = interpolation.choose_interpolator(
-                        (tolerance - fixed) / image_gain, n_samples, points_per_row, steps
+                        (tolerance - fixed) / image_gain, n_samples, points_per_row, steps, gathering
                     )
                 except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
                     continue
@@ -107,7 +113,8 @@ def cheapest(
                 cost += cost_model.SERIES[order] - 1 if mode < 2 else 0.0
                 if best is None or cost < best[0]:
                     error = fixed + image_gain * interpolator.error
-                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost)
+                    native = native_error is not None
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost, native)
     if best is None or tolerance < least_tolerance:
         reach = rounded_up(max(least_tolerance, least(n_samples, chunk, steps)))
         raise ToleranceUnreachable(tolerance, reach, PROFILES, how="in complex64")

@@ -7,6 +7,7 @@ For other folders:
     device_list    OpenCL devices of this machine, tried with a small kernel before they are used
     failures       errors of OpenCL as errors that name the device, the need and the remedy
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
+    native_functions  the error of a device's own sine and cosine
     memory_budget  bytes that a computation may take on a device
     pipeline       blocks of work on a device: the upload of one while the device works on the one before
 

@@ -16,9 +16,10 @@ from sarcl.imaging.direct._shared_line_plan import SharedLinePlan
 from sarcl.imaging.focusing_task import make_task
 from sarcl.numerics import cost_model, error_bounds, interpolation
 from sarcl.numerics.cost_model import DeviceClass
+from sarcl.opencl import native_functions
 
 SLOW = pytest.mark.slow
-WIDE = DeviceClass(lanes=False, local_memory=cost_model.MOST_LOCAL)
+WIDE = DeviceClass(lanes=False, local_memory=cost_model.MOST_LOCAL, gathering=cost_model.ON_GPU)
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(65, 70), spacing=(0.3, 0.2))
 
 
@@ -29,12 +30,12 @@ def wide(request):
     return device.one_lane() if device.info.vector_width > 1 else device
 
 
-def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, **changes):
+def planned(raw, grid, tolerance, *, wrap=False, skip=True, beam=None, on=WIDE, **changes):
     """A task, its plan by shared lines with some of its fields changed, and the tiling."""
     task = make_task(raw, grid, None, None, wrap, skip, beam)
     made = _shared_line_plan.choose(
         tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=float(raw.bandwidth.max()),
-        highest=task.highest, local_memory=cost_model.MOST_LOCAL,
+        highest=task.highest, on=on,
     )  # fmt: skip
     assert isinstance(made, SharedLinePlan), "no plan by shared lines meets the tolerance"
     made = replace(made, **changes)
@@ -115,7 +116,8 @@ def pixel_by_pixel(monkeypatch):
             patch.setattr(kernel.device, "run", keep)
             add(kernel, on, low, high, pulses, *rest)
         schedule, (groups, tiles) = buffers["schedule_pulses"]
-        heads = kernel.device.download(schedule, np.empty((groups * tiles, 4 + tile_kernels.ENTRY * kernel.plan.group), np.int32))
+        heads = np.empty((groups * tiles, 4 + tile_kernels.ENTRY * kernel.plan.group), np.int32)
+        kernel.device.download(schedule, heads)
         counts.append((int(heads[:, 0].sum()), int(heads[:, 1].sum())))
 
     monkeypatch.setattr(tile_kernels.SharedLineKernel, "add", counted)
@@ -165,6 +167,23 @@ def test_energy_at_the_bands_edge_and_wide_tiles_keep_90_db(wide):
     assert plan.side == 64 and error_bounds.position_rounding(tiling.radius, 600e6, False) > 3e-5
     image, _ = focused(wide, task, plan, tiling)
     assert image_error(image, replace(raw, samples=samples)) <= plan.predicted_error <= 3e-5
+
+
+@SLOW
+def test_a_devices_own_sine_and_cosine_are_measured_and_planned(wide):
+    error = native_functions.sincos_error(wide)
+    assert 0 < error < 1e-5
+    on = WIDE._replace(native_error=error)
+    raw = spaceborne()
+    task, plan, tiling = planned(raw, PLANE, 1e-3, on=on)
+    assert plan.native and plan.predicted_error > planned(raw, PLANE, 1e-3)[1].predicted_error
+    image, _ = focused(wide, task, plan, tiling)
+    assert image_error(image, raw, most=600) <= plan.predicted_error
+    pixels, tiles = direct.make_plan(task, 1e-3, on._replace(local_memory=0))
+    assert pixels.native
+    image, _ = focused(wide, task, pixels, tiles)
+    assert image_error(image, raw, most=600) <= pixels.predicted_error
+    assert not planned(raw, PLANE, 1e-3, on=WIDE._replace(native_error=1e-4))[1].native
 
 
 def test_devices_with_one_lane_take_shared_lines_where_they_pay_and_their_memory_holds_them():

@@ -8,6 +8,7 @@ from dataclasses import dataclass
 from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
 from ..tiling.plane import outline
@@ -26,9 +27,11 @@ class SharedLinePlan(LinePlan):
     """As LinePlan, for lines that a work-group shares.
 
     slopes  interpolator whose weights' slopes shift the positions of pixels; None: none do
+    native  sine and cosine are the device's own
     """
 
     slopes: Interpolator | None = None
+    native: bool = False
 
     @property
     def items(self) -> int:
@@ -43,7 +46,8 @@ class SharedLinePlan(LinePlan):
         for name in ("SLOPE", "LOCAL"):
             del macros[name]
         taps, terms = (self.slopes.taps, self.slopes.terms) if self.slopes else (0, 0)
-        return macros | {"SLOPE_TAPS": taps, "SLOPE_TERMS": terms, "ITEMS": self.items, "CHUNK": CHUNK, "SHARED": 1}
+        macros |= {"SLOPE_TAPS": taps, "SLOPE_TERMS": terms, "ITEMS": self.items, "CHUNK": CHUNK}
+        return macros | {"SHARED": 1, "NATIVE": int(self.native)}
 
     @property
     def local_bytes(self) -> int:
@@ -67,12 +71,12 @@ def choose(
     n_samples: int,
     bandwidth: float,
     highest: float,
-    local_memory: int,
+    on: DeviceClass,
 ) -> SharedLinePlan | None:
     """The cheapest SharedLinePlan whose predicted error is at most `tolerance`, or None.
 
-    highest       highest frequency, Hz
-    local_memory  bytes of local memory that a work-group may take
+    highest  highest frequency, Hz
+    on       the devices that follow the plan: their local memory holds two pulses
     """
     assert grid.spacing is not None
     distance, points = antennas.distance(grid.bounds), outline(grid)
@@ -85,6 +89,8 @@ def choose(
         order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
         turns = CHUNK // group  # of a sum, each by a sine and cosine of its own
         fixed = error_bounds.phase_rounding(0.0, highest, True) * (2 + turns)
+        native = on.native_pays(tolerance)
+        fixed += (2 + turns) * on.native_error if native else 0.0
         fixed += error_bounds.two_part_position_rounding(radius, distance, bandwidth)
         fixed += error_bounds.series_error(radius, distance, highest, order)
         fixed += 2 * error_bounds.curvature_rounding(radius, distance, highest)
@@ -93,7 +99,7 @@ def choose(
         fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
         shift, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
         for fine, taps, slope_taps in itertools.product(FINES, interpolation.LINE_TERMS, (0, 2, 4, 6, 8)):
-            if cells * 1.2 >= fine or slope_taps > taps or local_bytes(side, fine, taps, slope_taps) > local_memory:
+            if cells * 1.2 >= fine or slope_taps > taps or local_bytes(side, fine, taps, slope_taps) > on.local_memory:
                 continue
             line = interpolation.line_interpolator(taps, fine / cells)
             slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
@@ -112,6 +118,6 @@ def choose(
             if best is None or cost < best.cost:
                 best = SharedLinePlan(
                     side, fine, group, line, made, length, order, slopes is not None,
-                    *curvature.limits(bandwidth, length / n_samples), error + made.error, cost, slopes,
+                    *curvature.limits(bandwidth, length / n_samples), error + made.error, cost, slopes, native,
                 )  # fmt: skip
     return best

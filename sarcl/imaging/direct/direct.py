@@ -44,7 +44,7 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
         elif on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
             lined = _shared_line_plan.choose(
                 tolerance, grid, task.antennas, n_samples=raw.n_samples, bandwidth=bandwidth, highest=highest,
-                local_memory=on.local_memory,
+                on=on,
             )  # fmt: skip
     if lined is not None and not task.resolves_beam(LineTiling(grid, lined.side).radius):
         lined = None
@@ -61,6 +61,8 @@ def make_plan(task: FocusingTask, tolerance: float, on: DeviceClass = CPU) -> tu
         points_per_row=grid.size,
         chunk=CHUNK,
         least_tolerance=0.0,
+        gathering=on.gathering,
+        native_error=on.native_error if on.native_pays(tolerance) else None,
     )
     if lined is not None and lined.cost < plan.cost:
         return lined, LineTiling(grid, lined.side)

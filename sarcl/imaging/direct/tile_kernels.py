@@ -43,7 +43,7 @@ class GatherKernel:
         self.device, self.beam = device, beam
         self.lanes = device.info.vector_width
         macros = {**plan.macros(bistatic, wrap), "LOCAL": int(local), "VECTORS": VECTORS, "CHUNK": CHUNK}
-        macros |= {"BEAM": int(beam), **weights}
+        macros |= {"BEAM": int(beam), "NATIVE": int(plan.native), **weights}
         self.components = plan.components(bistatic, beam)
         self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
