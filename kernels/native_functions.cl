@@ -2,7 +2,7 @@
 //
 // source    common.clh:sincos_cycles
 // macros    NATIVE as in common.clh
-// reference: none; sarcl/opencl/native_functions.py compares with float64
+// reference: sarcl/opencl/native_functions.py:sincos_error
 
 #undef VW
 #define VW 1
