@@ -23,4 +23,4 @@ For this folder alone:
     _programs      source texts of kernels, and precautions for building programs
 """
 
-__all__ = ["choose_device", "device", "device_list", "failures", "fft", "memory_budget", "pipeline"]
+__all__ = ["choose_device", "device", "device_list", "failures", "fft", "memory_budget", "native_functions", "pipeline"]
