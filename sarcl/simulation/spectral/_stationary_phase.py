@@ -47,9 +47,11 @@ def chirp_ripple(waveform: Waveform, frequencies: np.ndarray) -> np.ndarray:
     """d of equation (26): spectrum of a rectangular chirp over its form by stationary phase, complex128 (n,).
 
     With K = bandwidth/duration and f from the centre: d = (1 - j)/2 [Z(a + b) + Z(a - b)], Z = C + jS the Fresnel
-    integrals, a = duration sqrt(K/2), b = f sqrt(2/K).
+    integrals, a = duration sqrt(K/2), b = f sqrt(2/K). A down-chirp is the conjugate of the chirp, and d, which is the
+    same at f and -f, becomes its conjugate.
     """
     rate = waveform.bandwidth / waveform.duration
     a, b = waveform.duration * np.sqrt(rate / 2), (frequencies - waveform.center) * np.sqrt(2 / rate)
     (sine, cosine), (other_sine, other_cosine) = scipy.special.fresnel(a + b), scipy.special.fresnel(a - b)
-    return np.asarray((1 - 1j) / 2 * (cosine + other_cosine + 1j * (sine + other_sine)))
+    made = np.asarray((1 - 1j) / 2 * (cosine + other_cosine + 1j * (sine + other_sine)))
+    return made.conj() if waveform.kind == "down-chirp" else made

@@ -91,7 +91,7 @@ def spectral_echo(
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     choice("variant", variant, ("exact", "saras"))
-    if ripple and waveform.kind != "chirp":
+    if ripple and waveform.sweep_rate is None:
         raise ValueError(f"ripple is that of a rectangular chirp's spectrum, and the waveform is a {waveform.kind}")
     request = echo_request(
         scene, SKIPS, polarization=polarization, vertical=vertical, shadows=shadows, seed=seed, skip=skip,

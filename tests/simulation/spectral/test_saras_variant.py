@@ -100,19 +100,26 @@ def test_the_doppler_centroid_is_that_of_the_antennas_pointing(squint, device):
     assert (centroid - wanted + 150) % 300 - 150 == pytest.approx(0, abs=3)
 
 
-def test_ripples_are_those_of_a_rectangular_chirp(device):
+@pytest.mark.parametrize("down", [False, True])
+def test_ripples_are_those_of_a_rectangular_chirp(device, down):
     bandwidth, duration = 50e6, 2e-6
+    chirp = sarcl.Waveform.chirp(center=9.6e9, bandwidth=bandwidth, duration=duration, down=down)
     f = np.linspace(-0.5, 0.5, 9) * bandwidth
     t = (np.arange(200_000) + 0.5) / 200_000 * duration - duration / 2
-    rate = bandwidth / duration
-    wanted = np.array([(np.exp(1j * np.pi * (rate * t**2 - 2 * x * t))).mean() * duration for x in f])
-    stationary = np.exp(0.25j * np.pi) / np.sqrt(rate) * CHIRP.pulse_spectrum(CHIRP.center + f)
-    assert np.allclose(chirp_ripple(CHIRP, CHIRP.center + f) * stationary, wanted, rtol=1e-6, atol=1e-9 * duration)
+    assert chirp.sweep_rate == (-1 if down else 1) * bandwidth / duration
+    wanted = np.array([np.exp(1j * np.pi * (chirp.sweep_rate * t**2 - 2 * x * t)).mean() * duration for x in f])
+    turn = np.exp(-0.25j * np.pi if down else 0.25j * np.pi)
+    stationary = turn / np.sqrt(bandwidth / duration) * chirp.pulse_spectrum(chirp.center + f)
+    assert np.allclose(chirp_ripple(chirp, chirp.center + f) * stationary, wanted, rtol=1e-6, atol=1e-9 * duration)
     options = {"tolerance": 1e-2, "compressed": False, "device": device}
     antenna = sarcl.Antenna.gaussian(width=(0.008, 0.1))
-    plain = sarcl.spectral_echo(points(), CHIRP, TRACK, antenna=antenna, **options)
-    rippled = sarcl.spectral_echo(points(), CHIRP, TRACK, antenna=antenna, ripple=True, **options)
-    ratio = chirp_ripple(CHIRP, plain.frequency[0] + plain.frequency_step[0] * np.arange(plain.n_samples))
+    plain = sarcl.spectral_echo(points(), chirp, TRACK, antenna=antenna, **options)
+    rippled = sarcl.spectral_echo(points(), chirp, TRACK, antenna=antenna, ripple=True, **options)
+    ratio = chirp_ripple(chirp, plain.frequency[0] + plain.frequency_step[0] * np.arange(plain.n_samples))
+    assert np.abs(ratio.imag).max() > 0.1
     assert np.allclose(rippled.samples, plain.samples * ratio, rtol=1e-4)
+
+
+def test_ripples_of_other_pulses_are_refused(device):
     with pytest.raises(ValueError, match="waveform is a tone"):
         sarcl.spectral_echo(points(), sarcl.Waveform.tone(center=9e9, duration=1e-7), TRACK, ripple=True, device=device)
