@@ -22,7 +22,9 @@ from ._search import GROWTH
 log = logging.getLogger(__name__)
 
 AGREE = 0.4  # least closeness of two phases at which they agree; that of noise is smaller
-GAIN = 1.005  # least gain in sharpness of echoes that a phase was not found from
+# Least gain in sharpness of echoes that a phase was not found from. It is 0.1 dB of a peak, which is left in the data
+# rather than risked: neighbouring points of the scene, which both halves of the band show, can gain as much by chance
+GAIN = 1.05
 KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
 BRIGHT = 10  # points of the uncorrected image that must not be lost
 FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
@@ -98,6 +100,8 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     ladder = [2**k for k in range(2, 40) if 2**k < n] + [n]
     gains = np.array([[gain(test, modes) for test in tests] for modes in ladder])
     best = int(gains[:, :2].prod(axis=1).argmax())
+    if agreement <= least and ladder[best] < n:
+        agreement, least = _smooth_agreement(bands, ladder[best], closeness)
     # phases from some of the places have more noise, and ask for more smoothing
     apart = gains[:, 2:].min(axis=1).max() if len(tests) > 2 else np.inf
     log.debug("gains of %s cosines: %s", ladder, gains.round(3).tolist())
@@ -130,6 +134,23 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
         "modes": ladder[best],
         "reason": reason,
     }
+
+
+def _smooth_agreement(
+    bands: list[np.ndarray], modes: int, closeness: Callable[[np.ndarray, np.ndarray], float]
+) -> tuple[float, float]:
+    """Closeness of the phases of both halves of the band, smoothed to `modes` cosines, and where they begin to agree.
+
+    With few points in a range cell the phases of single pulses, each free, focus them to fewer points than there are:
+    two such phases have no more than the smooth curve in common on which they lie. Curves of few cosines are close by
+    chance far more often, and curves near zero are close whatever they are: those must be closer to each other than to
+    zero.
+    """
+    first, second = (_phase_smoothing.smooth(phase, modes) for phase in bands)
+    zero = np.zeros(len(first))
+    return closeness(first, second), max(
+        AGREE, _phase_smoothing.chance(modes), closeness(first, zero), closeness(second, zero)
+    )
 
 
 def _sharpens_others(view: ApertureView, errors: Errors) -> bool:

@@ -38,7 +38,10 @@ def test_a_leak_is_not_focused_at_the_cost_of_the_points():
     assert "leak of constant delay" in errors.reason and errors.reason in str(errors)
 
 
-@pytest.mark.parametrize("seed", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 1, *range(3, 10)))])
+# 110 and 164: clutter, or three points of an arm, gain 2 to 5 % in sharpness by a phase that blurs the brightest ones
+@pytest.mark.parametrize(
+    "seed", [2, *(pytest.param(k, marks=pytest.mark.slow) for k in (0, 1, *range(3, 10), 110, 164))]
+)
 def test_correct_data_are_not_harmed(seed):
     row = trials.trial("correct", seed)
     assert not row["harmed"], row
@@ -49,3 +52,11 @@ def test_smooth_errors_are_removed():
     rows = [trials.trial("error", seed) for seed in range(10)]
     assert not any(row["harmed"] for row in rows), rows
     assert sum(row["restored"] for row in rows) >= 9, rows
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("seed", [25, 195])
+def test_phases_of_single_pulses_that_agree_by_their_smooth_curve_alone_are_enough(seed):
+    # 20 points of a rail, and 2 points in clutter: unsmoothed, the halves of the band agree to 0.35 and 0.38
+    row = trials.trial("error", seed)
+    assert row["found"] and row["restored"] and not row["harmed"], row
