@@ -70,7 +70,9 @@ def energy(raw: PhaseHistory) -> np.ndarray:
 
 def delay(raw: PhaseHistory, row: int, places: np.ndarray) -> np.ndarray:
     """Delays tau - tau_ref of one row at places, m (n, 3): s (n,)."""
-    return 2 * (half_path(raw.tx[row], raw.rx[row], places) - raw.reference_range[row]) / SPEED_OF_LIGHT
+    tx = raw.tx[row]
+    rx = tx if raw.is_monostatic else raw.rx[row]
+    return 2 * (half_path(tx, rx, places) - raw.reference_range[row]) / SPEED_OF_LIGHT
 
 
 def pixels(power: np.ndarray, grid: ImageGrid, most: int) -> np.ndarray:
@@ -129,7 +131,7 @@ def contributions(
     length = fft.good_length(OVERSAMPLE * n_samples)
     low = n_samples // 2
     lags = np.asarray(lags, np.float64)
-    out = np.empty((n_rows, len(places), len(lags)), np.complex64)
+    out = np.zeros((n_rows, len(places), len(lags)), np.complex64)
     weight = np.ones(n_rows) if raw.weight is None else raw.weight
     for start in range(0, n_rows, ROWS):
         stop = min(start + ROWS, n_rows)
@@ -138,7 +140,12 @@ def contributions(
             samples = samples * windows.weights("hamming", n_samples).astype(np.float32)
         profiles = range_profiles.from_samples(None, samples, weight[start:stop, None] / scale, length)
         for row in range(start, stop):
-            late = delay(raw, row, places)
+            lit: Any = slice(None)
+            if beam is not None:
+                apart = places - raw.tx[row]
+                away = np.sqrt(np.einsum("nk,nk->n", apart, apart))
+                lit = np.flatnonzero(apart @ beam[1][row] >= np.cos(beam[0] / 2) * away)
+            late = delay(raw, row, places[lit])
             carrier = raw.frequency[row] + low * raw.frequency_step[row]
             turns = (late * raw.frequency_step[row])[:, None] + lags / n_samples
             position = (turns % 1) * length
@@ -147,8 +154,5 @@ def contributions(
             profile = profiles[row - start]
             read = profile[before % length] * (1 - after) + profile[(before + 1) % length] * after
             read *= np.abs(turns) <= 0.5
-            if beam is not None:
-                apart = places - raw.tx[row]
-                read *= (apart @ beam[1][row] >= np.cos(beam[0] / 2) * np.linalg.norm(apart, axis=1))[:, None]
-            out[row] = read * np.exp(2j * np.pi * (carrier * late % 1)).astype(np.complex64)[:, None]
+            out[row, lit] = read * np.exp(2j * np.pi * (carrier * late % 1)).astype(np.complex64)[:, None]
     return out
