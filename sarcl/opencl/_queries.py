@@ -117,7 +117,7 @@ def _loader() -> str | None:
     """The library that finds OpenCL drivers: the system's, else that inside pyopencl's wheel."""
     import pyopencl
 
-    inside = Path(pyopencl.__file__).parent.parent.glob("pyopencl.libs/libOpenCL*")
+    inside = Path(pyopencl.__file__).parent.glob(".libs/libOpenCL*")
     return ctypes.util.find_library("OpenCL") or next(map(str, inside), None)
 
 
