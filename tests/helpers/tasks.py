@@ -93,7 +93,7 @@ def expect(holds: Any, text: str) -> None:
 
 def near(found: Any, wanted: Any, allowed: float, scale: float | None = None, what: str = "result") -> None:
     """Wrong unless the L2 norm of the difference is at most `allowed` of `scale`, by default of the norm wanted."""
-    found, wanted = np.asarray(found), np.asarray(wanted)
+    found, wanted = (np.asarray(values).astype(np.complex128) for values in (found, wanted))  # squares fit
     expect(found.shape == wanted.shape, f"{what} has shape {found.shape}, wanted {wanted.shape}")
     finite(found, what)
     size = float(np.linalg.norm(wanted)) if scale is None else scale
