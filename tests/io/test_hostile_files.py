@@ -398,12 +398,12 @@ def test_room_for_pictures_and_pages_is_looked_for_before_the_work(tmp_path, mon
     (tmp_path / "e.toml").write_text("".join(f"[[case]]\nn_pulses = {11 + i}\n" for i in range(20)))
     monkeypatch.setattr(output_paths.shutil, "disk_usage", lambda path: type("Usage", (), {"free": 300_000}))
     monkeypatch.setattr("sarcl.imaging.backproject.backproject", None)  # no work is begun
-    grid = ["--shape", "900", "900", "--spacing", "0.1"]
+    grid = ["--shape", "900", "900", "--spacing", "0.1", "0.1"]
     for command, words in (
         (["focus", str(tmp_path / "a.h5"), *grid, "-o", str(tmp_path / "a.png")], r"a\.png': it needs 1\.8\d* MB"),
         (
-            ["focus", str(tmp_path / "a.h5"), "--shape", "170", "170", "--spacing", "0.1", "-o", str(tmp_path / "b.h5"),
-             "-o", str(tmp_path / "b.png")],
+            ["focus", str(tmp_path / "a.h5"), "--shape", "170", "170", "--spacing", "0.1", "0.1",
+             "-o", str(tmp_path / "b.h5"), "-o", str(tmp_path / "b.png")],
             r"b\.png': it, with the outputs before it, needs 355 kB",
         ),
         (["fda", str(tmp_path / "e.toml"), "-o", str(tmp_path / "e.html")], r"e\.html': it needs 800 kB"),
