@@ -5,6 +5,9 @@ from __future__ import annotations
 import os
 import sys
 import warnings
+from collections.abc import Iterator
+from contextlib import contextmanager
+from contextvars import ContextVar
 from typing import TYPE_CHECKING, Any
 
 from .text import tolerance_text
@@ -17,12 +20,37 @@ if TYPE_CHECKING:
 _HERE = os.path.dirname(os.path.realpath(str(sys.modules[__name__.partition(".")[0]].__file__))) + os.sep
 
 
+# topics that have been warned of, where each is to be warned of once
+_TOPICS: ContextVar[set[str] | None] = ContextVar("topics", default=None)
+
+
 class SarclWarning(UserWarning):
     """A warning about a result that is correct as it is."""
 
 
-def warn(text: str) -> None:
-    """A SarclWarning that points at the line which called the library, however deep inside it is found."""
+@contextmanager
+def warned_once() -> Iterator[None]:
+    """Every topic of `warn` causes one warning at most until this context ends; an inner context changes nothing."""
+    if _TOPICS.get() is not None:
+        yield
+        return
+    token = _TOPICS.set(set())
+    try:
+        yield
+    finally:
+        _TOPICS.reset(token)
+
+
+def warn(text: str, topic: str = "") -> None:
+    """A SarclWarning that points at the line which called the library, however deep inside it is found.
+
+    topic  what it is about, in a word: in `warned_once` nothing more is said of it; default the text
+    """
+    said = _TOPICS.get()
+    if said is not None:
+        if (topic or text) in said:
+            return
+        said.add(topic or text)
     level, frame = 2, sys._getframe(1)
     while frame.f_back and os.path.realpath(frame.f_code.co_filename).startswith(_HERE):
         level, frame = level + 1, frame.f_back

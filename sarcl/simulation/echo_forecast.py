@@ -113,10 +113,11 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     output_log.setLevel(logging.WARNING)  # the log is for the echoes that were asked for, not for these pulses
     try:
         few, more = min(FEW, len(track)), min(MORE, len(track))
-        once, _ = made(few)  # builds kernels, which takes seconds
-        if once < KERNELS:
-            once, _ = made(few)
-        longer, raw = made(more)
+        with errors.warned_once():  # the pulses are computed two or three times
+            once, _ = made(few)  # builds kernels, which takes seconds
+            if once < KERNELS:
+                once, _ = made(few)
+            longer, raw = made(more)
     finally:
         output_log.setLevel(level)
     slope = max(longer - once, 0.0) / (more - few) if more > few else longer / more

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.channels import LEAST_CUT, channels_of, cut_of, sampling, warn_of
-from ...base.errors import ToleranceMissed, ToleranceUnreachable
+from ...base.errors import ToleranceMissed, ToleranceUnreachable, warned_once
 from ...base.report import Report
 from ...base.validation import choice
 from ...model.antenna_array import AntennaArray
@@ -60,7 +60,8 @@ def array_echo(
     layout = ChannelLayout(rows, sent, grid, (near, far), waveform, compressed)
     geometry = layout.geometry(tx, rx, reference_range, layout.frequencies)
     with EchoOutput(layout.shape(len(track)), out, request.budget, (near, far)) as output:
-        method, prepared = _planned(layout, scene, original_scene, whole, geometry, weights, request)
+        with warned_once():  # the scene may be prepared for one method and then for the other
+            method, prepared = _planned(layout, scene, original_scene, whole, geometry, weights, request)
         added = _filled(method, prepared, output)
         prepared.check_seen(added.counts, near, far)
         request.clock.lap("spectra")
