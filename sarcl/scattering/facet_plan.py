@@ -20,6 +20,7 @@ from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
+from ._cutting_error import CuttingError
 from ._frequency_nodes import crossed, over_band
 from .antenna_weights import MOST_NODES, WeightError
 
@@ -27,9 +28,14 @@ GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smal
 LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
 SHARE = 0.6  # of the tolerance, for the facets themselves; the rest is for ranges and interpolation
 MOST_FACETS = 50_000_000
+# Facets times pulses times samples that are added up in float64, in about a second, where float32 does not suffice, or
+# needs this many times as many facets
+FLOAT64_TERMS, WORTH_FLOAT32 = 4e6, 64
 # bytes per cut facet of an echo: corners, normals, materials and illumination on the host, measured with 1e6 facets
 FACET_BYTES = 512
 DARK = 30.0  # times less in the cross-polarised echoes that are asked for: then that is said
+# rms error of amplitudes in float32, relative to their rms; 1.5e-7 measured by tests/scattering/test_facet_kernel.py
+KERNEL = 5e-7
 TO_CORNER = 2 / 3  # largest distance of a corner from the centroid, relative to the longest edge
 
 
@@ -38,7 +44,9 @@ class FacetPlan:
     """Facets no longer than max_edge, m, their amplitudes over f^power interpolated between `nodes`, Hz (n,).
 
     power            1 where facets reflect coherently, 0 where their amplitude has no factor k
-    predicted_error  relative;  n_facets  number of facets after cutting, about
+    predicted_error  relative to the facets as they are cut, at random phases; times `gain`, relative to the facets as
+                     they were given;  n_facets  number of facets after cutting, about
+    is_float64       amplitudes are computed and added up in float64, frequency by frequency, without nodes
     """
 
     max_edge: float
@@ -46,6 +54,8 @@ class FacetPlan:
     predicted_error: float
     n_facets: float
     power: int = 1
+    gain: float = 1.0
+    is_float64: bool = False
 
     def basis(self, frequencies: np.ndarray) -> np.ndarray:
         """Lagrange's polynomials of the nodes at frequencies f, Hz (m,), times (f/1 GHz)^power: (n, m).
@@ -61,11 +71,8 @@ class FacetPlan:
 
     def describe(self) -> dict[str, Any]:
         """Words and numbers for a report."""
-        return {
-            "facets": round(self.n_facets),
-            "facet edges, m": self.max_edge,
-            "frequencies per facet": len(self.nodes),
-        }
+        sums = {"sums": "in float64"} if self.is_float64 else {"frequencies per facet": len(self.nodes)}
+        return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, **sums}
 
 
 def coherent(scene: Scene) -> np.ndarray:
@@ -76,12 +83,15 @@ def coherent(scene: Scene) -> np.ndarray:
 def plan_facets(
     tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
     polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
-    weights: WeightError | None = None, max_bytes: float = np.inf,
+    weights: WeightError | None = None, max_bytes: float = np.inf, profiles: float = 0.0,
+    terms: float = np.inf,
 ) -> FacetPlan:  # fmt: skip
-    """The cheapest plan for facets whose error is at most SHARE of `tolerance`.
+    """The cheapest plan for facets whose error is at most SHARE of `tolerance`, relative to the facets as given.
 
     center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
     cut                False: facets stay as they are;  weights  errors of the antenna weights
+    profiles   least error of the range profiles that cut facets are spread into
+    terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
     max_bytes  that the cut facets may take; twice the facets of the scene are allowed whatever it is
     ToleranceUnreachable where more facets would be needed than that, or than 50 million, with the best tolerance of
     fewer.
@@ -96,39 +106,59 @@ def plan_facets(
     weights = weights or WeightError()
     dark = crossed(scene, mirror, top, finest, antennas, polarizations, vertical, center)
     best: tuple[float, FacetPlan] | None = None
-    least, edge, fine = np.inf, min(top, finest), False
+    exact: FacetPlan | None = None
+    cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical)
+    least, least_rounding, edge, fine = np.inf, np.inf, min(top, finest), False
+
+    def needed(gain: float, error: float) -> float:
+        """The tolerance that an error meets, with what range profiles of cut facets need beside it."""
+        return gain * max(error / SHARE, error + (profiles if gain > 1 else 0.0))
+
     while True:
-        corner = TO_CORNER * edge
+        corner, gain = TO_CORNER * edge, 1.0
         count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
-        fixed = _rounding(edge, highest) * dark + weights.rounding
+        if count > most or (exact is not None and count > WORTH_FLOAT32 * exact.n_facets):
+            break
+        small = count * terms <= FLOAT64_TERMS and dark <= DARK
+        rounding = _rounding(edge, highest) * dark + weights.rounding
+        shape = weights.gradient * corner if mirror.any() else 0.0
         if mirror.any():
-            fixed += _spherical(corner, distance, highest) + weights.gradient * corner
-        if fixed < SHARE * tolerance and count <= most:
+            if needed(1.0, shape if small else rounding + shape) < tolerance:
+                gain = cutting.gain(edge) if cut else 1.0
+            bent = _spherical(corner, distance, highest)
+            shape += _at_most(cutting, edge, gain, bent, tolerance / gain * SHARE - shape - (0 if small else rounding))
+        if small and exact is None and gain * shape <= SHARE * tolerance:
+            exact = FacetPlan(edge, np.array([center]), shape, count, 1, gain, is_float64=True)
+        fixed = rounding + shape
+        least_rounding = min(least_rounding, needed(gain, rounding))
+        if needed(gain, fixed) < tolerance:
             fine = True
             band = over_band(
                 scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
             )  # fmt: skip
             for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
                 error = fixed + weights.with_phase(n, band[power])
-                least = min(least, error)
-                if error <= SHARE * tolerance:
+                least = min(least, needed(gain, error))
+                if needed(gain, error) <= tolerance:
                     per_node = cost_model.FACET_NODE + 4 * cost_model.FACET_TAP * len(polarizations)
                     cost = count * (cost_model.FACET + n * per_node)
                     if best is None or cost < best[0]:
-                        best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power)
-        elif count <= most:
-            least = min(least, fixed)
+                        best = cost, FacetPlan(edge, chebyshev(center, bandwidth, n), error, count, power, gain)
+        else:
+            least = min(least, needed(gain, fixed))
         settled = best is not None and count > 4 * best[1].n_facets
-        if settled or not cut or not mirror.any() or count > most:
+        if settled or not cut or not mirror.any():
             break
         edge /= LADDER
+    if best is None and exact is not None:
+        return exact
     if best is None and _rounding(0.0, highest) * dark >= SHARE * tolerance and dark > DARK:
         names = ", ".join(polarizations)
         raise ToleranceUnreachable(
             tolerance, None, "float32 integrals over facets", "ask for HH or VV",
             how=f"in {names}, in which these facets send back {20 * np.log10(dark):.0f} dB less than in HH and VV",
         )  # fmt: skip
-    reach = least / SHARE * (1 + 1e-9) if np.isfinite(least) else None
+    reach = least * (1 + 1e-9) if np.isfinite(least) else None
     if best is None and not cut:
         raise ToleranceUnreachable(
             tolerance, reach, "facets as large as they are", how=f"with facets of up to {top:.3g} m uncut"
@@ -138,7 +168,7 @@ def plan_facets(
             tolerance, reach, "amplitudes over the band", "halve the band and add the halves' images",
             how=f"with facets' amplitudes interpolated between {MOST_NODES} frequencies",
         )  # fmt: skip
-    if best is None and _rounding(0.0, highest) + weights.rounding >= SHARE * tolerance:
+    if best is None and least_rounding >= tolerance:
         raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
     if best is None:
         how, remedy = f"without cutting these facets into more than {most:,.0f}", "take a smaller scene"
@@ -147,6 +177,17 @@ def plan_facets(
             remedy += ", a track farther away, or a larger max_bytes"
         raise ToleranceUnreachable(tolerance, reach, "number of facets", remedy, how=how)
     return best[1]
+
+
+def _at_most(cutting: CuttingError, edge: float, gain: float, bound: float, left: float) -> float:
+    """Error of linear phases over pieces, relative to these: measured, or by its bound, or estimated where the bound is
+    more than is left of the tolerance."""
+    if left <= 0:
+        return bound
+    measured = cutting.measured(edge)
+    if measured is not None:
+        return measured / gain
+    return min(bound, cutting.relative(edge)) if bound >= left else bound
 
 
 def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
@@ -177,5 +218,5 @@ def _spherical(corner: float, distance: float, highest: float) -> float:
 
 
 def _rounding(edge: float, highest: float) -> float:
-    """Error of float32 directions (4e-7 |q| |edge| rad, a fifth of which counts) and integrals (kernels/facet.clh)."""
-    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + 2e-6
+    """Error of float32 directions (4e-7 |q| |edge| rad, a fifth of which counts), and rms error of the amplitudes."""
+    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + KERNEL

@@ -14,6 +14,7 @@ For other folders:
 
 For this folder alone:
 
+    _exact_facets      few facets in few pulses and samples, added up in float64 on the host
     _facet_spreading   facets to range profiles
     _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
     _point_spreading   points to range profiles: a nonuniform FFT of type 1

@@ -7,11 +7,11 @@ from typing import Any
 
 import numpy as np
 
-from ..base.constants import SPEED_OF_LIGHT
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.scatterers import Points
+from ._exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
 
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
@@ -85,30 +85,21 @@ def _exact(
     beam: AntennaWeights,
 ) -> tuple[np.ndarray, np.ndarray]:
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and their power at random phases."""
+    if isinstance(part, FacetSet):
+        inside = inside_window(part, antennas, p)
+        return facet_samples(part, antennas, p, frequencies, polarizations, vertical, beam, inside)
     from ..reference.echo import echo as exact_echo
-    from ..reference.geometry import half_path
-    from ..scene.triangles import centroids
 
-    tx, rx = antennas.tx[p], antennas.rx[p]
-    places = part.positions if isinstance(part, Points) else centroids(part.triangles)
+    tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
     away = np.linalg.norm(places - tx, axis=1), np.linalg.norm(places - rx, axis=1)
     delta = (away[0] + away[1]) / 2 - antennas.reference_range[p]
     inside = (delta >= antennas.near[p]) & (delta <= antennas.far[p])
     values = np.zeros((len(polarizations), len(frequencies)), np.complex128)
     powers = np.zeros(values.shape)
-    if isinstance(part, Points):
-        place = (tx, rx, float(antennas.reference_range[p]))
-        same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
-        for j, f in enumerate(frequencies.tolist()):
-            a = part.amplitudes * inside * beam.weights(places, p, f)
-            values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
-            powers[same, j] = (np.abs(a) ** 2).sum()
-        return values, powers
-    weight = inside * part.share_at(p)
-    delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[p]))
-    sent = part.amplitudes(tx, rx, frequencies, polarizations, vertical)
+    place = (tx, rx, float(antennas.reference_range[p]))
+    same = [i for i, name in enumerate(polarizations) if name[0] == name[1]]
     for j, f in enumerate(frequencies.tolist()):
-        wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
-        a = sent[j] * (weight * beam.weights(places, p, f))[:, None]
-        values[:, j], powers[:, j] = wave @ a, (np.abs(a) ** 2).sum(axis=0)
+        a = part.amplitudes * inside * beam.weights(places, p, f)
+        values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
+        powers[same, j] = (np.abs(a) ** 2).sum()
     return values, powers

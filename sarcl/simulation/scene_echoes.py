@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -25,15 +25,17 @@ from ..scattering.mesh_quality import facet_error, speckle_contrast
 from ..scattering.scatterers import Points, facets_of, points_of
 from ..scattering.subdivision import Subdivision, plan_cut
 from ..scene.scene import Scene
+from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._point_spreading import spread_points, tiled_points
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW, refuse_unseen
-from .spreading import Band, Counts, TiledScatterers
+from .spreading import PER_TILE, Band, Counts, TiledScatterers
 
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
+CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
 Progress = Callable[[str, int, int], None]
 
 
@@ -145,7 +147,8 @@ class SceneEchoes:
     ) -> ChannelEchoes:
         request = self.request
         weights = self.weights.at(antennas, slice(first, first + len(antennas)))
-        plan, nodes, spreader, parts = None, np.zeros(0), None, []
+        plan, nodes, parts = None, np.zeros(0), []
+        spreader: FacetSpreader | ExactFacets | None = None
         if self.points is not None and self.tiled_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
@@ -161,6 +164,13 @@ class SceneEchoes:
             words = spreader.plan.describe("spread") | self.tiled_facets.facet_plan.describe()
             words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
             parts.append((self.subdivision.gain * spreader.predicted_error, words))
+        elif self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
+            facets, stop = self.facets, first + len(antennas)
+            spreader = ExactFacets(
+                facets if stop - first == self.n_pulses else facets.between(first, stop), self.subdivision.plan,
+                antennas, frequencies, request.gated, request.polarizations, request.vertical, weights,
+            )  # fmt: skip
+            parts.append((self.subdivision.gain * spreader.predicted_error, spreader.describe() | self.mesh_warnings))
         chosen = max(parts, key=lambda part: part[0])[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(
@@ -207,7 +217,7 @@ class ChannelEchoes:
     frequencies: np.ndarray
     point_plan: Plan | None
     nodes: np.ndarray
-    spreader: FacetSpreader | None
+    spreader: FacetSpreader | ExactFacets | None
     predicted_error: float
     plan: dict[str, Any]
 
@@ -261,6 +271,7 @@ def prepare_scene(
     facets, held_points, held_facets, mesh_warnings = None, None, None, dict[str, Any]()
     if subdivision is not None:
         facet_plan, pieces = subdivision.apply(scene)
+        subdivision = replace(subdivision, plan=facet_plan)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         mesh_warnings = _warned(
             facet_error.judge(original_scene, antennas, waveform), speckle_contrast.judge(pieces, antennas, waveform)
@@ -271,7 +282,7 @@ def prepare_scene(
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
-        if facets is not None and tiled:
+        if facets is not None and tiled and not facet_plan.is_float64:
             held_facets = TiledFacets(
                 device, facets, facet_plan, antennas, waveform, weights, request.polarizations, vertical
             )
@@ -332,12 +343,15 @@ def plan_scene(
     share, made = tolerance / parts_of(scene), None
     weight_error.check(share)
     if len(scene.triangles):
+        terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf
+        profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
         made = plan_cut(
             scene, waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error,
-            request.host,
+            request.host, profiles, terms,
         )  # fmt: skip
         left = share / made.gain - made.plan.predicted_error
-        _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)  # pieces: not counted yet
+        if not made.plan.is_float64:  # pieces are not counted yet
+            _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)
     n_points = len(scene.amplitudes)
     if "zero reflectivity" in request.skips:
         n_points = int(np.count_nonzero(scene.amplitudes))
@@ -372,8 +386,8 @@ def _warned(*judgements: facet_error.FacetError | speckle_contrast.Speckle) -> d
     """Warn of meshes that are too coarse; returns what a report says of them."""
     out: dict[str, Any] = {}
     for judgement in judgements:
-        for text in judgement.warnings():
-            warn(text)
+        for number, text in enumerate(judgement.warnings()):
+            warn(text, f"{type(judgement).__name__} {number}")
         out |= judgement.describe()
     return out
 

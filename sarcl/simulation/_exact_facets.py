@@ -1,0 +1,100 @@
+"""Echoes of facets summed in float64 on the host: few facets, seen in few pulses and samples."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Sequence
+from typing import Any
+
+import numpy as np
+
+from ..base.constants import SPEED_OF_LIGHT
+from ..base.stage_timer import Clock
+from ..base.vectors import unit
+from ..numerics.error_bounds import FLOAT32
+from ..numerics.pulse_geometry import PulseGeometry
+from ..scattering.antenna_weights import AntennaWeights
+from ..scattering.facet_plan import FacetPlan
+from ..scattering.facets import FacetSet
+from ..scene.triangles import centroids, normals
+from .spreading import Counts
+
+AT_ONCE = 200_000  # amplitudes computed per block of frequencies
+
+
+class ExactFacets:
+    """Facets of one channel at one receiver, added up frequency by frequency: neither profiles nor interpolation.
+
+    predicted_error  relative to the facets as they are cut, at random phases
+    """
+
+    def __init__(
+        self, facets: FacetSet, facet_plan: FacetPlan, antennas: PulseGeometry, frequencies: np.ndarray, gated: bool,
+        polarizations: Sequence[str], vertical: np.ndarray, weights: AntennaWeights,
+    ) -> None:  # fmt: skip
+        """facets  as the antennas' pulses see them;  gated  leave out facets outside the range window"""
+        self.facets, self.facet_plan, self.antennas, self.frequencies = facets, facet_plan, antennas, frequencies
+        self.gated, self.polarizations, self.vertical, self.weights = gated, polarizations, vertical, weights
+        # samples are stored in complex64: an error of the echo itself, and not of its pieces
+        self.predicted_error = facet_plan.predicted_error + FLOAT32.unit / facet_plan.gain
+
+    def describe(self) -> dict[str, Any]:
+        """Words and numbers for a report."""
+        return self.facet_plan.describe()
+
+    def add(
+        self, samples: np.ndarray, pulses: Sequence[int], clock: Clock, on_progress: Callable[[int], object]
+    ) -> Counts:
+        """Add to samples (n_pulses, n_polarizations, n_samples) of consecutive `pulses` of the antennas.
+
+        on_progress is called with the number of pairs of facet and pulse that are done.
+        """
+        clock.lap("scene")
+        counts, part = Counts(), self.facets
+        places, facing = centroids(part.triangles), normals(part.triangles)
+        for row, p in enumerate(pulses):
+            sides = [(facing * unit(end[p] - places)).sum(axis=1) for end in (self.antennas.tx, self.antennas.rx)]
+            front = (sides[0] * sides[1] > 0) & ((sides[0] > 0) | part.two_sided)
+            inside = inside_window(part, self.antennas, p) if self.gated else np.ones(len(part), bool)
+            values, _ = facet_samples(
+                part, self.antennas, p, self.frequencies, self.polarizations, self.vertical, self.weights, inside
+            )
+            samples[row] += values.astype(np.complex64)
+            away = int((inside & ~front).sum())
+            counts += Counts(len(part), int((~inside).sum()), away)
+            on_progress(counts.pairs)
+        clock.lap("echo")
+        return counts
+
+
+def inside_window(part: FacetSet, antennas: PulseGeometry, pulse: int) -> np.ndarray:
+    """Which facets (k,) have their centroids in the range window of a pulse."""
+    places = centroids(part.triangles)
+    away = np.linalg.norm(places - antennas.tx[pulse], axis=1) + np.linalg.norm(places - antennas.rx[pulse], axis=1)
+    delta = away / 2 - antennas.reference_range[pulse]
+    return np.asarray((delta >= antennas.near[pulse]) & (delta <= antennas.far[pulse]))
+
+
+def facet_samples(
+    part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, polarizations: Sequence[str],
+    vertical: np.ndarray, weights: AntennaWeights, inside: np.ndarray,
+) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
+    """Samples (n_polarizations, n) of a pulse at frequencies, Hz (n,), and their power at random phases.
+
+    inside  the facets that count (k,)
+    """
+    from ..reference.geometry import half_path
+
+    tx, rx, places = antennas.tx[pulse], antennas.rx[pulse], centroids(part.triangles)
+    delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[pulse]))
+    weight = inside * part.share_at(pulse)
+    values = np.zeros((len(polarizations), len(frequencies)), np.complex128)
+    powers = np.zeros(values.shape)
+    step = max(1, AT_ONCE // max(1, len(part)))
+    for first in range(0, len(frequencies), step):
+        block = frequencies[first : first + step]
+        sent = part.amplitudes(tx, rx, block, polarizations, vertical)
+        for j, f in enumerate(block.tolist()):
+            wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
+            a = sent[j] * (weight * weights.weights(places, pulse, f))[:, None]
+            values[:, first + j], powers[:, first + j] = wave @ a, (np.abs(a) ** 2).sum(axis=0)
+    return values, powers
