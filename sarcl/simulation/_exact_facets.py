@@ -82,10 +82,10 @@ def facet_samples(
 
     inside  the facets that count (k,)
     """
-    from ..reference.geometry import half_path
-
     tx, rx, places = antennas.tx[pulse], antennas.rx[pulse], centroids(part.triangles)
-    delay = 2 / np.longdouble(SPEED_OF_LIGHT) * half_path(tx, rx, places, float(antennas.reference_range[pulse]))
+    steps = (places.astype(np.longdouble) - end for end in (tx, rx))  # a metre is thousands of cycles of a long path
+    path = sum(np.sqrt((step**2).sum(axis=1)) for step in steps)
+    delay = (path - 2 * np.longdouble(antennas.reference_range[pulse])) / np.longdouble(SPEED_OF_LIGHT)
     weight = inside * part.share_at(pulse)
     values = np.zeros((len(polarizations), len(frequencies)), np.complex128)
     powers = np.zeros(values.shape)
