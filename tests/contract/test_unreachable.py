@@ -363,6 +363,7 @@ MAY_CATCH = {
     "io/_gotcha.py": "scipy's reader of damaged files; the file is put before a message, which is raised again",
     "io/_checksums.py": "text that is no JSON",
     "io/mesh.py": "trimesh's readers of damaged files",
+    "io/_other_files.py": "paths that are no names of files, XML that cannot be read",
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",
     "fullwave/bodies/materials.py": "the number of the part is put before a message, which is raised again",
     "cli/_job.py": "signals outside the main thread",
