@@ -28,7 +28,7 @@ from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level
 
-SPAN = 32  # vectors of a profile per work-item
+SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
 
 
 @dataclass(frozen=True, eq=False)
@@ -57,13 +57,14 @@ class Factorized(Engine):
         self.antennas = self.task.antennas
         self.task = replace(self.task, antennas=replace(self.antennas, beam=None))
         self.lanes = device.info.vector_width
+        self._span = SPAN if self.lanes > 1 else 1
         bistatic = not task.antennas.is_monostatic
         self.merges = []
         for i, level in enumerate(plan.levels):
             made = plan.between if i else plan.first
             macros = {
                 "BISTATIC": int(bistatic),
-                "SPAN": SPAN,
+                "SPAN": self._span,
                 "WRAP": plan.length if task.wrap and not i else 0,
                 "TAPS": made.taps,
                 "TERMS": made.terms,
@@ -255,7 +256,7 @@ class Factorized(Engine):
         clock.lap("backproject")
 
     def _spans(self, level: int) -> int:
-        return -(-2 * self.strides[level] // (SPAN * (8 if self.lanes > 1 else 2)))
+        return -(-2 * self.strides[level] // (self._span * (8 if self.lanes > 1 else 2)))
 
     def _descend(self, down: _Descent, level: int, low: int, high: int, source: Any, first: int, within: float) -> None:
         """From the profiles of tiles low ... high - 1 of a level to their pixels, through all levels below.
