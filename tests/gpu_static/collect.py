@@ -8,6 +8,7 @@ from __future__ import annotations
 
 import os
 import re
+import threading
 import warnings
 from collections.abc import Callable, Iterator, Mapping
 from contextlib import contextmanager
@@ -81,6 +82,7 @@ class PaperDevice(Device):
         self.info, self.found, self.task, self.until = info, found, "", ""
         self._raw = self.context = self.queue = None
         self._kernels: dict[tuple[Any, ...], dict[str, Any]] = {}
+        self._lock = threading.RLock()
 
     def begin(self, task: str, until: str = "") -> None:
         """Name the task that the programs built from now on are for, and the beginning of the last kernel's name."""
@@ -127,7 +129,9 @@ class PaperDevice(Device):
         out[...] = 1
         return out
 
-    def run(self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any) -> None:
+    def run(
+        self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any, **options: Any
+    ) -> None:
         items = 0 if group is None else int(np.prod(group))
         kernel.use.groups.setdefault(kernel.function_name, set()).add(items)
         if self.until and kernel.function_name.startswith(self.until):
@@ -186,6 +190,6 @@ def collected(
     if failed:
         raise RuntimeError(
             "tasks whose plans are wanted failed on a device that computes nothing; leave out what cannot run there "
-            "(tests/gpu_static/tasks.py), or mend PaperDevice (tests/gpu_static/collect.py):\n" + "\n".join(failed)
+            "(tests/gpu_static/tasks.py), or mend PaperDevice (tests/gpu_static/collect.py):\n" + "\n".join(failed[:10])
         )
     return found

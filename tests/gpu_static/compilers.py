@@ -21,6 +21,8 @@ REMEDY = "type: sh .ci/setup.sh gpu-static"
 COMMON = ("-x", "cl", "-cl-std=CL1.2", "-O3", "-nogpulib", "-Wno-linker-warnings")
 PTX = ("--target=nvptx64-nvidia-nvcl", "-Xclang", "-target-cpu", "-Xclang", "sm_80", "-Xclang", "-target-feature",
        "-Xclang", "+ptx78", "-Dcl_khr_fp64")  # fmt: skip
+# clang has no instruction for native_sin and native_cos of libclc; NVIDIA's OpenCL takes those of approximate values
+NATIVE = ("-Dnative_sin=__nvvm_sin_approx_f", "-Dnative_cos=__nvvm_cos_approx_f")
 FOUND = re.compile(
     r"Function properties for (\w+)\s*\n\s*(\d+) bytes stack frame, (\d+) bytes spill stores, (\d+) bytes spill loads"
     r"\s*\nptxas info\s*: Used (\d+) registers(.*)"
@@ -97,7 +99,7 @@ def nvidia_ptx(text: str, macros: list[str], folder: Path) -> Path:
     """NVIDIA's intermediate language for a program: one text, of which ptxas makes each target's machine code."""
     ptx = folder / "all.ptx"
     builtins = ["-Xclang", "-mlink-builtin-bitcode", "-Xclang", str(LIBRARY / "nvptx64--nvidiacl.bc")]
-    called([CLANG, *PTX, *COMMON, *macros, *builtins, "-S", "-o", str(ptx), "-"], text)
+    called([CLANG, *PTX, *COMMON, *NATIVE, *macros, *builtins, "-S", "-o", str(ptx), "-"], text)
     return ptx
 
 

@@ -93,17 +93,6 @@ def hills() -> Any:
     return sarcl.Scene.from_heights(axis, axis, np.random.default_rng(0).standard_normal((3, 3)) * 0.3)
 
 
-def array_beam(tolerance: float) -> Errors:
-    random = np.random.default_rng(0)
-    array = sarcl.AntennaArray.linear(9, spacing=0.015, frequency_step=1e9 / 9)
-    places = random.uniform(-1, 1, (7, 3)) * 100 + np.array([1e4, 0, 0])
-    times = 1e4 / 299792458.0 + random.uniform(-1e-9, 1e-9, 5)
-    made, exact = (
-        np.asarray(sarcl.beam(array, 10e9, times=times, positions=places, tolerance=t)) for t in (tolerance, 1e-9)
-    )
-    return float(np.linalg.norm(made - exact) / np.linalg.norm(exact)), tolerance
-
-
 TASKS: dict[str, Callable[[], Errors]] = {
     "direct 1e-1": lambda: image(1e-1),
     "direct 1e-3": lambda: image(1e-3),
@@ -124,10 +113,8 @@ TASKS: dict[str, Callable[[], Errors]] = {
     "echo points bistatic": lambda: echo(
         points(), 1e-5, receiver=sarcl.Trajectory.circle(radius=9e3, height=7e3, arc=0.01, start=0.2, n_pulses=3)
     ),
-    "echo points antenna": lambda: echo(points(), 1e-3, antenna=sarcl.Antenna.gaussian(width=(0.1, 0.1), gain_db=20)),
     "echo facets": lambda: echo(hills(), 1e-2, max_edge=1.0, shadows=True),
     "echo facets all": lambda: echo(hills(), 1e-2, max_edge=1.0, shadows=False, polarization="all"),
-    "beam": lambda: array_beam(1e-4),
 }  # fmt: skip
 
 
