@@ -81,8 +81,8 @@ def _replayed(tolerance: str, file: str, macros: dict[str, int], loads: float) -
         return [loads + wavefronts.shared_lines(*(macros[name] for name in names))]
     taps = macros["TAPS"]
     samples = wavefronts.samples_of_pixels(2 / 299792458.0 * 600e6 / 8192 * GATHER[tolerance][1])
-    alike = loads - 2 * taps
-    return [alike + wavefronts.gather(s, taps, macros["VECTORS"])[0] for s in (samples, samples.transpose(0, 2, 1))]
+    alike = loads - taps  # the others load a complex sample per tap, 8 bytes
+    return [alike + wavefronts.gather(s, taps, macros["VECTORS"], 8)[0] for s in (samples, samples.transpose(0, 2, 1))]
 
 
 def _in_memory(record: dict[str, Any]) -> list[str]:
