@@ -96,8 +96,11 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
     wv edge;
     state = beam_state(pulse, g, n, to_tx, tx_r, radius[k], skip, state, &edge);
     put(out, N_CONST, C_EDGE, w_float(edge));
-#pragma unroll
-    for (int i = 0; i < 4; i++) put(out, N_CONST, C_BX + i, w_float(w_load(pulse + (P_BX + i) * n, g, lo)));
+    point gradient = beam_gradient(pulse, g, n, to_tx, tx_r);
+    put(out, N_CONST, C_SLOPE, w_float(gradient.x));
+    put(out, N_CONST, C_SLOPE + 1, w_float(gradient.y));
+    put(out, N_CONST, C_SLOPE + 2, w_float(gradient.z));
+    put(out, N_CONST, C_COS, w_float(w_load(pulse + P_COS * n, g, lo)));
 #endif
     put(out, N_CONST, C_STATE, AS_FLOAT(state));
 }
@@ -218,10 +221,10 @@ __kernel void line_constants(__global const float *restrict pulse, __global cons
 #if BEAM
     wv beam_edge;
     state = beam_state(pulse, g, n, to_tx, tx_r, radius, skip, state, &beam_edge);
-    point beam = load_antenna(pulse, P_BX, g, n, 0);
+    point gradient = beam_gradient(pulse, g, n, to_tx, tx_r);
     put(out, N_LINE, L_EDGE, w_float(beam_edge));
-    put(out, N_LINE, L_BX, w_float(w_dot(beam, load_step(axes, 0))));
-    put(out, N_LINE, L_BY, w_float(w_dot(beam, load_step(axes, 1))));
+    put(out, N_LINE, L_SLOPE_X, w_float(w_dot(gradient, load_step(axes, 0))));
+    put(out, N_LINE, L_SLOPE_Y, w_float(w_dot(gradient, load_step(axes, 1))));
     put(out, N_LINE, L_COS, w_float(w_load(pulse + P_COS * n, g, lo)));
 #endif
     put(out, N_LINE, L_STATE, AS_FLOAT(state));

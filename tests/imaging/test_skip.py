@@ -117,6 +117,26 @@ def test_both_kernels_see_the_same_beam_and_window(lanes, tolerance, bistatic):
     assert counts["{'beam'}"][0] == 0 and counts["{'beam'}"][1] > lit
 
 
+@pytest.mark.parametrize(
+    "distance, width", [(10e3, 8.0), pytest.param(770e3, 8.0, marks=REPEATED), (36e6, 800.0)], ids=["10", "770", "36000"]
+)
+@pytest.mark.parametrize("grid", [PLANE, POINTS], ids=["plane", "points"])
+def test_the_edge_of_a_narrow_beam_is_in_place_at_any_distance(device, grid, distance, width):
+    # positions and directions in pairs of float32 place the edge to 1e-14 rad over half the angle; directions in
+    # float32, of which it is the small difference, would move it by 1e-7 rad: 0.1 m and 4 m at the larger distances
+    raw, angle = noise_history(n_rows=24, distance=distance, arc=700 / distance), spread(distance, width)
+    beam = angle, aimed(raw, (4, -3 - width / 2, 0), sweep=30.0)
+    index, places = grid.sample(3000, seed=9)
+    wanted, norm = exact(raw, places, beam=beam, edge=1e-14 / (angle / 2))
+    clear = np.isfinite(wanted)
+    assert clear.mean() > 0.9
+    for tolerance in (1e-3, 1e-5):
+        image = sarcl.backproject(raw, grid, beam=beam, tolerance=tolerance, device=device, method="direct")
+        error = np.asarray(image.data)[index][clear] - wanted[clear]
+        assert np.linalg.norm(error) / np.linalg.norm(wanted[clear]) <= tolerance
+        assert (image.data == 0).any() and image.report.contributions_skipped["beam"] > 0
+
+
 def test_pairs_left_out_are_pairs_that_no_pulse_sees():
     # counted by hand, pixel by pixel: what is skipped lies outside, and most of what lies outside is skipped
     raw = noise_history(n_rows=10, n_samples=32)
