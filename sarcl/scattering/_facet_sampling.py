@@ -12,7 +12,7 @@ def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.
     """Indices of up to `most` of n elements, and the number of the n that each represents.
 
     size  (n,), such as areas or powers: half of the draws are as likely as the size, half alike for all. Sums over the
-          draws, each times the number it stands for, estimate sums over all without bias.
+          draws, each times the number it represents, estimate sums over all without bias.
     """
     n = len(size)
     if n <= most:

@@ -103,7 +103,7 @@ def _sampled(
 
 
 def _places(scene: Scene, random: np.random.Generator, many: int) -> tuple[np.ndarray, FacetSet, np.ndarray]:
-    """Random points on sampled facets, m (n, 3), these facets, and the number of facets that each stands for (n,)."""
+    """Random points on sampled facets, m (n, 3), these facets, and the number of facets that each represents (n,)."""
     some, share = drawn(areas(scene.triangles), FACETS * many, random)
     triangles, corner = scene.triangles[some], random.dirichlet((1.0, 1.0, 1.0), len(some))
     return np.einsum("ni,nij->nj", corner, triangles).reshape(-1, 3), facets_at(scene, some, triangles), share

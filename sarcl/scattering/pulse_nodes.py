@@ -109,7 +109,7 @@ def _error(
 ) -> float:  # fmt: skip
     """Relative error of amplitudes a quarter, a half and three quarters on from some of the nodes.
 
-    share  (k,), the number of facets that each of `part` stands for
+    share  (k,), the number of facets that each of `part` represents
     """
     n_pulses, places = len(weights.geometry), centroids(part.triangles)
     wrong = right = 0.0

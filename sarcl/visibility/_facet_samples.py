@@ -1,4 +1,4 @@
-"""Sample points of facets, which stand for equal parts of a triangle; and probes at its corners."""
+"""Sample points of facets, which represent equal parts of a triangle; and probes at its corners."""
 
 from __future__ import annotations
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 REGISTERS, WARPS, GROUPS = 65536, 64, 32
 LOCAL = {"sm_80": 164 * 1024, "sm_90": 228 * 1024}
 WAVES = {"gfx90a": 8, "gfx1100": 16}  # most waves per SIMD of AMD
-DRIVERS_CHOICE = 256  # work-items per group that stand for a driver's choice
+DRIVERS_CHOICE = 256  # work-items per group taken for a driver's choice
 
 
 def nvidia(target: str, registers: int, local_memory: int, group: int) -> float:

@@ -2,7 +2,7 @@
 
 Echoes between two positions are computed over the whole band. Without the phase of the path to the scene's centre they
 are interpolated to every element, and get the phase of that element's own path, in extended precision. Scatterers are
-visited once per pair of positions, not once per channel: for a small scene a handful of positions stand for 450
+visited once per pair of positions, not once per channel: for a small scene a handful of positions suffices for 450
 elements, and some twenty pairs of positions for 450 transmitting by 450 receiving elements.
 """
 
@@ -33,9 +33,9 @@ BLOCK = 256  # pulses per array operation: bounds the memory
 
 
 class InterpolatedChannels:
-    """Echoes of channels, interpolated from positions that stand for transmitting and receiving elements.
+    """Echoes of channels, interpolated from a few positions of transmitting and receiving elements.
 
-    tx, rx     Positions; where elements receive their own channels, those of `tx` stand for both
+    tx, rx     Positions; where elements receive their own channels, those of `tx` are both
     error      interpolation error, relative;  tolerance  what is left of it for the echoes at the positions
     runs       number of range profiles that are computed: pulses times pairs of positions
     """
