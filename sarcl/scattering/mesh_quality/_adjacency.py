@@ -65,7 +65,8 @@ def components(n: int, a: np.ndarray, b: np.ndarray) -> np.ndarray:
 
 
 def uncut(triangles: np.ndarray, j: MeshAdjacency, kind: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-    """The same surface with flat parts in as few triangles as their outlines need, and for each one of the facets that it replaces (n,).
+    """The same surface with flat parts in as few triangles as their outlines need, and for each of these one of the
+    facets that it replaces (n,).
 
     j     of the triangles, m (k, 3, 3);  kind  (k,): facets of different kinds stay apart
     Corners inside a plane, or on the straight line two planes meet in, go; outlines that are not convex stay as they
