@@ -147,7 +147,7 @@ __kernel void schedule_pulses(__global const float *restrict constants, int n, i
             record[L_STEP + along], record[L_STEP + along + 1], line.frac, line.fine_cycles, line.fine_cycles_low,
             record[L_RATIO + along], record[L_RATIO + along + 1], line.cycles_across, line.cycles_across_low, line.cycles,
             line.kappa, line.sigma * (FINE / line.along), line.u.x, line.u.y, line.u.inverse, line.u.R0,
-            line.v.x, line.v.y, line.v.inverse, line.v.R0};
+            BISTATIC ? line.v.x : 0, BISTATIC ? line.v.y : 0, BISTATIC ? line.v.inverse : 0, BISTATIC ? line.v.R0 : 0};
 #pragma unroll
         for (int k = 0; k < N_ENTRY - E_STEP; k++) entry[E_STEP + k] = as_int(values[k]);
     }

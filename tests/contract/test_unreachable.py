@@ -91,12 +91,13 @@ REFUSED = {
     "points in a side lobe": (
         echoed(POINTS, track=aside(), antenna=sarcl.Antenna.gaussian(width=0.04)), 1.5e-6, "float32 gains",
     ),
-    "facets": (echoed(TILE), 1e-6, "float32 integrals"),
-    "facets and points": (echoed(TILE + POINTS), 1.75e-6, "float32 integrals"),
+    "facets": (echoed(TILE), 1e-6, "number of facets"),
+    "facets below float32": (echoed(TILE), 4e-7, "float32 integrals"),
+    "facets and points": (echoed(TILE + POINTS), 1.75e-6, "float32 range profiles"),
     "facets uncut": (echoed(PLATE, max_edge=None), 1e-3, "facets as large as they are"),
     "too many facets": (echoed(PLATE), 1e-4, "number of facets"),
     "channels of points": (channels(POINTS), 1e-7, "float32 range profiles"),
-    "channels of facets": (channels(TILE), 1e-6, "float32 integrals"),
+    "channels of facets": (channels(TILE), 1e-6, "float32 range profiles"),
 }  # fmt: skip
 
 
@@ -107,6 +108,7 @@ def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name, monkeypa
         "sarcl.scattering.facet_plan.MOST_FACETS", 20_000
     )  # so that what is best takes a second, not an hour
     monkeypatch.setattr("sarcl.base.validation.LEAST_TOLERANCE", 0.0)  # what float64 refuses lies below it
+    monkeypatch.setattr("sarcl.scattering.facet_plan.FLOAT64_TERMS", 0.0)  # as with more facets, pulses and samples
     make, asked, limit = REFUSED[name]
     with pytest.raises(ToleranceUnreachable) as caught:
         make(asked)

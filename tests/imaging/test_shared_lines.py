@@ -108,9 +108,9 @@ def pixel_by_pixel(monkeypatch):
     def counted(kernel, on, low, high, pulses, *rest):
         buffers, run = {}, kernel.device.run
 
-        def keep(made, size, group, *args):
+        def keep(made, size, group, *args, **how):
             buffers[made.function_name] = args[-1], size
-            run(made, size, group, *args)
+            run(made, size, group, *args, **how)
 
         with monkeypatch.context() as patch:
             patch.setattr(kernel.device, "run", keep)
