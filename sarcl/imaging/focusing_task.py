@@ -28,7 +28,7 @@ Skip = Literal["range window", "beam", "zero weight", "no data"]
 # full angle, rad, and direction of the axis; or an antenna, and its direction or attitude
 BeamCone = float | tuple[float, ArrayLike] | Antenna | tuple[Antenna, ArrayLike | Trajectory]
 SKIPS = ("range window", "beam", "zero weight", "no data")
-BEAM_EDGE = 2e-5  # rad: pixels so near the edge of a beam may count as inside or outside
+BEAM_EDGE = 1e-5  # rad: pixels so near the edge of a beam may count as inside or outside
 
 
 @dataclass(frozen=True, eq=False)
@@ -67,13 +67,14 @@ class FocusingTask:
 
         (x - T).b - |x - T| cos alpha is computed by differences from the tile's middle: a gradient, which is at most
         sin alpha and the angle that the tile's radius takes up, times the radius, and a curvature. Both are rounded by
-        6e-8. Where antennas are among the pixels, this is so for pixels farther from them than the radius.
+        6e-8, independently of each other. Where antennas are among the pixels, this is so for pixels farther from them
+        than the radius.
         """
         if self.antennas.beam is None:
             return True
         distance = self.antennas.distance(self.grid.bounds) or radius
         sine, angle = float(np.sin(self.antennas.beam_angle / 2)), radius / distance if distance else 0.0
-        off = 6e-8 * radius * (min(sine + angle, 2.0) + min(angle, 2.0))
+        off = 6e-8 * radius * float(np.hypot(min(sine + angle, 2.0), min(angle, 2.0)))
         return bool(off <= BEAM_EDGE * distance * max(sine, BEAM_EDGE))
 
     @property

@@ -21,7 +21,7 @@ ALLOW = "which sarcl does not follow; external=True allows it for files that you
 
 
 def beside(path: Path, name: str) -> Path | None:
-    """The file that a name, relative to the folder of `path`, stands for; None where it lies outside that folder."""
+    """The file of that name in the folder of `path`, or below it; None where it lies outside that folder."""
     folder = path.parent.resolve()
     try:
         found = (folder / name.strip()).resolve()

@@ -142,7 +142,7 @@ class CuttingError:
             self._whole = self._whole_powers()
         n, each = len(self._triangles), self._each
         pieces = _random_pieces(np.repeat(self._triangles, each, axis=0), edge)
-        share = np.repeat(areas(self._triangles), each) / (each * areas(pieces))  # pieces that each stands for
+        share = np.repeat(areas(self._triangles), each) / (each * areas(pieces))  # pieces that each represents
         powers, places = np.zeros(n), centroids(pieces)
         waves = self._wavenumbers[np.random.default_rng(3).integers(0, GAIN_FREQUENCIES, len(pieces))]
         for ends in self._gain_ends:
@@ -157,7 +157,7 @@ class CuttingError:
 
         Pieces that are small beside the curvature of the wave are added up, each with its own distance: where a facet
         lies in the near field, its linear phase alone would give another echo. Of a facet too large for that a part
-        of the same shape stands for the whole; its echo falls with its size no slower than that of the pieces.
+        of the same shape represents the whole facet; its echo falls with its size no slower than that of the pieces.
         """
         triangles = self._triangles
         away = min(float(np.linalg.norm(end - triangles, axis=-1).min()) for ends in self._gain_ends for end in ends)

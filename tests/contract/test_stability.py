@@ -82,9 +82,10 @@ def test_the_error_does_not_grow_with_the_number_of_pulses(method, n):
 
 
 @SLOW
-def test_the_error_does_not_grow_with_the_number_of_pulses_on_any_device(device):
-    # both above the pairs from which devices of one lane share lines and take their own sine
-    hold_at(50_000, 200_000, "direct", device)
+def test_the_error_does_not_grow_with_the_number_of_pulses_on_any_device(device, monkeypatch):
+    # devices of one lane share lines and take their own sine at both numbers: errors of one plan are compared
+    monkeypatch.setattr("sarcl.numerics.cost_model.SHARING_PAYS", 0.0)
+    hold_at(1000, 200_000, "direct", device)
 
 
 def test_a_point_120_db_below_its_neighbour_is_seen_at_1e_7():
