@@ -45,7 +45,7 @@ def load(
         above = _reference(file, name, heights, geoid)
         rows, columns = _window(file, name, bounds)
         height = _heights(file, name, rows, columns, nodata)
-        longitude, latitude = _places(file, rows, columns)
+        longitude, latitude = _places(file, name, rows, columns)
     if above:
         height = height + undulation(geoid, longitude, latitude, name, above, external)
     log.info(
@@ -99,7 +99,8 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
         input_paths.check(path, "DEM file")
     try:
         import rasterio
-        from rasterio.errors import NotGeoreferencedWarning, RasterioIOError
+        from rasterio._err import CPLE_BaseError  # errors of GDAL that have no class in rasterio.errors
+        from rasterio.errors import NotGeoreferencedWarning, RasterioError
     except ImportError as exc:
         raise ImportError("elevation models need the package rasterio: pip install sarcl[dem]") from exc
     with warnings.catch_warnings():
@@ -111,7 +112,7 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
                 if is_file and not external:
                     _other_files.check_parts(path, file.driver, file.files, name)
                 yield file
-        except (RasterioIOError, UnicodeDecodeError) as exc:  # the latter of GDAL's messages about names in the file
+        except (RasterioError, CPLE_BaseError, UnicodeDecodeError) as exc:  # the last of GDAL's messages about names in the file
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
 
 
@@ -222,17 +223,22 @@ def _heights(file: Any, name: str, rows: np.ndarray, columns: np.ndarray, nodata
     return np.where(missing, np.nan, height)
 
 
-def _places(file: Any, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
     """Longitude and latitude of points, degrees on WGS84 (n_rows, n_columns) each."""
     column, row = np.meshgrid(columns + 0.5, rows + 0.5)
     t = file.transform
     x, y = t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
-    if not _warped(file):
-        return x, y
-    from rasterio.warp import transform
+    longitude, latitude = x, y
+    if _warped(file):
+        from rasterio.warp import transform
 
-    longitude, latitude = transform(file.crs, WGS84, x.ravel(), y.ravel())
-    return np.asarray(longitude).reshape(x.shape), np.asarray(latitude).reshape(x.shape)
+        longitude, latitude = (np.reshape(a, x.shape) for a in transform(file.crs, WGS84, x.ravel(), y.ravel()))
+    if not ((abs(latitude) <= 90) & np.isfinite(longitude)).all():
+        raise ValueError(
+            f"{name} has points that are on no place of the Earth (corners at {x[0, 0]:g}, {y[0, 0]:g} and "
+            f"{x[-1, -1]:g}, {y[-1, -1]:g} in its CRS); check its georeferencing and its CRS"
+        )
+    return longitude, latitude
 
 
 def _warped(file: Any) -> bool:
