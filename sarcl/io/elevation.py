@@ -112,7 +112,8 @@ def _opened(path: Path, name: str, external: bool) -> Iterator[Any]:
                 if is_file and not external:
                     _other_files.check_parts(path, file.driver, file.files, name)
                 yield file
-        except (RasterioError, CPLE_BaseError, UnicodeDecodeError) as exc:  # the last of GDAL's messages about names in the file
+        # a UnicodeDecodeError comes of GDAL's messages about names in the file
+        except (RasterioError, CPLE_BaseError, UnicodeDecodeError) as exc:
             raise ValueError(f"{name} cannot be read ({exc}): it is damaged or no raster") from exc
 
 
@@ -228,12 +229,17 @@ def _places(file: Any, name: str, rows: np.ndarray, columns: np.ndarray) -> tupl
     column, row = np.meshgrid(columns + 0.5, rows + 0.5)
     t = file.transform
     x, y = t.a * column + t.b * row + t.c, t.d * column + t.e * row + t.f
-    longitude, latitude = x, y
+    longitude, latitude, off = x, y, np.zeros((2, 4))
     if _warped(file):
         from rasterio.warp import transform
 
         longitude, latitude = (np.reshape(a, x.shape) for a in transform(file.crs, WGS84, x.ravel(), y.ravel()))
-    if not ((abs(latitude) <= 90) & np.isfinite(longitude)).all():
+        corners = np.ix_((0, -1), (0, -1))  # far beyond a map projection other numbers than infinity may come out
+        back = transform(WGS84, file.crs, longitude[corners].ravel(), latitude[corners].ravel())
+        with np.errstate(invalid="ignore"):  # infinite coordinates give NaN, which is refused below
+            off = np.subtract(back, (x[corners].ravel(), y[corners].ravel()))
+    on_earth = (abs(latitude) <= 90) & np.isfinite(longitude)
+    if not (on_earth.all() and (np.hypot(*off) <= abs(t.a) + abs(t.b)).all()):
         raise ValueError(
             f"{name} has points that are on no place of the Earth (corners at {x[0, 0]:g}, {y[0, 0]:g} and "
             f"{x[-1, -1]:g}, {y[-1, -1]:g} in its CRS); check its georeferencing and its CRS"

@@ -347,7 +347,8 @@ def test_what_is_no_elevation_model_of_a_place_is_refused(tmp_path):
 @pytest.mark.parametrize("crs, at", [("EPSG:4979", 94.0), ("EPSG:4979", np.inf), ("EPSG:32633", 1e40)])
 def test_a_raster_beyond_the_earth_is_refused(tmp_path, crs, at):
     beyond = rasterio.Affine(STEP, 0, WEST, 0, -STEP, at)
-    refuse(tmp_path, "DEM 'a.tif' (has points that are on no place of the Earth|cannot be read)", crs=crs, transform=beyond)
+    message = "DEM 'a.tif' (has points that are on no place of the Earth|cannot be read)"
+    refuse(tmp_path, message, crs=crs, transform=beyond)
 
 
 def test_invalid_places_are_refused(tmp_path):
