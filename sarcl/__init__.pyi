@@ -37,11 +37,11 @@ from .model import pointing as pointing
 from .model import radar as radar
 from .model.antenna import Antenna as Antenna
 from .model.antenna_array import AntennaArray as AntennaArray
+from .model.concatenation import concatenate as concatenate
 from .model.image import Image as Image
 from .model.image_grid import ImageGrid as ImageGrid
 from .model.orbit import Orbit as Orbit
 from .model.phase_history import PhaseHistory as PhaseHistory
-from .model.phase_history import concatenate as concatenate
 from .model.radar import Radar as Radar
 from .model.store import read as read
 from .model.trajectory import Trajectory as Trajectory

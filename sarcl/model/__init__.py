@@ -5,6 +5,7 @@ For other folders:
     antenna           Antenna: pattern in its own axes, mounting
     antenna_array     AntennaArray: positions and carriers of elements
     antenna_pattern   gain of a pattern in given directions, its steepest slope, its extent
+    concatenation     phase histories joined by their rows
     dates             dates in UTC to seconds since an epoch
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels
@@ -30,6 +31,7 @@ __all__ = [
     "antenna",
     "antenna_array",
     "antenna_pattern",
+    "concatenation",
     "dates",
     "image",
     "image_grid",

@@ -15,9 +15,10 @@ import numpy as np
 
 from ..io import formats, sarcl_hdf5
 from .antenna_array import AntennaArray
+from .concatenation import concatenate
 from .image import FIELDS, Image, image_fields
 from .image_grid import ImageGrid
-from .phase_history import PER_ROW, PhaseHistory, concatenate, phase_history_fields
+from .phase_history import PER_ROW, PhaseHistory, phase_history_fields
 from .waveform import Waveform
 
 if TYPE_CHECKING:

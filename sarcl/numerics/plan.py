@@ -136,7 +136,7 @@ def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
 
 
 def skips(skip: Any, known: tuple[str, ...]) -> set[str]:
-    """The reasons to skip that True, False or a set of names stands for; ValueError lists the known."""
+    """The reasons to skip, of True (all), False (none) or a set of names; ValueError lists the known ones."""
     if isinstance(skip, (bool, np.bool_)):
         return set(known) if skip else set()
     names: list[Any] = list(skip) if isinstance(skip, (list, tuple, set, frozenset)) else [None]

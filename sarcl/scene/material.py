@@ -294,7 +294,7 @@ def _reflectivity(value: np.ndarray) -> np.ndarray:
         raise ValueError(f"material is {value.min():g}; it must be at least 0: a number is an amplitude reflectivity")
     if value.max(initial=0) > 1:
         raise ValueError(
-            f"material is {value.max():g}; an amplitude reflectivity lies between 0 and 1: a number stands for a "
+            f"material is {value.max():g}; an amplitude reflectivity lies between 0 and 1: a number means a "
             "perfect conductor of that reflectivity"
         )
     return value.astype(np.float64)

@@ -73,7 +73,7 @@ class FacetError:
         more = f" (and {self.coarse - 1} more surfaces by over {WARN:g} dB)" if self.coarse > 1 else ""
         return [
             f"mesh too coarse for the wavelength: about ({place}) m facets of {self.edge:.2g} m "
-            f"({self.edge * waves:.2g} wavelengths) stand for a curve of radius {self.radius:.2g} m, which stands up "
+            f"({self.edge * waves:.2g} wavelengths) approximate a curve of radius {self.radius:.2g} m, which lies up "
             f"to {self.standoff:.2g} m ({self.standoff * waves:.2g} wavelengths) off them; echoes of that surface, "
             f"{10 * np.log10(max(self.rcs, 1e-30)):.0f} dBsm, differ by {self.error_db:.1f} dB rms over pulses and "
             f"band and by up to {self.worst_db:.1f} dB{more}. Mesh the curve itself with edges of at most "
