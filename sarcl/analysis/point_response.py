@@ -252,7 +252,7 @@ def _cut(values: Callable[[np.ndarray], np.ndarray], room: float, step: float, n
         return np.abs(values(t)) ** 2
 
     irw = _half_power(power, room, step) + _half_power(lambda t: power(-t), room, step)
-    reach = min(REACH, room / irw)
+    reach = min(REACH, max(room, 0.0) / irw)  # room is -inf where pixels are missing beside the cut, and irw then inf
     if not reach >= LEAST_REACH:
         raise ValueError(
             f"in {name} the image holds less than {LEAST_REACH:g} IRW on each side of the peak; focus a grid "

@@ -16,6 +16,7 @@ from ..base import wgs84
 
 ITERATIONS = 30
 FOUND = 1e-6  # of a cell: positions that the iteration leaves farther away are outside the grid
+SAME = 1.2e-13  # degrees, 1.3e-8 m, twice the rounding of longitudes up to 360: positions nearer to a point are at it
 ANTIPODE = -1 + 1e-9  # cosine of the angle from the middle: beyond, stereographic coordinates are set to 1e6
 POLAR = 80.0  # degrees of latitude
 BLOCK = 2**20  # points of a grid that are projected at once
@@ -64,17 +65,19 @@ class Axes:
         axis = self.longitude
         if self.is_around:
             axis = np.append(axis, axis[0] + 360 * np.sign(axis[-1] - axis[0]))
-        middle = (axis[0] + axis[-1]) / 2
-        lon = middle + (longitude - middle + 180) % 360 - 180
-        return np.stack([_place(self.latitude, latitude), _place(axis, lon)])
+        turns = np.rint((longitude - (axis[0] + axis[-1]) / 2) / 360)
+        return np.stack([_place(self.latitude, latitude), _place(axis, longitude - 360 * turns)])
 
 
 def _place(axis: Array, values: Array) -> Array:
-    """Fractional indices (n,) of values in a monotonic axis, by linear inter- and extrapolation."""
+    """Fractional indices (n,) of values in a monotonic axis, by linear inter- and extrapolation; whole ones of its
+    own values."""
     if axis[-1] < axis[0]:
         return len(axis) - 1 - _place(axis[::-1], values)
     low = np.clip(np.searchsorted(axis, values, side="right") - 1, 0, len(axis) - 2)
-    return np.asarray(low + (values - axis[low]) / (axis[low + 1] - axis[low]))
+    beyond, step = values - axis[low], axis[low + 1] - axis[low]
+    part = np.where(np.abs(beyond) <= SAME, 0.0, np.where(np.abs(beyond - step) <= SAME, 1.0, beyond / step))
+    return np.asarray(low + part)
 
 
 @dataclass(frozen=True, eq=False)
@@ -121,7 +124,7 @@ class Curvilinear:
         return cls(is_polar, middle, axes, points, np.linalg.lstsq(known, corner.astype(np.float64), rcond=None)[0].T)
 
     def at(self, longitude: Array, latitude: Array) -> Array:
-        """Fractional (row, column) (2, n) of degrees (n,); NaN where none was found."""
+        """Fractional (row, column) (2, n) of degrees (n,), whole at the points; NaN where none was found."""
         wanted = _coordinates(self.is_polar, self.middle, self.axes, longitude, latitude)
         size = np.array(self.points.shape[1:])[:, None]
         at = self.affine[:, :2] @ wanted + self.affine[:, 2:]
@@ -139,7 +142,11 @@ class Curvilinear:
             inside = ((at > -0.5) & (at < size - 0.5)).all(axis=0)
             if not (np.abs(step[:, inside]) > 1e-3 * FOUND).any():
                 break
-        return np.where((np.abs(step) <= FOUND).all(axis=0), at, np.nan)
+        same = np.radians(SAME) if self.is_polar else SAME
+        found = (np.abs(step) <= FOUND).all(axis=0) | (np.abs(off) <= same).all(axis=0)
+        whole = np.clip(np.rint(np.nan_to_num(at)).astype(np.int64), 0, size - 1)
+        is_point = (np.abs(wanted - self.points[:, whole[0], whole[1]]) <= same).all(axis=0)
+        return np.where(is_point, whole, np.where(found, at, np.nan))
 
 
 def _blocks(shape: tuple[int, ...]) -> list[slice]:

@@ -121,3 +121,13 @@ def test_cross_polarised_echoes_that_are_rounding_alone_are_refused():
         plate, chirp, track, receiver=away, polarization="HV", vertical=(1, -0.7, 0.2), check=True
     ).report
     assert report.measured_error <= report.predicted_error <= 1e-3
+
+
+def test_a_peak_without_pixels_beside_its_cut_is_refused():
+    """Interpolation needs 13 pixels above and below the peak, and the image has 13 and 12: nowhere on a cut along
+    columns is there a value, however short it is."""
+    grid = sarcl.ImageGrid.plane(shape=(27, 86), spacing=1.0)
+    response = np.outer(np.sinc(0.5 * (np.arange(27) - 13)), np.sinc(0.74 * (np.arange(86) - 43)))
+    image = sarcl.Image(response.astype(np.complex64), grid, frequency=1e6, tx=np.array([-1000.0, 0, 1000]))
+    with pytest.raises(ValueError, match=r"in range the image holds less than 3 IRW on each side of the peak"):
+        sarcl.measure(image)

@@ -61,6 +61,32 @@ def test_missing_heights_are_missing_in_the_cells_around_them():
     assert holed.heights_at(LON[21], LAT[10]) == pytest.approx(z[10, 21], abs=1e-8)  # only what a cell needs
 
 
+@pytest.mark.parametrize("step", [1e-2, 1e-6, 1e-8])
+@pytest.mark.parametrize("longitude, latitude", [(97.3, -41.7), (-179.99999, 12.3), (0.1, 77.7), (12.0, 89.5)])
+@pytest.mark.parametrize("turned", [0.0, 0.3])
+def test_a_point_beside_missing_heights_has_its_own(longitude, latitude, step, turned):
+    """Rounding of degrees is up to 3e-8 of a cell of 1e-6 degrees, 0.1 m: no part of a neighbour's NaN, also where
+    longitudes are given a whole turn away, and where the model ends."""
+    i, j = np.meshgrid(np.arange(5), np.arange(7), indexing="ij")
+    lon = longitude + step * (np.cos(turned) * j + np.sin(turned) * i)
+    lat = latitude + step * (-np.cos(turned) * i + np.sin(turned) * j)
+    z = 100.0 + 10 * i + j
+    z[(i + j) % 2 == 1] = np.nan
+    holed = sarcl.ElevationModel(lon, lat, z)
+    for turn in (0, 360, -360):
+        assert np.array_equal(holed.heights_at(lon + turn, lat), z, equal_nan=True)
+    full = sarcl.ElevationModel(lon, lat, 100.0 + 10 * i + j)
+    between = [(values[:-1, :-1] + values[1:, 1:]) / 2 for values in (lon, lat)]
+    assert np.abs(full.heights_at(*between) - (105.5 + 10 * i + j)[:-1, :-1]).max() < 1e-3
+
+
+def test_a_column_and_the_same_after_a_turn_have_the_same_heights():
+    lon, z = np.arange(0.0, 360.0, 0.1), np.full((2, 3600), np.nan)
+    z[:, 0] = 5.0
+    around = sarcl.ElevationModel(lon, [10.0, 10.1], z)
+    assert np.array_equal(around.heights_at([-360.0, 0.0, 360.0, 720.0], 10.0), np.full(4, 5.0))
+
+
 def test_a_model_across_the_antimeridian_has_no_seam():
     east = sarcl.ElevationModel(LON + 167.97, LAT, hills(LON, LAT[:, None]))
     for lon in (180.0, -180.0):
