@@ -27,6 +27,7 @@
 #include "range_phase.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
+#include "line_schedule.clh"
 
 #define PIXELS 4                                // neighbouring pixels of a line that belong to a work-item
 #define ACROSS (SIDE / PIXELS)                  // work-items that share a line
@@ -37,7 +38,6 @@
 // Sample m of T is stored at row m % PERIOD, column m / PERIOD, and again PERIOD rows and one column before: so the samples
 // that an item reads lie in one column, whichever comes first.
 #define ROWS (PERIOD + READ - 1)
-#define MOST (FINE * (2 * SIDE + 16))
 #define COLUMNS (MOST / PERIOD + 1)
 
 DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
@@ -45,20 +45,6 @@ DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
 DEFINE_SLOPES(line_slopes, SLOPE_TAPS, SLOPE_TERMS)
 #define OUTER ((LINE_TAPS - SLOPE_TAPS) / 2)  // taps on either side that have no slopes
 #endif
-
-// Records of a group of pulses, in 32 bits each: a head, then one entry per pulse. Entries of pulses by lines come first,
-// those of pulses pixel by pixel from the end on.
-enum { H_LINES, H_PIXELS, H_MIDDLE, H_OUTSIDE, N_HEAD };  // pulses by lines, pixel by pixel; middle; outside + 65536 unlit
-// The pulse; first sample of T about the reference pixel; samples of T; then float32: what making T takes of line_geometry,
-// and what making W takes, for lines along the group's axis. `samples` are those of T per metre.
-enum {
-    E_PULSE, E_FROM, E_COUNT, E_BASE, E_STEP, E_STEP_LOW, E_FRAC, E_FINE, E_FINE_LOW,
-    E_RATIO, E_RATIO_LOW, E_ACROSS, E_ACROSS_LOW, E_CYCLES, E_KAPPA, E_SAMPLES,
-    E_U_X, E_U_Y, E_U_INVERSE, E_U_R0, E_V_X, E_V_Y, E_V_INVERSE, E_V_R0, N_ENTRY
-};
-// numbers of an entry, four at a time: named by the first of them
-#define FOUR(entry, first) (((__global const float4 *)(entry))[(first) / 4])
-#define N_GROUP (N_HEAD + N_ENTRY * GROUP)
 
 // What the items of a work-group make of a pulse together.
 typedef struct {
@@ -69,93 +55,6 @@ typedef struct {
     float2 T[ROWS * COLUMNS];
     int at[SIDE];
 } pulse_lines;
-
-static inline group group_of(__global const float *restrict middle, float step_x, float step_y) {
-    group pulses;
-    // lines run along the axis on which the range grows faster
-    pulses.transposed = fabs(middle[L_STEP_Y]) > fabs(middle[L_STEP_X]);
-    pulses.step_i = pulses.transposed ? step_x : step_y;
-    pulses.step_j = pulses.transposed ? step_y : step_x;
-    pulses.middle = load_line(middle, pulses.transposed);
-    return pulses;
-}
-
-// Half of the mean of the curvature at a line's ends, and half of that in its middle, m: what is in the line's position.
-static inline float in_position_of(group pulses, line_geometry line, float i, float centre) {
-    float end = SIDE / 2, q = q_of(pulses, i, end);
-    return 0.25f * (curvature_at(line, i, end, q) + curvature_at(line, i, -end, q)) + 0.5f * centre;
-}
-
-// First of the samples of T that the lines of a pulse read, counted about the reference pixel, and their number; 0 where
-// they are too many to be stored, as for a steep pulse, or have no spacing.
-INLINED int samples_needed(group pulses, line_geometry line, int *from) {
-    if (!(fabs(line.along) >= LEAST_STEP)) return 0;
-    float position[5], lowest = INFINITY, highest = -INFINITY, bend = 0, samples_of_T = FINE / line.along;
-#pragma unroll
-    for (int k = 0; k < 5; k++) {
-        float i = (k - 2) * (SIDE / 4), centre = curvature_at(line, i, 0, q_of_line(pulses, i));
-        position[k] = fma(in_position_of(pulses, line, i, centre), line.sigma, i * line.across) * samples_of_T;
-        lowest = fmin(lowest, position[k]);
-        highest = fmax(highest, position[k]);
-    }
-    // positions are a cubic of i: between two of five, no one lies farther outside than 3/8 of the largest second difference
-#pragma unroll
-    for (int k = 1; k < 4; k++) bend = fmax(bend, fabs(position[k - 1] - 2 * position[k] + position[k + 1]));
-    lowest -= fma(0.5f, bend, 2.0f);
-    highest += fma(0.5f, bend, 2.0f);
-    if (!(highest - lowest < MOST && fabs(lowest) < MOST)) return 0;
-    *from = (int)floor(lowest) - LINE_TAPS / 2 - FINE * (SIDE / 2);
-    int count = (int)ceil(highest) + LINE_TAPS / 2 + FINE * (SIDE / 2) - *from;
-    return count <= MOST ? count : 0;
-}
-
-// What is done with each pulse of a group, at each tile. global size (groups, tiles of this block)
-//   constants   (tiles, n, N_LINE)      from tile_constants.cl:line_constants
-//   schedule    (tiles, groups, N_GROUP)
-__kernel void schedule_pulses(__global const float *restrict constants, int n, int n_used, float step_x, float step_y,
-                              float limit_cycles, float limit_position, float limit_step,
-                              __global int *restrict schedule) {
-    int start = get_global_id(0) * GROUP, stop = min(start + GROUP, n_used);
-    __global const float *records = constants + get_global_id(1) * (size_t)n * N_LINE;
-    __global int *head = schedule + (get_global_id(1) * get_global_size(0) + get_global_id(0)) * N_GROUP;
-    __global int *entries = head + N_HEAD;
-    int inside = 0, crossing = 0, outside = 0, any = start;
-    for (int p = start; p < stop; p++) {
-        int state = as_int(records[(size_t)p * N_LINE + L_STATE]);
-        inside += state == INSIDE;
-        outside += state == OUTSIDE ? 1 : state == UNLIT ? 65536 : 0;
-        if (state == CROSSING && !crossing++) any = p;
-    }
-    int middle = any, before = inside / 2, n_lines = 0, n_pixels = 0;
-    for (int p = start; p < stop && inside; p++)
-        if (as_int(records[(size_t)p * N_LINE + L_STATE]) == INSIDE && !before--) middle = p;
-    group pulses = group_of(records + (size_t)middle * N_LINE, step_x, step_y);
-    for (int p = start; p < stop && inside + crossing; p++) {
-        __global const float *record = records + (size_t)p * N_LINE;
-        int state = as_int(record[L_STATE]), from = 0, count = 0;
-        if (state != INSIDE && state != CROSSING) continue;
-        line_geometry line = load_line(record, pulses.transposed);
-        if (state == INSIDE && fabs(line.along) <= limit_step && fits(pulses, line, limit_cycles, limit_position))
-            count = samples_needed(pulses, line, &from);
-        __global int *entry = entries + N_ENTRY * (count ? n_lines++ : GROUP - ++n_pixels);
-        entry[E_PULSE] = p;
-        entry[E_FROM] = from;
-        entry[E_COUNT] = count;
-        entry[E_BASE] = line.base;
-        int along = 2 * pulses.transposed;
-        float values[N_ENTRY - E_STEP] = {
-            record[L_STEP + along], record[L_STEP + along + 1], line.frac, line.fine_cycles, line.fine_cycles_low,
-            record[L_RATIO + along], record[L_RATIO + along + 1], line.cycles_across, line.cycles_across_low, line.cycles,
-            line.kappa, line.sigma * (FINE / line.along), line.u.x, line.u.y, line.u.inverse, line.u.R0,
-            BISTATIC ? line.v.x : 0, BISTATIC ? line.v.y : 0, BISTATIC ? line.v.inverse : 0, BISTATIC ? line.v.R0 : 0};
-#pragma unroll
-        for (int k = 0; k < N_ENTRY - E_STEP; k++) entry[E_STEP + k] = as_int(values[k]);
-    }
-    head[H_LINES] = n_lines;
-    head[H_PIXELS] = n_pixels;
-    head[H_MIDDLE] = middle;
-    head[H_OUTSIDE] = outside;
-}
 
 // Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
 INLINED void weigh_line(group pulses, __global const float *restrict entry, int r, __global const float *restrict weights,
@@ -337,7 +236,7 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
 }
 
 // global size (ITEMS, tiles of this block), local size (ITEMS, 1). Arguments as of `backproject`; constants as in
-// tile_constants.cl:line_constants, schedule from schedule_pulses; step_x, step_y: m per pixel along j and i;
+// tile_constants.cl:line_constants, schedule from schedule_pulses.cl; step_x, step_y: m per pixel along j and i;
 // weights, slopes: of LINE_TAPS and SLOPE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
 __kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1))) void
 backproject_shared_lines(__global const float *restrict profiles, int stride, int origin,

@@ -23,7 +23,7 @@ from ._shared_line_plan import SharedLinePlan
 from .line_plan import LinePlan, steps
 
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
-ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/backproject_shared_lines.cl
+ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
@@ -146,7 +146,7 @@ class SharedLineKernel:
         macros = plan.macros(bistatic, wrap, local) | geometry
         self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=0, RANGE=0, SHARED=1)
         self.wrap_and_fine = plan.length if wrap else 0, plan.fine
-        self.schedule = device.kernel("backproject_shared_lines.cl", "schedule_pulses", **macros)
+        self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **macros)
         self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **macros)
         tables = (plan.interpolator, plan.line, plan.slopes or plan.line)
         self.tables = [device.upload(made.table) for made in tables]
