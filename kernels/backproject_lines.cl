@@ -259,12 +259,7 @@ __kernel void backproject_lines(__global const float *restrict profiles, int str
         }
         if (n_lines + n_pixels == 0) continue;
         __global const float *middle = records + (size_t)(n_lines ? by_lines[n_lines / 2] : by_pixels[0]) * N_LINE;
-        group pulses;
-        // lines run along the axis on which the range grows faster
-        pulses.transposed = fabs(middle[L_STEP_Y]) > fabs(middle[L_STEP_X]);
-        pulses.step_i = pulses.transposed ? step_x : step_y;
-        pulses.step_j = pulses.transposed ? step_y : step_x;
-        pulses.middle = load_line(middle, pulses.transposed);
+        group pulses = group_of(middle, step_x, step_y);
 
         for (int f = 0; f < n_lines; f++) {
             line_geometry line = load_line(records + (size_t)by_lines[f] * N_LINE, pulses.transposed);
