@@ -5,14 +5,12 @@ from __future__ import annotations
 import itertools
 from dataclasses import dataclass
 
-from ...base.errors import ToleranceUnreachable
 from ...model.image_grid import ImageGrid
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
-from ..tiling.plane import outline
-from .line_plan import FINES, GroupCurvature, LinePlan
+from .line_plan import FINES, MOST_CHOSEN, MOST_FIXED, LinePlan, curvatures, profile_interpolator, series
 
 SIDES = (64, 32)  # pixels along a side of a tile
 GROUP_SIZES = (64, 32, 16, 8)  # pulses per group
@@ -78,23 +76,19 @@ def choose(
     highest  highest frequency, Hz
     on       the devices that follow the plan: their local memory holds two pulses
     """
-    assert grid.spacing is not None
-    distance, points = antennas.distance(grid.bounds), outline(grid)
+    distance = antennas.distance(grid.bounds)
     best: SharedLinePlan | None = None
-    for side, group in itertools.product(SIDES, GROUP_SIZES):
-        curvature = GroupCurvature.of(grid, antennas, points, side, group, highest)
+    choices = list(itertools.product(SIDES, GROUP_SIZES))
+    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance):
         radius = curvature.radius
-        if 4 * radius > distance or (side > SIDES[-1] and min(grid.shape) <= side / 2):
-            continue
-        order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
+        order, fixed = series(tolerance, radius, distance, highest)
         turns = CHUNK // group  # of a sum, each by a sine and cosine of its own
-        fixed = error_bounds.phase_rounding(0.0, highest, True) * (2 + turns)
+        fixed += error_bounds.phase_rounding(0.0, highest, True) * (2 + turns)
         native = on.native_pays(tolerance)
         fixed += (2 + turns) * on.native_error if native else 0.0
         fixed += error_bounds.two_part_position_rounding(radius, distance, bandwidth)
-        fixed += error_bounds.series_error(radius, distance, highest, order)
         fixed += 2 * error_bounds.curvature_rounding(radius, distance, highest)
-        if fixed > 0.7 * tolerance:
+        if fixed > MOST_FIXED * tolerance:
             continue
         fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
         shift, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
@@ -105,14 +99,13 @@ def choose(
             slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
             shifted = shift**2 / 2 + shift * interpolation.slope_error(slopes) if slopes else shift
             error = fixed + line.error + shifted
-            if error > 0.9 * tolerance:
+            if error > MOST_CHOSEN * tolerance:
                 continue
             samples = fine * 1.4 * side + taps + 4  # of T
-            reads = grid.size * samples / side**2
-            try:
-                made, length, _ = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
-            except ToleranceUnreachable:  # other lines may leave more of the tolerance to the interpolator
+            found = profile_interpolator(tolerance - error, n_samples, grid.size * samples / side**2)
+            if found is None:
                 continue
+            made, length, _ = found
             cost = cost_model.shared_lines(side, fine, taps, slope_taps, group, made.taps, samples)
             cost += cost_model.profile(length) / grid.size
             if best is None or cost < best.cost:

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import itertools
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,8 @@ LOCAL_BYTES = 60_000  # bytes of local memory that a group of pulses may take
 SIDES = (64, 32, 16)  # pixels along a side of a tile
 FINES = (1, 2, 4, 8)  # samples of a line's profile per pixel
 GROUP_SIZES = (16, 8, 4)  # pulses per group
+MOST_FIXED = 0.7  # largest share of a tolerance for errors that no interpolator changes
+MOST_CHOSEN = 0.9  # the same with the errors of a line's interpolators; the rest is for that of the range profile
 LEAST_CELLS = 1e-30  # resolution cells per pixel; as LEAST_STEP of kernels/backproject_lines.cl
 
 
@@ -203,6 +206,34 @@ class GroupCurvature:
         return self.cycles, max(self.off * sigma, 1e-6), self.cells(bandwidth) * oversample * (1 + 1e-5)
 
 
+def curvatures(
+    grid: ImageGrid, antennas: PulseGeometry, choices: Sequence[tuple[int, int]], highest: float, distance: float
+) -> Iterator[tuple[int, int, GroupCurvature]]:
+    """Of `choices`, (side of a tile, pulses per group), those that the grid and its distance, m, allow."""
+    assert grid.spacing is not None
+    points, least = outline(grid), min(side for side, _ in choices)
+    for side, group in choices:
+        if 2 * side * float(np.hypot(*grid.spacing)) > distance or (side > least and min(grid.shape) <= side / 2):
+            continue
+        yield side, group, GroupCurvature.of(grid, antennas, points, side, group, highest)
+
+
+def series(tolerance: float, radius: float, distance: float, highest: float) -> tuple[int, float]:
+    """Order of the range series, and its phase error, rad."""
+    errors = {order: error_bounds.series_error(radius, distance, highest, order) for order in (2, 3)}
+    order = 2 if errors[2] < 0.1 * tolerance else 3
+    return order, errors[order]
+
+
+def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:
+    """As interpolation.choose_interpolator; None where it finds nothing: other lines may leave more to the
+    interpolator."""
+    try:
+        return interpolation.choose_interpolator(error, n_samples, reads)
+    except ToleranceUnreachable:
+        return None
+
+
 def choose(
     tolerance: float,
     grid: ImageGrid,
@@ -220,21 +251,16 @@ def choose(
     source   interpolator and length of profiles that exist already; None: they are chosen too
     sides    sides of tiles to choose from, pixels
     """
-    assert grid.spacing is not None
     distance = antennas.distance(grid.bounds)
     best: LinePlan | None = None
-    for side, group in ((s, g) for s in sides for g in GROUP_SIZES if s * g <= 512):
-        radius = side / 2 * float(np.hypot(*grid.spacing))
-        if 4 * radius > distance or (side > sides[-1] and min(grid.shape) <= side / 2):
-            continue
-        curvature = GroupCurvature.of(grid, antennas, outline(grid), side, group, highest)
-        order = 2 if error_bounds.series_error(radius, distance, highest, 2) < 0.1 * tolerance else 3
-        fixed = error_bounds.phase_rounding(0.0, highest, True) * 2 + error_bounds.position_rounding(
-            radius, bandwidth, False
-        )
-        fixed += error_bounds.series_error(radius, distance, highest, order)
+    choices = [(s, g) for s in sides for g in GROUP_SIZES if s * g <= 512]
+    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance):
+        radius = curvature.radius
+        order, fixed = series(tolerance, radius, distance, highest)
+        fixed += error_bounds.phase_rounding(0.0, highest, True) * 2
+        fixed += error_bounds.position_rounding(radius, bandwidth, False)
         fixed += error_bounds.curvature_rounding(radius, distance, highest)
-        if fixed > 0.7 * tolerance:
+        if fixed > MOST_FIXED * tolerance:
             continue
         fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
         position_phase, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
@@ -246,7 +272,7 @@ def choose(
             # the error of the weights' slopes is a few times that of the weights
             shifted = position_phase**2 / 2 + 8 * position_phase * line.error if slope else position_phase
             error = fixed + line.error + shifted
-            if error > 0.9 * tolerance:
+            if error > MOST_CHOSEN * tolerance:
                 continue
             vectors = fine * (1.3 * side + 8)
             per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
@@ -254,10 +280,10 @@ def choose(
             per_pair = per_tap + per_tile / side**2 + cost_model.LINE_GROUP / group
             if source is None:
                 reads = grid.size * cost_model.LINE_SAMPLE * vectors / side**2
-                try:
-                    made, length, cost = interpolation.choose_interpolator(tolerance - error, n_samples, reads)
-                except ToleranceUnreachable:  # other lines may leave more of the tolerance to the interpolator
+                found = profile_interpolator(tolerance - error, n_samples, reads)
+                if found is None:
                     continue
+                made, length, cost = found
                 per_pair += (cost - cost_model.TAPS[2]) * reads / grid.size
             else:
                 made, length = source

@@ -76,28 +76,24 @@ class GatherKernel:
         )  # fmt: skip
 
 
-class LineKernel:
-    """Backprojection of square tiles of a plane, line by line: kernels/backproject_lines.cl."""
+class _Lines:
+    """What both kernels by lines of pixels share: tiles on the device, and the records of their pulses."""
 
     def __init__(
-        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
-        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
+        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, beam: bool,
+        weights: Mapping[str, int], **records: int,
     ) -> None:  # fmt: skip
         if weights["WEIGHT"]:
             raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
         self.device, self.tiling, self.beam = device, tiling, beam
-        self.components = line_plan.components(beam)
-        # the pulses of a group share one curvature, so blocks of rows are whole groups
-        self.chunk = self.least_rows = plan.group
-        self.lanes = device.info.vector_width
-        macros, geometry = plan.macros(bistatic, wrap, local), {"BISTATIC": int(bistatic), "BEAM": int(beam)}
-        macros |= geometry
-        # the program of TileConstants, with the same macros
-        self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=int(local), RANGE=0)
+        self.geometry = {"BISTATIC": int(bistatic), "BEAM": int(beam)}
+        self.macros = plan.macros(bistatic, wrap, bool(records["LOCAL"])) | self.geometry
+        # LOCAL alone: the program of TileConstants, with the same macros
+        self.records = device.kernel("tile_constants.cl", "line_constants", **self.geometry, **records, RANGE=0)
         self.wrap_and_fine = plan.length if wrap else 0, plan.fine
-        self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **macros)
-        self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
-        self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
+        assert tiling.grid.spacing is not None
+        dy, dx = (np.float32(d) for d in tiling.grid.spacing)
+        self.steps, self.axes = (dx, dy), device.upload(float_pairs.wide(steps(tiling.grid)))
         self.limits = [np.float32(v) for v in (plan.limit_cycles, plan.limit_position, plan.limit_step)]
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
@@ -106,29 +102,49 @@ class LineKernel:
             self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
         )
 
+    def constants(self, on: TilesOnDevice, low: int, high: int, pulse: Any, n: int, floats: int) -> Any:
+        """Records (tiles, n, floats) of pulses at tiles low ... high - 1, on the device."""
+        out = self.device.empty(4 * floats * n * (high - low))
+        self.device.run(
+            self.records, (n // self.device.info.vector_width, high - low), None,
+            pulse, on.buffers[0], np.float32(self.tiling.radius), n, on.tiles.n_tiles, low, on.skip,
+            *self.wrap_and_fine, self.axes, out,
+        )  # fmt: skip
+        return out
+
+
+class LineKernel(_Lines):
+    """Backprojection of square tiles of a plane, line by line: kernels/backproject_lines.cl."""
+
+    def __init__(
+        self, device: Device, plan: LinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
+        beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
+    ) -> None:  # fmt: skip
+        super().__init__(
+            device, plan, tiling, bistatic=bistatic, wrap=wrap, beam=beam, weights=weights, LOCAL=int(local)
+        )
+        self.components = line_plan.components(beam)
+        # the pulses of a group share one curvature, so blocks of rows are whole groups
+        self.chunk = self.least_rows = plan.group
+        self.kernel = device.kernel("backproject_lines.cl", "backproject_lines", **self.macros)
+        self.table, self.weights = device.upload(plan.interpolator.table), device.upload(plan.line.table)
+
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
         offset: int, image: Any, *weights: Any,
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
-        device, (pulse, n, used), tiles = self.device, pulses, on.tiles
-        assert self.tiling.grid.spacing is not None
-        dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
-        constants = device.empty(4 * self.components * n * (high - low))
-        device.run(
-            self.constants, (n // self.lanes, high - low), None,
-            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
-            *self.wrap_and_fine, self.axes, constants,
-        )  # fmt: skip
-        device.run(
+        (pulse, n, used), tiles = pulses, on.tiles
+        constants = self.constants(on, low, high, pulse, n, self.components)
+        self.device.run(
             self.kernel, (high - low,), (1,),
-            source, stride, origin, self.table, self.weights, n, used, constants, dx, dy, low,
+            source, stride, origin, self.table, self.weights, n, used, constants, *self.steps, low,
             tiles.n_tiles, *self.limits, image, np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
             steps=used,
         )  # fmt: skip
 
 
-class SharedLineKernel:
+class SharedLineKernel(_Lines):
     """Square tiles of a plane by lines that a work-group shares: kernels/backproject_shared_lines.cl."""
 
     chunk = _shared_line_plan.CHUNK
@@ -137,27 +153,15 @@ class SharedLineKernel:
         self, device: Device, plan: SharedLinePlan, tiling: LineTiling, *, bistatic: bool, wrap: bool, local: bool,
         beam: bool, weights: Mapping[str, int] = NO_WEIGHTS,
     ) -> None:  # fmt: skip
-        if weights["WEIGHT"]:
-            raise RuntimeError("lines of pixels share the weights of their pulses; please report this")
-        self.device, self.tiling, self.beam, self.plan = device, tiling, beam, plan
-        self.least_rows, self.n_line = plan.group, line_plan.components(beam) + 8
+        super().__init__(
+            device, plan, tiling, bistatic=bistatic, wrap=wrap, beam=beam, weights=weights, LOCAL=int(local), SHARED=1
+        )
+        self.plan, self.least_rows, self.n_line = plan, plan.group, line_plan.components(beam) + 8
         self.components = self.n_line + ENTRY + 1  # and a pulse's share of its group's record
-        geometry = {"BISTATIC": int(bistatic), "BEAM": int(beam)}
-        macros = plan.macros(bistatic, wrap, local) | geometry
-        self.constants = device.kernel("tile_constants.cl", "line_constants", **geometry, LOCAL=0, RANGE=0, SHARED=1)
-        self.wrap_and_fine = plan.length if wrap else 0, plan.fine
-        self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **macros)
-        self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **macros)
+        self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **self.macros)
+        self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **self.macros)
         tables = (plan.interpolator, plan.line, plan.slopes or plan.line)
         self.tables = [device.upload(made.table) for made in tables]
-        self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
-        self.limits = [np.float32(v) for v in (plan.limit_cycles, plan.limit_position, plan.limit_step)]
-
-    def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
-        """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
-        return TilesOnDevice(
-            self.device, tiles, skip, [self.device.upload(float_pairs.wide(tiles.references.T))], self.beam
-        )
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
@@ -165,20 +169,13 @@ class SharedLineKernel:
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
-        assert self.tiling.grid.spacing is not None
-        dy, dx = (np.float32(d) for d in self.tiling.grid.spacing)
         groups, items = -(-used // self.plan.group), self.plan.items
-        constants = device.empty(4 * self.n_line * n * (high - low))
+        constants = self.constants(on, low, high, pulse, n, self.n_line)
         schedule = device.empty(4 * (4 + ENTRY * self.plan.group) * groups * (high - low))
-        device.run(
-            self.constants, (n, high - low), None,
-            pulse, on.buffers[0], np.float32(self.tiling.radius), n, tiles.n_tiles, low, on.skip,
-            *self.wrap_and_fine, self.axes, constants,
-        )  # fmt: skip
-        device.run(self.schedule, (groups, high - low), None, constants, n, used, dx, dy, *self.limits, schedule)
+        device.run(self.schedule, (groups, high - low), None, constants, n, used, *self.steps, *self.limits, schedule)
         device.run(
             self.kernel, (items, high - low), (items, 1),
-            source, stride, origin, *self.tables, n, used, constants, schedule, dx, dy, low, tiles.n_tiles, image,
+            source, stride, origin, *self.tables, n, used, constants, schedule, *self.steps, low, tiles.n_tiles, image,
             np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, steps=used,
         )  # fmt: skip
 
