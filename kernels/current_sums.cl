@@ -13,6 +13,8 @@
 //           sums      (chunks, frequencies up to whole blocks, 2, n): cosine and sine part of s
 // macros    VW        pulses per work-item; n is a multiple of it
 //           BISTATIC  1: receiver and rho apart; 0: receiver = transmitter and rho = kappa
+//           GROUP     work-items of a group along the pulses, which keep paths in local memory: on GPUs private arrays that
+//                     are indexed by variables lie in global memory; 0: groups of any size, paths in private memory
 //           LINEAR    1: the phase is linear in the frequency over BLOCK frequencies, and followed by complex products
 // reference: sarcl/reference/formed_echo.py:current_sums
 
@@ -20,6 +22,15 @@
 
 #define BLOCK 8   // frequencies whose sums are in registers
 #define TILE 32   // cells whose paths are kept for all blocks of frequencies
+
+// Paths of a work-item for the cells of a tile; no other item reads them.
+#if GROUP
+#define PATHS(name) __local fv name[TILE * GROUP]
+#define PATH(name, i) name[(i) * GROUP + (int)get_local_id(0)]
+#else
+#define PATHS(name) fv name[TILE]
+#define PATH(name, i) name[i]
+#endif
 
 // D of a cell
 static inline fv longer(fv x, fv y, fv z, fv inverse, float4 cell) {
@@ -33,7 +44,7 @@ static inline void wave(fv cycles, fv *re, fv *im) {
     *im = -s;
 }
 
-// global size (n / VW, chunks, 1 or more: work-items among which blocks of frequencies are divided)
+// global size (n / VW, in groups of GROUP; chunks; 1 or more: work-items among which blocks of frequencies are divided)
 __kernel void current_sums(__global const float4 *restrict cell, __global const float2 *restrict current,
                            __global const int *restrict chunk, __global const float *restrict antenna,
                            __global const float *restrict kappa, __global const float *restrict rho,
@@ -45,9 +56,9 @@ __kernel void current_sums(__global const float4 *restrict cell, __global const 
 #if BISTATIC
     fv vx = LOAD(p, antenna + 4 * n), vy = LOAD(p, antenna + 5 * n), vz = LOAD(p, antenna + 6 * n);
     fv v_near = LOAD(p, antenna + 7 * n);
-    fv back[TILE];
+    PATHS(back);
 #endif
-    fv path[TILE];
+    PATHS(path);
     int first = chunk[here], end = chunk[here + 1];
     for (int start = first; start < end; start += TILE) {
         int many = min(TILE, end - start);
@@ -56,10 +67,10 @@ __kernel void current_sums(__global const float4 *restrict cell, __global const 
             fv sent = longer(ux, uy, uz, near, y);
             float along = fma(travel_x, y.x, fma(travel_y, y.y, travel_z * y.z));
 #if BISTATIC
-            path[i] = sent - along;
-            back[i] = longer(vx, vy, vz, v_near, y);
+            PATH(path, i) = sent - along;
+            PATH(back, i) = longer(vx, vy, vz, v_near, y);
 #else
-            path[i] = fma(sent, (fv)2.0f, (fv)(-along));
+            PATH(path, i) = fma(sent, (fv)2.0f, (fv)(-along));
 #endif
         }
         for (int b = get_global_id(2); b < blocks; b += get_global_size(2)) {
@@ -83,11 +94,11 @@ __kernel void current_sums(__global const float4 *restrict cell, __global const 
 #if LINEAR
                 fv turn_c, turn_s;
 #if BISTATIC
-                wave(fma((fv)k0, path[i], r0 * back[i]), &c, &s);
-                wave(fma((fv)dk, path[i], dr * back[i]), &turn_c, &turn_s);
+                wave(fma((fv)k0, PATH(path, i), r0 * PATH(back, i)), &c, &s);
+                wave(fma((fv)dk, PATH(path, i), dr * PATH(back, i)), &turn_c, &turn_s);
 #else
-                wave((fv)k0 * path[i], &c, &s);
-                wave((fv)dk * path[i], &turn_c, &turn_s);
+                wave((fv)k0 * PATH(path, i), &c, &s);
+                wave((fv)dk * PATH(path, i), &turn_c, &turn_s);
 #endif
 #endif
 #pragma unroll
@@ -96,9 +107,9 @@ __kernel void current_sums(__global const float4 *restrict cell, __global const 
                     float2 value = at[(size_t)f * cells];
 #if !LINEAR
 #if BISTATIC
-                    wave(fma((fv)kappa[f], path[i], LOAD(p, rho + (size_t)f * n) * back[i]), &c, &s);
+                    wave(fma((fv)kappa[f], PATH(path, i), LOAD(p, rho + (size_t)f * n) * PATH(back, i)), &c, &s);
 #else
-                    wave((fv)kappa[f] * path[i], &c, &s);
+                    wave((fv)kappa[f] * PATH(path, i), &c, &s);
 #endif
 #endif
                     re[j] = fma((fv)value.x, c, fma((fv)(-value.y), s, re[j]));

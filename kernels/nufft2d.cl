@@ -13,11 +13,15 @@
 //           table     (TAPS/2, 2, TERMS) as interp.clh reads it
 // macros    VW        1: the lanes are the taps of a sample
 //           TAPS, TERMS   of the kernel; TILE cells per side of a tile, M0, M1 >= TILE + 2 TAPS + 4
+//           GROUPED   1: a work-group owns a tile and sums it in local memory, TILE a multiple of 8; 0: one work-item does
 // reference: sarcl/reference/polar_format.py:spread
 
 #include "common.clh"
 #include "interp.clh"
 
+#if GROUPED
+#include "shared_tile.clh"
+#else
 // complex numbers of one row of taps, as one vector; six taps are padded: there is no vector of twelve
 #if TAPS == 2
 #define PAIRS 2
@@ -36,9 +40,11 @@ typedef float16 taps_v;
 #define STORE_TAPS(v, p) vstore16(v, 0, p)
 #endif
 
-#define REACH (TILE + TAPS - 1) // first taps that touch a tile, along one axis
 #define ROWS (TILE + 2 * TAPS - 2)
 #define STRIDE (TILE + TAPS - 2 + PAIRS)
+#endif
+
+#define REACH (TILE + TAPS - 1) // first taps that touch a tile, along one axis
 
 // Samples first ... last of a line whose position on one axis, middle + n step, may lie in [low, high].
 static inline void clip(float low, float high, float middle, float step, int *first, int *last) {
@@ -61,39 +67,98 @@ static inline int first_cell(float n, float rest, float high, float low, float *
     return (int)cell + (int)more - TAPS / 2 + 1;
 }
 
-// global size (tiles along axis 1, tiles along axis 0 in this band): work-item owns one tile of the grid.
+// Where a tile's samples may lie: positions low ... high on each axis.
+typedef struct {
+    float low0, high0, low1, high1;
+} reach;
+
+// Samples first ... last of a row that may lie in the tile along axis 0, of its copy that is q0 periods away.
+static inline void along0(reach of, float t0, float d0, float period, int n_samples, int *first, int *last) {
+    *first = -(n_samples / 2);
+    *last = n_samples - 1 - n_samples / 2;
+    clip(of.low0 + period, of.high0 + period, t0, d0, first, last);
+}
+
+#if GROUPED
+// Whether a row may have samples in the tile.
+static inline int meets(reach of, __global const int *cell, __global const float *l, int m0, int m1, int n_samples) {
+    float t0 = cell[0] + l[0], d0 = l[1] + l[2], t1 = cell[1] + l[3], d1 = l[4] + l[5];
+    int from0, to0, from1, to1, middle = n_samples / 2, found = 0;
+    periods(of.low0, of.high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
+    for (int q0 = from0; q0 <= to0 && !found; q0++) {
+        int begin, end;
+        along0(of, t0, d0, (float)q0 * m0, n_samples, &begin, &end);
+        if (begin <= end) {
+            periods(of.low1, of.high1, t1, d1, m1, begin, end, &from1, &to1);
+            found = from1 <= to1;
+        }
+    }
+    return found;
+}
+#endif
+
+// global size (tiles along axis 1, tiles along axis 0 in this band), times the group (8, 8) where GROUPED: a work-item, or
+// a group, owns one tile of the grid.
 //   samples  (n_rows, n_samples, 2)
 //   first    tile row of the band;  out (rows of the band, M1, 2);  add: 1 adds to the values there, 0 overwrites them
 __kernel void spread(__global const float *restrict samples, int n_rows, int n_samples,
                      __global const int *restrict cell, __global const float *restrict line,
                      __global const float *restrict table, int m0, int m1, int first, int add, __global float *out) {
+#if GROUPED
+    __local shared_tile tile;
+    __local int met[ITEMS]; // rows that may have samples in the tile
+    int b = get_local_id(0), a = get_local_id(1), item = a * ACROSS + b;
+    int base0 = TILE * (first + (int)get_global_id(1) / ACROSS), base1 = TILE * ((int)get_global_id(0) / ACROSS);
+    clear_tile(&tile, item);
+#else
     int base0 = TILE * (first + (int)get_global_id(1)), base1 = TILE * (int)get_global_id(0);
-    int middle = n_samples / 2;
     float sum[2 * ROWS * STRIDE];
     for (int i = 0; i < 2 * ROWS * STRIDE; i++) sum[i] = 0;
+#endif
+    int middle = n_samples / 2;
+    reach of = {base0 - TAPS / 2 - 1, base0 + TILE + TAPS / 2, base1 - TAPS / 2 - 1, base1 + TILE + TAPS / 2};
     for (int p = 0; p < n_rows; p++) {
         __global const float *l = line + 6 * (size_t)p, *row = samples + 2 * ((size_t)p * n_samples + middle);
+#if GROUPED
+        if (p % ITEMS == 0) {
+            barrier(CLK_LOCAL_MEM_FENCE);
+            int mine = p + item;
+            met[item] = mine < n_rows && meets(of, cell + 2 * mine, line + 6 * (size_t)mine, m0, m1, n_samples);
+            barrier(CLK_LOCAL_MEM_FENCE);
+        }
+        if (!met[p % ITEMS]) continue;
+#endif
         float t0 = cell[2 * p] + l[0], d0 = l[1] + l[2], t1 = cell[2 * p + 1] + l[3], d1 = l[4] + l[5];
-        float low0 = base0 - TAPS / 2 - 1, high0 = base0 + TILE + TAPS / 2;
-        float low1 = base1 - TAPS / 2 - 1, high1 = base1 + TILE + TAPS / 2;
         int from0, to0, from1, to1;
-        periods(low0, high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
+        periods(of.low0, of.high0, t0, d0, m0, -middle, n_samples - 1 - middle, &from0, &to0);
         for (int q0 = from0; q0 <= to0; q0++) {
-            int begin = -middle, end = n_samples - 1 - middle;
-            float period0 = (float)q0 * m0;
-            clip(low0 + period0, high0 + period0, t0, d0, &begin, &end);
+            int begin, end;
+            along0(of, t0, d0, (float)q0 * m0, n_samples, &begin, &end);
             if (begin > end) continue;
-            periods(low1, high1, t1, d1, m1, begin, end, &from1, &to1);
+            periods(of.low1, of.high1, t1, d1, m1, begin, end, &from1, &to1);
             for (int q1 = from1; q1 <= to1; q1++) {
                 int start = begin, stop = end;
                 float period1 = (float)q1 * m1;
-                clip(low1 + period1, high1 + period1, t1, d1, &start, &stop);
-                int shift0 = cell[2 * p] - q0 * m0 - base0 + TAPS - 1;
-                int shift1 = cell[2 * p + 1] - q1 * m1 - base1 + TAPS - 1;
+                clip(of.low1 + period1, of.high1 + period1, t1, d1, &start, &stop);
+                int shift0 = cell[2 * p] - q0 * m0 - base0, shift1 = cell[2 * p + 1] - q1 * m1 - base1;
+#if GROUPED
+                for (int n = start; n <= stop; n += ITEMS) {
+                    int many = min(ITEMS, stop - n + 1);
+                    if (item < many) {
+                        float z0, z1;
+                        int i = shift0 + first_cell(n + item, l[0], l[1], l[2], &z0);
+                        int j = shift1 + first_cell(n + item, l[3], l[4], l[5], &z1);
+                        put_sample(&tile, item, i, j, z0, z1, vload2(n + item, row), table);
+                    }
+                    barrier(CLK_LOCAL_MEM_FENCE);
+                    add_samples(&tile, many, a, b);
+                    barrier(CLK_LOCAL_MEM_FENCE);
+                }
+#else
                 for (int n = start; n <= stop; n++) {
                     float z0, z1;
-                    int i = shift0 + first_cell(n, l[0], l[1], l[2], &z0);
-                    int j = shift1 + first_cell(n, l[3], l[4], l[5], &z1);
+                    int i = shift0 + TAPS - 1 + first_cell(n, l[0], l[1], l[2], &z0);
+                    int j = shift1 + TAPS - 1 + first_cell(n, l[3], l[4], l[5], &z1);
                     if (i < 0 || i >= REACH || j < 0 || j >= REACH) continue;
                     float w0[TAPS], w1[TAPS], pairs[2 * PAIRS];
                     tap_weights(z0, table, w0);
@@ -109,13 +174,26 @@ __kernel void spread(__global const float *restrict samples, int n_rows, int n_s
 #pragma unroll
                     for (int k = 0; k < TAPS; k++, at += 2 * STRIDE) STORE_TAPS(fma((taps_v)w0[k], v, LOAD_TAPS(at)), at);
                 }
+#endif
             }
         }
     }
+#if GROUPED
+    barrier(CLK_LOCAL_MEM_FENCE);
+    for (int k = item; k < TILE * TILE; k += ITEMS) {
+        int i = base0 + k / TILE, j = base1 + k % TILE;
+        if (i < m0 && j < m1) {
+            __global float *to = out + 2 * ((size_t)(i - TILE * first) * m1 + j);
+            float2 s = sum_of_cell(&tile, k);
+            vstore2(add ? vload2(0, to) + s : s, 0, to);
+        }
+    }
+#else
     for (int i = 0; i < TILE && base0 + i < m0; i++) {
         __global float *to = out + 2 * ((size_t)(base0 - TILE * first + i) * m1 + base1);
         float *from = sum + 2 * ((i + TAPS - 1) * STRIDE + TAPS - 1);
         int n = 2 * min(TILE, m1 - base1);
         for (int j = 0; j < n; j++) to[j] = add ? to[j] + from[j] : from[j];
     }
+#endif
 }

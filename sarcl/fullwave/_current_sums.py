@@ -15,6 +15,8 @@ from ._currents import Currents
 BLOCK = 8  # frequencies whose sums a work-item has in registers, as in kernels/current_sums.cl
 CHUNK = 2048  # cells of a work-item: float32 sums over more would lose digits
 PULSES = 256  # at a time
+GROUP = 32  # pulses of a work-group that keeps paths in local memory
+PATHS = 2 * 4 * 32 * GROUP  # bytes of these: to and from the 32 cells of a tile
 BENT = 1e-4  # cycles: largest error of a phase that is taken as linear in the frequency over BLOCK frequencies
 
 
@@ -55,10 +57,12 @@ def current_sums(device: Device, currents: Currents, paths: Paths, *, max_bytes:
     n_frequencies, n_pulses = len(paths.sent), len(paths.tx)
     out = np.zeros((6, n_pulses, n_frequencies), np.complex128)
     reach = max((float(np.linalg.norm(offset, axis=1).max()) for _, offset, _ in lists if len(offset)), default=0.0)
+    group = GROUP if device.info.vector_width == 1 and device.shares(PATHS, GROUP) else 0
     kernel = device.kernel(
-        "current_sums.cl", "current_sums", BISTATIC=int(paths.bistatic), LINEAR=int(_is_linear(paths, reach))
-    )
-    lanes, blocks = device.info.vector_width, -(-n_frequencies // BLOCK)
+        "current_sums.cl", "current_sums", BISTATIC=int(paths.bistatic), LINEAR=int(_is_linear(paths, reach)),
+        GROUP=group,
+    )  # fmt: skip
+    lanes, blocks = max(group, 1) * device.info.vector_width, -(-n_frequencies // BLOCK)
     for first in range(0, n_pulses, PULSES):
         part = paths.part(np.arange(first, min(first + PULSES, n_pulses)))
         count = -(-len(part.tx) // lanes) * lanes
@@ -69,7 +73,7 @@ def current_sums(device: Device, currents: Currents, paths: Paths, *, max_bytes:
             for start in range(0, len(offset), max(1, most) * CHUNK):
                 cells = slice(start, start + max(1, most) * CHUNK)
                 total = _sums(device, kernel, offset[cells], values(cells), tables, currents.wave.travel,
-                              (n_frequencies, count))  # fmt: skip
+                              (n_frequencies, count), group)  # fmt: skip
                 out[number, first : first + len(part.tx)] += total[:, : len(part.tx)].T
     return out
 
@@ -115,9 +119,9 @@ def _tables(paths: Paths, count: int) -> tuple[np.ndarray, np.ndarray, np.ndarra
 
 def _sums(
     device: Device, kernel: Any, offset: np.ndarray, values: np.ndarray, tables: list[Any], travel: np.ndarray,
-    shape: tuple[int, int],
+    shape: tuple[int, int], group: int,
 ) -> np.ndarray:  # fmt: skip
-    """Sums over one list of cells: complex128 (F, pulses)."""
+    """Sums over one list of cells: complex128 (F, pulses); group: the macro GROUP of the kernel."""
     (n_frequencies, count), n = shape, len(offset)
     blocks, chunks = -(-n_frequencies // BLOCK), -(-n // CHUNK)
     cells = np.column_stack([offset, (offset**2).sum(axis=1) / 2]).astype(np.float32)
@@ -129,7 +133,7 @@ def _sums(
     device.run(
         kernel,
         size,
-        None,
+        (group, 1, 1) if group else None,
         *arrays,
         *tables,
         sums,

@@ -12,6 +12,7 @@ For other folders:
     polynomials             Lagrange polynomials, Chebyshev nodes
     pulse_geometry          antenna positions per pulse, as kernels/geometry.clh reads them
     range_profiles          samples in frequency to oversampled range profiles and back
+    shared_tile             tiles of a grid that a work-group sums in local memory
     tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
     windows                 windows over frequency and over the aperture
@@ -28,6 +29,7 @@ __all__ = [
     "polynomials",
     "pulse_geometry",
     "range_profiles",
+    "shared_tile",
     "tile_constants",
     "tiles",
     "windows",

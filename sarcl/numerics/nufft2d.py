@@ -14,14 +14,14 @@ from ..base.text import size_text
 from ..base.tolerances import rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
-from . import cost_model
+from . import cost_model, shared_tile
 from .error_bounds import FLOAT32, sum_rounding
 from .interpolation import TERMS, Interpolator, interpolator, lower_bound
 from .plan import LEAST_TOLERANCE
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
 MOST_COUNTED = 2**20  # samples that are counted to find the most in a cell
-CELLS = 64, 8  # cells per side of a tile: on CPUs it stays in a cache, on GPUs many tiles are computed at once
+CELLS = 64, 8  # cells per side of a tile of one work-item: on CPUs it stays in a cache, on GPUs many are at work
 
 
 @dataclass(frozen=True, eq=False)
@@ -155,7 +155,7 @@ class Gridder:
         self.cell = cell.astype(np.int32)
         self.line = np.stack([position - cell, high, step - high], axis=-1).reshape(-1, 6).astype(np.float32)
         macros = {"TAPS": plan.interpolator.taps, "TERMS": plan.interpolator.terms, "TILE": self.tile}
-        self.kernel = device.kernel("nufft2d.cl", "spread", **{**macros, "VW": 1})
+        self.kernel = device.kernel("nufft2d.cl", "spread", **macros, VW=1, GROUPED=int(shared_tile.used_by(device)))
         self.table = device.upload(plan.interpolator.table)
 
     def blocks(self, budget: float) -> tuple[int, int]:
@@ -200,7 +200,7 @@ class Gridder:
                     clock.lap("samples")
                 cell, line = self.device.upload(self.cell[start:stop]), self.device.upload(self.line[start:stop])
                 self.device.run(
-                    self.kernel, (-(-m1 // self.tile), last - first), (1, 1) if self.device.is_cpu else None,
+                    self.kernel, *shared_tile.launch(self.device, (-(-m1 // self.tile), last - first)),
                     samples, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
                     steps=stop - start,
                 )  # fmt: skip
@@ -235,4 +235,6 @@ def _transposed(wave: np.ndarray, out: np.ndarray) -> None:
 
 def tile_of(device: Device) -> int:
     """Cells per side of a tile."""
+    if shared_tile.used_by(device):
+        return shared_tile.CELLS
     return CELLS[0] if device.is_cpu else CELLS[1]

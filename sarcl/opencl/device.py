@@ -256,6 +256,13 @@ class Device:
 
         return int(kernel.get_work_group_info(pyopencl.kernel_work_group_info.WORK_GROUP_SIZE, self.queue.device))
 
+    def shares(self, nbytes: int, items: int) -> bool:
+        """Whether kernels in which so many work-items share so many bytes of local memory are the better ones.
+
+        Never on CPU devices: there a work-item keeps its sums in a cache.
+        """
+        return not self.is_cpu and self.info.local_memory >= nbytes and self.info.max_group >= items
+
     def reikna_thread(self) -> Any:
         """reikna's handle on this device's queue."""
         from reikna.cluda import ocl_api

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.devices import as_gpu
 
 from sarcl.fullwave import _current_sums, _dispersion, _formed_echoes
 from sarcl.fullwave._currents import Currents
@@ -64,8 +65,12 @@ def difference(got, wanted):
 @pytest.mark.parametrize(
     ("n", "n_frequencies", "n_pulses"), [(1, 1, 1), (31, 7, 8), (500, 8, 9), (700, 17, 3), (2049, 9, 16)]
 )
-def test_sums_of_currents_are_those_of_the_twin(device, n, n_frequencies, n_pulses):
+@pytest.mark.parametrize("kind", ["itself", "gpu"])
+def test_sums_of_currents_are_those_of_the_twin(device, kind, n, n_frequencies, n_pulses):
     currents = random_currents(n, n_frequencies)
+    if kind == "gpu":
+        device = as_gpu(device)
+        assert device.shares(_current_sums.PATHS, _current_sums.GROUP)
     tx = antennas(currents, n_pulses, 0.2)
     for rx in (tx, antennas(currents, n_pulses, 0.5, seed=2)):
         paths = paths_of(currents, tx, rx)

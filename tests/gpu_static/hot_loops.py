@@ -44,10 +44,11 @@ HOT = {
     ("beam.cl", "times"): Hot("VW", "element and entry"),
     ("current_sums.cl", "current_sums"): Hot("8 * VW", "cell, frequency and pulse"),  # BLOCK in the kernel
     ("merge_subapertures.cl", "merge"): Hot("1", "pulse and sample of a profile"),
-    ("nufft2d.cl", "spread"): Hot("1", "sample and tile of the grid"),
+    # a trip of a group's 64 items adds up to 64 samples: instructions of all items per sample
+    ("nufft2d.cl", "spread"): Hot("1", "sample and tile of the grid", loop="barrier", trips=("64",)),
     ("range_doppler.cl", "straighten"): Hot("VW", "sample"),
     ("ray_casting.cl", "hidden"): Hot("1", "node of the tree and ray"),
-    ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid"),
+    ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
     ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency"),
     ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet"),
     ("spread_points.cl", "spread"): Hot("VW", "pulse and scatterer"),

@@ -15,16 +15,6 @@ REMEDY = (
     "the commit"
 )
 MOST_LOCAL = 48 * 1024  # bytes of local memory per work-group that every GPU has
-# Kernels whose private arrays lie in memory on GPUs, and why that is so.
-IN_MEMORY = {
-    (
-        "current_sums.cl",
-        "current_sums",
-    ): "paths of 32 cells, each read once per eight frequencies; to compute them anew "
-    "would take a fourth more instructions",
-    ("nufft2d.cl", "spread"): "a work-item owns a tile of the grid, which no GPU holds in registers",
-    ("spectral_echo.cl", "spread"): "a work-item owns a tile of the grid, which no GPU holds in registers",
-}
 # Programs that no plan for a GPU builds, and why.
 NOT_ON_GPUS = {
     "trial.cl": "the trial of a device builds it, no plan does",
@@ -60,7 +50,6 @@ def limits(found: dict[str, Any]) -> list[str]:
     """Sentences on kernels that do not compile, spill, use a stack or take more local memory than every GPU has."""
     out = []
     for variant, kernels in found.items():
-        file = variant.split()[0]
         for kernel, numbers in kernels.items():
             for target in TARGETS:
                 here = numbers[target]
@@ -69,10 +58,10 @@ def limits(found: dict[str, Any]) -> list[str]:
                     out.append(f"{where} cannot be compiled or counted: {here['error']}")
                     continue
                 for name in ("spills", "stack"):
-                    if here.get(name) and (file, kernel) not in IN_MEMORY:
+                    if here.get(name):
                         out.append(
                             f"{where}: {here[name]} {RATCHETED[name]}, wanted none. Keep arrays that are indexed by "
-                            "variables out of the kernel, or give a reason in tests/gpu_static/ratchet.py:IN_MEMORY"
+                            "variables out of the kernel, or in local memory"
                         )
                 if here.get("local memory", 0) > MOST_LOCAL:
                     out.append(
@@ -86,20 +75,12 @@ def coverage(found: dict[str, Any]) -> list[str]:
     """Sentences on files of kernels/ of which no task builds a program, and on reasons that hold no longer."""
     built = {variant.split()[0] for variant in found}
     files = {path.name for path in (ROOT / "kernels").glob("*.cl")}
-    kernels = {(variant.split()[0], kernel) for variant, launched in found.items() for kernel in launched}
     return [
         *(f"kernels/{name}: no task of tests/gpu_static/tasks.py launches a kernel of it; add one that does, or give a "
           "reason in tests/gpu_static/ratchet.py:NOT_ON_GPUS" for name in sorted(files - built - set(NOT_ON_GPUS))),
         *(f"{name} is launched on GPUs; take it out of tests/gpu_static/ratchet.py:NOT_ON_GPUS"
           for name in sorted(built & set(NOT_ON_GPUS))),
-        *(f"{file} {kernel} has no stack any more; take it out of tests/gpu_static/ratchet.py:IN_MEMORY"
-          for file, kernel in IN_MEMORY if (file, kernel) in kernels and not _in_memory(found, file, kernel)),
     ]  # fmt: skip
-
-
-def _in_memory(found: dict[str, Any], file: str, kernel: str) -> bool:
-    numbers = [k[kernel] for variant, k in found.items() if variant.split()[0] == file and kernel in k]
-    return any(n[target].get(name) for n in numbers for target in TARGETS for name in ("spills", "stack"))
 
 
 def worse(found: dict[str, Any], before: dict[str, Any]) -> tuple[list[str], list[str]]:

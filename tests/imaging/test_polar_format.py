@@ -10,13 +10,14 @@ import numpy as np
 import pytest
 from helpers.cases import image_error, noise_on, straight
 from helpers.contract_cases import build, draw
+from helpers.devices import as_gpu
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.stage_timer import Clock
 from sarcl.imaging.polar_format import _wavefront, polar_format
 from sarcl.imaging.polar_format._wavefront import curvature, waves_about
-from sarcl.numerics import nufft2d
+from sarcl.numerics import nufft2d, shared_tile
 from sarcl.numerics.interpolation import interpolator
 from sarcl.opencl import fft
 from sarcl.reference.polar_format import polar_format as plane_sum
@@ -145,9 +146,12 @@ def test_any_reference_and_any_centre_will_do():
         hold(moved, grid, 1e-4)
 
 
-@pytest.mark.parametrize("tile", nufft2d.CELLS)
+@pytest.mark.parametrize("tile", [*nufft2d.CELLS, shared_tile.CELLS])
 def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
     monkeypatch.setattr(nufft2d, "CELLS", (tile, tile))
+    if tile == shared_tile.CELLS:
+        device = as_gpu(device)
+        assert shared_tile.used_by(device)
     raw = noise_on(ARC, n_samples=90)
     waves = waves_about(raw, GRID.center)
     for scale in (1.0, 7.0):  # wavenumbers that wrap once, and again and again
@@ -167,6 +171,28 @@ def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
             place = (turns[:, None] + step[:, None] * n[:, None]) % 1 * plan.length
             wanted = spread(raw.samples.ravel(), place.reshape(-1, 2), plan.interpolator, plan.length)
             assert np.linalg.norm(seen[0] - wanted) <= 3e-6 * np.linalg.norm(wanted)
+
+
+def test_tiles_that_a_work_group_shares_are_those_of_single_work_items(device, monkeypatch):
+    """Bit by bit, in bands of tiles and blocks of rows: both add samples up in the same order."""
+    raw, gpu = noise_on(ARC, n_samples=90), as_gpu(device)
+    turns, step = (7 * v for v in waves_about(raw, GRID.center).pixel_cycles(raw, GRID))
+    plan, seen = nufft2d.GridPlan(interpolator(6, 2.0), (126, 150), 1.0, 1.0, 1.0), {}
+    for shared in (True, False):
+        found = seen[shared] = []
+
+        def rows(device, data, found=found, **options):
+            found.append(data.copy())
+            return data
+
+        monkeypatch.setattr(fft, "rows", rows)
+        monkeypatch.setattr(shared_tile, "used_by", lambda device, shared=shared: shared)
+        monkeypatch.setattr(nufft2d, "tile_of", lambda device: shared_tile.CELLS)
+        engine = nufft2d.Gridder(gpu, plan, turns, step, raw.n_samples)
+        assert engine.blocks(57200) == (1, 25)
+        engine.image(raw.read, GRID.shape, 57200, Clock(), lambda share: None)
+    for got, wanted in zip(seen[True], seen[False], strict=True):
+        assert np.array_equal(got, wanted)
 
 
 def test_a_point_at_the_centre_is_as_sharp_as_theory_says():

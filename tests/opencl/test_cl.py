@@ -345,7 +345,7 @@ MACROS = {
     "ROUGH": 1, "DIAGRAM_ISOTROPIC": 0, "DIAGRAM_COS": 1, "DIAGRAM_COS2": 2, "DIAGRAM_EXP": 3,
     "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1, "SEGMENT": 64,
     "SHARED": 1, "ITEMS": 16, "SLOPE_TAPS": 2, "SLOPE_TERMS": 2, "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64,
-    "FROM64": 0, "NUMBER64": 0,
+    "FROM64": 0, "NUMBER64": 0, "GROUPED": 1,
 }  # fmt: skip
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 

@@ -18,6 +18,7 @@ from typing import Any
 import numpy as np
 
 from ...base.text import size_text
+from ...numerics import shared_tile
 from ...numerics.interpolation import Interpolator
 from ...opencl import fft
 from ...opencl.device import Device
@@ -59,9 +60,9 @@ class ReflectivityMap:
         self.first = device.upload(np.stack(first, axis=1)[self.order])
         self.rest = device.upload(np.stack(rest, axis=1)[self.order])
         self.wave = np.exp(-2j * np.pi * cycles).astype(np.complex64)
-        macros = {"VW": 1, "TAPS": taps, "TERMS": plan.kernel.terms, "TILE": plan.tile}
-        self.spread = device.kernel("spectral_echo.cl", "spread", **macros, NODES=1)
-        self.macros = macros
+        grouped = int(shared_tile.used_by(device))
+        self.macros = {"VW": 1, "TAPS": taps, "TERMS": plan.kernel.terms, "TILE": plan.tile, "GROUPED": grouped}
+        self.spread = device.kernel("spectral_echo.cl", "spread", **self.macros, NODES=1)
         self.table = device.upload(plan.kernel.table)
         self.flat = device.upload(_flat(plan.kernel))
 
@@ -90,8 +91,8 @@ class ReflectivityMap:
             n = min(at_once, plan.n_rows // plan.tile - first)
             made = device.empty(n * a_band)
             device.run(
-                self.spread, (n_tiles, n), (1, 1) if device.is_cpu else None,
-                values, self.first, self.rest, self.start, self.table, n_tiles, first, made,
+                self.spread, *shared_tile.launch(device, (n_tiles, n)), values, self.first, self.rest, self.start,
+                self.table, n_tiles, first, made,
             )  # fmt: skip
             rows = device.download(made, np.empty((n * plan.tile, plan.n_columns), np.complex64))
             wave = fft.rows(device, rows)

@@ -4,7 +4,9 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.devices import as_gpu
 
+from sarcl.numerics import shared_tile
 from sarcl.reference import spectral_echo as twin
 from sarcl.simulation.spectral._aspect_window import DopplerGrid, aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import transfer_tables
@@ -18,19 +20,23 @@ def ones(sines, frequency):
     return np.ones((1, len(sines)), np.complex128)
 
 
-@pytest.fixture(params=CELLS)
+@pytest.fixture(params=[*CELLS, "shared"])
 def task(request, every_device):
+    tile, device = request.param, every_device
+    if tile == "shared":
+        tile, device = CELLS[1], as_gpu(every_device)
+        assert shared_tile.used_by(device)
     seen = aspects(0.01, 0.03, RANGES, BAND, (-50.0, 50.0), 1e-3)
     transfer = transfer_tables(seen, ones, 1, 2, 4)
     ends = np.outer(2 * wavenumber(np.array(BAND)), transfer.limits) * 200.0 / (2 * np.pi)
     grid = DopplerGrid(200.0, 200, int(ends.min()), int(ends.max() - ends.min()))
     numbers = range_wavenumbers(transfer, grid)
-    plan = plan_map(1e-4, numbers, grid, RANGES, 0.0, request.param, 1e-3)
+    plan = plan_map(1e-4, numbers, grid, RANGES, 0.0, tile, 1e-3)
     random = np.random.default_rng(0)
     n = 300
     azimuth, slant_range = random.uniform(-150, 250, n), random.uniform(*RANGES, n)
     b = (random.normal(size=n) + 1j * random.normal(size=n)).astype(np.complex64)
-    held = ReflectivityMap(every_device, plan, numbers, grid, azimuth, slant_range)
+    held = ReflectivityMap(device, plan, numbers, grid, azimuth, slant_range)
     return held, transfer, azimuth, slant_range, b
 
 
@@ -65,7 +71,7 @@ def test_kernels_are_their_twins(task):
     made = device.empty(8 * plan.n_rows * plan.n_columns)
     values = (b * held.wave)[held.order]
     device.run(
-        held.spread, (n_tiles, plan.n_rows // plan.tile), (1, 1) if device.is_cpu else None,
+        held.spread, *shared_tile.launch(device, (n_tiles, plan.n_rows // plan.tile)),
         device.upload(values), held.first, held.rest, held.start, held.table, n_tiles, 0, made,
     )  # fmt: skip
     grid = device.download(made, np.empty((plan.n_rows, plan.n_columns), np.complex64))
