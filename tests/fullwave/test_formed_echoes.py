@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
+from helpers.current_cases import antennas, difference, random_currents, twin, unit
 from helpers.devices import as_gpu
 
 from sarcl.fullwave import _current_sums, _dispersion, _formed_echoes
@@ -11,55 +12,10 @@ from sarcl.fullwave._currents import Currents
 from sarcl.fullwave._far_field import amplitude
 from sarcl.fullwave._formed_echoes import formed_echoes, paths_of
 from sarcl.fullwave._incident import PlaneWave
-from sarcl.fullwave._pulse import Pulse
-from sarcl.fullwave.lattice import Lattice
 from sarcl.opencl.device import Device
-from sarcl.reference import formed_echo
 
-CELL = 0.02  # m
-RANGE = 1.1e3  # m
 # float32: paths of 10 m to 1e-6 m, phases of some 100 cycles to 3e-5 rad, sums of 2048 terms
 ROUNDING = 5e-5
-
-
-def unit(v):
-    return np.asarray(v, float) / np.linalg.norm(v)
-
-
-def random_currents(n, n_frequencies, shape=(48, 48, 48), cell=CELL, seed=0):
-    """Currents that are random at n edges and n faces of a grid."""
-    rng = np.random.default_rng(seed)
-    grid = Lattice(cell, shape, np.array([1.0, 2.0, 3.0]))
-    places = rng.permutation(3 * np.prod(grid.shape))[: 2 * n]
-    edges, faces = np.sort(places[:n]), np.sort(places[n:])
-    wave = PlaneWave(unit((1, 0.3, -0.9)), np.array([0, 1.0, 0]), Pulse.gaussian(1e9, 2e9))
-    k = np.linspace(0.7, 1, n_frequencies) * 2 * np.pi / (10 * cell)
-    phasors = rng.normal(size=(4, n_frequencies, n))
-    electric, magnetic = ((phasors[a] + 1j * phasors[a + 1]).astype(np.complex64) for a in (0, 2))
-    centre = grid.origin + cell * np.array(grid.shape) / 2
-    omega = _dispersion.grid_omega(grid, k, wave.travel)
-    return Currents(grid, wave, centre, k, omega, edges, electric, faces, magnetic, 0, 0.0)
-
-
-def antennas(currents, n, spread, distance=RANGE, seed=1):
-    """Antennas about the direction from which the wave came."""
-    rng = np.random.default_rng(seed)
-    towards = np.array([unit(-currents.wave.travel + spread * rng.normal(size=3)) for _ in range(n)])
-    return currents.centre + distance * towards
-
-
-def twin(currents, paths, tx, rx):
-    out = []
-    for _, offset, values in _current_sums._by_component(currents):
-        out.append(formed_echo.current_sums(
-            offset, values(slice(None)), currents.wave.travel, paths.sent, paths.received, tx - currents.centre,
-            rx - currents.centre,
-        ))  # fmt: skip
-    return np.array(out)
-
-
-def difference(got, wanted):
-    return np.abs(got - wanted).max() / np.sqrt((np.abs(wanted) ** 2).mean())
 
 
 @pytest.mark.parametrize(

@@ -9,7 +9,7 @@ import sys
 from pathlib import Path
 
 import pytest
-from gpu_static.oclgrind_task import TASKS
+from gpu_static.oclgrind_task import NAMES
 
 OPTIONS = [
     "--build-options", "-cl-opt-disable",  # optimised code has instructions that Oclgrind 21.10 does not know
@@ -30,7 +30,7 @@ def under_oclgrind(log: Path, *command: str) -> subprocess.CompletedProcess[str]
     )  # fmt: skip
 
 
-@pytest.mark.parametrize("name", TASKS)
+@pytest.mark.parametrize("name", NAMES)
 def test_nothing_is_found_in_a_task_whose_result_is_right(name, tmp_path):
     log = tmp_path / "log"
     done = under_oclgrind(log, str(Path(__file__).with_name("oclgrind_task.py")), name)
