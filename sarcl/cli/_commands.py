@@ -108,6 +108,8 @@ def simulate(args: argparse.Namespace, job: Job) -> int:
         job.check()
         raw.save(output)
     _say_report("echo", raw.report, job)
+    if raw.time is None:
+        job.say("the track has no times: the antenna rests while a pulse is on its way; prf or speed gives it times")
     job.say(f"wrote {output}: {raw.n_rows} rows of {raw.n_samples} samples")
     if images:
         raw = _compressed(raw, job)

@@ -325,6 +325,42 @@ def test_simulate_makes_echoes_and_the_image(here, capsys):
     assert np.abs(image.data[i[1], j[1]]) == pytest.approx(0.1 * image.gain, rel=0.2)
 
 
+CENTIMETRES = """<COLLADA xmlns="http://www.collada.org/2005/11/COLLADASchema" version="1.4.1">
+<asset><unit name="centimeter" meter="0.01"/><up_axis>Z_UP</up_axis></asset>
+<library_geometries><geometry id="g"><mesh>
+<source id="p"><float_array id="a" count="{count}">{numbers}</float_array><technique_common>
+<accessor source="#a" count="{corners}" stride="3"><param name="X" type="float"/><param name="Y" type="float"/>
+<param name="Z" type="float"/></accessor></technique_common></source>
+<vertices id="v"><input semantic="POSITION" source="#p"/></vertices>
+<triangles count="{facets}"><input semantic="VERTEX" source="#v" offset="0"/><p>{order}</p></triangles>
+</mesh></geometry></library_geometries>
+<library_visual_scenes><visual_scene id="s"><node id="n"><instance_geometry url="#g"/></node></visual_scene>
+</library_visual_scenes>
+<scene><instance_visual_scene url="#s"/></scene></COLLADA>"""
+
+
+@pytest.mark.filterwarnings("always::sarcl.SarclWarning")
+def test_what_simulate_has_to_warn_of_it_says_once(here, capsys):
+    """A coarse mesh in centimetres from a circle without prf or speed: three things to say, each in one line."""
+    ball = 100 * sarcl.shapes.sphere(0.5, facets=300).triangles.reshape(-1, 3)  # cm
+    numbers, order = (" ".join(f"{x:.9g}" for x in values) for values in (ball.ravel(), np.arange(len(ball))))
+    text = CENTIMETRES.format(count=ball.size, numbers=numbers, corners=len(ball), facets=len(ball) // 3, order=order)
+    (here / "ball.dae").write_text(text)
+    points = SCENARIO.index("[[scene.points]]")
+    fast = "[echo]\ntolerance = 1e-2\nshadows = false\n"
+    (here / "s.toml").write_text(f'{SCENARIO[:points]}[[scene.from_mesh]]\nfile = "ball.dae"\n{GRID}{fast}')
+    assert parser.main(["simulate", "s.toml"]) == 0
+    said, warned = capsys.readouterr()
+    assert said.count("the track has no times") == 1
+    assert warned.count("\n") == 2
+    assert warned.count("sarcl: warning: the unit of this mesh is 0.01 m, as its file says") == 1
+    assert warned.count("sarcl: warning: mesh too coarse for the wavelength") == 1
+    (here / "s.toml").write_text(SCENARIO.replace("n_pulses = 48", "n_pulses = 48\nprf = 100.0"))
+    assert parser.main(["simulate", "s.toml"]) == 0
+    said, warned = capsys.readouterr()
+    assert warned == "" and "the track has no times" not in said
+
+
 def test_echoes_that_are_not_compressed_are_compressed_first(here, capsys):
     (here / "s.toml").write_text(SCENARIO + "[echo]\ncompressed = false\n")
     assert parser.main(["simulate", "s.toml"]) == 0
