@@ -15,7 +15,7 @@ For other folders:
     rows          some rows spread over all, and groups of rows by keys
     stage_timer   seconds per stage of a computation
     text          bytes, durations, tolerances and spelling suggestions as text for messages
-    threads       how many processors computations of this process use
+    threads       how many processors computations of this process use, and NumPy on all of them
     tolerances    tolerances that a refusal names: rounded up, and tried until one is met
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy

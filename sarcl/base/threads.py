@@ -1,8 +1,14 @@
-"""How many processors computations of this process use."""
+"""How many processors computations of this process use, and NumPy on all of them."""
 
 from __future__ import annotations
 
 import os
+from collections.abc import Callable, Sequence
+from concurrent.futures import ThreadPoolExecutor
+from typing import TypeVar
+
+Part = TypeVar("Part")
+Made = TypeVar("Made")
 
 
 def threads() -> int:
@@ -13,3 +19,16 @@ def threads() -> int:
     return (
         int(text) if text else len(os.sched_getaffinity(0)) if hasattr(os, "sched_getaffinity") else os.cpu_count() or 1
     )
+
+
+def of_each(function: Callable[[Part], Made], parts: Sequence[Part]) -> list[Made]:
+    """The function of each part, in their order, by up to `threads()` threads.
+
+    Starting these takes about 0.2 ms. It pays where the function spends its time in NumPy, with arrays of thousands of
+    values, during which other threads run.
+    """
+    workers = min(threads(), len(parts))
+    if workers < 2:
+        return [function(part) for part in parts]
+    with ThreadPoolExecutor(workers) as pool:
+        return list(pool.map(function, parts))

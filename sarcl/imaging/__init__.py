@@ -15,6 +15,7 @@ For other folders:
     pixel_taper      a taper over the aperture of each pixel
     profile_energy   energy of the range profiles against the energy at the pixels
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
+    unseen_pixels    pixels outside the range window of every row
     direct/          every (row, pixel) pair that is not skipped, in float32
     factorized/      pulses decimated on a quadtree of tiles
     float64/         direct backprojection in float64
@@ -26,7 +27,6 @@ For other folders:
 For this folder alone:
 
     _row_coverage    which rows saw a pixel, and the sum of their weights: the gain of the image
-    _unseen_pixels   pixels outside the range window of every row
 """
 
 __all__ = [
@@ -50,4 +50,5 @@ __all__ = [
     "run",
     "strip_map",
     "tiling",
+    "unseen_pixels",
 ]

@@ -8,7 +8,7 @@ from contextlib import ExitStack, closing
 from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
 
 import numpy as np
-from numpy.typing import ArrayLike
+from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.errors import ToleranceMissed, warn
@@ -23,7 +23,6 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
 from ._row_coverage import room_for_gain, seen_by
-from ._unseen_pixels import unseen_pixels
 from .antenna_beam import shares
 from .choose_method import MethodChoice, choose
 from .collection import collection
@@ -37,6 +36,7 @@ from .run.image_output import BandBuffer, ImageOutput, is_path
 from .run.tile_files import gaps, share
 from .run.workers import LocalWorkers, WorkerPool
 from .tiling.tiling import Run
+from .unseen_pixels import unseen_pixels
 
 if TYPE_CHECKING:
     import distributed
@@ -235,6 +235,18 @@ def backproject(
         if measured is not None and measured > tolerance:
             raise ToleranceMissed(tolerance, measured, image)
         return image
+
+
+def pixels_alone(raw: PhaseHistory, grid: ImageGrid, **keywords: Unpack[FocusKeywords]) -> NDArray[np.complexfloating]:
+    """The pixels of `backproject`, of grid.shape, for images that nobody keeps: no gain, check, report or warning."""
+    options = FocusOptions(**keywords)
+    _, task = options.task(raw, grid)
+    workers, chosen = _open_workers(task, options, None)
+    with ExitStack() as stack:
+        output = ImageOutput(grid, chosen.tiling, None, stack, chosen.dtype)
+        _fill(workers, task, chosen, output, None, (0, chosen.tiling.n_bands), Clock(), None)
+        output.finish()
+    return np.asarray(output.data)
 
 
 def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:

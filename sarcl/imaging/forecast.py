@@ -23,11 +23,11 @@ from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
 from . import profile_energy
-from ._unseen_pixels import unseen_pixels
 from .choose_method import MethodChoice
 from .factorized.plan import FactorPlan, moving_cost
 from .focus_options import FocusOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
+from .unseen_pixels import unseen_pixels
 
 PROBE = 0.03  # s: shortest run of the kernel from which the speed of a device is measured
 MOST_BANDS = 2**16  # bands that are divided into blocks; the memory of the first block follows from these

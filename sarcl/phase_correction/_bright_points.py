@@ -8,6 +8,7 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import groups
+from ..base.threads import of_each
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics import range_profiles, windows
@@ -16,7 +17,9 @@ from ..opencl import fft
 
 CANDIDATES = 50_000  # brightest pixels from which points are chosen
 OVERSAMPLE = 8  # of profiles read linearly: an error of 0.6 %, different at each point
-ROWS = 64  # rows per array operation: bounds the memory
+ROWS = 64  # rows whose profiles are made together: bounds the memory
+PAD = 2  # samples of a profile that repeat its other end
+VALUES = 2**15  # per array operation: they fit in a processor's cache
 Beam = tuple[float, np.ndarray]  # full angle, rad, and a unit vector per row (n_rows, 3): the cone that it sees
 
 
@@ -118,6 +121,15 @@ def brightest(raw: PhaseHistory, power: np.ndarray, grid: ImageGrid, width: floa
     return np.asarray(places[kept])
 
 
+def phasor(cycles: np.ndarray) -> np.ndarray:
+    """exp(+j 2 pi cycles), complex64, of cycles in float64: what is left of a turn is rounded to float32."""
+    angle = (2 * np.pi * (cycles - np.rint(cycles))).astype(np.float32)
+    made = np.empty(angle.shape, np.complex64)
+    np.cos(angle, out=made.real)
+    np.sin(angle, out=made.imag)
+    return made
+
+
 def contributions(
     raw: PhaseHistory, places: np.ndarray, lags: Any, scale: float, taper: bool = False, beam: Beam | None = None
 ) -> np.ndarray:
@@ -129,30 +141,64 @@ def contributions(
     """
     n_rows, n_samples = raw.n_rows, raw.n_samples
     length = fft.good_length(OVERSAMPLE * n_samples)
-    low = n_samples // 2
     lags = np.asarray(lags, np.float64)
     out = np.zeros((n_rows, len(places), len(lags)), np.complex64)
     weight = np.ones(n_rows) if raw.weight is None else raw.weight
+    few = int(np.clip(VALUES // max(len(places) * len(lags), 1), 1, ROWS))
     for start in range(0, n_rows, ROWS):
         stop = min(start + ROWS, n_rows)
         samples = raw.read(start, stop)
         if taper:
             samples = samples * windows.weights("hamming", n_samples).astype(np.float32)
-        profiles = range_profiles.from_samples(None, samples, weight[start:stop, None] / scale, length)
-        for row in range(start, stop):
+        profiles = range_profiles.from_samples(None, samples, weight[start:stop, None] / scale, length, PAD)
+
+        def fill(first: int, start: int = start, stop: int = stop, profiles: np.ndarray = profiles) -> None:
+            rows = np.arange(first, min(first + few, stop))
             lit: Any = slice(None)
             if beam is not None:
-                apart = places - raw.tx[row]
-                away = np.sqrt(np.einsum("nk,nk->n", apart, apart))
-                lit = np.flatnonzero(apart @ beam[1][row] >= np.cos(beam[0] / 2) * away)
-            late = delay(raw, row, places[lit])
-            carrier = raw.frequency[row] + low * raw.frequency_step[row]
-            turns = (late * raw.frequency_step[row])[:, None] + lags / n_samples
-            position = (turns % 1) * length
-            before = np.floor(position).astype(np.int64)
-            after = (position - before).astype(np.float32)
-            profile = profiles[row - start]
-            read = profile[before % length] * (1 - after) + profile[(before + 1) % length] * after
-            read *= np.abs(turns) <= 0.5
-            out[row, lit] = read * np.exp(2j * np.pi * (carrier * late % 1)).astype(np.complex64)[:, None]
+                seen = _sees(raw.tx[rows], places, (beam[0], beam[1][rows]))
+                lit = np.flatnonzero(seen.any(axis=0))
+            read = _read(raw, rows, places[lit], lags, profiles[rows - start], length)
+            if beam is not None:
+                read *= seen[:, lit, None]
+            out[rows[0] : rows[-1] + 1, lit] = read
+
+        of_each(fill, range(start, stop, few))
     return out
+
+
+def _sees(tx: np.ndarray, places: np.ndarray, beam: Beam) -> np.ndarray:
+    """Whether places, m (n, 3), lie in the beams of rows at tx, m (k, 3): bool (k, n)."""
+    along = sum((places[:, axis] - tx[:, axis, None]) * beam[1][:, axis, None] for axis in range(3))
+    return np.asarray(along >= np.cos(beam[0] / 2) * _distances(tx, places))
+
+
+def _distances(ends: np.ndarray, places: np.ndarray) -> np.ndarray:
+    """Distances (k, n), m, of places, m (n, 3), from antennas, m (k, 3)."""
+    total = (places[:, 0] - ends[:, 0, None]) ** 2
+    for axis in (1, 2):
+        total += (places[:, axis] - ends[:, axis, None]) ** 2
+    return np.asarray(np.sqrt(total, out=total))
+
+
+def _read(
+    raw: PhaseHistory, rows: np.ndarray, places: np.ndarray, lags: np.ndarray, profiles: np.ndarray, length: int
+) -> np.ndarray:
+    """The terms of the image equation (k, n, n_lags) of a few rows, whose profiles (k, length + 2 PAD) are given."""
+    path = _distances(raw.tx[rows], places)
+    if not raw.is_monostatic:
+        path = (path + _distances(raw.rx[rows], places)) / 2
+    late = 2 * (path - raw.reference_range[rows, None]) / SPEED_OF_LIGHT
+    turns = (late * raw.frequency_step[rows, None])[:, :, None] + lags / raw.n_samples
+    position = (turns - np.floor(turns)) * length
+    before = position.astype(np.int64)
+    after = (position - before).astype(np.float32)
+    before += (PAD + profiles.shape[1] * np.arange(len(rows)))[:, None, None]
+    flat = profiles.ravel()
+    read = flat[before]
+    before += 1
+    read += (flat[before] - read) * after
+    read *= np.abs(turns) <= 0.5
+    carrier = raw.frequency[rows] + raw.n_samples // 2 * raw.frequency_step[rows]
+    read *= phasor(carrier[:, None] * late)[:, :, None]
+    return read

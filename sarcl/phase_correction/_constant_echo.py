@@ -10,6 +10,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
+from ._bright_points import phasor
 
 ROWS = 256  # rows per array operation: bounds the memory
 # shares of the energy, times the number of pulses, below which nothing is taken out: that of noise is 1
@@ -39,8 +40,8 @@ def without_constant_echo(raw: PhaseHistory, channels: int) -> PhaseHistory | No
 def _late(raw: PhaseHistory, rows: slice) -> np.ndarray:
     """exp(+j 2 pi f tau_ref): turns samples of an echo of constant delay into those of a constant reference range."""
     frequency = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
-    cycles = np.outer(2 * raw.reference_range[rows] / SPEED_OF_LIGHT, frequency)
-    return np.asarray(np.exp(2j * np.pi * (cycles % 1)))
+    reference, same = np.unique(raw.reference_range[rows], return_inverse=True)
+    return phasor(np.outer(2 * reference / SPEED_OF_LIGHT, frequency))[same.ravel()]
 
 
 class _Less(RowsOnDemand):

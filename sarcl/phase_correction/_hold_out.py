@@ -79,26 +79,27 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     tests = [(bands[1 - h], values[h], plain[h], bands[h]) for h in (0, 1)]
     sides = []
     for some in sets:
-        own = [_phase(view, v[:, some]) for v in values] if some.sum() > 1 else []
+        own = [_phase(view, v.compress(some, axis=1)) for v in values] if some.sum() > 1 else []
         known = closeness(*own) if own else 0.0
-        both = np.concatenate([v[:, some] for v in values], axis=1)
-        old = np.concatenate([v[:, some] for v in plain], axis=1)
+        both = np.concatenate([v.compress(some, axis=1) for v in values], axis=1)
+        old = np.concatenate([v.compress(some, axis=1) for v in plain], axis=1)
         sides.append((known, _phase(view, both) if known > least else zero, both, old))
         log.debug("%d places give phases that agree to %.2f between halves of the band", some.sum(), known)
     if all(side[0] > least for side in sides):
         tests += [(sides[1 - i][1], sides[i][2], sides[i][3], sides[i][1]) for i in (0, 1)]
     tick()
 
-    def gain(test: tuple[np.ndarray, ...], modes: int) -> float:
-        """Gain in sharpness by the phase of other echoes, registered to the image of these."""
-        phase, held, before, own = test
-        phase = _phase_smoothing.smooth(phase, modes)
-        phase, _ = _phase_smoothing.alignment(phase, own, view.shift_phase, view.cell / 2)
-        was = _phase_gradient.sharpness(before, zero, view.window)
-        return _phase_gradient.sharpness(held, phase, view.window) / max(was, 1e-300)
-
     ladder = [2**k for k in range(2, 40) if 2**k < n] + [n]
-    gains = np.array([[gain(test, modes) for test in tests] for modes in ladder])
+
+    def ladder_of_gains(phase: np.ndarray, held: np.ndarray, before: np.ndarray, own: np.ndarray) -> list[float]:
+        """Gains in sharpness by the phase of other echoes, smoothed, and registered to the image of these."""
+        was = max(_phase_gradient.sharpness(before, zero, view.window), 1e-300)
+        ways = _phase_smoothing.unwrappings(phase)
+        smoothed = (_phase_smoothing.smooth(phase, modes, ways) for modes in ladder)
+        moved = (_phase_smoothing.alignment(curve, own, view.shift_phase, view.cell / 2)[0] for curve in smoothed)
+        return [_phase_gradient.sharpness(held, curve, view.window) / was for curve in moved]
+
+    gains = np.array([ladder_of_gains(*test) for test in tests]).T
     best = int(gains[:, :2].prod(axis=1).argmax())
     if agreement <= least and ladder[best] < n:
         agreement, least = _smooth_agreement(bands, ladder[best], closeness)
@@ -207,13 +208,12 @@ def _phase(view: ApertureView, v: np.ndarray) -> np.ndarray:
     first, last = view.narrow_pulses
     phase = np.zeros(view.n)
     brightest = np.argsort(-np.abs(v[first:last].sum(axis=0)))[: view.places]
-    phase[first:last] = _narrow_phase(v[first:last, brightest])
+    phase[first:last] = _narrow_phase(v[first:last].take(brightest, axis=1))
     while last - first < view.n:
         step = (last - first) // GROWTH + 1
         low, high = max(0, first - step), min(view.n, last + step)
-        part = _phase_gradient.turned(v[low:high], phase[low:high])
-        start = _phase_gradient.extended(part, first - low, last - low)
-        phase[low:high] += _phase_gradient.sharpen(part, start, 0)
+        start = _phase_gradient.extended(v[low:high], phase[low:high], first - low, last - low)
+        phase[low:high] = _phase_gradient.sharpen(v[low:high], start, 0)
         first, last = low, high
     still = _phase_gradient.sharpen(v, np.zeros(view.n), 0)
     return max((phase, still), key=lambda start: _phase_gradient.sharpness(v, start, 0))

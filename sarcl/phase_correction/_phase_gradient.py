@@ -19,9 +19,12 @@ from collections.abc import Iterator
 
 import numpy as np
 
+from ..base.threads import of_each, threads
 from ._phase_smoothing import cosines, detrended
 
 CHUNK = 2**22  # values per FFT call: bounds the memory
+FEW = 8  # pulses at a time, whose contributions fit in a processor's cache
+LARGE, PARTS = 2**20, 4  # contributions from which their sums are made in parts, by several threads, and how many
 POWER_STEPS = 10  # iterations of the power method
 NARROWEST = 10.0  # Doppler bins, smallest window of `gradient` about a point
 
@@ -61,7 +64,8 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
         total, pull = 0.0, np.zeros(len(v), np.complex128)
         for columns, image in _images(v, phase, width):
             total += _fourth(image)
-            pull += (_back(image, len(v)).conj() * v[:, columns]).sum(axis=1)
+            back = _back(image, len(v))
+            pull += _like(v, back[0]) if len(back) == 1 else (back.conj() * v[:, columns]).sum(axis=1)
         phase = phase + np.where(pull == 0, 0, np.angle(pull * np.exp(-1j * phase)))
         if total <= before * (1 + enough):
             break
@@ -69,12 +73,12 @@ def sharpen(v: np.ndarray, phase: np.ndarray, width: float, steps: int = 30, eno
     return phase
 
 
-def extended(v: np.ndarray, first: int, last: int) -> np.ndarray:
-    """Phase (n,) of all pulses relative to the image of pulses first ... last - 1 at the points; 0 for these pulses."""
-    image = v[first:last].sum(axis=0, dtype=np.complex64)
-    phase = np.angle(v @ (_cubed(image).conj()))
-    phase[first:last] = 0
-    return phase
+def extended(v: np.ndarray, phase: np.ndarray, first: int, last: int) -> np.ndarray:
+    """Phase (n,) of all pulses that fits the image of pulses first ... last - 1 at the points, which keep their own."""
+    image = _at_points(v[first:last], phase[first:last])
+    found = np.angle(_like(v, _cubed(image)))
+    found[first:last] = phase[first:last]
+    return np.asarray(found)
 
 
 def sharpness(v: np.ndarray, phase: np.ndarray, width: float) -> float:
@@ -111,6 +115,33 @@ def turned(v: np.ndarray, phase: np.ndarray) -> np.ndarray:
     return np.asarray(v * np.exp(-1j * phase).astype(np.complex64)[:, None])
 
 
+def _at_points(v: np.ndarray, phase: np.ndarray) -> np.ndarray:
+    """The image at the points themselves (columns,): the sum over pulses of v (n, columns) with the phase removed."""
+    # NumPy's products of matrices use threads that wait for each other, on a busy machine longer than this takes
+    turn = np.exp(-1j * phase).astype(np.complex64)[:, None]
+
+    def image(pulses: slice) -> np.ndarray:
+        made = np.zeros(v.shape[1], np.complex64)
+        for first in range(pulses.start, pulses.stop, FEW):
+            rows = slice(first, min(first + FEW, pulses.stop))
+            made += (v[rows] * turn[rows]).sum(axis=0)
+        return made
+
+    return np.asarray(sum(of_each(image, _parts(v))))
+
+
+def _like(v: np.ndarray, image: np.ndarray) -> np.ndarray:
+    """Correlation (n,) of every pulse of v (n, columns) with an image (columns,)."""
+    other = image.conj()
+    return np.concatenate(of_each(lambda pulses: np.array([row @ other for row in v[pulses]]), _parts(v)))
+
+
+def _parts(v: np.ndarray) -> list[slice]:
+    """Pulses in parts, the same on every machine: several where threads pay."""
+    n, parts = len(v), PARTS if v.size > LARGE else 1
+    return [slice(n * k // parts, n * (k + 1) // parts) for k in range(parts)]
+
+
 def _length(n: int) -> int:
     """Length of the Doppler axis: 2 n or more, so that |I|^2 is sampled at its Nyquist rate and nothing wraps."""
     import scipy.fft
@@ -126,7 +157,7 @@ def _images(v: np.ndarray, phase: np.ndarray, width: float) -> Iterator[tuple[sl
     import scipy.fft
 
     if width == 0:
-        yield slice(None), turned(v, phase).sum(axis=0, keepdims=True)
+        yield slice(None), _at_points(v, phase)[None]
         return
     n = len(v)
     length = _length(n)
@@ -134,7 +165,7 @@ def _images(v: np.ndarray, phase: np.ndarray, width: float) -> Iterator[tuple[sl
     step = max(1, CHUNK // length // 36) * 36  # a multiple of both numbers of lags in use, 1 and 9
     for first in range(0, v.shape[1], step):
         columns = slice(first, first + step)
-        image = scipy.fft.fft(turned(v[:, columns], phase), length, axis=0, overwrite_x=True)
+        image = scipy.fft.fft(turned(v[:, columns], phase), length, axis=0, overwrite_x=True, workers=threads())
         image[half : max(length - half, half)] = 0
         yield columns, image
 
@@ -150,7 +181,9 @@ def _back(image: np.ndarray, n: int) -> np.ndarray:
     import scipy.fft
 
     cubed = _cubed(image)
-    return cubed if len(image) == 1 else np.asarray(scipy.fft.ifft(cubed, axis=0, overwrite_x=True)[:n])
+    if len(image) == 1:
+        return cubed
+    return np.asarray(scipy.fft.ifft(cubed, axis=0, overwrite_x=True, workers=threads())[:n])
 
 
 def _cubed(image: np.ndarray) -> np.ndarray:
@@ -168,13 +201,13 @@ def _centered(v: np.ndarray, width: float) -> np.ndarray:
     half = max(1, min(int(width / 2 * length / n), length // 2))
     out = np.empty_like(v)
     step = max(1, CHUNK // length)
+    turns = np.exp(-2j * np.pi * np.arange(length) / length).astype(np.complex64)
     for first in range(0, v.shape[1], step):
         part = v[:, first : first + step]
-        level = np.abs(scipy.fft.fft(part, length, axis=0))
+        spectrum = scipy.fft.fft(part, length, axis=0, workers=threads())
+        level = spectrum.real**2 + spectrum.imag**2
         level[half : length - half] = 0
-        bins = level.argmax(axis=0)
-        turn = np.arange(n)[:, None] * np.where(bins > length // 2, bins - length, bins) / length
-        out[:, first : first + step] = part * np.exp(-2j * np.pi * turn).astype(np.complex64)
+        out[:, first : first + step] = part * turns[np.arange(n)[:, None] * level.argmax(axis=0) % length]
     return out
 
 
@@ -190,7 +223,7 @@ def _windowed(v: np.ndarray, width: float) -> np.ndarray:
     out = np.empty_like(v)
     step = max(1, CHUNK // length)
     for first in range(0, v.shape[1], step):
-        spectrum = scipy.fft.fft(v[:, first : first + step], length, axis=0)
+        spectrum = scipy.fft.fft(v[:, first : first + step], length, axis=0, workers=threads())
         spectrum[bins > width / 2] = 0
-        out[:, first : first + step] = scipy.fft.ifft(spectrum, axis=0, overwrite_x=True)[:n]
+        out[:, first : first + step] = scipy.fft.ifft(spectrum, axis=0, overwrite_x=True, workers=threads())[:n]
     return out

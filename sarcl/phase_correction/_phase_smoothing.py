@@ -7,6 +7,7 @@ from collections.abc import Iterator
 import numpy as np
 
 MENDINGS = 4  # corrections of a smoothed phase by its wrapped residual
+FEW = 16  # pulses of a product of matrices
 MOST_BINS = 256.0  # Doppler cells, largest shift between two images that is searched
 
 
@@ -15,17 +16,21 @@ def cosines(n: int, modes: int) -> np.ndarray:
     return np.cos(np.pi * np.outer(np.arange(n) + 0.5, np.arange(modes)) / n)
 
 
-def smooth(phase: np.ndarray, modes: int) -> np.ndarray:
+def smooth(phase: np.ndarray, modes: int, ways: list[np.ndarray] | None = None) -> np.ndarray:
     """The sum of `modes` cosines and a slope that fits exp(j phase) best, phase (n,) wrapped or not.
+
+    ways  the phase as `unwrappings` gives it, where the caller has it
 
     Where modes is n the phase is unwrapped, not smoothed. With noise, plain unwrapping makes errors of 2 pi, each of
     which spoils any smoothing. So the results of several unwrapping methods are smoothed, each is corrected by its
     wrapped residual, and the closest is returned.
     """
+    if ways is None:
+        ways = unwrappings(phase)
     if modes >= len(phase):
-        return unwrapped(phase)
+        return unwrapped(phase, ways)
     best, closest = phase, -1.0
-    for way in _unwrappings(phase):
+    for way in ways:
         fit = _lowest(way, modes)
         for _ in range(MENDINGS):
             fit = fit + _lowest(_wrapped(phase - fit), modes)
@@ -35,15 +40,22 @@ def smooth(phase: np.ndarray, modes: int) -> np.ndarray:
     return best
 
 
-def unwrapped(phase: np.ndarray) -> np.ndarray:
+def unwrapped(phase: np.ndarray, ways: list[np.ndarray] | None = None) -> np.ndarray:
     """phase (n,) unwrapped, also with noise, and where it changes by more than pi per pulse.
 
     Of the results of several methods, and of those within pi of a smoothed phase: the one with the least curvature.
     """
     n = len(phase)
-    bases = [smooth(phase, modes) for modes in (8, n // 16, n // 8, n // 4) if 1 < modes < n]
-    curves = [*_unwrappings(phase), *(base + _wrapped(phase - base) for base in bases)]
+    if ways is None:
+        ways = unwrappings(phase)
+    bases = [smooth(phase, modes, ways) for modes in (8, n // 16, n // 8, n // 4) if 1 < modes < n]
+    curves = [*ways, *(base + _wrapped(phase - base) for base in bases)]
     return min(curves, key=lambda curve: float((np.diff(curve, 2) ** 2).sum()))
+
+
+def unwrappings(phase: np.ndarray) -> list[np.ndarray]:
+    """phase (n,) by several methods of unwrapping, for `smooth` and `unwrapped`."""
+    return list(_unwrappings(phase))
 
 
 def _unwrappings(phase: np.ndarray) -> Iterator[np.ndarray]:
@@ -109,7 +121,9 @@ def alignment(phase: np.ndarray, other: np.ndarray, along: np.ndarray, reach: fl
     width = int(np.ceil(np.sqrt(len(slopes))))
     steps = np.exp(-1j * np.outer(moves[:, 0], slopes[:width] - slopes[0]))
     starts = np.exp(-1j * np.outer(slopes[::width], moves[:, 0])) * difference
-    close = np.abs(starts @ steps).ravel()[: len(slopes)]
+    # so few pulses at a time that no threads are started, which take longer than the products
+    blocks = (slice(first, first + FEW) for first in range(0, n, FEW))
+    close = np.abs(sum(starts[:, block] @ steps[block] for block in blocks)).ravel()[: len(slopes)]
     limit = np.array([np.inf, reach])
     best, closest = phase, -1.0
     # two starts: the best of finely spaced shifts, robust to noise; a fit to the unwrapped difference, also in range

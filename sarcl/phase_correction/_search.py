@@ -16,7 +16,7 @@ PASSES = 5  # largest number of images in one ascent
 ENOUGH = 1.002  # gain in sharpness below which an ascent ends, if also
 MOVED = 0.05  # range cells: no range error changes by more
 GROWTH = 4  # a sub-aperture grows by a fourth of its length on each side
-LAST_PASSES = 3  # passes over the whole aperture
+LAST_PASSES = 3  # passes over the whole aperture, at most
 BANDS = 8, 4, 2, 1  # parts of the band: a range error of eight cells is one cell of an eighth of the band
 LEAST_SAMPLES = 8  # in a part of the band
 RANGE_MODES = 8  # cosines over the aperture for range errors, or an eighth of the pulses where that is fewer
@@ -80,9 +80,13 @@ def _widened(view: ApertureView, errors: Errors) -> Errors:
         low, high = max(0, first - step), min(n, last + step)
         now = phase[low:high], shift[low:high]
         v = view.pulses(low, high).contributions(now, places, NO_LAG)[:, :, 0]
-        start = _phase_gradient.extended(v, first - low, last - low)
-        phase[low:high] += _phase_gradient.sharpen(v, start, 0)
+        start = _phase_gradient.extended(v, np.zeros(high - low), first - low, last - low)
+        found = _phase_gradient.sharpen(v, start, 0)
+        phase[low:high] += found
+        if passes and _phase_gradient.sharpness(v, found, 0) < ENOUGH * _phase_gradient.sharpness(v, start, 0):
+            break
         first, last = low, high
+    phase, shift = view.shift_removed((phase, shift))
     # a start without phases: where targets seen by different pulses have none in common, growth loses some of them
     zero = np.zeros(n)
     places = view.probes((zero, shift), (phase, shift))

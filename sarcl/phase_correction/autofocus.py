@@ -11,9 +11,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
+from ..base.errors import warn
 from ..base.validation import count, instance, sealed
 from ..imaging.antenna_beam import is_antenna
-from ..imaging.focusing_task import BeamCone, beam_of, weigh
+from ..imaging.focusing_task import BeamCone, beam_of, make_task, weigh
+from ..imaging.unseen_pixels import unseen_pixels
 from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import Tapered, in_memory
 from ..model.phase_history import PhaseHistory
@@ -104,7 +106,8 @@ def autofocus(
     was, errors.found is False, and errors.reason says why and what to do. Phases that only shift the image cannot be
     estimated: the mean of the phase, and the least-squares fit of a shift across range, are not corrected.
     TypeError, ValueError: arguments of the wrong kind; too few pulses; pulses that lack a channel others have; data
-    not compressed; an image that is zero. Sources: _phase_gradient.py; docs/theory/autofocus.md.
+    not compressed; an image that is zero. SarclWarning: 1 % of the pixels or more lie outside the range window of
+    every row. Sources: _phase_gradient.py; docs/theory/autofocus.md.
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
@@ -139,6 +142,9 @@ def autofocus(
     view = replace(view, alive=alive, places=places, scale=scale, beam=cone, options=options)
     tick = _ticker(progress, _search.searches(view, bool(range_errors)) + 2)
     errors = _search.search(view, bool(range_errors), tick)
+    unseen = unseen_pixels(make_task(weighted, grid, None, None, False, True, beam, True))
+    if unseen and unseen.warning:
+        warn(unseen.warning)
     errors, tests = _hold_out.cross_validated(view, errors, tick)
     if not tests["found"]:
         log.warning("no correction by autofocus passed cross-validation; the data are unchanged: %s", tests["reason"])

@@ -40,7 +40,7 @@ VERBS = {
 @pytest.mark.parametrize("asked", REFUSED)
 @pytest.mark.parametrize("verb", VERBS)
 def test_every_verb_refuses_them_in_the_same_words(verb, asked):
-    with pytest.raises(ValueError) as refused:  # noqa: PT011: the text is compared as a whole
+    with pytest.raises(ValueError) as refused:
         VERBS[verb](asked)
     assert str(refused.value) == REFUSED[asked]
 

@@ -11,6 +11,7 @@ from helpers.cases import REPEATED, image_error, noise_history
 
 import sarcl
 from sarcl.base import validation
+from sarcl.imaging.backproject import pixels_alone
 from sarcl.reference.backproject import backproject as exact_image
 
 PLANE = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(33, 45), spacing=(0.3, 0.2))
@@ -282,6 +283,16 @@ def test_bad_options_say_what_was_wanted(name):
     options, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         sarcl.backproject(noise_history(), PLANE, **options)
+
+
+def test_pixels_alone_are_those_of_the_image():
+    raw = noise_history()
+    beam = (8.0 / 10e3, -raw.tx)  # 4 m on either side of the origin: the plane is 10 m x 9 m
+    for options in ({}, {"tolerance": 1e-7}, {"beam": beam, "window": "hamming", "weights": np.arange(40.0)}):
+        wanted = sarcl.backproject(raw, PLANE, **options)
+        made = pixels_alone(raw, PLANE, **options)
+        assert np.array_equal(made, wanted.data) and made.dtype == wanted.data.dtype
+    assert np.ndim(wanted.gain) == 2  # the beam leaves pixels out
 
 
 def test_unknown_options_raise():

@@ -357,6 +357,14 @@ def test_a_pulse_contributes_in_its_beam_alone(points):
     assert residual(points, phase, errors.phase) <= 0.15
 
 
+def test_pixels_outside_every_range_window_are_warned_of_once(points):
+    """A grid whose far half lies behind the unambiguous range of 48 m: one warning, whatever number of images."""
+    grid = sarcl.ImageGrid.plane(center=(20, 0, 0), shape=(120, 240), spacing=0.5)
+    with pytest.warns(sarcl.SarclWarning, match="of the pixels lie outside the range window of every row") as caught:
+        _, errors = sarcl.autofocus(disturbed(points, smooth(N_PULSES, 14, rms=4)), grid, range_errors=False)
+    assert errors.found and len(caught) == 1
+
+
 def test_scale_and_listed_pixels_do_not_matter(points):
     phase = smooth(N_PULSES, 14, rms=4)
     raw = disturbed(points, phase)
@@ -482,6 +490,27 @@ def test_a_lag_is_half_the_path_behind_a_place():
     v = contributions(raw, nearer, [0.0, 0.5], 1.0)[N_PULSES // 2, 0]
     assert abs(v[1]) == pytest.approx(N_SAMPLES, rel=0.01)
     assert abs(v[0]) == pytest.approx(N_SAMPLES * np.sinc(0.5), rel=0.02)
+
+
+def test_contributions_are_those_of_the_image_equation_pair_by_pair(points):
+    """Of a bistatic row, of rows that start at other frequencies, and behind places in range, in any number of rows."""
+    random = np.random.default_rng(3)
+    places = random.uniform(-10, 10, (700, 3)) * (1, 1, 0)
+    lags = np.array([-0.5, 0.0, 1.5])
+    raw = replace(
+        points, rx=points.tx + np.array([0, 30, 5]), frequency=points.frequency + 1e6 * random.random(N_PULSES)
+    )
+    made = contributions(raw, places, lags, 2.0)
+    f = raw.frequency[:, None] + raw.frequency_step[:, None] * np.arange(N_SAMPLES)
+    for row in (0, 63, 64, N_PULSES - 1):
+        path = np.linalg.norm(raw.tx[row] - places, axis=1) + np.linalg.norm(raw.rx[row] - places, axis=1)
+        delay = (path - 2 * raw.reference_range[row]) / SPEED_OF_LIGHT
+        middle = f[row, N_SAMPLES // 2]
+        later = delay[:, None] + lags / (N_SAMPLES * raw.frequency_step[row])
+        ramp = np.exp(2j * np.pi * (f[row] - middle) * later[:, :, None])
+        wanted = (raw.samples[row] * ramp).sum(axis=2) * np.exp(2j * np.pi * middle * delay)[:, None] / 2
+        # profiles are read linearly between eight values per cell: largest curvature (pi/8)^2/8, 2 % of the peak
+        assert np.abs(made[row] - wanted).max() <= 0.02 * np.abs(wanted).max()
 
 
 def test_an_antenna_that_is_farther_away_delays_the_phase():
