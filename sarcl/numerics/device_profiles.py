@@ -17,7 +17,6 @@ from . import range_profiles
 from .interpolation import Interpolator
 from .range_profiles import LARGEST
 
-AT_ONCE = 2**22  # samples of rows that are transformed at a time: enough to fill a GPU
 # An FFT of any length convolves with a chirp, whose sums are larger than those of the profile by length^1.5 at most.
 SPARE = 1e10
 WEIGHTS = 1e18  # largest weights of rows and of samples lie between one over this and this: pairs of float32 hold them
@@ -163,7 +162,7 @@ class _Batches:
 
     def __init__(self, device: Device, length: int, dtype: type[np.complexfloating]) -> None:
         self.device, self.length, self.dtype = device, length, dtype
-        self.most = max(1, AT_ONCE // length)
+        self.most = fft.rows_at_once(device, length)
         self.row_bytes = float(np.dtype(dtype).itemsize) * length + fft.temporary_bytes(length, dtype)
         self._rows = 0
         self._work: Any = None

@@ -50,7 +50,7 @@ class _Known:
         while self.running and (wait or self.running[0][0].command_execution_status <= 0):
             event, steps, enqueued = self.running.popleft()
             event.wait()
-            seconds = max(_seconds(event, enqueued), 1e-9)
+            seconds = max(lasted(event, enqueued), 1e-9)
             if seconds >= SHORT * LASTS or steps >= self.largest:  # a small part says little of a large one
                 self.rate, self.largest = steps / seconds, max(self.largest, steps)
 
@@ -100,8 +100,8 @@ def _axis(size: tuple[int, ...], group: tuple[int, ...] | None, fixed: frozenset
     return axis, units[axis]
 
 
-def _seconds(event: Any, enqueued: float) -> float:
-    """Duration of a part that has ended: as the driver says, else the time since it was enqueued."""
+def lasted(event: Any, enqueued: float) -> float:
+    """Duration, s, of a part that has ended: as the driver says, else the time since it was enqueued."""
     import pyopencl
 
     try:

@@ -5,15 +5,23 @@ from __future__ import annotations
 import atexit
 import functools
 import threading
+import time
 from typing import Any
 
 import numpy as np
 
 from ..base.threads import threads
+from ._launches import LASTS, lasted
 from ._programs import quiet
 from .device import Device
 
+AT_ONCE = 2**22  # most samples of a batch: they fill a GPU, and larger ones gain nothing
+# Multiplications with additions, at the speed of a device's trial, in whose time a launch takes a sample on: an FFT
+# waits for memory, so this is many times what it computes. Launches that take longer make the next batches smaller.
+SAMPLE = 200.0
+
 _turns = threading.Lock()  # a plan's kernels get their arguments before they are enqueued: one thread at a time
+_slow: dict[Device, float] = {}  # samples of a batch whose launches last LASTS, of devices whose launches lasted longer
 
 
 def good_length(n: int) -> int:
@@ -68,13 +76,37 @@ def temporary_bytes(length: int, dtype: Any) -> int:
     return 2 * longest * np.dtype(dtype).itemsize
 
 
+def rows_at_once(device: Device, length: int) -> int:
+    """Rows of a batch on a device, whose launches are short (_launches.LASTS) by the speed that was measured."""
+    samples = min(AT_ONCE, LASTS * device.info.rate / SAMPLE, _slow.get(device, AT_ONCE))
+    return max(1, int(samples) // length)
+
+
 def _reikna(device: Device, data: np.ndarray, inverse: bool) -> np.ndarray:
-    with _turns:
-        thread, compiled = _plan(device, data.shape, data.dtype.char)
-        buffer = thread.to_device(np.ascontiguousarray(data))
-        compiled(buffer, buffer, inverse)
-    out = buffer.get()
-    return out * out.real.dtype.type(data.shape[1]) if inverse else out
+    """The FFT in batches of one size, for which one program is built; the last batch is filled with what was there."""
+    data, out = np.ascontiguousarray(data), np.empty(data.shape, data.dtype)
+    n, length = data.shape
+    start, buffer, shape = 0, None, (0, length)
+    while start < n:
+        most = min(n, rows_at_once(device, length))
+        if most != shape[0]:
+            shape, buffer = (most, length), None
+            buffer = device.empty(most * length * data.itemsize)
+        part = slice(start, start + most)
+        device.write(buffer, data[part])
+        with _turns:
+            thread, compiled = _plan(device, shape, data.dtype.char)
+            rows = thread.array(shape, data.dtype, base=buffer)
+            enqueued = time.perf_counter()
+            launches = compiled(rows, rows, inverse)
+        device.download(buffer, out[part])
+        seconds = max(lasted(launch, enqueued) for launch in launches)
+        if seconds > LASTS:
+            _slow[device] = most * length * LASTS / seconds
+        start += most
+    if inverse:
+        out *= data.real.dtype.type(length)
+    return out
 
 
 @functools.lru_cache(maxsize=16)

@@ -102,7 +102,7 @@ def test_a_driver_without_a_clock_is_timed_by_the_host(monkeypatch):
             raise pyopencl.RuntimeError("clGetEventProfilingInfo failed: PROFILING_INFO_NOT_AVAILABLE", -7)
 
     monkeypatch.setattr(_launches.time, "perf_counter", lambda: 12.5)
-    assert _launches._seconds(Clockless(), 12.0) == 0.5
+    assert _launches.lasted(Clockless(), 12.0) == 0.5
 
 
 def gpu_of(device):
