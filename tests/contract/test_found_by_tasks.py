@@ -131,3 +131,35 @@ def test_a_peak_without_pixels_beside_its_cut_is_refused():
     image = sarcl.Image(response.astype(np.complex64), grid, frequency=1e6, tx=np.array([-1000.0, 0, 1000]))
     with pytest.raises(ValueError, match=r"in range the image holds less than 3 IRW on each side of the peak"):
         sarcl.measure(image)
+
+
+@pytest.mark.slow
+def test_far_off_broadside_range_doppler_keeps_its_error():
+    """At 44 degrees from broadside the phases of the secondary range compression are 150 cycles at the ends of the
+    band: in float32 rounded by up to 1e-4 rad, of which the predicted error has a tenth."""
+    wavelength, n = 299792458 / 6.4e9, 11
+    y = 0.19 * wavelength * (np.arange(n) - n / 2)
+    tx = np.stack([np.full(n, -14e3), y, np.full(n, 14e3)], axis=1)
+    random = np.random.default_rng(1)
+    raw = sarcl.PhaseHistory(
+        (random.normal(size=(n, 16)) + 1j * random.normal(size=(n, 16))).astype(np.complex64),
+        frequency=6.304e9, frequency_step=12e6, tx=tx, reference_range=np.linalg.norm(tx, axis=1)[5], time=y / 100,
+    )  # fmt: skip
+    doppler = -0.69 * 2 * 100 / wavelength
+    report = sarcl.range_doppler(raw, side="left", doppler=doppler, tolerance=3e-5, check=True).report
+    assert report.measured_error <= report.predicted_error <= 3e-5
+
+
+def test_bands_too_wide_for_their_squint_are_refused_by_range_doppler():
+    """The Doppler frequency of 1.089 GHz at 61 degrees is one that no wave of 0.9 GHz has: such bins were left out."""
+    wavelength, n = 0.3, 11
+    y = 0.4 * wavelength * (np.arange(n) - n / 2)
+    tx = np.stack([np.full(n, -19e3), y, np.full(n, 3e3)], axis=1)
+    raw = sarcl.PhaseHistory(
+        np.ones((n, 64), np.complex64), frequency=0.9e9, frequency_step=3e6, tx=tx, time=y / 100,
+        reference_range=np.linalg.norm(tx, axis=1)[5],
+    )  # fmt: skip
+    with pytest.raises(
+        ValueError, match=r"too near to the direction of flight.* of 0\.9 to 1\.089 GHz; use backproject"
+    ):
+        sarcl.range_doppler(raw, side="left", doppler=-0.85 * 2 * 100 / wavelength, tolerance=0.05)

@@ -182,7 +182,7 @@ def spectral(draw: Draw) -> None:
         start=(-0.7 * away, -step * n / 2, 0.7 * away), velocity=(0, speed, 0), prf=speed / step, n_pulses=n
     )
     chirp = sarcl.Waveform.chirp(center=center, bandwidth=bandwidth, duration=draw.log(10, 1e3) / bandwidth)
-    size = C / (2 * bandwidth) * draw.log(0.1, 30)
+    size = min(C / (2 * bandwidth) * draw.log(0.1, 30), 3e3 * wavelength)  # transforms of larger maps take a minute
     scene = inputs.points(draw, np.zeros(3), size) if draw.chance(0.7) else inputs.facets(draw, wavelength)
     options: dict[str, Any] = {"tolerance": inputs.tolerance(draw, 1e-5), "device": inputs.device(draw)}
     if draw.chance(0.3):

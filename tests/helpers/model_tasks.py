@@ -29,7 +29,8 @@ def beam(draw: Draw) -> None:
         array, f0, times=times, positions=positions, reference=reference, tolerance=allowed, device=inputs.device(draw),
         max_bytes=draw.pick(None, draw.log(8e5, 1e8)),
     )  # fmt: skip
-    wanted = exact_field(array.positions + reference, array.offsets_at(0), array.weights, f0, times, positions)
+    elements = np.asarray(array.positions, np.longdouble) + reference  # 1e-9 m are 3e-5 of the shortest wavelength
+    wanted = exact_field(elements, array.offsets_at(0), array.weights, f0, times, positions)
     finite(found, "field")
     expect(found.shape == wanted.shape, f"shape {found.shape}, wanted {wanted.shape}")
     off = float(np.abs(found - wanted).max()) / float(np.abs(array.weights).sum())

@@ -15,6 +15,7 @@ from ...model.phase_history import PhaseHistory
 from ._aperture_window import ApertureWindow
 
 STEEPEST = 0.98  # largest sine of a squint angle
+EVANESCENT = 0.999  # sine from which on a Doppler bin is left out: at 1 no wave has its Doppler frequency
 MOST_ROWS = 2048  # rows from which a Doppler centroid is estimated
 # Relative error by the ends of the band: FRESNEL / (k^3 sqrt(n)) for tapers of k Fresnel widths and a pixel's band of n
 # of them. Measured with noise: 0.1 where the tapers lie beyond the rows, 0.45 where rows are weighted by them (beams).

@@ -26,6 +26,7 @@ from ...numerics import range_profiles
 from ...numerics.polynomials import lagrange
 from ...opencl import fft
 from ...opencl.device import Device
+from ._doppler import EVANESCENT
 from ._plan import SEGMENT, FocusPlan, band_frequencies
 from ._track import Track
 
@@ -214,21 +215,22 @@ class _Bins:
     def _filter(self, doppler: np.ndarray, middle: float) -> np.ndarray:
         """Secondary range compression for a slant range, amplitude and taper: complex64 (bins, n_samples)."""
         speed = float(self.plan.fit.at(np.array([middle]))[0][0])
-        f, band = self.frequencies[None].astype(np.float32), self.plan.band
-        bend = (SPEED_OF_LIGHT / (2 * speed) * doppler)[:, None].astype(np.float32)
-        inside = np.abs(bend) < 0.999 * f
-        bend = np.where(inside.all(axis=1, keepdims=True), bend, np.float32(0))
+        kind, band = self.plan.phases, self.plan.band
+        f, bend = self.frequencies[None].astype(kind), (SPEED_OF_LIGHT / (2 * speed) * doppler)[:, None].astype(kind)
+        inside = np.abs(bend) < EVANESCENT * f
+        bend = np.where(inside.all(axis=1, keepdims=True), bend, kind(0))
         root = np.sqrt((f - bend) * (f + bend))
         a = np.sqrt((self.center - bend) * (self.center + bend))
-        g = (self.frequencies - self.center)[None].astype(np.float32)
+        g = (self.frequencies - self.center)[None].astype(kind)
         turn = g * (bend / a)
-        cycles = np.float32(-2 / SPEED_OF_LIGHT * middle) * (turn * turn / (root + a + g * (self.center / a)))
+        cycles = kind(-2 / SPEED_OF_LIGHT * middle) * (turn * turn / (root + a + g * (self.center / a)))
+        phase = ((cycles - np.rint(cycles)) * kind(2 * np.pi)).astype(np.float32)
+        f, bend, root = (values.astype(np.float32, copy=False) for values in (f, bend, root))
         level = f / (root * np.sqrt(root))
         sines = bend / f
         low, high = float(sines.min()), float(sines.max())
         if band.window is not None or low < band.low or high > band.high:
             level = level * band.weight(sines).astype(np.float32)
-        phase = (cycles - np.rint(cycles)) * np.float32(2 * np.pi)
         out = np.empty(phase.shape, np.complex64)
         out.real, out.imag = level * np.cos(phase), level * np.sin(phase)
         out[~inside.all(axis=1)] = 0

@@ -15,7 +15,7 @@ from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.interpolation import Interpolator, choose_interpolator
 from ...opencl import fft
-from ._doppler import STEEPEST, Band, delay
+from ._doppler import EVANESCENT, STEEPEST, Band, delay
 from ._extent import Extent
 from ._track import Track
 from ._velocity import Hyperbolas
@@ -26,6 +26,7 @@ INTERPOLATION, COMPRESSION = 0.4, 0.5  # shares of the tolerance that the other 
 # Root mean squares over a band of a phase that grows with the square of the frequency from its middle, and of its
 # fourth power, relative to those at its ends: 1/sqrt(5), 1/sqrt(17), and some room for the phase's cubic part.
 QUADRATIC, FOURTH = 0.5, 0.3
+LEAST_PHASE = 0.05  # share of the tolerance below which the phases of the compression are float32
 CUBIC = 1 / 24  # largest error of a cubic through four nodes, in the first interval: of exp(j k psi), k the node
 
 
@@ -41,6 +42,7 @@ class FocusPlan:
                     that of its middle; with several (three at least) it is interpolated by cubics through four of
                     their ends
     interpolator, profile_length   of range profiles;  center  their delay 0, m
+    phases          float32, or float64 where the phases of the secondary range compression need it
     errors          predicted relative errors by cause
     """
 
@@ -55,6 +57,7 @@ class FocusPlan:
     interpolator: Interpolator
     profile_length: int
     center: float
+    phases: type[np.float32] | type[np.float64]
     errors: dict[str, float]
 
     @property
@@ -119,11 +122,16 @@ def make_plan(
     frequencies = band_frequencies(raw)
     center = float(frequencies[raw.n_samples // 2])
     steepest = max(abs(s) for s in extent.band.ends)
-    if steepest > STEEPEST:
+    bandwidth = frequencies.max() / frequencies.min()  # at one Doppler frequency sines differ by as much
+    if steepest > STEEPEST or steepest * bandwidth > EVANESCENT:
         raise ValueError(
             f"points are seen up to {np.degrees(np.arcsin(min(1.0, steepest))):.3g} degrees from broadside, too near "
-            "to the direction of flight for range_doppler; use backproject"
+            f"to the direction of flight for range_doppler with frequencies of {frequencies[0] / 1e9:.4g} to "
+            f"{frequencies[-1] / 1e9:.4g} GHz; use backproject"
         )
+    phases, error = _phases(frequencies, center, fit, band, ranges, LEAST_PHASE * tolerance)
+    errors["rounding"] += error
+    spare -= error
     interpolator, profile_length, _ = choose_interpolator(INTERPOLATION * spare, raw.n_samples, float(len(ranges)))
     errors["interpolation in range"] = interpolator.error
     speeds = fit.at(ranges)[0]
@@ -141,7 +149,7 @@ def make_plan(
     bins = np.arange(int(np.floor(min(doppler) * scale)), int(np.ceil(max(doppler) * scale)) + 1)
     return FocusPlan(
         times, ranges, extent.finer, band, fit, length, bins, blocks, interpolator, profile_length,
-        float(ranges.mean()), errors,
+        float(ranges.mean()), phases, errors,
     )  # fmt: skip
 
 
@@ -178,6 +186,19 @@ def _blocks(
         "secondary range compression of so wide a swath at this squint",
         "give ranges=(near, far) of a part of it, or use backproject",
     )  # fmt: skip
+
+
+def _phases(
+    frequencies: np.ndarray, center: float, fit: Hyperbolas, band: Band, ranges: np.ndarray, allowed: float
+) -> tuple[type[np.float32] | type[np.float64], float]:
+    """The type of the phases of the secondary range compression, and the error by its rounding.
+
+    Far off broadside the phases at the ends of the bands are hundreds of cycles.
+    """
+    bends = np.array(band.ends)[:, None] * center
+    most = float(np.abs(curved(frequencies[[0, -1]], center, bends)).max()) * 4 * np.pi / SPEED_OF_LIGHT * ranges[-1]
+    error = float(np.finfo(np.float32).eps) * most  # several operations, and the root mean square over the bands
+    return (np.float32, error) if error <= allowed else (np.float64, 0.0)
 
 
 def _lacking(frequencies: np.ndarray, center: float, fit: Hyperbolas, band: Band, ranges: np.ndarray) -> float:
