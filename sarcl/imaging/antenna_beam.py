@@ -31,6 +31,7 @@ if TYPE_CHECKING:
     from .focusing_task import FocusingTask
 
 PIXELS, ROWS = 256, 64  # from which the mean gain is estimated
+LEAST_DISTANCE = 1e-6  # radii of a tile: no direction is left so near to an antenna
 
 
 def is_antenna(beam: Any) -> bool:
@@ -86,8 +87,12 @@ def _axes(antenna: Antenna, track: Trajectory, aim: Any, center: np.ndarray, up:
     return antenna.axes(pointing.fixed(track, given, up=up))
 
 
-def rounding(task: FocusingTask) -> float:
-    """Relative error of the image from gains in float32. ValueError where the grid lies out of the beam."""
+def rounding(task: FocusingTask, radius: float) -> float:
+    """Relative error of the image from gains in float32. ValueError where the grid lies out of the beam.
+
+    radius   of the largest tiles, m, padding included. Directions are differences of positions about a tile's middle:
+             where a tile reaches farther than to the antenna, they are rounded by as much more
+    """
     beam = task.antenna
     assert beam is not None
     _, points = task.grid.sample(PIXELS, seed=3)
@@ -98,7 +103,11 @@ def rounding(task: FocusingTask) -> float:
             "the grid lies wholly out of the antenna's beam; aim it: beam=(antenna, direction), or (antenna, attitude) "
             "with the attitude of sarcl.pointing"
         )
-    one_way = sum(PATTERN + ANGLE * one.slope(beam.frequency) for one in beam.patterns)
+    ends = np.concatenate([beam.geometry.tx[rows], beam.geometry.rx[rows]])
+    distances = np.array([np.linalg.norm(points - end, axis=1) for end in ends])
+    reach = radius / np.maximum(distances, max(LEAST_DISTANCE * radius, np.finfo(float).tiny))
+    angle = ANGLE * float(np.sqrt(np.mean((1 + 2 * reach) ** 2)))
+    one_way = sum(PATTERN + angle * one.slope(beam.frequency) for one in beam.patterns)
     return float(one_way * beam.peak / np.sqrt(power))
 
 

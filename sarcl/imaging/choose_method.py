@@ -117,7 +117,9 @@ class _Float32:
         self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
             self.energy.whole_profile - self.near, 0.0
         )
-        self.gains = 0.0 if task.antenna is None else antenna_beam.rounding(task)
+        self.gains = 0.0
+        if task.antenna is not None:
+            self.gains = antenna_beam.rounding(task, tiling_of(task.grid, 32).radius)  # of the largest tiles
         self.coordinates = 0.0
         if task.grid.is_plane:  # listed points are taken as they are
             farthest = float(np.abs(task.grid.bounds).max())

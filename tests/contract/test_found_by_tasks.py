@@ -161,3 +161,34 @@ def test_bands_too_wide_for_their_squint_are_refused_by_range_doppler():
     )  # fmt: skip
     with pytest.raises(ValueError, match=r"too near to the direction of flight.* 0\.9 to 1\.089 GHz; use backproject"):
         sarcl.range_doppler(raw, side="left", doppler=-0.85 * 2 * 100 / wavelength, tolerance=0.05)
+
+
+def test_the_largest_modulus_of_a_sampled_spectrum_is_1():
+    """Between the points of an FFT 8 times as fine as the signal it was up to 1.02."""
+    random = np.random.default_rng(0)
+    for n in (1, 2, 3, 12, 31):
+        signal = random.normal(size=n) + 1j * random.normal(size=n)
+        pulse = sarcl.Waveform.sampled(signal, rate=1e8, center=1e10)
+        f = pulse.center + 1e8 * np.linspace(-0.5, 0.5, 256 * n)
+        largest = np.abs(pulse.pulse_spectrum(f)).max()
+        assert 1 - 3e-5 < largest < 1 + 1e-12
+        energy = np.abs(np.fft.fft(signal / np.abs(signal).max(), 4096 * n)).max() ** 2 / 1e16
+        assert pulse.peak_energy_density == pytest.approx(energy, rel=1e-6)
+    tone = sarcl.Waveform.sampled(np.exp(2j * np.pi * 0.3 * np.arange(50)), rate=1e8, center=1e10)
+    assert tone.peak_energy_density == pytest.approx((50 / 1e8) ** 2, rel=1e-12)
+
+
+def test_gains_in_tiles_that_reach_far_beyond_the_grid_keep_their_error():
+    """Columns 616 m apart, of which the grid has one: a tile has 32, and its middle lies 9.5 km from the pixels. Seen
+    from 15 m, their directions are differences of such positions in float32: off by 2e-5 rad."""
+    tx = np.linspace([-11.4, -5.3, 8.6], [-11.0, -4.8, 11.1], 3)
+    raw = noise_on(tx, n_samples=6)
+    grid = sarcl.ImageGrid.plane(shape=(4, 1), spacing=(2, 616))
+    beam = sarcl.Antenna.gaussian(width=(0.084, 1.8), two_way=True)
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"float32 gains of the antenna|gains of the antenna have"):
+        sarcl.backproject(raw, grid, beam=beam, tolerance=1e-5, wrap=True)
+    report = sarcl.backproject(raw, grid, beam=beam, tolerance=0.02, wrap=True, check=True).report
+    assert report.measured_error <= report.predicted_error <= 0.02
+    near = replace(grid, spacing=(2, 0.5))
+    report = sarcl.backproject(raw, near, beam=beam, tolerance=1e-4, wrap=True, check=True).report
+    assert report.measured_error <= report.predicted_error <= 1e-4
