@@ -127,7 +127,8 @@ class FacetSet:
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
         """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""
-        first, second = (self.triangles[:, i] - self.triangles[:, 0] for i in (1, 2))
+        corners = _from_widest_angle(self.triangles)
+        first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
         factor = np.where(self.two_sided, -self.reflectivity, self.reflectivity)
         rows = [*first.T, *second.T, factor]
         if self.is_rough:
@@ -156,3 +157,11 @@ def vertical_axes(up: np.ndarray) -> np.ndarray:
     """`up`, and the direction that replaces it for lines of sight along it (6,)."""
     other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
     return np.array([*up, *other], np.float32)
+
+
+def _from_widest_angle(triangles: np.ndarray) -> np.ndarray:
+    """Triangles, m (k, 3, 3), from the corner opposite the longest edge on: needles have normals that float32 resolves
+    if one of the two edges is the short one."""
+    lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - np.roll(triangles, -2, axis=1), axis=2)
+    at = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
+    return np.take_along_axis(triangles, at[:, :, None], axis=1)

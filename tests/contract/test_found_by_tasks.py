@@ -192,3 +192,16 @@ def test_gains_in_tiles_that_reach_far_beyond_the_grid_keep_their_error():
     near = replace(grid, spacing=(2, 0.5))
     report = sarcl.backproject(raw, near, beam=beam, tolerance=1e-4, wrap=True, check=True).report
     assert report.measured_error <= report.predicted_error <= 1e-4
+
+
+def test_needles_have_the_normals_of_their_corners():
+    """Facets 3000 times as long as wide, listed from their sharp corner: two long edges in float32 leave their normal
+    off by 2e-4 rad, the short edge does not."""
+    random = np.random.default_rng(2)
+    along = 0.03 * random.normal(size=(20, 3))
+    across = np.cross(along, [-0.7, 0.1, 0.7]) / 3000  # so that they face the track
+    scene = sarcl.Scene.facets(np.stack([0 * along, along - across, along + across], axis=1))
+    track = sarcl.Trajectory.line(start=(-4000, -5, 6000), velocity=(0, 10, 0), prf=4.0, n_pulses=4)
+    chirp = sarcl.Waveform.chirp(center=2e9, bandwidth=6e7, duration=6e-6)
+    report = sarcl.echo(scene, chirp, track, tolerance=1e-5, check=True).report
+    assert report.measured_error <= report.predicted_error <= 1e-5
