@@ -14,6 +14,7 @@ from __future__ import annotations
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 
@@ -215,8 +216,9 @@ class _Bins:
     def _filter(self, doppler: np.ndarray, middle: float) -> np.ndarray:
         """Secondary range compression for a slant range, amplitude and taper: complex64 (bins, n_samples)."""
         speed = float(self.plan.fit.at(np.array([middle]))[0][0])
-        kind, band = self.plan.phases, self.plan.band
-        f, bend = self.frequencies[None].astype(kind), (SPEED_OF_LIGHT / (2 * speed) * doppler)[:, None].astype(kind)
+        kind: Any = self.plan.phases
+        band, f = self.plan.band, self.frequencies[None].astype(kind)
+        bend = (SPEED_OF_LIGHT / (2 * speed) * doppler)[:, None].astype(kind)
         inside = np.abs(bend) < EVANESCENT * f
         bend = np.where(inside.all(axis=1, keepdims=True), bend, kind(0))
         root = np.sqrt((f - bend) * (f + bend))
