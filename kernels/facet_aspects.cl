@@ -41,14 +41,9 @@ __kernel void aspect_amplitudes(__global const float *restrict facets, __global 
     triple edge_1 = load_triple(facets + F_EDGE * (size_t)n, at, n);
     triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)n, at, n);
     fv factor = LOAD(at, facets + F_FACTOR * (size_t)n);
-    triple normal = t_cross(edge_1, edge_2);
-    fv twice_area = sqrt(t_dot(normal, normal));
-    // blanks have no area
-    normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
+    fv twice_area;
+    triple normal = facing_normal(edge_1, edge_2, factor, u, &twice_area);
     fv cosine = t_dot(normal, u);
-    iv faces_away = (factor < 0) & (cosine < 0);
-    normal = t_scale(faces_away ? (fv)-1.0f : (fv)1.0f, normal);
-    cosine = faces_away ? -cosine : cosine;
     triple h, v;
     polarisation(u, vertical, other, &h, &v);
     scattering S = scatter_back(normal, u, h, v, c_make(LOAD(at, roots), LOAD(at, roots + n)));

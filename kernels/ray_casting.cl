@@ -8,6 +8,7 @@
 // symbols   facet     (n, 12), see facet_points.clh; the lift keeps a facet, its coplanar neighbours and its twin from hiding it
 //           index     facets to test, (size,); place (samples,) barycentric coordinates
 //           eye       the antenna, in units of the scene; shrink  a power of two that makes eye - p about one
+//           other     the other antenna, as facet_points.clh takes it
 //           leaf      (n/8, 3, 3, 8): corners of eight facets, by corner and axis
 //           node      (., 2, 3, 8): lower and upper sides of the boxes of eight children; level l starts at base[l]
 //           side      1: the facet turned away from the eye is dark; 0: both sides are seen;  slack  rad, by which a
@@ -105,15 +106,15 @@ __kernel void face(__global const float *restrict facet, __global const int *res
 }
 
 __kernel void hidden(__global const float *restrict facet, __global const int *restrict index,
-                     __global const float2 *restrict place, int samples, float ex, float ey, float ez, float shrink,
-                     __global const float *restrict leaf, __global const float *restrict node,
+                     __global const float2 *restrict place, int samples, float ex, float ey, float ez, float ox, float oy,
+                     float oz, float shrink, __global const float *restrict leaf, __global const float *restrict node,
                      __constant const int *restrict base, int depth, __global ulong *restrict out) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 eye = (float3)(ex, ey, ez);
+    float3 eye = (float3)(ex, ey, ez), other = (float3)(ox, oy, oz);
     ulong bits = out[i];
     for (int s = 0; s < samples; s++)
-        if (!(bits >> s & 1) && blocked(leaf, node, base, depth, lifted(f, place[s], eye), eye, shrink)) bits |= 1UL << s;
+        if (!(bits >> s & 1) && blocked(leaf, node, base, depth, lifted(f, place[s], eye, other), eye, shrink)) bits |= 1UL << s;
     out[i] = bits;
 }
 

@@ -89,25 +89,17 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
         triple edge_1 = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
         triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
         fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
-        fv tx_range, rx_range;
-        triple normal = t_cross(edge_1, edge_2), u_t = toward(from_tx, x, &tx_range);
-        fv twice_area = sqrt(t_dot(normal, normal));
-        // blanks have no area
-        normal = t_scale((fv)1.0f / max(twice_area, (fv)1e-37f), normal);
-        fv cosine_tx = t_dot(normal, u_t);
-        iv faces_away = (factor < 0) & (cosine_tx < 0);
-        normal = t_scale(faces_away ? (fv)-1.0f : (fv)1.0f, normal);
-        cosine_tx = faces_away ? -cosine_tx : cosine_tx;
-        triple h_t, v_t;
+        fv tx_range, rx_range, twice_area;
+        triple u_t = toward(from_tx, x, &tx_range), h_t, v_t;
         polarisation(u_t, vertical, other, &h_t, &v_t);
 #if BISTATIC
         triple u_r = toward(from_rx, x, &rx_range), h_r, v_r;
         polarisation(u_r, vertical, other, &h_r, &v_r);
-        triple u_sum = t_add(u_t, u_r);
-        iv front = (cosine_tx > 0) & (t_dot(normal, u_r) > 0);
+        triple u_sum = t_add(u_t, u_r), normal = facing_normal(edge_1, edge_2, factor, u_sum, &twice_area);
+        iv front = lit_share(normal, u_t, u_r) > 0;
 #else
-        triple u_sum = t_scale((fv)2.0f, u_t), u_r = u_t;
-        iv front = cosine_tx > 0;
+        triple u_sum = t_scale((fv)2.0f, u_t), u_r = u_t, normal = facing_normal(edge_1, edge_2, factor, u_sum, &twice_area);
+        iv front = t_dot(normal, u_t) > 0;
         rx_range = tx_range;
 #endif
         fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share);

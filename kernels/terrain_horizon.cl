@@ -159,18 +159,18 @@ static inline int behind(float3 p, float3 eye, __global const float *grid_x, __g
 }
 
 __kernel void horizon(__global const float *restrict facet, __global const int *restrict index,
-                      __global const float2 *restrict place, int samples, float ex, float ey, float ez,
-                      __global const float *restrict x, __global const float *restrict y,
+                      __global const float2 *restrict place, int samples, float ex, float ey, float ez, float ox, float oy,
+                      float oz, __global const float *restrict x, __global const float *restrict y,
                       __global const float *restrict z_rows, __global const float *restrict z_columns, int nx, int ny,
                       float per_x, float per_y, __global const float *restrict number, __global const int *restrict whole,
                       __global const float *restrict table, __global ulong *restrict hidden) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 eye = (float3)(ex, ey, ez);
+    float3 eye = (float3)(ex, ey, ez), other = (float3)(ox, oy, oz);
     ulong bits = hidden[i];
     for (int s = 0; s < samples; s++)
-        if (!(bits >> s & 1) && behind(lifted(f, place[s], eye), eye, x, y, z_rows, z_columns, nx, ny, per_x, per_y,
-                                       number, whole, table))
+        if (!(bits >> s & 1) && behind(lifted(f, place[s], eye, other), eye, x, y, z_rows, z_columns, nx, ny, per_x,
+                                       per_y, number, whole, table))
             bits |= 1UL << s;
     hidden[i] = bits;
 }

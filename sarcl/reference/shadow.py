@@ -4,34 +4,40 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.vectors import unit
+
 CENTROID = np.array([[1 / 3, 1 / 3]])
 
 
-def sample(triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray, lift: float) -> np.ndarray:
+def sample(
+    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray, lift: float, other: np.ndarray | None = None
+) -> np.ndarray:
     """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
 
-    By `lift` of a facet's longest edge along its normal.
+    By `lift` of a facet's longest edge along its normal, to the side that the viewpoint and the `other` look at.
     """
     a = triangles[:, 0]
     b, c = triangles[:, 1] - a, triangles[:, 2] - a
     normal = np.cross(b, c)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    normal[np.einsum("ij,ij->i", normal, viewpoint - a) < 0] *= -1
+    looks = sum(unit(end - a) for end in (viewpoint, viewpoint if other is None else other))
+    normal[np.einsum("ij,ij->i", normal, looks) < 0] *= -1
     length = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     u, v = np.asarray(places).T[:, None, :, None]
     return (a + lift * length[:, None] * normal)[:, None] + u * b[:, None] + v * c[:, None]
 
 
 def hidden(
-    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-3
-) -> np.ndarray:
-    """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,).
+    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-3,
+    other: np.ndarray | None = None,
+) -> np.ndarray:  # fmt: skip
+    """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,); other: see sample.
 
     Source: Moeller and Trumbore 1997.
     """
     a = triangles[:, 0]
     b, c = triangles[:, 1] - a, triangles[:, 2] - a
-    points = sample(triangles, viewpoint, places, lift)
+    points = sample(triangles, viewpoint, places, lift, other)
     out = np.zeros(points.shape[:2], bool)
     for i in np.ndindex(out.shape):
         ray = viewpoint - points[i]

@@ -15,6 +15,7 @@ For other folders:
 For this folder alone:
 
     _cutting_error         errors of cut facets: gain of cutting, errors that cancel between pieces
+    _direction_error       errors of directions: cosines in float32, H and V that turn near the vertical
     _facet_sampling        random samples of the facets or points of a scene
     _frequency_nodes       frequencies at which amplitudes are computed
     _rough_surface         scattering diagrams of rough facets (SARAS)

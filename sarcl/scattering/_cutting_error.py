@@ -23,7 +23,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import areas, bisect, centroids, cut, edges
 from ._facet_sampling import drawn
-from .physical_optics import normals_and_areas, scattering_matrix, triangle_integral
+from .physical_optics import lit_share, normals_and_areas, scattering_matrix, triangle_integral, turned
 
 Ends = tuple[np.ndarray, np.ndarray]  # positions of transmitter and receiver, m (3,) each
 FACETS = 200  # sampled facets
@@ -54,9 +54,12 @@ class CuttingError:
 
     def __init__(
         self, scene: Scene, mirror: np.ndarray, antennas: PulseGeometry, center: float, bandwidth: float,
-        polarizations: Sequence[str], vertical: np.ndarray,
+        polarizations: Sequence[str], vertical: np.ndarray, steep: Sequence[Ends] = (),
     ) -> None:  # fmt: skip
-        """mirror  True for coherent facets (k,);  center, bandwidth  Hz;  vertical  (3,), of the polarisations"""
+        """mirror  True for coherent facets (k,);  center, bandwidth  Hz;  vertical  (3,), of the polarisations
+
+        steep  antennas at other pulses at which errors are estimated too
+        """
         some = np.flatnonzero(mirror)
         if len(some):
             length = np.maximum.reduce(edges(scene.triangles[some]))
@@ -77,6 +80,7 @@ class CuttingError:
         ends = antennas.tx, antennas.rx
         self._gain_ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), GAIN_PULSES)]
         self._ends = [(ends[0][row], ends[1][row]) for row in spread_over(len(ends[0]), ERROR_PULSES)]
+        self._error_ends = [*self._ends, *steep]
         self._whole: np.ndarray | None = None
         self._phase: float | None = None
         self._gains: dict[float, float] = {}
@@ -181,8 +185,7 @@ class CuttingError:
         n, two_sided = (np.repeat(a, 3, axis=0) for a in (normals_and_areas(self._triangles)[0], self._two_sided))
         for ends in self._ends:
             looks = [unit(end - corners) for end in ends]
-            sides = [(n * look).sum(axis=1) for look in looks]
-            seen = (sides[0] * sides[1] > 0) & ((sides[0] > 0) | two_sided)
+            seen = lit_share(np.where((two_sided & turned(n, *looks))[:, None], -n, n), *looks) > 0
             q = looks[0] + looks[1]
             across = np.linalg.norm(q - n * (n * q).sum(axis=1)[:, None], axis=1)
             most = max(most, float(across[seen].max(initial=0.0)))
@@ -197,7 +200,7 @@ class CuttingError:
             return np.asarray((weight * values.sum(axis=1)).reshape(n, each).sum(axis=1))
 
         common = rest = power = 0.0
-        for ends in self._ends:
+        for ends in self._error_ends:
             echo, finer = self._seen(pieces, of, ends, 2).echoes(self._wavenumber)
             error = 4 / 3 * (finer - echo)  # pieces of half the size have a quarter of it
             powers = summed(np.abs(echo) ** 2)
@@ -221,7 +224,7 @@ class CuttingError:
         places = centroids(triangles)
         to_tx, to_rx = (unit(end - places) for end in ends)
         normals = normals_and_areas(triangles)[0]
-        behind = self._two_sided[of] & ((normals * to_tx).sum(axis=1) < 0)
+        behind = self._two_sided[of] & turned(normals, to_tx, to_rx)
         normals = np.where(behind[:, None], -normals, normals)
         matrix = scattering_matrix(normals, to_tx, to_rx, self._permittivity[of], self._vertical)
         return matrix.reshape(-1, 4)[:, self._columns] * self._reflectivity[of, None], to_tx + to_rx

@@ -21,6 +21,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, edges
 from ._cutting_error import CuttingError
+from ._direction_error import DirectionError
 from ._frequency_nodes import crossed, over_band
 from .antenna_weights import MOST_NODES, WeightError
 
@@ -107,8 +108,9 @@ def plan_facets(
     dark = crossed(scene, mirror, top, finest, antennas, polarizations, vertical, center)
     best: tuple[float, FacetPlan] | None = None
     exact: FacetPlan | None = None
-    cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical)
-    least, least_rounding, edge, fine = np.inf, np.inf, min(top, finest), False
+    directions = DirectionError(scene, mirror, antennas, highest, polarizations, vertical)
+    cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical, directions.steep)
+    least, least_rounding, edge, fine, turn = np.inf, np.inf, min(top, finest), False, 0.0
 
     def needed(gain: float, error: float) -> float:
         """The tolerance that an error meets, with what range profiles of cut facets need beside it."""
@@ -120,13 +122,16 @@ def plan_facets(
         if count > most or (exact is not None and count > WORTH_FLOAT32 * exact.n_facets):
             break
         small = count * terms <= FLOAT64_TERMS and dark <= DARK
-        rounding = _rounding(edge, highest) * dark + weights.rounding
+        rounding = _rounding(edge, highest, directions.rounding) * dark + weights.rounding
         shape = weights.gradient * corner if mirror.any() else 0.0
         if mirror.any():
+            turn, sharp = directions.turn(edge)
             if needed(1.0, shape if small else rounding + shape) < tolerance:
                 gain = cutting.gain(edge) if cut else 1.0
             bent = _spherical(corner, distance, highest)
-            shape += _at_most(cutting, edge, gain, bent, tolerance / gain * SHARE - shape - (0 if small else rounding))
+            turn = max(0.0, turn - corner / max(distance - corner, 1e-300))  # what `bent` has of directions
+            left = tolerance / gain * SHARE - shape - (0 if small else rounding)
+            shape += _at_most(cutting, edge, gain, bent, (turn, sharp), left)
         if small and exact is None and gain * shape <= SHARE * tolerance:
             exact = FacetPlan(edge, np.array([center]), shape, count, 1, gain, is_float64=True)
         fixed = rounding + shape
@@ -152,7 +157,7 @@ def plan_facets(
         edge /= LADDER
     if best is None and exact is not None:
         return exact
-    if best is None and _rounding(0.0, highest) * dark >= SHARE * tolerance and dark > DARK:
+    if best is None and _rounding(0.0, highest, directions.rounding) * dark >= SHARE * tolerance and dark > DARK:
         names = ", ".join(polarizations)
         raise ToleranceUnreachable(
             tolerance, None, "float32 integrals over facets", "ask for HH or VV",
@@ -168,6 +173,12 @@ def plan_facets(
             tolerance, reach, "amplitudes over the band", "halve the band and add the halves' images",
             how=f"with facets' amplitudes interpolated between {MOST_NODES} frequencies",
         )  # fmt: skip
+    if best is None and turn > SHARE * tolerance:
+        raise ToleranceUnreachable(
+            tolerance, reach, "change of H and V over facets seen along `vertical`",
+            "pass another vertical=(x, y, z), farther from the lines of sight",
+            how="where H and V change their directions over facets that an antenna sees along `vertical`",
+        )  # fmt: skip
     if best is None and least_rounding >= tolerance:
         raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
     if best is None:
@@ -179,15 +190,22 @@ def plan_facets(
     return best[1]
 
 
-def _at_most(cutting: CuttingError, edge: float, gain: float, bound: float, left: float) -> float:
-    """Error of linear phases over pieces, relative to these: measured, or by its bound, or estimated where the bound is
-    more than is left of the tolerance."""
-    if left <= 0:
-        return bound
+def _at_most(
+    cutting: CuttingError, edge: float, gain: float, bound: float, turn: tuple[float, bool], left: float
+) -> float:
+    """Error of linear phases and one scattering matrix over pieces, relative to these: measured, or by its bound, or
+    estimated where the bound is more than is left of the tolerance.
+
+    turn  error of one H and V per piece, beyond the bound, and whether these turn sharply within one: then measures
+          and estimates, which suppose that errors fall with the square of the size, miss it
+    """
+    missed = turn[0] * turn[1]
+    if left <= missed:
+        return bound + turn[0]
     measured = cutting.measured(edge)
     if measured is not None:
-        return measured / gain
-    return min(bound, cutting.relative(edge)) if bound >= left else bound
+        return measured / gain + missed
+    return min(bound + turn[0], cutting.relative(edge) + missed) if bound + turn[0] >= left else bound + turn[0]
 
 
 def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
@@ -217,6 +235,7 @@ def _spherical(corner: float, distance: float, highest: float) -> float:
     )
 
 
-def _rounding(edge: float, highest: float) -> float:
-    """Error of float32 directions (4e-7 |q| |edge| rad, a fifth of which counts), and rms error of the amplitudes."""
-    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + KERNEL
+def _rounding(edge: float, highest: float, steepness: float) -> float:
+    """Error of float32 directions (4e-7 |q| |edge| rad, a fifth of which counts), and rms error of the amplitudes, more
+    where these are steep in the direction."""
+    return 0.2 * 4e-7 * (4 * np.pi * highest / SPEED_OF_LIGHT) * edge + max(KERNEL, steepness)

@@ -87,11 +87,11 @@ class FacetSet:
         """Amplitude of every facet for antennas at tx, rx, m (3,), about its centroid, in float64: the reference of
         kernels/spread_facets.cl, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
         from ._rough_surface import rough_mean
-        from .physical_optics import fresnel, normals_and_areas, scattering_parts, triangle_mean
+        from .physical_optics import fresnel, normals_and_areas, scattering_parts, triangle_mean, turned
 
         places = centroids(self.triangles)
         to_tx, to_rx = (unit(end - places) for end in (tx, rx))
-        behind = self.two_sided & ((normals(self.triangles) * to_tx).sum(axis=1) < 0)
+        behind = self.two_sided & turned(normals(self.triangles), to_tx, to_rx)
         triangles = np.where(behind[:, None, None], self.triangles[:, ::-1], self.triangles)
         facing, areas = normals_and_areas(triangles)
         both = to_tx + to_rx

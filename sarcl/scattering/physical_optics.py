@@ -24,6 +24,7 @@ import math
 
 import numpy as np
 
+from ..base.constants import EDGE_ON
 from ..base.vectors import unit
 
 UP = (0.0, 0.0, 1.0)
@@ -107,6 +108,32 @@ def polarisation(sight: np.ndarray, up: tuple[float, float, float] = UP) -> tupl
     return h, np.cross(h, s)
 
 
+def lit_share(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
+    """Share (...) of the physical-optics echo that a facet sends back: 1 in front of both antennas, 0 behind either.
+
+    normal, to_tx, to_rx  unit vectors (..., 3), the last two from the facet to the antennas
+
+        share = max(L(n.u_t) + L(n.u_r) - 1, 0),   L(c) = clamp((1 + c/w)/2, 0, 1),   w = EDGE_ON |u_t - u_r|
+
+    Physical optics doubles the incident magnetic field on a surface in front of the transmitter, and has none behind
+    it. With two antennas its echo therefore jumps where a facet turns through the plane that holds one of them, and
+    rounding would decide. Along a conducting plane a wave whose electric field is normal to the plane meets the
+    boundary condition as it is, undoubled: half of the echo, the mean of both sides, is the limit. The echo fades over
+    cosines between -w and w. On a sheet with both antennas in its plane the currents of both sides cancel: share 0. The
+    echo of a facet for one antenna falls with the cosine, without a jump: w = 0, and nothing changes.
+    """
+    n, u, r = (np.asarray(a, float) for a in (normal, to_tx, to_rx))
+    width = np.maximum(EDGE_ON * np.linalg.norm(u - r, axis=-1), 1e-30)
+    each = [np.clip(0.5 + 0.5 * (n * look).sum(axis=-1) / width, 0, 1) for look in (u, r)]
+    return np.asarray(np.maximum(each[0] + each[1] - 1, 0))
+
+
+def turned(normal: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray) -> np.ndarray:
+    """True (...) where the antennas look at the back of a facet: n.(u_t + u_r) < 0. On the side that they look at,
+    `lit_share` is that of a sheet, which reflects on both sides."""
+    return np.asarray((normal * (to_tx + to_rx)).sum(axis=-1) < 0)
+
+
 def scattering_matrix(
     normal: np.ndarray,
     to_tx: np.ndarray,
@@ -114,7 +141,7 @@ def scattering_matrix(
     permittivity: np.ndarray,
     up: tuple[float, float, float] = UP,
 ) -> np.ndarray:
-    """S, complex128 (..., 2, 2), of facets with unit normals; zero where either antenna lies behind the facet.
+    """S, complex128 (..., 2, 2), of facets with unit normals: times `lit_share`, 0 where an antenna lies behind one.
 
     normal, to_tx, to_rx  unit vectors (..., 3), the last two from the facet to the antennas;  permittivity  (...)
 
@@ -140,7 +167,7 @@ def scattering_parts(
     n, u, r = np.broadcast_arrays(*(np.asarray(a) for a in (normal, to_tx, to_rx)))
     k = -u
     cosine = (n * u).sum(axis=-1)
-    lit = (cosine > 0) & ((n * r).sum(axis=-1) > 0)
+    lit = lit_share(n, u, r)
     across = np.cross(k, n)
     length = np.linalg.norm(across, axis=-1, keepdims=True)
     # at normal incidence any tangent does: R_v = -R_h there
@@ -156,7 +183,7 @@ def scattering_parts(
             vertical = cosine * ed * _dot(across, t), -ed * _dot(received, nt)
             parts = sum(horizontal) + sum(vertical), horizontal[0] - horizontal[1], vertical[1] - vertical[0]
             for part, value in zip(out, parts, strict=True):
-                part[..., i, j] = np.where(lit, value, 0)
+                part[..., i, j] = np.where(lit > 0, lit * value, 0)
     return cosine, out
 
 

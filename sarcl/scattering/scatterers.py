@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..base import boxes, counter_rng
-from ..base.constants import SPEED_OF_LIGHT
+from ..base.constants import EDGE_ON, SPEED_OF_LIGHT
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
@@ -153,8 +153,10 @@ def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> tup
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
     """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
 
-    n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene.
+    n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene. Facets
+    that are edge-on to one of two antennas still send back a part (physical_optics.py:lit_share).
     """
+    edge_on = 0.0 if antennas.is_monostatic else 2 * EDGE_ON
     corners = boxes.box(centers)
     middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
     out = np.zeros(len(centers), bool)
@@ -167,5 +169,5 @@ def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry
         mean = look.mean(axis=0)
         # a shift of the point by `radius` turns the direction by at most asin(radius/distance)
         spread = np.linalg.norm(look - mean, axis=1).max() + np.pi / 2 * radius / distance.min()
-        out |= normals @ mean + spread < 0
+        out |= normals @ mean + spread < -edge_on
     return out

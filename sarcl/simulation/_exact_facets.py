@@ -15,6 +15,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import FacetSet
+from ..scattering.physical_optics import lit_share, turned
 from ..scene.triangles import centroids, normals
 from .spreading import Counts
 
@@ -50,10 +51,11 @@ class ExactFacets:
         """
         clock.lap("scene")
         counts, part = Counts(), self.facets
-        places, facing = centroids(part.triangles), normals(part.triangles)
+        places, given = centroids(part.triangles), normals(part.triangles)
         for row, p in enumerate(pulses):
-            sides = [(facing * unit(end[p] - places)).sum(axis=1) for end in (self.antennas.tx, self.antennas.rx)]
-            front = (sides[0] * sides[1] > 0) & ((sides[0] > 0) | part.two_sided)
+            looks = [unit(end[p] - places) for end in (self.antennas.tx, self.antennas.rx)]
+            seen_side = np.where((part.two_sided & turned(given, *looks))[:, None], -given, given)
+            front = lit_share(seen_side, *looks) > 0
             inside = inside_window(part, self.antennas, p) if self.gated else np.ones(len(part), bool)
             values, _ = facet_samples(
                 part, self.antennas, p, self.frequencies, self.polarizations, self.vertical, self.weights, inside

@@ -6,7 +6,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base.vectors import dot
+from ..base.vectors import dot, unit
 from ..opencl.device import Device
 from ._ray_casting import DeviceFacets, Frame
 
@@ -29,17 +29,21 @@ class EmbreeOccluders:
         # kept here: the scene holds no reference to its mesh
         self._mesh = TriangleMesh(self._scene, ((triangles - frame.center) * frame.unit).astype(np.float32))
 
-    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+    def hide(
+        self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, other: np.ndarray,
+        hidden: Any,
+    ) -> None:  # fmt: skip
         """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
         samples = points[1]
         row = self.device.download(facets.buffer, np.empty((facets.size, 12), np.float32))
         row = row[self.device.download(index, np.empty(n, np.int32))]
         uv = self.device.download(points[0], np.empty((samples, 2), np.float32))
-        eye = (viewpoint - self.frame.center) * self.frame.unit
+        eye, beside = ((at - self.frame.center) * self.frame.unit for at in (viewpoint, other))
         found = np.empty((n, samples), np.uint8)
         for first in range(0, n, CHUNK):
             part = row[first : first + CHUNK]
-            side = np.sign(dot(part[:, 9:], eye - part[:, :3]))[:, None] * part[:, 9:]
+            looks = unit(eye - part[:, :3]) + unit(beside - part[:, :3])
+            side = np.sign(dot(part[:, 9:], looks))[:, None] * part[:, 9:]
             for s, (u, v) in enumerate(uv):
                 start = part[:, :3] + u * part[:, 3:6] + v * part[:, 6:9] + side
                 ahead = eye - start

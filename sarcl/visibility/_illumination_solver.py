@@ -87,11 +87,11 @@ class IlluminationSolver:
             eye = self.frame.eye(viewpoint)[:3]
             arguments = (self.facets.buffer, which, self.facets.side, *eye, np.float32(slack), int(first == 0), hidden)
             device.run(face, (n,), None, *arguments)
-        for viewpoint, horizon in zip(viewpoints, horizons, strict=True):
+        for viewpoint, other, horizon in zip(viewpoints, viewpoints[::-1], horizons, strict=True):
             if horizon is not None:
-                horizon.hide(self.facets, which, n, points, hidden)
+                horizon.hide(self.facets, which, n, points, other, hidden)
             if self.occluders is not None:
-                self.occluders.hide(self.facets, which, n, points, viewpoint, hidden)
+                self.occluders.hide(self.facets, which, n, points, viewpoint, other, hidden)
         seen = device.empty(n)
         device.run(device.kernel("ray_casting.cl", "seen"), (n,), None, hidden, points[1], seen)
         return device.download(seen, np.empty(n, np.uint8))

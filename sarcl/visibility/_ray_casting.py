@@ -91,13 +91,18 @@ class Occluders:
         self.node = device.upload(np.concatenate(levels))
         self.base = device.upload(base.astype(np.int32))
 
-    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, hidden: Any) -> None:
+    def hide(
+        self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, other: np.ndarray,
+        hidden: Any,
+    ) -> None:  # fmt: skip
         """Set the bits of occluded sample points.
 
         index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
+        other  the other antenna, m (3,), or `viewpoint`: sample points lie on the side of a facet that both look at
         """
         kernel = self.device.kernel("ray_casting.cl", "hidden")
-        arguments = (facets.buffer, index, *points, *self.frame.eye(viewpoint))
+        eye = self.frame.eye(viewpoint)
+        arguments = (facets.buffer, index, *points, *eye[:3], *self.frame.eye(other)[:3], eye[3])
         self.device.run(kernel, (n,), None, *arguments, self.leaf, self.node, self.base, self.depth, hidden)
 
 

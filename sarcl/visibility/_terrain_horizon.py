@@ -62,11 +62,11 @@ class Horizons:
     table: Any
     held: list[Any]
 
-    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, hidden: Any) -> None:
+    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, other: np.ndarray, hidden: Any) -> None:
         """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
         t = self.terrain
         kernel = t.device.kernel("terrain_horizon.cl", "horizon")
-        eye = t.frame.eye(self.viewpoint)[:3]
+        eye = (*t.frame.eye(self.viewpoint)[:3], *t.frame.eye(other)[:3])
         grid = (t.x, t.y, t.z_rows, t.z_columns, len(t.axes[0]), len(t.axes[1]), *np.array(t.per, np.float32))
         arguments = (facets.buffer, index, *points, *eye, *grid, self.number, self.whole, self.table, hidden)
         t.device.run(kernel, (n,), None, *arguments)

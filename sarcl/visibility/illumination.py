@@ -10,6 +10,7 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base.constants import EDGE_ON
 from ..base.errors import warn
 from ..base.validation import array, choice, number, sealed
 from ..opencl.choose_device import open_device
@@ -200,8 +201,10 @@ def lit(
         tolerance * projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
     ]
     _, offered, turns = pulse_blocks(ends, bounds, limits)
-    # angle by which facets may turn towards an antenna before the next viewpoint
-    slack = 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
+    # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one of
+    # two antennas send back a part of their echo (scattering/physical_optics.py:lit_share)
+    edge_on = 0.0 if rx is None else 2 * EDGE_ON
+    slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
         tolerance=tolerance, engine=engine,

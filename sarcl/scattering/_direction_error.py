@@ -1,0 +1,160 @@
+"""Errors of scattering matrices that are steep in the direction: cosines in float32, and H and V near the vertical.
+
+- **Cosines.** S falls with the cosine of incidence, or fades with it (physical_optics.py:lit_share): a direction that
+  is rounded by e rad changes S by e/cosine of itself. The rounding of S is measured on sampled facets.
+- **Polarisation.** H is horizontal, s x up. It turns about the line of sight s from place to place, by the change of
+  the azimuth times the sine of the elevation: by step/(horizontal distance) near the vertical through an antenna, and
+  by all angles across it. A plane facet has one S, that of its centroid: the error is what H and V at its corners would
+  make of S. Where both antennas are one and S is that of a conductor it cancels.
+
+docs/theory/facets.md says what follows; tests/scattering/test_direction_error.py measures it against finer facets.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ..base.boxes import box
+from ..base.rows import spread_over
+from ..base.vectors import unit
+from ..numerics.pulse_geometry import PulseGeometry
+from ..scene.scene import Scene
+from ..scene.triangles import areas, bisect, centroids, edges
+from ._facet_sampling import drawn
+from .physical_optics import normals_and_areas, scattering_matrix, turned
+
+FACETS, PULSES = 200, 5  # samples
+FLOAT32_DIRECTION = 6e-8  # rad, rms: measured 4e-8 to 7e-8 by tests/scattering/test_direction_error.py
+STEEP = 0.5  # sine of the angle between line of sight and vertical: above, H turns no faster than directions do
+MOST_PIECES = 4096  # of the sampled facets, cut more finely towards the vertical through an antenna
+SHARP = 0.3  # rad of turn over one piece: beyond, errors do not fall with the square of its size
+
+Ends = tuple[np.ndarray, np.ndarray]  # positions of transmitter and receiver, m (3,) each
+
+
+class DirectionError:
+    """Errors of a scene's facets, relative to these at random phases; `mirror` (k,) tells those that are cut."""
+
+    def __init__(
+        self, scene: Scene, mirror: np.ndarray, antennas: PulseGeometry, frequency: float,
+        polarizations: Sequence[str], vertical: np.ndarray,
+    ) -> None:  # fmt: skip
+        """frequency  the highest, Hz;  vertical  unit vector (3,), of the polarisations"""
+        self._vertical = (float(vertical[0]), float(vertical[1]), float(vertical[2]))
+        self._columns = [2 * "HV".index(name[0]) + "HV".index(name[1]) for name in polarizations]
+        eps = np.array([m.permittivity(frequency) for m in scene.materials], np.complex128)
+        self._triangles, self._two_sided = scene.triangles, scene.two_sided
+        self._permittivity, self._reflectivity = eps[scene.material], scene.reflectivity
+        self.rounding = self._rounding([(antennas.tx[p], antennas.rx[p]) for p in spread_over(len(antennas), PULSES)])
+        cancels = antennas.is_monostatic and bool(np.isinf(self._permittivity[mirror]).all())
+        none = cancels or not mirror.any()
+        self.steep = [] if none else self._near_vertical(antennas, box(centroids(scene.triangles)))
+        self._mirror = np.flatnonzero(mirror) if self.steep else np.zeros(0, int)
+        self._drawn: list[tuple[np.ndarray, np.ndarray]] = []
+
+    def turn(self, edge: float) -> tuple[float, bool]:
+        """Error of one pair of H and V per facet cut to `edge`, m, at the steepest pulses; and whether they turn
+        sharply within one. 0 where no line of sight is within 30 deg of the vertical."""
+        worst, sharp = 0.0, False
+        for i, ends in enumerate(self.steep):
+            if len(self._drawn) <= i:
+                self._drawn.append(self._draw(ends))
+            error, angle = self._turn(*self._drawn[i], ends, edge)
+            worst, sharp = max(worst, error), sharp or angle > SHARP
+        return worst, sharp
+
+    def _rounding(self, looks: list[Ends]) -> float:
+        some, share = drawn(areas(self._triangles), FACETS, np.random.default_rng(0))
+        triangles, wrong, right = self._triangles[some], 0.0, 0.0
+        share = share * areas(triangles) * self._reflectivity[some] ** 2
+        normals, places = normals_and_areas(triangles)[0], centroids(triangles)
+        for ends in looks:
+            to_tx, to_rx = (unit(end - places) for end in ends)
+            n = np.where((self._two_sided[some] & turned(normals, to_tx, to_rx))[:, None], -normals, normals)
+            exact = self._matrix(n, to_tx, to_rx, some)
+            right += float(share @ (np.abs(exact) ** 2).sum(axis=1))
+            for look in (to_tx,) if ends[0] is ends[1] or np.array_equal(*ends) else (to_tx, to_rx):
+                tilted = self._matrix(unit(n + FLOAT32_DIRECTION * look), to_tx, to_rx, some)
+                wrong += float(share @ (np.abs(tilted - exact) ** 2).sum(axis=1))
+        return float(np.sqrt(wrong / right)) if right else 0.0
+
+    def _matrix(self, normals: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, some: np.ndarray) -> np.ndarray:
+        """S of facets `some`, complex128 (n, 4)."""
+        return scattering_matrix(normals, to_tx, to_rx, self._permittivity[some], self._vertical).reshape(-1, 4)
+
+    def _near_vertical(self, antennas: PulseGeometry, bounds: np.ndarray) -> list[Ends]:
+        """Antennas at the pulse at which the line of sight of each antenna comes nearest to the vertical."""
+        middle, radius = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
+        out = []
+        for end in antennas.ends:
+            look = end - middle
+            aside = np.linalg.norm(_level(look, self._vertical), axis=1)
+            sine = (aside - radius) / (np.linalg.norm(look, axis=1) + radius)
+            at = int(np.argmin(sine))
+            if sine[at] < STEEP:
+                out.append((antennas.tx[at], antennas.rx[at]))
+        return out
+
+    def _draw(self, ends: Ends) -> tuple[np.ndarray, np.ndarray]:
+        """Facets sampled at a pulse, more near the vertical through an antenna; and the number that each represents."""
+        triangles = self._triangles[self._mirror]
+        area, places = areas(triangles), centroids(triangles)
+        aside = np.minimum.reduce([np.linalg.norm(_level(places - end, self._vertical), axis=1) for end in ends])
+        steep = area / np.maximum(aside, np.maximum.reduce(edges(triangles))) ** 2
+        size = area / area.sum() + steep / steep.sum() if area.any() else area
+        some, share = drawn(size, FACETS, np.random.default_rng(4))
+        return self._mirror[some], share
+
+    def _turn(self, some: np.ndarray, share: np.ndarray, ends: Ends, edge: float) -> tuple[float, float]:
+        pieces, of = self._graded(self._triangles[some], ends, edge)
+        weight, middle = share[of] * areas(pieces) * self._reflectivity[some[of]] ** 2, centroids(pieces)
+        to_tx, to_rx = (unit(end - middle) for end in ends)
+        n = normals_and_areas(pieces)[0]
+        n = np.where((self._two_sided[some[of]] & turned(n, to_tx, to_rx))[:, None], -n, n)
+        exact = self._matrix(n, to_tx, to_rx, some[of]).reshape(-1, 2, 2)
+        right = float(weight @ (np.abs(exact.reshape(-1, 4)[:, self._columns]) ** 2).sum(axis=1))
+        shrink = np.minimum(1.0, edge / np.maximum.reduce(edges(pieces)))[:, None]
+        wrong, sharpest = np.zeros(len(pieces)), 0.0
+        for corner in np.moveaxis(pieces, 1, 0):
+            angles = [self._turned_by(middle, middle + shrink * (corner - middle), end) for end in ends]
+            sent, received = (_rotations(angle) for angle in angles)
+            there = received @ exact @ np.swapaxes(sent, 1, 2)
+            apart = (there - exact).reshape(-1, 4)[:, self._columns]
+            wrong = np.maximum(wrong, (np.abs(apart) ** 2).sum(axis=1))
+            sharpest = max(sharpest, *(float(np.abs(angle).max()) for angle in angles))
+        return float(np.sqrt(weight @ wrong / right)) if right else 0.0, sharpest
+
+    def _turned_by(self, places: np.ndarray, others: np.ndarray, end: np.ndarray) -> np.ndarray:
+        """Angle by which H and V turn about the line of sight from an antenna, from places to others, rad (n,)."""
+        look, up = unit(places - end), np.array(self._vertical)
+        one, two = (_level(p - end, self._vertical) for p in (places, others))
+        return np.asarray(np.arctan2(np.cross(one, two) @ up, (one * two).sum(axis=1)) * (look @ up))
+
+    def _graded(self, triangles: np.ndarray, ends: Ends, edge: float) -> tuple[np.ndarray, np.ndarray]:
+        """Facets cut down to `edge` on the vertical through an antenna, to their distance from it elsewhere, and which
+        of the given ones each is a part of (n,)."""
+        of = np.arange(len(triangles))
+        while True:
+            lengths = edges(triangles)
+            longest, places = np.maximum.reduce(lengths), centroids(triangles)
+            aside = np.minimum.reduce([np.linalg.norm(_level(places - end, self._vertical), axis=1) for end in ends])
+            long = longest > np.maximum(edge, aside - longest)
+            if not long.any() or len(triangles) + long.sum() > MOST_PIECES:
+                return triangles, of
+            halves = bisect(triangles[long], lengths[:, long])
+            triangles = np.concatenate([triangles[~long], *halves])
+            of = np.concatenate([of[~long], of[long], of[long]])
+
+
+def _level(vectors: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
+    """Horizontal part of vectors (n, 3)."""
+    axis = np.array(up)
+    return np.asarray(vectors - (vectors @ axis)[..., None] * axis)
+
+
+def _rotations(angle: np.ndarray) -> np.ndarray:
+    """Matrices (n, 2, 2) that turn H, V of lines of sight about them: H' = cos H - sin V."""
+    c, s = np.cos(angle), np.sin(angle)
+    return np.moveaxis(np.array([[c, -s], [s, c]]), -1, 0)
