@@ -18,6 +18,8 @@
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
 //           ROUGH, DIAGRAM_*  see facet_planes.clh
 //           TILE       facets per tile, a multiple of VW
+//           GROUPED    1: work-groups of 64 items: each shares the facets of a tile, or adds a row up in local memory, TILE a
+//                      multiple of 64; 0: each work-item does so alone
 // reference: sarcl/reference/facet.py:facet_amplitude
 
 #include "common.clh"
@@ -32,16 +34,31 @@
 #include "facet.clh"
 #include "facet_planes.clh"
 
+#if GROUPED
+#include "spread_group.clh"
+#else
+#define ITEMS 1
+#endif
+
 #define CHANNELS (NODES * (HH + HV + VH + VV))
+// Amplitudes of vector i of a tile at a pulse node, and the distance from one number of them to the next: items of a group
+// read and write neighbours.
+#if GROUPED
+#define AMPLITUDES(a, tile, i) ((a) + (tile) * (2 * CHANNELS * TILE) + (i))
+#define PLANE TILE
+#else
+#define AMPLITUDES(a, tile, i) ((a) + ((tile) * (TILE / VW) + (i)) * (2 * CHANNELS * VW))
+#define PLANE VW
+#endif
 #define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
 #define BRIGHT 2
 
 static inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
-    STORE(scale * a.re, 2 * channel, out);
-    STORE(scale * a.im, 2 * channel + 1, out);
+    STORE(scale * a.re, 0, out + 2 * channel * PLANE);
+    STORE(scale * a.im, 0, out + (2 * channel + 1) * PLANE);
 }
 
-// Amplitudes at pulse nodes. global size (pulse nodes, tiles of this call).
+// Amplitudes at pulse nodes. global size (pulse nodes, times the group where GROUPED; tiles of this call).
 //   constants  of the nodes, n of them per tile, as in backproject.cl, of all tiles
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
@@ -52,7 +69,7 @@ static inline void put_channel(__global float *out, int channel, complex_v a, fv
 //   up       (6)                      vertical, and the axis that replaces it for vectors along it
 //   patterns, second, axes (pulse nodes, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
 //   first    this call's first tile
-//   out      (pulse nodes, tiles of this call, TILE/VW, CHANNELS, 2, VW)   re, im
+//   out      (pulse nodes, tiles of this call, TILE/VW, CHANNELS, 2, VW), GROUPED: (., ., CHANNELS, 2, TILE)   re, im
 //   marks    (pulse nodes, tiles of this call, TILE)                       FRONT, BRIGHT
 __kernel void facet_amplitudes(int n, __global const float *restrict constants, __global const float *restrict offsets,
                                int n_offsets, __global const float *restrict facets, __global const uchar *restrict seen,
@@ -61,7 +78,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
                                __global const float *restrict patterns, int second, __global const float *restrict axes,
                                float range, __global const float *restrict reach, __global const float *restrict radius,
                                int first, __global float *restrict out, __global uchar *restrict marks) {
-    int q = get_global_id(0), k = first + get_global_id(1);
+    int q = get_global_id(0) / ITEMS, k = first + get_global_id(1);
     float3 vertical = vload3(0, up), other = vload3(1, up);
     __global const float *c = constants + (k * (size_t)n + q) * N_CONST;
     size_t here = (size_t)q * get_global_size(1) + get_global_id(1);
@@ -75,9 +92,9 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #if CULL
     unseen = unseen || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
 #endif
-    for (int i = 0; i < TILE / VW; i++) {
+    for (int i = get_global_id(0) % ITEMS; i < TILE / VW; i += ITEMS) {
         size_t at = (size_t)k * (TILE / VW) + i, node_vector = here * (TILE / VW) + i;
-        __global float *out_i = out + node_vector * CHANNELS * 2 * VW;
+        __global float *out_i = AMPLITUDES(out, here, i);
         float share[VW], is_front[VW], is_bright[VW];
 #pragma unroll
         for (int l = 0; l < VW; l++) {
@@ -164,8 +181,8 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
     }
 }
 
-// What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call, splits):
-// work-item (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
+// What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call, times
+// the group where GROUPED; splits): work-item, or group, (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
 //   pulse_nodes (n_used, 2)           first of the PULSE_NODES nodes of a pulse, and the nearest
@@ -184,7 +201,14 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                             __global const float *restrict axes, __global const float *restrict reach,
                             __global const float *restrict radius, __global const float *restrict table, int last, int flush,
                             __global float *rows, int stride, int origin, __global int *restrict done) {
-    int p = get_global_id(0), split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
+#if GROUPED
+    __local row_window window;
+    int p = get_global_id(0) / ITEMS, item = get_local_id(0), start = -1;
+    clear_window(&window, item);
+#else
+    int p = get_global_id(0), item = 0;
+#endif
+    int split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
     __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
     int from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
     for (int k = first + split; k < first + n_here; k += get_global_size(1)) {
@@ -198,14 +222,14 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
         from_rx = load_direction(c, C_RX, C_RX_LOW);
 #endif
         if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
-            unlit_count += n_facets;
+            if (item == 0) unlit_count += n_facets;
             continue;
         }
 #endif
-        for (int i = 0; i < TILE / VW; i++) {
-            size_t at = (size_t)k * (TILE / VW) + i, at_node[PULSE_NODES];
+        for (int i = item; i < TILE / VW; i += ITEMS) {
+            size_t at = (size_t)k * (TILE / VW) + i, tile_at_node[PULSE_NODES];
 #pragma unroll
-            for (int q = 0; q < PULSE_NODES; q++) at_node[q] = (((size_t)from + q) * n_here + (k - first)) * (TILE / VW) + i;
+            for (int q = 0; q < PULSE_NODES; q++) tile_at_node[q] = ((size_t)from + q) * n_here + (k - first);
             size_t at_nearest = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
             offset x = load_offset(offsets, at, n_offsets);
             about_centre(&x, tile, k, n_tiles);
@@ -221,9 +245,11 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                 inside_count += counts;
                 front_count += counts && (marks[at_nearest * VW + l] & FRONT);
 #pragma unroll
-                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts ? marks[at_node[q] * VW + l] : 0;
+                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
             }
+#if !GROUPED
             if (!(any_mark & BRIGHT)) continue;
+#endif
 
             fv sine, cosine, w[TAPS];
             sincos_cycles(where.cycles, &sine, &cosine);
@@ -231,26 +257,52 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             cosine *= inside;
             iv j;
             tap_weights(first_tap(where.t, where.base, stride, origin, &j), table, w);
+#if GROUPED
+            int tap = any_mark & BRIGHT ? origin + j : NOWHERE;
+#endif
             for (int channel = 0; channel < CHANNELS; channel++) {
                 complex_v a = c_make((fv)0.0f, (fv)0.0f);
 #pragma unroll
                 for (int q = 0; q < PULSE_NODES; q++) {
-                    __global const float *from_node = amplitudes + (at_node[q] * CHANNELS + channel) * 2 * VW;
+                    __global const float *from_node = AMPLITUDES(amplitudes, tile_at_node[q], i) + 2 * channel * PLANE;
                     fv weight_of_node = (fv)(PULSE_NODES == 1 ? 1.0f : shares[PULSE_NODES * p + q]);
                     a.re = fma(weight_of_node, LOAD(0, from_node), a.re);
-                    a.im = fma(weight_of_node, LOAD(1, from_node), a.im);
+                    a.im = fma(weight_of_node, LOAD(0, from_node + PLANE), a.im);
                 }
                 // times exp(-j 2 pi cycles)
-                add_taps(sum + 6 * (size_t)channel * stride + 2 * origin, j, w, fma(a.re, cosine, a.im * sine),
-                         fma(a.im, cosine, -a.re * sine));
+                fv echo_re = fma(a.re, cosine, a.im * sine), echo_im = fma(a.im, cosine, -a.re * sine);
+                __global float *channel_sum = sum + 6 * (size_t)channel * stride;
+#if GROUPED
+                start = add_scatterers(&window, channel_sum, stride, start, item, tap, w, (float2)(echo_re, echo_im));
+#if CHANNELS > 1
+                // the next channel has a row of its own
+                if (start >= 0) empty_window(&window, channel_sum, stride, start, item);
+                start = -1;
+#endif
+#else
+                add_taps(channel_sum + 2 * origin, j, w, echo_re, echo_im);
+#endif
             }
         }
+#if GROUPED
+        if (++added % flush == 0 && start >= 0) {
+            empty_window(&window, sum, stride, start, item);
+            start = -1;
+        }
+    }
+    if (start >= 0) empty_window(&window, sum, stride, start, item);
+    inside_count = sum_of_items(&window, item, inside_count);
+    front_count = sum_of_items(&window, item, front_count);
+#else
         if (++added % flush == 0)
             for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
     }
     for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
-    size_t at = (size_t)split * n_used + p, n_counts = (size_t)get_global_size(1) * n_used;
-    done[at] += inside_count;
-    done[n_counts + at] += front_count;
-    done[2 * n_counts + at] += unlit_count;
+#endif
+    if (item == 0) {
+        size_t at = (size_t)split * n_used + p, n_counts = (size_t)get_global_size(1) * n_used;
+        done[at] += inside_count;
+        done[n_counts + at] += front_count;
+        done[2 * n_counts + at] += unlit_count;
+    }
 }

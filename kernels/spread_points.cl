@@ -9,6 +9,7 @@
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, RANGE, ORDER, GAINS, ALIKE, VARIES, CULL, SPREADING as in the headers
 //           NODES     frequencies f_m
 //           TILE      scatterers per tile, a multiple of VW
+//           GROUPED   1: a work-group of 64 items adds a row up, in local memory, TILE a multiple of 64; 0: one work-item does
 // reference: sarcl/reference/echo.py:echo
 
 #include "common.clh"
@@ -20,8 +21,13 @@
 #include "vec3_complex.clh"
 #include "pattern.clh"
 #include "gains.clh"
+#if GROUPED
+#include "spread_group.clh"
+#else
+#define ITEMS 1
+#endif
 
-// global size (pulses of this block, splits): work-item (p, s) adds tiles s, s + splits, ... to row (s, p).
+// global size (pulses of this block, times the group where GROUPED; splits): work-item, or group, (p, s) adds tiles s, s + splits, ... to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
 //   scatterers  (2, n_tiles TILE)    re, im of amplitude
 //   nodes       (NODES)    f_m over the patterns' frequency;  patterns, second, axes (n_used, 18), range, reach (6)   see gains.clh
@@ -38,8 +44,16 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
                      __global const float *restrict reach, __global const float *restrict radius,
                      __global const float *restrict table, int last, int flush, __global float *rows, int stride,
                      int origin, __global int *restrict done) {
-    int p = get_global_id(0), split = get_global_id(1), count = 0, unlit_count = 0, added = 0;
-    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * NODES * stride, *row = sum + 2 * origin;
+#if GROUPED
+    __local row_window window;
+    int p = get_global_id(0) / ITEMS, item = get_local_id(0), start = -1;
+    clear_window(&window, item);
+#else
+    int p = get_global_id(0), item = 0;
+    __global float *row = rows + 6 * (get_global_id(1) * n_used + p) * NODES * stride + 2 * origin;
+#endif
+    int split = get_global_id(1), count = 0, unlit_count = 0, added = 0;
+    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * NODES * stride;
     for (int k = split; k < n_tiles; k += get_global_size(1)) {
         __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
@@ -55,19 +69,19 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
 #endif
 #if CULL
         if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
-            unlit_count += n_points;
+            if (item == 0) unlit_count += n_points;
             continue;
         }
 #endif
-        if (state == INSIDE) count += n_points;
-        for (int i = 0; i < TILE / VW; i++) {
+        if (state == INSIDE && item == 0) count += n_points;
+        for (int i = item; i < TILE / VW; i += ITEMS) {
             size_t at_vector = (size_t)k * (TILE / VW) + i;
             offset x = load_offset(offsets, at_vector, n_offsets);
             about_centre(&x, tile, k, n_tiles);
             phase_position at = locate(c, pulse, p, n, x);
-            fv re = LOAD(at_vector, scatterers), im = LOAD(at_vector, scatterers + n_offsets);
+            fv re = LOAD(at_vector, scatterers), im = LOAD(at_vector, scatterers + n_offsets), inside = 1;
             if (state == CROSSING) {
-                fv inside = keep_inside(c, &at);
+                inside = keep_inside(c, &at);
                 re *= inside;
                 im *= inside;
                 float is_inside[VW];
@@ -81,6 +95,9 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
             iv j;
             fv w[TAPS];
             tap_weights(first_tap(at.t, at.base, stride, origin, &j), table, w);
+#if GROUPED
+            int first = inside != 0 ? origin + j : NOWHERE;
+#endif
 #if WEIGHTS
             fv tx_range, rx_range;
             triple u_t = toward(from_tx, x, &tx_range), u_r = u_t;
@@ -93,17 +110,41 @@ __kernel void spread(__global const float *restrict pulse, int n, int n_used,
             for (int m = 0; m < NODES; m++) {
                 if (m == 0 || VARIES) gain = weight(view, patterns, second, nodes[m]);
                 complex_v weighted = c_mul(gain, c_make(echo_re, echo_im));
+#if GROUPED
+                __global float *sums = sum + 6 * (size_t)m * stride;
+                start = add_scatterers(&window, sums, stride, start, item, first, w, (float2)(weighted.re, weighted.im));
+#if NODES > 1
+                // the next frequency has a row of its own
+                if (start >= 0) empty_window(&window, sums, stride, start, item);
+                start = -1;
+#endif
+#else
                 add_taps(row + 6 * (size_t)m * stride, j, w, weighted.re, weighted.im);
+#endif
             }
+#elif GROUPED
+            start = add_scatterers(&window, sum, stride, start, item, first, w, (float2)(echo_re, echo_im));
 #else
             add_taps(row, j, w, echo_re, echo_im);
 #endif
         }
+#if GROUPED
+        if (++added % flush == 0 && start >= 0) {
+            empty_window(&window, sum, stride, start, item);
+            start = -1;
+        }
+    }
+    if (start >= 0) empty_window(&window, sum, stride, start, item);
+    count = sum_of_items(&window, item, count);
+#else
         if (++added % flush == 0)
             for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
     }
     for (int m = 0; m < NODES; m++) empty_into_total(sum + 6 * (size_t)m * stride, stride);
+#endif
     size_t at = (size_t)split * n_used + p;
-    done[at] = count;
-    done[(size_t)get_global_size(1) * n_used + at] = unlit_count;
+    if (item == 0) {
+        done[at] = count;
+        done[(size_t)get_global_size(1) * n_used + at] = unlit_count;
+    }
 }

@@ -22,7 +22,7 @@ from ..scattering.pulse_nodes import plan_pulse_nodes
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
 from ._kernel_images import sample_patches
-from .spreading import Band, Counts, TiledScatterers, splits, terms
+from .spreading import GROUP, Band, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
 NODES_SHARE = 0.2  # of the tolerance that is left: the most that interpolation between pulse nodes may take
@@ -97,12 +97,14 @@ class FacetSpreader:
         device, held, plan, weights = self.device, self.held, self.plan, self.weights
         self.tiles = held.tiles(plan.per_tile)
         tiles, nodes, bistatic = self.tiles.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
+        self.grouped = is_grouped(device)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
             "METAL": int(held.metal),
             "DISPERSIVE": int(held.dispersive),
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
+            "GROUPED": int(self.grouped),
             **{name: int(name in self.made) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
@@ -118,13 +120,13 @@ class FacetSpreader:
         self.flush = max(1, int(terms(tolerance) / tiles.per_tile))
         self.channels = len(nodes) * len(self.made)
         self.stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-        self.splits = splits(device, len(self.antennas), tiles.n_tiles)
+        self.splits = splits(device, len(self.antennas), tiles.n_tiles, self.grouped)
         self.spectra_of = SpreadSamples(device, self.n_samples, plan.interpolator, plan.length)
 
     def _blocks(self, budget: float) -> tuple[int, int]:
         """Pulses per block, and tiles whose amplitudes are held at once, that keep to the budget, bytes."""
         device, tiles, lanes = self.device, self.tiles.tiles, self.device.info.vector_width
-        most, spacing = max(64, 16 * device.info.units), self.pulse_nodes.spacing
+        most, spacing = most_pulses(device), self.pulse_nodes.spacing
         if spacing > 1:
             most = max(most, MOST_PULSES)
         per_pulse: float = self.constants.nbytes * tiles.n_tiles * (2 if spacing > 1 else 1)
@@ -179,19 +181,21 @@ class FacetSpreader:
         moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
-        n_offsets, ends = tiles.offsets.shape[1], (1, 1) if device.is_cpu else None
+        n_offsets, each, ends = tiles.offsets.shape[1], 1, (1, 1) if device.is_cpu else None
+        if self.grouped:
+            each, ends = GROUP, (GROUP, 1)
         size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
         made, marks = device.empty(8 * size * self.channels), device.empty(size)
         for first in range(0, tiles.n_tiles, self.tiles_at_once):
             here = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
-                self.amplitudes, (len(at), here), ends,
+                self.amplitudes, (each * len(at), here), ends,
                 n_nodes, node_constants, held.offsets, n_offsets, held.planes, seen, later, moments, self.nodes,
                 self.up, self.patterns, self.second, node_axes, np.float32(self.weights.range), self.reach,
                 held.radius, first, made, marks,
             )  # fmt: skip
             device.run(
-                self.spread, (used, self.splits), ends,
+                self.spread, (each * used, self.splits), ends,
                 pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, n_offsets, made, marks, first,
                 here, which_here, shares_here, axes, self.reach, held.radius, self.table, held.last, self.flush, rows,
                 self.stride, self.stride // 2, done, steps=here / self.splits,

@@ -17,7 +17,7 @@ from ..opencl.device import Device
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from ._kernel_images import sample_patches
-from .spreading import Counts, TiledScatterers, splits, terms
+from .spreading import GROUP, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 
 def tiled_points(
@@ -48,7 +48,8 @@ def spread_points(
     device, lanes, n_samples = points.device, points.device.info.vector_width, samples.shape[1]
     held = points.tiles(plan.per_tile)
     tiles, bistatic, channels = held.tiles, not antennas.is_monostatic, len(nodes)
-    macros = {**plan.macros(bistatic), **weights.macros(channels), "TILE": tiles.per_tile}
+    grouped = is_grouped(device)
+    macros = {**plan.macros(bistatic), **weights.macros(channels), "TILE": tiles.per_tile, "GROUPED": int(grouped)}
     tile_constants = TileConstants(device, plan, bistatic=bistatic)
     kernel = device.kernel("spread_points.cl", "spread", **macros)
     table = device.upload(plan.interpolator.table)
@@ -59,12 +60,10 @@ def spread_points(
     clock.lap("scene")
 
     stride = plan.length + 2 * range_profiles.padding(plan.interpolator)
-    parts = splits(device, len(antennas), tiles.n_tiles)
+    parts = splits(device, len(antennas), tiles.n_tiles, grouped)
     spectra_of = SpreadSamples(device, n_samples, plan.interpolator, plan.length)
     per_pulse = tile_constants.nbytes * tiles.n_tiles + (24 * stride * parts + spectra_of.row_bytes) * channels
-    # enough pulses at once to keep every unit busy, few enough for the progress to be seen
-    most = max(64, 16 * device.info.units)
-    at_once = max(1, min(most, int(budget / 2 / per_pulse)) // lanes) * lanes
+    at_once = max(1, min(most_pulses(device), int(budget / 2 / per_pulse)) // lanes) * lanes
     counts, first, end = Counts(), pulses[0], pulses[-1] + 1
     for start in range(first, end, at_once):
         stop = min(start + at_once, end)
@@ -75,8 +74,11 @@ def spread_points(
         constants = tile_constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
         rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
         axes = device.upload(weights.packed_axes(np.arange(start, stop)))
+        size, ends = (used, parts), (1, 1) if device.is_cpu else None
+        if grouped:
+            size, ends = (GROUP * used, parts), (GROUP, 1)
         device.run(
-            kernel, (used, parts), (1, 1) if device.is_cpu else None,
+            kernel, size, ends,
             pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, tiles.offsets.shape[1],
             held.planes, ratios, patterns, second, axes, np.float32(weights.range), reach, held.radius, table,
             held.last, flush, rows, stride, stride // 2, done, steps=tiles.n_tiles / parts,

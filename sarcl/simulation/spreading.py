@@ -21,6 +21,9 @@ from ..opencl.device import Device
 from ._kernel_images import PatchSamples
 
 PER_TILE = (256, 64)
+GROUP = 64  # work-items that add up a row together: ITEMS of kernels/spread_group.clh
+LOCAL = 12 * 1024  # bytes of local memory that they take, with 8 taps
+GROUPED_ITEMS = 100_000  # work-items of a launch, of groups: more than a GPU runs at once
 
 
 @dataclass(frozen=True)
@@ -188,8 +191,21 @@ def _chunk(n_scatterers: int, tolerance: float) -> int:
     return min(n_scatterers, max(min(PER_TILE), int(terms(tolerance))))
 
 
-def splits(device: Device, n_pulses: int, n_tiles: int) -> int:
+def is_grouped(device: Device) -> bool:
+    """Whether work-groups add rows up, in local memory (kernels/spread_group.clh); else each row has one work-item."""
+    return device.info.vector_width == 1 and device.shares(LOCAL, GROUP)
+
+
+def most_pulses(device: Device) -> int:
+    """Pulses of a block: enough to keep every unit busy, few enough for the progress to be seen."""
+    return max(64, 16 * device.info.units)
+
+
+def splits(device: Device, n_pulses: int, n_tiles: int, grouped: bool = False) -> int:
     """Partial sums per pulse: enough work-items for the device."""
+    if grouped:
+        at_once = min(n_pulses, most_pulses(device))
+        return int(min(-(-GROUPED_ITEMS // (GROUP * at_once)), n_tiles))
     return int(min(max(1, -(-4 * device.info.units // n_pulses)), n_tiles, 64))
 
 

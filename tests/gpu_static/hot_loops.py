@@ -17,7 +17,7 @@ class Hot:
     contributions  of one trip of the loop, by one work-item: an expression
     unit           what a contribution is
     loop           "innermost": the innermost loop with most instructions;  "barrier": the smallest loop with a barrier,
-                   through which the items of a work-group go together
+                   through which the items of a work-group go together;  "around": the smallest loop around such a loop
     trips          trips of each loop inside the hot one, in order of addresses, loops inside these right after each:
                    expressions
     """
@@ -50,8 +50,9 @@ HOT = {
     ("ray_casting.cl", "hidden"): Hot("1", "node of the tree and ray"),
     ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
     ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency"),
-    ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet"),
-    ("spread_points.cl", "spread"): Hot("VW", "pulse and scatterer"),
+    ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet", loop="around", trips=("1",)),
+    # each item brings a scatterer; the loop inside adds those of the group up, and runs again where a window moves
+    ("spread_points.cl", "spread"): Hot("VW", "pulse and scatterer", loop="around", trips=("1",)),
 }
 
 
@@ -88,8 +89,10 @@ def hot_loop(code: Code, which: str) -> Loop | None:
     loops = code.every_loop()
     if which == "innermost":
         loops = [loop for loop in loops if not loop.inside]
-    elif which == "barrier":
+    else:
         loops = [loop for loop in loops if any(code.opcodes[n].startswith("BAR") for n in range(loop.first, loop.last))]
+        if which == "around":
+            loops = [loop for loop in loops if any(inner in loops for inner in loop.inside)]
         return min(loops, key=lambda loop: loop.last - loop.first, default=None)
     return max(loops, key=lambda loop: loop.last - loop.first, default=None)
 

@@ -345,16 +345,22 @@ MACROS = {
     "ROUGH": 1, "DIAGRAM_ISOTROPIC": 0, "DIAGRAM_COS": 1, "DIAGRAM_COS2": 2, "DIAGRAM_EXP": 3,
     "GAINS": 1, "ALIKE": 0, "VARIES": 1, "CULL": 1, "SPREADING": 1, "SEGMENT": 64,
     "SHARED": 1, "ITEMS": 16, "SLOPE_TAPS": 2, "SLOPE_TERMS": 2, "ABSORB": 1, "LINEAR": 1, "WEIGHT": 1, "TAPER": 64,
-    "FROM64": 0, "NUMBER64": 0, "GROUPED": 1,
+    "FROM64": 0, "NUMBER64": 0, "GROUPED": 0,
 }  # fmt: skip
+GROUPED = {"GROUPED": 1, "VW": 1, "TILE": 64}
+SHARED = "nufft2d.cl", "spectral_echo.cl", "spread_facets.cl", "spread_points.cl"
 PROGRAMS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
 
 
-@pytest.mark.parametrize("file, other", [*((file, {}) for file in PROGRAMS), ("beam.cl", {"DOUBLE": 1})], ids=str)
+@pytest.mark.parametrize(
+    "file, other",
+    [*((file, {}) for file in PROGRAMS), ("beam.cl", {"DOUBLE": 1}), *((file, GROUPED) for file in SHARED)],
+    ids=str,
+)
 def test_pocl_needs_the_short_header_alone(device, monkeypatch, file, other):
     if device.info.platform != _programs.POCL:
         pytest.skip("not PoCL")
-    if not device.info.fp64 and ("float64" in file or other):
+    if not device.info.fp64 and ("float64" in file or "DOUBLE" in other):
         pytest.skip("no float64")
     import pyopencl
 
