@@ -8,8 +8,10 @@ from helpers.facet_cases import plate, seen_from, still
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.base.vectors import unit
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
-from sarcl.scattering._cutting_error import longest_piece
+from sarcl.scattering._cutting_error import CuttingError, longest_piece
 from sarcl.scene.triangles import cut
 
 TONE = sarcl.Waveform.chirp(center=9.6e9, bandwidth=1e6, duration=1e-6)
@@ -102,6 +104,39 @@ def test_many_looks_take_the_estimate_from_small_pieces():
     ]  # fmt: skip
     assert np.linalg.norm(raw.samples[:, 0] - exact) <= 1e-2 * np.linalg.norm(exact)
     assert raw.report.plan["facets"] <= 1e5
+
+
+def cutting_error(triangles, tx):
+    ends = PulseGeometry(tx[None], tx[None])
+    scene = sarcl.Scene.facets(triangles, two_sided=False)
+    return CuttingError(scene, np.ones(len(triangles), bool), ends, 9.6e9, 0.0, ("HH",), VERTICAL)
+
+
+@pytest.mark.parametrize("triangles", [plate(1.0), SCALENE], ids=["plate", "scalene"])
+@pytest.mark.parametrize("distance, off", [(10.0, 5), (10.0, 20), (30.0, 20)])
+def test_the_estimate_from_small_pieces_is_no_less_than_their_error_and_no_more_than_ten_times(
+    triangles, distance, off
+):
+    """Sums of linear phases over all pieces against the integral over the facets."""
+    tx, f = seen_from(distance, np.radians(off)), 9.6e9
+    k, up = 2 * np.pi * f / SPEED_OF_LIGHT, tuple(VERTICAL.tolist())
+    whole = facet.facet_echo(triangles, np.inf, np.array([f]), tx, tx, distance, up=up)[0, 0, 0]
+    estimates = cutting_error(triangles, tx)
+    for edge in (0.01, 0.0053):
+        parts, _ = cut(triangles, longest_piece(edge), 10**6)
+        middle = parts.mean(axis=1)
+        look = unit(tx - middle)
+        made = facet.facet_amplitude(parts, np.inf, f, look, look, up)[:, 0, 0]
+        total = made @ np.exp(-2j * k * (np.linalg.norm(tx - middle, axis=1) - distance))
+        found = abs(total - whole) / abs(whole)
+        assert found <= estimates.gain(edge) * estimates.relative(edge) <= 10 * found
+
+
+def test_pieces_in_step_with_the_wave_have_no_estimate():
+    # a direction in which the errors of pieces add up exists from half a cycle of path along an edge on
+    estimates = cutting_error(plate(1.0), seen_from(1e4, np.radians(20)))
+    most = np.pi / (4 * np.pi * 9.6e9 / SPEED_OF_LIGHT * np.sin(np.radians(20)))
+    assert np.isinf(estimates.relative(1.01 * most)) and estimates.relative(0.99 * most) < 1e-3
 
 
 def test_rounding_does_not_decide_which_pieces_are_cut():

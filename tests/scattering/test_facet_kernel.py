@@ -138,8 +138,8 @@ def scattering_cases():
     u[1000:1500] -= (1 - 1e-3) * (u * normal).sum(axis=1)[1000:1500, None] * normal[1000:1500]
     u[1500:2000] *= -1
     r[2000:2500] *= -1
-    for end, rows in ((u, slice(2500, 3000)), (r, slice(3000, 3500))):
-        cosine = random.uniform(-3 * EDGE_ON, 3 * EDGE_ON, (500, 1))
+    for end, rows in ((u, slice(2500, 3500)), (r, slice(3000, 4000))):
+        cosine = random.uniform(-2 * EDGE_ON, 2 * EDGE_ON, (1000, 1))
         end[rows] += (cosine - (end * normal).sum(axis=1)[rows, None]) * normal[rows]
     r /= np.linalg.norm(r, axis=1, keepdims=True)
     u /= np.linalg.norm(u, axis=1, keepdims=True)
@@ -172,7 +172,7 @@ def test_scattering_matrices_err_by_the_rounding_of_directions(device, antennas)
     fades = (np.minimum(cosine, seen) < wide) & (antennas == 2)
     bound[fades] += 3e-7 / EDGE_ON
     assert (np.abs(got - wanted).max(axis=(1, 2)) < bound).all()
-    assert antennas == 1 or 500 < (fades & (wanted != 0).any(axis=(1, 2))).sum() < 1000
+    assert antennas == 1 or (fades & (wanted != 0).any(axis=(1, 2))).sum() > 500
     assert (got[1500:2000] == 0).all() and np.abs(wanted).max() > 1.9
     if antennas == 1:
         assert (got[np.isinf(eps)][:, 0, 1] == 0).all() and (got[:, 0, 1] == got[:, 1, 0]).all()
