@@ -50,7 +50,8 @@ class DirectionError:
         self.rounding = self._rounding([(antennas.tx[p], antennas.rx[p]) for p in spread_over(len(antennas), PULSES)])
         cancels = antennas.is_monostatic and bool(np.isinf(self._permittivity[mirror]).all())
         none = cancels or not mirror.any()
-        self.steep = [] if none else self._near_vertical(antennas, box(centroids(scene.triangles)))
+        rows = [] if none else steep_pulses(antennas, centroids(scene.triangles), vertical)
+        self.steep = [(antennas.tx[p], antennas.rx[p]) for p in rows]
         self._mirror = np.flatnonzero(mirror) if self.steep else np.zeros(0, int)
         self._drawn: list[tuple[np.ndarray, np.ndarray]] = []
 
@@ -60,7 +61,8 @@ class DirectionError:
         worst, sharp = 0.0, False
         for i, ends in enumerate(self.steep):
             if len(self._drawn) <= i:
-                self._drawn.append(self._draw(ends))
+                some, share = drawn_near_vertical(self._triangles[self._mirror], ends, self._vertical)
+                self._drawn.append((self._mirror[some], share))
             error, angle = self._turn(*self._drawn[i], ends, edge)
             worst, sharp = max(worst, error), sharp or angle > SHARP
         return worst, sharp
@@ -83,29 +85,6 @@ class DirectionError:
     def _matrix(self, normals: np.ndarray, to_tx: np.ndarray, to_rx: np.ndarray, some: np.ndarray) -> np.ndarray:
         """S of facets `some`, complex128 (n, 4)."""
         return scattering_matrix(normals, to_tx, to_rx, self._permittivity[some], self._vertical).reshape(-1, 4)
-
-    def _near_vertical(self, antennas: PulseGeometry, bounds: np.ndarray) -> list[Ends]:
-        """Antennas at the pulse at which the line of sight of each antenna comes nearest to the vertical."""
-        middle, radius = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
-        out = []
-        for end in antennas.ends:
-            look = end - middle
-            aside = np.linalg.norm(_level(look, self._vertical), axis=1)
-            sine = (aside - radius) / (np.linalg.norm(look, axis=1) + radius)
-            at = int(np.argmin(sine))
-            if sine[at] < STEEP:
-                out.append((antennas.tx[at], antennas.rx[at]))
-        return out
-
-    def _draw(self, ends: Ends) -> tuple[np.ndarray, np.ndarray]:
-        """Facets sampled at a pulse, more near the vertical through an antenna; and the number that each represents."""
-        triangles = self._triangles[self._mirror]
-        area, places = areas(triangles), centroids(triangles)
-        aside = np.minimum.reduce([np.linalg.norm(_level(places - end, self._vertical), axis=1) for end in ends])
-        steep = area / np.maximum(aside, np.maximum.reduce(edges(triangles))) ** 2
-        size = area / area.sum() + steep / steep.sum() if area.any() else area
-        some, share = drawn(size, FACETS, np.random.default_rng(4))
-        return self._mirror[some], share
 
     def _turn(self, some: np.ndarray, share: np.ndarray, ends: Ends, edge: float) -> tuple[float, float]:
         pieces, of = self._graded(self._triangles[some], ends, edge)
@@ -148,7 +127,35 @@ class DirectionError:
             of = np.concatenate([of[~long], of[long], of[long]])
 
 
-def _level(vectors: np.ndarray, up: tuple[float, float, float]) -> np.ndarray:
+def steep_pulses(antennas: PulseGeometry, places: np.ndarray, vertical: Sequence[float] | np.ndarray) -> list[int]:
+    """For each antenna the pulse at which lines of sight to places, m (n, 3), come nearest to the vertical, where they
+    come within 30 deg of it."""
+    bounds = box(places)
+    middle, radius = bounds.mean(axis=0), float(np.linalg.norm(bounds[1] - bounds[0])) / 2
+    out = []
+    for end in antennas.ends:
+        look = end - middle
+        aside = np.linalg.norm(_level(look, vertical), axis=1)
+        sine = (aside - radius) / (np.linalg.norm(look, axis=1) + radius)
+        at = int(np.argmin(sine))
+        if sine[at] < STEEP:
+            out.append(at)
+    return out
+
+
+def drawn_near_vertical(
+    triangles: np.ndarray, ends: Ends, vertical: Sequence[float] | np.ndarray
+) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of facets sampled at a pulse, more of them near the vertical through an antenna; and the number that each
+    represents."""
+    area, places = areas(triangles), centroids(triangles)
+    aside = np.minimum.reduce([np.linalg.norm(_level(places - end, vertical), axis=1) for end in ends])
+    steep = area / np.maximum(aside, np.maximum.reduce(edges(triangles))) ** 2
+    size = area / area.sum() + steep / steep.sum() if area.any() else area
+    return drawn(size, FACETS, np.random.default_rng(4))
+
+
+def _level(vectors: np.ndarray, up: Sequence[float] | np.ndarray) -> np.ndarray:
     """Horizontal part of vectors (n, 3)."""
     axis = np.array(up)
     return np.asarray(vectors - (vectors @ axis)[..., None] * axis)

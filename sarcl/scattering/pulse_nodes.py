@@ -5,7 +5,7 @@ docs/theory/facets.md derives the error; it is measured on samples, and held by 
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -14,6 +14,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..numerics.polynomials import lagrange
 from ..scene.triangles import areas, centroids, edges
+from ._direction_error import drawn_near_vertical, steep_pulses
 from ._facet_sampling import drawn
 from ._frequency_nodes import typical_power
 from .antenna_weights import AntennaWeights
@@ -22,9 +23,13 @@ from .facets import FacetSet
 ORDER = 4  # nodes that a cubic goes through
 SPACINGS = (64, 32, 16, 8, 4)  # pulses between nodes that are tried
 FACETS, WINDOWS = 200, 6  # samples: facets, and intervals between nodes along the track
+STEEP_WINDOWS = 32  # such intervals where facets pass below an antenna, each at another pulse
 WORTH = 2e7  # pairs of facet and pulse: below, estimating the error would cost more than the nodes save
 MOST_TURN = 1.0  # rad between nodes, of the phase from a facet's corner to its centre: no specular flash lies between
 SAFETY = 2.0  # the error is estimated from samples
+
+
+Sample = tuple[FacetSet, np.ndarray]  # facets, and the number that each represents (k,)
 
 
 @dataclass(frozen=True, eq=False)
@@ -80,7 +85,16 @@ def plan_pulse_nodes(
     if len(part) * n_pulses < WORTH:
         return every(n_pulses)
     some, share = drawn(areas(part.triangles), FACETS, np.random.default_rng(0))
-    sample = part.picked(some)
+    sample, geometry = part.picked(some), weights.geometry
+    steep = steep_pulses(geometry, centroids(part.triangles), vertical)
+
+    def sampled(pulse: int) -> Sample:
+        """H and V of facets near the vertical through an antenna turn fastest: other facets at every pulse."""
+        if not steep:
+            return sample, share
+        near, represents = drawn_near_vertical(part.triangles, (geometry.tx[pulse], geometry.rx[pulse]), vertical)
+        return part.picked(near), represents
+
     corner = float(np.maximum.reduce(edges(part.triangles)).max()) * 2 / 3 if part.is_mirror else 0.0
     for spacing in SPACINGS:
         if n_pulses < 4 * spacing + 1:
@@ -88,7 +102,7 @@ def plan_pulse_nodes(
         turn = 2 * np.pi * frequency / SPEED_OF_LIGHT * corner * _turning(weights, centroids(sample.triangles), spacing)
         if turn > MOST_TURN:
             continue
-        error = _error(sample, share, weights, polarizations, vertical, frequency, spaced(n_pulses, spacing))
+        error = _error(sampled, steep, weights, polarizations, vertical, frequency, spaced(n_pulses, spacing))
         if SAFETY * error <= tolerance:
             return spaced(n_pulses, spacing, SAFETY * error)
     return every(n_pulses)
@@ -104,32 +118,39 @@ def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float
 
 
 def _error(
-    part: FacetSet, share: np.ndarray, weights: AntennaWeights, polarizations: Sequence[str], vertical: np.ndarray,
-    frequency: float, nodes: PulseNodes,
+    sampled: Callable[[int], Sample], steep: Sequence[int], weights: AntennaWeights, polarizations: Sequence[str],
+    vertical: np.ndarray, frequency: float, nodes: PulseNodes,
 ) -> float:  # fmt: skip
     """Relative error of amplitudes a quarter, a half and three quarters on from some of the nodes.
 
-    share  (k,), the number of facets that each of `part` represents
+    sampled  facets that are sampled from a pulse on, and the number that each represents (k,)
+    steep    pulses that are sampled whatever the others
     """
-    n_pulses, places = len(weights.geometry), centroids(part.triangles)
+    last = len(weights.geometry) - 1 - nodes.spacing
     wrong = right = 0.0
-    made: dict[int, np.ndarray] = {}
-
-    def at(pulse: int) -> np.ndarray:
-        if pulse not in made:
-            ends = weights.geometry.tx[pulse], weights.geometry.rx[pulse]
-            sent = part.amplitudes(*ends, np.array([frequency]), polarizations, vertical)[0]
-            made[pulse] = sent * weights.weights(places, pulse, frequency)[:, None]
-        return made[pulse]
-
-    starts = np.linspace(0, n_pulses - 1 - nodes.spacing, WINDOWS).astype(int) // nodes.spacing * nodes.spacing
-    for start in np.unique(starts).tolist():
+    starts = np.append(
+        np.linspace(0, last, STEEP_WINDOWS if steep else WINDOWS), np.minimum(np.array(steep, int), last)
+    )
+    for start in np.unique(starts.astype(int) // nodes.spacing * nodes.spacing).tolist():
+        part, share = sampled(start)
+        made: dict[int, np.ndarray] = {}
         for step in (1, 2, 3):
             pulse = start + max(1, step * nodes.spacing // 4)
             needed, which, factors = nodes.of(pulse, pulse + 1)
-            guess = sum(
-                factor * at(int(needed[which[0, 0] + q])) for q, factor in enumerate(factors[0].astype(float).tolist())
-            )
-            wrong += float(share @ (np.abs(guess - at(pulse)) ** 2).sum(axis=1))
-            right += typical_power(share * (np.abs(at(pulse)) ** 2).sum(axis=1))
+            near = needed[which[0, 0] :][:ORDER].tolist()
+            for one in {*near, pulse} - made.keys():
+                made[one] = _amplitudes(part, weights, one, polarizations, vertical, frequency)
+            guess = sum(factor * made[one] for factor, one in zip(factors[0].astype(float).tolist(), near, strict=True))
+            wrong += float(share @ (np.abs(guess - made[pulse]) ** 2).sum(axis=1))
+            right += typical_power(share * (np.abs(made[pulse]) ** 2).sum(axis=1))
     return float(np.sqrt(wrong / right)) if right else 0.0
+
+
+def _amplitudes(
+    part: FacetSet, weights: AntennaWeights, pulse: int, polarizations: Sequence[str], vertical: np.ndarray,
+    frequency: float,
+) -> np.ndarray:  # fmt: skip
+    """Amplitudes at a pulse, weights of the antennas included, complex128 (k, n_polarizations)."""
+    ends = weights.geometry.tx[pulse], weights.geometry.rx[pulse]
+    sent = part.amplitudes(*ends, np.array([frequency]), polarizations, vertical)[0]
+    return np.asarray(sent * weights.weights(centroids(part.triangles), pulse, frequency)[:, None])

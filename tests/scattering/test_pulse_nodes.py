@@ -7,7 +7,10 @@ from helpers.cases import thinned
 import sarcl
 from sarcl import pointing
 from sarcl.model.antenna import Antenna
+from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.scattering import pulse_nodes
+from sarcl.scattering.antenna_weights import AntennaWeights
+from sarcl.scattering.facets import FacetSet
 from sarcl.scattering.pulse_nodes import PulseNodes, every, spaced
 from sarcl.scene.material import Material
 
@@ -115,3 +118,29 @@ def test_memory_for_amplitudes_keeps_to_the_budget(device):
         for size in (1e6, 1e9)
     )
     np.testing.assert_allclose(small.samples, large.samples, atol=1e-4 * np.abs(large.samples).max())
+
+
+@pytest.mark.parametrize("tolerance", [2e-3, 2e-2])
+def test_the_error_between_nodes_knows_how_h_and_v_turn_below_the_antenna(always, tolerance):
+    """4000 facets under a track, seen by a receiver 40 deg off the vertical: 16 pulses apart, thrice the estimate."""
+    random, n, names, up = np.random.default_rng(2), 4000, ("HH", "VV"), np.array([0.0, 0.0, 1.0])
+    places = random.uniform((-100, -100, 0), (100, 100, 5), (n, 3))
+    part = FacetSet(
+        places[:, None] + 0.02 * random.normal(size=(n, 3, 3)), np.ones(n), np.ones(n, bool), np.zeros(n, int),
+        (Material(),), None, np.arange(n), np.zeros(0),
+    )  # fmt: skip
+    tx = np.stack([np.linspace(-50, 50, 1001), np.zeros(1001), np.full(1001, 1e3)], axis=1)
+    geometry = PulseGeometry(tx, np.broadcast_to([700.0, 300.0, 900.0], (1001, 3)))
+    nodes = pulse_nodes.plan_pulse_nodes(part, AntennaWeights(geometry, 9.6e9), names, up, 9.6e9, tolerance)
+    assert (nodes.spacing > 1) == (tolerance > 1e-2)
+
+    def sent(pulse):
+        return part.amplitudes(geometry.tx[pulse], geometry.rx[pulse], np.array([9.6e9]), names, up)[0]
+
+    wrong = right = 0.0
+    for pulse in random.integers(0, 1001, 24).tolist():
+        needed, which, factors = nodes.of(pulse, pulse + 1)
+        near = needed[which[0, 0] :][: nodes.order]
+        guess = sum(factor * sent(one) for factor, one in zip(factors[0].astype(float), near, strict=True))
+        wrong, right = wrong + np.abs(guess - sent(pulse)) ** 2, right + np.abs(sent(pulse)) ** 2
+    assert np.sqrt(wrong.sum() / right.sum()) <= nodes.error <= tolerance
