@@ -66,7 +66,7 @@ def current_sums(device: Device, currents: Currents, paths: Paths, *, max_bytes:
     for first in range(0, n_pulses, PULSES):
         part = paths.part(np.arange(first, min(first + PULSES, n_pulses)))
         count = -(-len(part.tx) // lanes) * lanes
-        tables = [device.copied(values) for values in _tables(part, count)]
+        tables = [device.upload(values) for values in _tables(part, count)]
         sums_per_cell = 8 * blocks * BLOCK * count / CHUNK
         most = int(budget(device, max_bytes) / (8 * n_frequencies + 16 + sums_per_cell)) // CHUNK
         for number, offset, values in lists:
@@ -127,7 +127,7 @@ def _sums(
     cells = np.column_stack([offset, (offset**2).sum(axis=1) / 2]).astype(np.float32)
     bounds = np.minimum(np.arange(chunks + 1) * CHUNK, n).astype(np.int32)
     sums = device.empty(8 * chunks * blocks * BLOCK * count)
-    arrays = [device.copied(table) for table in (cells, np.ascontiguousarray(values), bounds)]
+    arrays = [device.upload(table) for table in (cells, np.ascontiguousarray(values), bounds)]
     share = 1 if device.is_cpu else blocks
     size = (count // device.info.vector_width, chunks, share)
     device.run(

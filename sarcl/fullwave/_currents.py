@@ -83,7 +83,7 @@ def currents(
         norms = np.zeros((2, len(omega)))
         for (part, late), sum_ in zip(lists, sums, strict=True):
             turns = every * _turns(lattice, omega, times + late)
-            norms += fields.transform(part, device.copied(turns), sum_, SAMPLES, len(omega))
+            norms += fields.transform(part, device.upload(turns), sum_, SAMPLES, len(omega))
         decay.add(*norms)
         if progress:
             progress(fields.step, min(most_steps, max(expected_steps(table), fields.step + decay.missing_steps())))
