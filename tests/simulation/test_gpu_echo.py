@@ -55,9 +55,13 @@ def scattered(n, extent):
         (scattered(1000, 2.0), {}),  # hundreds of scatterers in a sample
         (scattered(300, 200.0), {"range_window": (-500, 500)}),  # some in a window of local memory, most beyond it
         (scattered(700, 60.0), {"range_window": (-20, 30)}),  # tiles that cross the edges of the range window
-        (scattered(130, 40.0), {"antenna": sarcl.Antenna.gaussian(width=(0.006, 0.02)), "pointed": True}),
-        (scattered(70, 3.0), {"tolerance": 1e-6}),
-        (scattered(1, 3.0), {}),
+        pytest.param(
+            scattered(130, 40.0),
+            {"antenna": sarcl.Antenna.gaussian(width=(0.006, 0.02)), "pointed": True},
+            marks=pytest.mark.slow,
+        ),
+        pytest.param(scattered(70, 3.0), {"tolerance": 1e-6}, marks=pytest.mark.slow),
+        pytest.param(scattered(1, 3.0), {}, marks=pytest.mark.slow),
     ],
     ids=["dense", "sparse", "window", "antenna", "1e-6", "one"],
 )
