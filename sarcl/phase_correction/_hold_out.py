@@ -29,6 +29,7 @@ KEPT = 0.95  # least change in sharpness, which is that of noise too, of the ech
 BRIGHT = 10  # points of the uncorrected image that must not be lost
 FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
 LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
+SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
 PASSES = 3  # of the estimate from given places
 IN_FOCUS = (
     "no phase sharpens echoes that it was not found from: the data are as well focused as these echoes can show; if "
@@ -175,8 +176,10 @@ def _none_lost(view: ApertureView, errors: Errors) -> bool:
     powers = view.power((zero, zero)), view.power(errors)
     (old, was), (new, now) = (_bright_points.pixels_and_levels(p, view.grid, _bright_points.CANDIDATES) for p in powers)
     bright = _bright_points.brightest(view.raw[:: view.channels], powers[0], view.grid, 8.0, BRIGHT)
-    # a phase that changes by so much per pulse moves a point by so much across range
-    turn = np.percentile(np.abs(np.diff(errors[0])), 90) * view.n / max(float(np.ptp(view.shift_phase[:, 0])), 1e-300)
+    # a phase that changes by so much per pulse moves a point by so much across range, unless it soon turns back
+    span = max(1, view.n // SPANS)
+    slope = np.percentile(np.abs(errors[0][span:] - errors[0][:-span]), 90) / span
+    turn = slope * view.n / max(float(np.ptp(view.shift_phase[:, 0])), 1e-300)
     for place in bright:
         level = was[np.linalg.norm(old - place, axis=1).argmin()]
         near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + turn
