@@ -11,7 +11,7 @@ from helpers.cases import noise_on
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging.range_doppler import _task
+from sarcl.imaging.range_doppler import _aperture_window, _task
 from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
 from sarcl.imaging.range_doppler._gain import gain_of
 from sarcl.imaging.range_doppler.range_doppler import _row_weights
@@ -52,6 +52,42 @@ def test_points_read_0_dbsm_and_have_the_side_lobes_of_the_window(raw, window, l
         assert 20 * np.log10(abs(seen.peak) / seen.gain) == pytest.approx(0, abs=0.05)
         assert seen.pslr[1] < lobes and abs(seen.pslr[1] - exact.pslr[1]) < 2.0
         assert 1 < seen.irw[1] / exact.irw[1] < 1.06
+
+
+@pytest.fixture(scope="module")
+def seen_beyond():
+    """The same points, seen by every row."""
+    with pytest.MonkeyPatch.context() as patch:
+        patch.setattr(strip_map, "seen", lambda points: np.ones((len(points), strip_map.N_ROWS), bool))
+        return strip_map.unit_points(n_samples=128)
+
+
+def levels(image, raw):
+    """Of the points, dB of the gain there."""
+    seen = [at_point(image, raw, k) for k in range(len(strip_map.POINTS))]
+    return 20 * np.log10([abs(point.peak) / point.gain for point in seen])
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, pytest.param(3e-3, marks=pytest.mark.slow)])
+def test_uniform_weights_within_the_beam_read_0_dbsm_wherever_the_antenna_sees(raw, seen_beyond, tolerance, caplog):
+    for data in (raw, seen_beyond):
+        image = sarcl.range_doppler(data, tolerance=tolerance, window=(None, "boxcar"), **BEAM)
+        assert np.abs(levels(image, data)).max() <= 0.05
+    assert "gain from beyond the beam" not in image.report.plan and not caplog.text
+
+
+@pytest.mark.parametrize("tolerance", [1e-2, pytest.param(3e-3, marks=pytest.mark.slow)])
+def test_without_a_window_the_report_says_what_rows_beyond_the_beam_make_of_the_gain(
+    raw, seen_beyond, tolerance, caplog
+):
+    """A point seen there reads 0 dBsm, one that is not reads low by what the report says, and the log with a remedy."""
+    image = sarcl.range_doppler(seen_beyond, tolerance=tolerance, **BEAM)
+    assert np.abs(levels(image, seen_beyond)).max() <= 0.05
+    image = sarcl.range_doppler(raw, tolerance=tolerance, **BEAM)
+    said = image.report.plan["gain from beyond the beam"]
+    # of the inner points, which rows see over the whole taper; the track ends within that of the others
+    assert levels(image, raw)[1:3] == pytest.approx(-float(said.split()[0]), abs=0.1)
+    assert f"reads up to {said} low; window=(None, 'boxcar') keeps within the beam" in caplog.text
 
 
 @pytest.mark.parametrize("window", ["hamming", "triang", TAYLOR])
@@ -121,7 +157,8 @@ def test_points_at_the_end_of_a_strip_are_as_bright_as_in_its_middle():
 
 
 @pytest.mark.parametrize("zones", [8, 30])
-def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones):
+def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones, monkeypatch):
+    monkeypatch.setattr(_aperture_window, "INWARDS", (1 / 8,))  # of the width, whatever is left beyond the beam
     # measured with white noise for ends of k Fresnel zones: 0.45/(k^3 sqrt n), docs/theory/range_doppler.md
     box = np.ones(windows.TABLE)
     half = zones * ZONE / 2
@@ -129,6 +166,15 @@ def test_the_error_of_weights_is_that_of_the_smooth_ends_of_a_beam(zones):
     width = np.ptp(made.ends) / ZONE - zones
     k = width / (1 - 2 / 8)  # the window begins an eighth of a width within the beam
     assert made.error == pytest.approx(0.5 / (k**3 * np.sqrt(zones)), rel=0.35) and made.error <= 3e-3
+
+
+@pytest.mark.parametrize("zones", [4, 8, 30])
+def test_hardly_any_weight_is_left_to_rows_beyond_the_beam(zones):
+    half = zones * ZONE / 2
+    for window in ("boxcar", "hamming", "hann", TAYLOR):
+        made = ApertureWindow.over(-half, half, windows.table(window), ZONE, 3e-2)
+        rows = made.weights / (1 - made.sines**2) ** 1.5  # even in the tangent of the squint angle
+        assert rows[np.abs(made.sines) > half].sum() <= 4e-3 * rows.sum()
 
 
 @pytest.mark.parametrize("window", ["hamming", TAYLOR, "hann", "triang"])

@@ -16,9 +16,11 @@ from dataclasses import dataclass
 import numpy as np
 
 LEAST_ZONES = 1.5  # Fresnel zones, smallest width of B
-# of the width of B, by which W begins and ends within the beam: of the weights of rows outside, which an antenna whose
-# beam ends there does not see, hardly any is left, and 0.1 dB of their level would be; W is that much narrower
-INWARDS = 1 / 8
+# of the width of B, by which W begins and ends within the beam, so that hardly any weight is left to rows outside,
+# which an antenna whose beam ends there does not see: the first that leaves them OUTSIDE of the weights, 0.04 dB, or
+# less. W is that much narrower. Windows that fall towards their ends take the first, one that does not takes more
+INWARDS = 1 / 8, 3 / 16, 1 / 4, 5 / 16, 3 / 8, 7 / 16, 1 / 2
+OUTSIDE = 4e-3
 FINE, FINEST = 32, 2048  # least cells of the table per Fresnel zone, and in the beam
 FAINTEST = 1e-9  # of the largest weight: smaller ones are rounding of an FFT
 MARGIN = 12.0  # Fresnel zones beside the beam in which the stationary phase is compared: it spreads by a few
@@ -46,18 +48,28 @@ class ApertureWindow:
         """
         zones = LEAST_ZONES
         while True:
-            made = cls._smoothed(low, high, table, zone, zones)
+            for inwards in INWARDS:
+                made = cls._smoothed(low, high, table, zone, zones, inwards)
+                if made.error > allowed or made.outside(low, high) <= OUTSIDE:
+                    break
             if made.error <= allowed:
                 return made
             zones *= 1.2
 
+    def outside(self, low: float, high: float) -> float:
+        """Share of the weights that rows have which see the point beyond a beam from `low` to `high`, sines."""
+        rows = self.weights / (1 - self.sines**2) ** 1.5  # even in the tangent
+        return float(rows[(self.sines < low) | (self.sines > high)].sum() / rows.sum())
+
     @classmethod
-    def _smoothed(cls, low: float, high: float, table: np.ndarray, zone: float, zones: float) -> ApertureWindow:
+    def _smoothed(
+        cls, low: float, high: float, table: np.ndarray, zone: float, zones: float, share: float
+    ) -> ApertureWindow:
         from scipy.signal import fftconvolve
 
         step = min(zone / FINE, (high - low) / FINEST)
         half = int(np.ceil(zones * zone / 2 / step))
-        inwards = min(INWARDS * zones * zone, (high - low) / 4)  # a beam of few zones keeps half of itself
+        inwards = min(share * zones * zone, (high - low) / 4)  # a beam of few zones keeps half of itself
         low, high = low + inwards, high - inwards
         n = int(np.ceil((high - low) / step)) + 2 * half + 1
         sines = (low + high) / 2 + step * (np.arange(n) - (n - 1) / 2)

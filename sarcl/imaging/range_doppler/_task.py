@@ -19,7 +19,7 @@ from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ...opencl.device import Device
 from ..focusing_task import weigh
-from ._doppler import centroid_of_data, centroid_of_geometry
+from ._doppler import centroid_of_data, centroid_of_geometry, sine
 from ._extent import Extent, choose_extent
 from ._focus import Budget
 from ._ground import Ground
@@ -59,6 +59,19 @@ class RangeDopplerTask:
     wavelength: float
     worst: float
 
+    @property
+    def beyond_beam(self) -> float:
+        """What a point in the middle of the image lacks, dB, if no echo of it comes from beyond the beam; 0 or less.
+
+        The tapers of a beam without a window lie beyond it, and rows there count in the gain.
+        """
+        plan, r = self.plan, float(self.plan.ranges.mean())
+        speed, _, shift = (float(v[0]) for v in plan.fit.at(np.array([r])))
+        sines = sine(np.array(self.extent.middle_time + shift), np.array(r), self.track.times, speed)
+        weights = plan.band.weight(sines) * self.row_weight
+        within = weights[(sines >= plan.band.low) & (sines <= plan.band.high)].sum()
+        return float(20 * np.log10(within / weights.sum())) if within else 0.0
+
     def describe(self) -> dict[str, Any]:
         """The plan, Doppler, velocity and the errors by cause, for a report."""
         plan, extent, (expected, centroid) = self.plan, self.extent, self.centroids
@@ -73,6 +86,8 @@ class RangeDopplerTask:
         out["Doppler rate"] = f"{used:.6g} Hz/s"
         if plan.fit is not self.known:
             out["Doppler rate of the geometry"] = f"{geometry:.6g} Hz/s"
+        if extent.has_beam and plan.band.window is None:
+            out["gain from beyond the beam"] = f"{-self.beyond_beam:.2f} dB"
         return {
             **out,
             "Doppler band": f"{hertz * (plan.band.high - plan.band.low):.5g} Hz of the image, "

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import logging
 from collections.abc import Callable, Sequence
 from typing import Literal
 
@@ -26,6 +27,14 @@ from ._gain import gain_of
 from ._plan import FocusPlan
 from ._task import RangeDopplerTask, make_task
 from ._track import Track
+
+log = logging.getLogger(__name__)
+
+TOLD = 0.05  # dB, of the level of a point, from which on it is said that the beam's tapers lie beyond it
+BEYOND = (
+    "the beam has no window along the track, and ends in tapers beyond its angle, whose rows count in the gain: a "
+    "point that the antenna does not see there reads up to %.2f dB low; window=(None, 'boxcar') keeps within the beam"
+)
 
 Progress = Callable[[str, int, int], None]
 
@@ -67,7 +76,8 @@ def range_doppler(
     spacing    (s, m) between rows and columns, or None for either: the spectrum of a pixel then fills 0.8 of the
                sampling rate at most. Rows are a whole fraction of the pulse interval apart, no farther than asked
     beam       None: all rows contribute to every pixel. Else the azimuth beam, full angle in rad about the Doppler
-               centroid: rows that see a pixel outside it do not contribute. Its ends are tapered
+               centroid: rows that see a pixel outside it do not contribute. Its ends are tapered, beyond the angle
+               without a window along the track (the log and the report say how much that is), else within it
     doppler    centroid of the beam, and of the default times: "geometry", from reference ranges that change (else
                broadside); "data", from the phases of neighbouring rows; or in Hz, at the centre frequency
     doppler_rate  of the azimuth compression: "geometry", from the track; "data", from the displacement of two looks
@@ -95,6 +105,8 @@ def range_doppler(
     )  # fmt: skip
     plan, track, weight = task.plan, task.track, (task.sample_weight, task.row_weight)
     grid = ImageGrid.zero_doppler(plan.times, plan.ranges, task.ground.positions(plan.times, plan.ranges))
+    if task.extent.has_beam and plan.band.window is None and task.beyond_beam < -TOLD:
+        log.warning(BEYOND, -task.beyond_beam)
     clock.lap("plan")
 
     def on_progress(share: float) -> None:
