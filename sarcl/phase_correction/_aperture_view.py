@@ -21,7 +21,6 @@ TOLERANCE = 1e-2  # of images in which bright points are chosen
 LAGS = np.arange(-4, 5) / 2  # range cells from a point
 NO_LAG = np.zeros(1)
 WINDOW = 64.0  # Doppler cells about a point that sharpness is computed over, after the first passes
-SAME = 1e-6  # rad, and range cells: errors that differ by less make the same image
 MOST_PIXELS = 4000  # brightest pixels that are used over a wide aperture
 MOST_VALUES = 2.5e7  # contributions of a pulse to a point, 8 bytes each, that are kept at a time
 
@@ -100,23 +99,12 @@ class ApertureView:
 
     def power(self, errors: Errors) -> np.ndarray:
         """Power of the image of the corrected rows, of grid.shape, summed over polarisations; ValueError if 0."""
-        if not any(e.any() for e in errors):
-            return self._plain_power
-        if self._last and all(np.allclose(a, b, 0, SAME * unit)
-                              for a, b, unit in zip(errors, self._last[0], (1, self.cell), strict=True)):  # fmt: skip
-            return self._last[1]
-        self._last[:] = errors, self._power(errors)
-        return self._last[1]
+        return self._power(errors) if any(e.any() for e in errors) else self._plain_power
 
     @cached_property
     def _plain_power(self) -> np.ndarray:
         """`power` without errors, which every search starts from, and every correction is compared with."""
         return self._power((np.zeros(self.n), np.zeros(self.n)))
-
-    @cached_property
-    def _last(self) -> list[Any]:
-        """The errors of the last other `power`, and that power: what was searched for is then tested."""
-        return []
 
     def _power(self, errors: Errors) -> np.ndarray:
         raw = self.corrected(errors)

@@ -86,7 +86,6 @@ def _widened(view: ApertureView, errors: Errors) -> Errors:
         if passes and _phase_gradient.sharpness(v, found, 0) < ENOUGH * _phase_gradient.sharpness(v, start, 0):
             break
         first, last = low, high
-    phase, shift = view.shift_removed((phase, shift))
     # a start without phases: where targets seen by different pulses have none in common, growth loses some of them
     zero = np.zeros(n)
     places = view.probes((zero, shift), (phase, shift))
