@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 
+from ..base.constants import EDGE_ON
 from ..base.vectors import unit
 
 CENTROID = np.array([[1 / 3, 1 / 3]])
@@ -14,14 +15,16 @@ def sample(
 ) -> np.ndarray:
     """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
 
-    By `lift` of a facet's longest edge along its normal, to the side that the viewpoint and the `other` look at.
+    By `lift` of a facet's longest edge along its normal; where it is edge-on to the viewpoint, to the side that the
+    viewpoint and the `other` look at.
     """
     a = triangles[:, 0]
     b, c = triangles[:, 1] - a, triangles[:, 2] - a
     normal = np.cross(b, c)
     normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    looks = sum(unit(end - a) for end in (viewpoint, viewpoint if other is None else other))
-    normal[np.einsum("ij,ij->i", normal, looks) < 0] *= -1
+    ends = (viewpoint, viewpoint if other is None else other)
+    above, below = (np.einsum("ij,ij->i", normal, unit(end - a)) for end in ends)
+    normal[np.where(np.abs(above) <= 2 * EDGE_ON, above + below, above) < 0] *= -1
     length = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     u, v = np.asarray(places).T[:, None, :, None]
     return (a + lift * length[:, None] * normal)[:, None] + u * b[:, None] + v * c[:, None]

@@ -6,6 +6,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.constants import EDGE_ON
 from ..base.vectors import dot, unit
 from ..opencl.device import Device
 from ._ray_casting import DeviceFacets, Frame
@@ -42,8 +43,9 @@ class EmbreeOccluders:
         found = np.empty((n, samples), np.uint8)
         for first in range(0, n, CHUNK):
             part = row[first : first + CHUNK]
-            looks = unit(eye - part[:, :3]) + unit(beside - part[:, :3])
-            side = np.sign(dot(part[:, 9:], looks))[:, None] * part[:, 9:]
+            normal = unit(part[:, 9:])
+            above, below = (dot(normal, unit(end - part[:, :3])) for end in (eye, beside))
+            side = np.sign(np.where(np.abs(above) <= 2 * EDGE_ON, above + below, above))[:, None] * part[:, 9:]
             for s, (u, v) in enumerate(uv):
                 start = part[:, :3] + u * part[:, 3:6] + v * part[:, 6:9] + side
                 ahead = eye - start

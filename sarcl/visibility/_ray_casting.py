@@ -98,7 +98,8 @@ class Occluders:
         """Set the bits of occluded sample points.
 
         index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
-        other  the other antenna, m (3,), or `viewpoint`: sample points lie on the side of a facet that both look at
+        other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
+               viewpoint its sample points lie
         """
         kernel = self.device.kernel("ray_casting.cl", "hidden")
         eye = self.frame.eye(viewpoint)
