@@ -8,6 +8,7 @@ from __future__ import annotations
 import faulthandler
 import os
 import pickle
+import re
 import resource
 import signal
 import warnings
@@ -18,16 +19,29 @@ import numpy as np
 
 LARGE = (0, 1, 0x7F, 0xFF, 0x7FFF, 0xFFFF, 0x7FFFFFFF, 0xFFFFFFFF, 0x7FFFFFFFFFFFFFFF, 0xFFFFFFFFFFFFFFFF)
 DIGITS = b'0123456789-+.eE ,\n"[]{}='
+EXTREMES = (
+    "0", "1", "-1", "-0.0", "1e400", "1e-320", "nan", "inf", "9" * 25, "2147483648", "1e9", "true", '""', "[]", "",
+)  # fmt: skip
+NUMBER, WORD = re.compile(r"[-+]?\d[\d.]*(?:[eE][-+]?\d+)?"), re.compile(r"\w+")
 PATIENCE = 10  # s for one file; these files are read in milliseconds
 MEMORY = 2**31  # bytes that reading one file may take, beyond what the process has
 REFUSALS = (ValueError, TypeError, OSError, MemoryError)
 
 
 def mutated(data: bytes, seed: int) -> bytes:
-    """`data` with one to four changes: bits, bytes, words of extreme values, digits, pieces cut, repeated or moved."""
+    """`data` with one to four changes: bits, bytes, words of extreme values, digits, pieces cut, repeated or moved.
+
+    Of text every other case remains text, so that parsers hand it on: numbers, words and lines are changed.
+    """
     rng = np.random.default_rng(seed)
+    changes = 1 + int(rng.geometric(0.6)) % 4
+    if seed % 2 and data.isascii():
+        text = data.decode()
+        for _ in range(changes):
+            text = _changed_text(text, rng)
+        return text.encode()
     out = bytearray(data)
-    for _ in range(1 + int(rng.geometric(0.6)) % 4):
+    for _ in range(changes):
         n = max(len(out), 1)
         at, length = int(rng.integers(n)), int(min(2 ** rng.integers(0, 8), n))
         kind = int(rng.integers(10))
@@ -51,6 +65,30 @@ def mutated(data: bytes, seed: int) -> bytes:
             to = int(rng.integers(n))
             out[to : to + length] = out[at : at + length]
     return bytes(out)
+
+
+def _changed_text(text: str, rng: np.random.Generator) -> str:
+    """`text` with an extreme number, another digit, a line more or less, or a word in the place of another."""
+
+    def any_of(found: list[re.Match[str]]) -> re.Match[str]:
+        return found[int(rng.integers(len(found)))]
+
+    kind, numbers, words = int(rng.integers(4)), list(NUMBER.finditer(text)), list(WORD.finditer(text))
+    if kind <= 1 and numbers:
+        begin, end = any_of(numbers).span()
+        if kind == 0:
+            return text[:begin] + str(rng.choice(EXTREMES)) + text[end:]
+        at = int(rng.integers(begin, end))
+        return text[:at] + str(rng.choice(list("0123456789-.e"))) + text[at + 1 :]
+    if kind == 2 and words:
+        begin, end = any_of(words).span()
+        return text[:begin] + any_of(words).group() + text[end:]
+    lines = text.split("\n")
+    if rng.random() < 0.5:
+        del lines[int(rng.integers(len(lines)))]
+    else:
+        lines.insert(int(rng.integers(len(lines))), lines[int(rng.integers(len(lines)))])
+    return "\n".join(lines)
 
 
 def outcomes(

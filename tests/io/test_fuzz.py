@@ -27,8 +27,8 @@ from sarcl.scenario import scenario
 pytestmark = pytest.mark.skipif(not hasattr(os, "fork") or not Path("/proc/self/statm").exists(), reason="Linux alone")
 QUICK = 40  # mutations per format
 BOX = trimesh.creation.box((1, 2, 3))
-STATE = """<OSV><UTC>UTC=2021-12-23T05:{0:02d}:00.000000</UTC><X unit="m">7071000.{0}</X><Y unit="m">{0}000.0</Y>
-<Z unit="m">0.5</Z><VX unit="m/s">0.1</VX><VY unit="m/s">7500.0</VY><VZ unit="m/s">{0}.5</VZ></OSV>"""
+STATE = """<OSV><UTC>UTC=2021-12-23T05:{0:02d}:00.000000</UTC><X unit="m">{1}</X><Y unit="m">{2}</Y>
+<Z unit="m">{3}</Z><VX unit="m/s">{4}</VX><VY unit="m/s">{5}</VY><VZ unit="m/s">{6}</VZ></OSV>"""
 
 
 def raw_file(path):
@@ -80,6 +80,13 @@ def raster_file(path):
 def virtual_raster_file(path):
     raster_file(path.with_name("beside.tif"))
     path.write_text(VIRTUAL)
+
+
+def orbit_file(path):
+    made = sarcl.Orbit.kepler(7.07e6, 0.001, 1.7, span=(-60, 720))
+    states = [(i, *made.positions(60.0 * i).round(3), *made.velocities(60.0 * i).round(6)) for i in range(12)]
+    text = "".join(STATE.format(*state) for state in states)
+    path.write_text(f"<Earth_Explorer_File><Ref_Frame>EARTH_FIXED</Ref_Frame>{text}</Earth_Explorer_File>")
 
 
 def read_heights(path):
@@ -143,13 +150,7 @@ FORMATS = {
     "heights.tif": (raster_file, read_heights),
     "heights.asc": (raster_file, read_heights),
     "heights.vrt": (virtual_raster_file, read_heights),
-    "orbit.EOF": (
-        lambda path: path.write_text(
-            "<Earth_Explorer_File><Ref_Frame>EARTH_FIXED</Ref_Frame>"
-            + "".join(STATE.format(i) for i in range(12)) + "</Earth_Explorer_File>"
-        ),
-        sarcl.Orbit.read,
-    ),
+    "orbit.EOF": (orbit_file, sarcl.Orbit.read),
 }  # fmt: skip
 
 
@@ -187,10 +188,7 @@ def fuzzed(folder, name, cases):
     write, read = FORMATS[name]
     write(folder / name)
     whole = (folder / name).read_bytes()
-    try:
-        wanted = digest(read(folder / name))
-    except ValueError:  # the states of an orbit need not be those of a satellite
-        wanted = ""
+    wanted = digest(read(folder / name))
 
     def judge(case):
         path = folder / f"mutated-{name}"
