@@ -185,8 +185,9 @@ def test_gains_in_tiles_that_reach_far_beyond_the_grid_keep_their_error():
     raw = noise_on(tx, n_samples=6)
     grid = sarcl.ImageGrid.plane(shape=(4, 1), spacing=(2, 616))
     beam = sarcl.Antenna.gaussian(width=(0.084, 1.8), two_way=True)
-    with pytest.raises(sarcl.ToleranceUnreachable, match=r"float32 gains of the antenna|gains of the antenna have"):
+    with pytest.raises(sarcl.ToleranceUnreachable, match="gains of the antenna have") as said:
         sarcl.backproject(raw, grid, beam=beam, tolerance=1e-5, wrap=True)
+    assert said.value.best > 1e-4  # which is measured with a larger tolerance
     report = sarcl.backproject(raw, grid, beam=beam, tolerance=0.02, wrap=True, check=True).report
     assert report.measured_error <= report.predicted_error <= 0.02
     near = replace(grid, spacing=(2, 0.5))
