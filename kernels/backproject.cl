@@ -10,6 +10,21 @@
 //           WEIGHT    0 to 3: see pixel_weights.clh; GAINS, ALIKE and others as in gains.clh where it is 2 or 3
 // reference: sarcl/reference/backproject.py:backproject
 
+#define APART (VW == 1 && !BEAM && WEIGHT < 2)  // whole tiles inside of windows have code of their own
+#if APART
+#define BY_VALUE 1
+#define RECORD const float *
+#else
+#define RECORD __global const float *restrict
+#endif
+// The r-th vector of pixels of a work-item. With one lane, NEIGHBOURS items have neighbouring pixels, which read
+// neighbouring samples.
+#if VW == 1
+#define VECTOR(r) ((get_global_id(0) / NEIGHBOURS * VECTORS + (r)) * NEIGHBOURS + get_global_id(0) % NEIGHBOURS)
+#define NEIGHBOURS 16  // no tile has fewer work-items
+#else
+#define VECTOR(r) (get_global_id(0) * VECTORS + (r))
+#endif
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
@@ -21,6 +36,67 @@
 #include "pattern.clh"
 #include "gains.clh"
 #endif
+
+// Weights of a pulse in the pixels, as add_pulse takes them: its parameters, and the kernel's arguments.
+#if WEIGHT == 1
+#define WEIGHING_OF , float at_place, __global const float *restrict taper, const fv *from, const fv *inverse
+#define WEIGHING , place[p], taper, from, inverse
+#elif WEIGHT
+#define WEIGHING_OF , float of_row, __global const float *restrict of_axes, __global const float *restrict patterns, int second
+#define WEIGHING , row_weight[p], axes + 18 * (size_t)p, patterns, second
+#else
+#define WEIGHING_OF
+#define WEIGHING
+#endif
+
+// Adds pulse p to the sums of VECTORS vectors of pixels; crossing: the tile may lie partly outside of its window or beam.
+static inline void add_pulse(int crossing, RECORD record, __global const float *restrict pulse, int p, int n, const offset *x,
+                             __global const float *restrict row, int stride, int origin, TABLE table, fv *re,
+                             fv *im WEIGHING_OF) {
+#pragma unroll
+    for (int r = 0; r < VECTORS; r++) {
+        phase_position at = locate(record, pulse, p, n, x[r]);
+        fv v = 1;
+        if (crossing) v = keep_inside(record, &at);
+#if BEAM
+        if (crossing) v *= in_beam(record, x[r]);
+#endif
+#if WEIGHT >= 2
+        direction to_tx = load_direction(record, C_UX, C_LOW);
+#if BISTATIC
+        direction to_rx = load_direction(record, C_RX, C_RX_LOW);
+#else
+        direction to_rx = to_tx;
+#endif
+        fv tx_range, rx_range;
+        triple away = toward(to_tx, x[r], &tx_range), back = toward(to_rx, x[r], &rx_range);
+        antenna_view view = antenna_view_of(away, tx_range, back, rx_range, of_axes, 1.0f);
+        complex_v gain = weight(view, patterns, second, 1.0f);
+#endif
+#if WEIGHT == 3
+        re[r] = fma(v * (fv)of_row, fma(gain.re, gain.re, gain.im * gain.im), re[r]);
+        continue;
+#endif
+        fv g, h, sine, cosine;
+        look_up(row, stride, origin, at.base, at.t, table, &g, &h);
+        sincos_cycles(at.cycles, &sine, &cosine);
+        if (crossing) {
+            g *= v;
+            h *= v;
+        }
+#if WEIGHT == 1
+        fv tapered = taper_weight(taper, ((fv)at_place - from[r]) * inverse[r]);
+        g *= tapered;
+        h *= tapered;
+#elif WEIGHT == 2
+        fv matched = fma(g, gain.re, h * gain.im);
+        h = fma(h, gain.re, -g * gain.im);
+        g = matched;
+#endif
+        re[r] = fma(g, cosine, fma(-h, sine, re[r]));
+        im[r] = fma(g, sine, fma(h, cosine, im[r]));
+    }
+}
 
 // global size (work-items per tile, tiles of this block), local size (work-items per tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
@@ -37,7 +113,7 @@
 //   row_weight    (n_used), axes (n_used, 18), patterns, second: as in gains.clh; where WEIGHT is 2 or 3
 //   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 __kernel void backproject(__global const float *restrict profiles, int stride, int origin,
-                          __global const float *restrict table, __global const float *restrict pulse, int n,
+                          TAP_TABLE table, __global const float *restrict pulse, int n,
                           int n_used, __global const float *restrict constants,
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
@@ -58,14 +134,14 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
     offset x[VECTORS];
 #pragma unroll
     for (int r = 0; r < VECTORS; r++) {
-        x[r] = load_offset(offsets, (size_t)k * offset_step + get_global_id(0) * VECTORS + r, n_offsets);
+        x[r] = load_offset(offsets, (size_t)k * offset_step + VECTOR(r), n_offsets);
         about_centre(&x[r], tile, k, n_tiles);
     }
 #if WEIGHT == 1
     fv from[VECTORS], inverse[VECTORS];
 #pragma unroll
     for (int r = 0; r < VECTORS; r++) {
-        size_t i = (size_t)k * per_tile + get_global_id(0) * VECTORS + r;
+        size_t i = (size_t)k * per_tile + VECTOR(r);
         from[r] = LOAD(i, aperture);
         inverse[r] = LOAD(i, aperture + pixels);
     }
@@ -90,53 +166,22 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
             }
 #endif
             __global const float *row = profiles + 2 * ((size_t)p * stride + origin);
+#if APART
+            float loaded[N_CONST];
 #pragma unroll
-            for (int r = 0; r < VECTORS; r++) {
-                phase_position at = locate(record, pulse, p, n, x[r]);
-                fv v = 1;
-                if (state == CROSSING) v = keep_inside(record, &at);
-#if BEAM
-                if (state == CROSSING) v *= in_beam(record, x[r]);
-#endif
-#if WEIGHT >= 2
-                direction to_tx = load_direction(record, C_UX, C_LOW);
-#if BISTATIC
-                direction to_rx = load_direction(record, C_RX, C_RX_LOW);
+            for (int i = 0; i < N_CONST; i += 4) vstore4(((__global const float4 *)record)[i / 4], 0, loaded + i);
+            // whole tiles take one of the two: those that lie inside of windows never look at each pixel
+            if (state == INSIDE)
+                add_pulse(0, loaded, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
+            else
+                add_pulse(1, loaded, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
 #else
-                direction to_rx = to_tx;
+            add_pulse(state == CROSSING, record, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
 #endif
-                fv tx_range, rx_range;
-                triple away = toward(to_tx, x[r], &tx_range), back = toward(to_rx, x[r], &rx_range);
-                antenna_view view = antenna_view_of(away, tx_range, back, rx_range, axes + 18 * (size_t)p, 1.0f);
-                complex_v gain = weight(view, patterns, second, 1.0f);
-#endif
-#if WEIGHT == 3
-                re[r] = fma(v * (fv)row_weight[p], fma(gain.re, gain.re, gain.im * gain.im), re[r]);
-                continue;
-#endif
-                fv g, h, sine, cosine;
-                look_up(row, stride, origin, at.base, at.t, table, &g, &h);
-                sincos_cycles(at.cycles, &sine, &cosine);
-                if (state == CROSSING) {
-                    g *= v;
-                    h *= v;
-                }
-#if WEIGHT == 1
-                fv tapered = taper_weight(taper, ((fv)place[p] - from[r]) * inverse[r]);
-                g *= tapered;
-                h *= tapered;
-#elif WEIGHT == 2
-                fv matched = fma(g, gain.re, h * gain.im);
-                h = fma(h, gain.re, -g * gain.im);
-                g = matched;
-#endif
-                re[r] = fma(g, cosine, fma(-h, sine, re[r]));
-                im[r] = fma(g, sine, fma(h, cosine, im[r]));
-            }
         }
 #pragma unroll
         for (int r = 0; r < VECTORS; r++) {
-            size_t i = (size_t)k * per_tile + get_global_id(0) * VECTORS + r;
+            size_t i = (size_t)k * per_tile + VECTOR(r);
             add_compensated(image, image + 2 * pixels, i, re[r]);
             add_compensated(image + pixels, image + 3 * pixels, i, im[r]);
         }

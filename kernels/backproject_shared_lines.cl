@@ -10,6 +10,8 @@
 //           group of pulses, that of its middle pulse: where groups change, and after CHUNK pulses, sums are turned by the
 //           difference of the phases. T is stored by periods of the items' pixels, so that neighbouring items read
 //           neighbouring numbers of local memory, and the places of all samples that an item reads are constants.
+//           T(m) holds the bend of the group's lines too (line_group.clh:bend_of), at m beta/FINE + bend (m/FINE)^2 with the
+//           carrier of m beta/FINE: of the positions, rest_ij is then what the bend leaves.
 // symbols   T, W, n_i, rest_ij, beta   as in backproject_lines.cl
 // macros    FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM, SIDE, FINE, LINE_TAPS, LINE_TERMS, GROUP as in
 //           backproject_lines.cl;  SHARED 1, see line_geometry.clh
@@ -20,6 +22,7 @@
 #undef VW
 #define VW 1
 #define RANGE 0
+#define BY_VALUE 1
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
@@ -46,6 +49,17 @@ DEFINE_SLOPES(line_slopes, SLOPE_TAPS, SLOPE_TERMS)
 #define OUTER ((LINE_TAPS - SLOPE_TAPS) / 2)  // taps on either side that have no slopes
 #endif
 
+typedef struct {
+    float of[LINE_TAPS * LINE_TERMS];
+} line_table;
+typedef struct {
+#if SLOPE_TAPS
+    float of[SLOPE_TAPS * SLOPE_TERMS];
+#else
+    float of[LINE_TAPS * LINE_TERMS];  // not read
+#endif
+} slope_table;
+
 // What the items of a work-group make of a pulse together.
 typedef struct {
     float4 W[SIDE * LINE_TAPS / 2];
@@ -57,8 +71,8 @@ typedef struct {
 } pulse_lines;
 
 // Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
-INLINED void weigh_line(group pulses, __global const float *restrict entry, int r, __global const float *restrict weights,
-                        __global const float *restrict slopes, __local pulse_lines *made) {
+INLINED void weigh_line(group pulses, __global const float *restrict entry, int r, TABLE weights, TABLE slopes,
+                        __local pulse_lines *made) {
     float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP), ratios = FOUR(entry, E_FINE_LOW);
     float4 phases = FOUR(entry, E_ACROSS_LOW), u = FOUR(entry, E_U_X), v = FOUR(entry, E_V_X);
     float fine = steps.w, fine_low = ratios.x, samples_of_T = phases.w;
@@ -69,7 +83,8 @@ INLINED void weigh_line(group pulses, __global const float *restrict entry, int 
     // i times the ratio of steps, in two parts: the first product is exact
     float product = i * ratios.y, whole = nearest(product), rest = fma(i, ratios.z, product - whole);
     float shift = in_position_of(pulses, line, i, centre);
-    float t = fma(shift, samples_of_T, rest) - 0.5f * (LINE_TAPS - 1), first = nearest(t), z = t - first;
+    float place = place_of(pulses, i, ratios.y * (1.0f / FINE), samples_of_T * (1.0f / FINE), shift);
+    float t = fma(shift - pulses.bend * place * place, samples_of_T, rest) - 0.5f * (LINE_TAPS - 1), first = nearest(t), z = t - first;
     line_weights(z, weights, weight);
 #if SLOPE_TAPS
     float slope[SLOPE_TAPS];
@@ -81,17 +96,29 @@ INLINED void weigh_line(group pulses, __global const float *restrict entry, int 
     cycles -= nearest(cycles);
     cycles -= cycles_of(first, fine, fine_low);
     cycles -= nearest(cycles);
+    // from tap to tap the phase falls by that of a FINE-th of a pixel: turned from the middle outwards, where weights are small
+    float cosine[LINE_TAPS], sine[LINE_TAPS], step_sine, step_cosine, of_tap = cycles - (LINE_TAPS / 2) * fine;
+    of_tap = of_tap - (LINE_TAPS / 2) * fine_low;
+    sincos_cycles(of_tap - nearest(of_tap), &sine[LINE_TAPS / 2], &cosine[LINE_TAPS / 2]);
+    sincos_cycles(fine + fine_low, &step_sine, &step_cosine);
+#pragma unroll
+    for (int b = LINE_TAPS / 2 + 1; b < LINE_TAPS; b++) {
+        cosine[b] = fma(cosine[b - 1], step_cosine, sine[b - 1] * step_sine);
+        sine[b] = fma(sine[b - 1], step_cosine, -cosine[b - 1] * step_sine);
+    }
+#pragma unroll
+    for (int b = LINE_TAPS / 2 - 1; b >= 0; b--) {
+        cosine[b] = fma(cosine[b + 1], step_cosine, -sine[b + 1] * step_sine);
+        sine[b] = fma(sine[b + 1], step_cosine, cosine[b + 1] * step_sine);
+    }
     __local float2 *W = (__local float2 *)made->W + r * LINE_TAPS;
 #pragma unroll
     for (int b = 0; b < LINE_TAPS; b++) {
-        float of_tap = cycles - b * fine, sine, cosine;
-        of_tap = of_tap - b * fine_low;
-        sincos_cycles(of_tap - nearest(of_tap), &sine, &cosine);
-        W[b] = (float2)(weight[b] * cosine, weight[b] * sine);
+        W[b] = (float2)(weight[b] * cosine[b], weight[b] * sine[b]);
 #if SLOPE_TAPS
         if (b >= OUTER && b < OUTER + SLOPE_TAPS) {
             float per_metre = slope[b - OUTER] * samples_of_T;
-            ((__local float2 *)made->V)[r * SLOPE_TAPS + b - OUTER] = (float2)(per_metre * cosine, per_metre * sine);
+            ((__local float2 *)made->V)[r * SLOPE_TAPS + b - OUTER] = (float2)(per_metre * cosine[b], per_metre * sine[b]);
         }
 #endif
     }
@@ -102,13 +129,15 @@ INLINED void weigh_line(group pulses, __global const float *restrict entry, int 
 }
 
 // Sample number k of T: the profile of a pulse at a place of a line, carrier included. row: its profile.
-INLINED void take_sample(__global const float *restrict entry, int k, __global const float *restrict row, int stride,
-                         int origin, __global const float *restrict table, __local float2 *T) {
+INLINED void take_sample(group pulses, __global const float *restrict entry, int k, __global const float *restrict row, int stride,
+                         int origin, TABLE table, __local float2 *T) {
     float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP);
     float m = k + as_int(numbers.y), re, im, sine, cosine;
     // m times the step, in two parts: the first product is exact
     float product = m * steps.x, whole = nearest(product);
-    float t = fma(m, steps.y, product - whole) + steps.z;
+    // the bend in samples of the profile: entry[E_SAMPLES] is that of T per metre
+    float bend = pulses.bend * entry[E_SAMPLES] * (1.0f / (FINE * FINE)) * (steps.x + steps.y);
+    float t = fma(m, fma(m, bend, steps.y), product - whole) + steps.z;
     look_up(row, stride, origin, as_int(numbers.w) + nearest_int(product), t, table, &re, &im);
     sincos_cycles(cycles_of(m, steps.w, entry[E_FINE_LOW]), &sine, &cosine);
     float2 sample = (float2)(fma(re, cosine, -im * sine), fma(re, sine, im * cosine));
@@ -192,7 +221,9 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
         float i = r - SIDE / 2, q_line = q_of_line(now, i);
         float centre = curvature_at(now.middle, i, 0, q_line), centre_next = curvature_at(next.middle, i, 0, q_line);
 #if SLOPE_TAPS
-        float in_position = in_position_of(now, now.middle, i, centre) - centre;
+        float shift = in_position_of(now, now.middle, i, centre), per_sample = 1 / now.middle.along;
+        float place = place_of(now, i, now.middle.across * per_sample, now.middle.sigma * per_sample, shift);
+        float in_position = shift - centre;
 #endif
 #pragma unroll
         for (int c = 0; c < PIXELS; c++) {
@@ -206,8 +237,9 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
             }
             float re = s->re[0][c], im = s->im[0][c];
 #if SLOPE_TAPS
-            re = fma(s->slope_re[0][c], rest - in_position, re);
-            im = fma(s->slope_im[0][c], rest - in_position, im);
+            float off = rest - in_position - now.bend * fma(j + j, place, j * j);
+            re = fma(s->slope_re[0][c], off, re);
+            im = fma(s->slope_im[0][c], off, im);
 #endif
             sincos_cycles(cycles, &sine, &cosine);
             float turned_re = fma(re, cosine, -im * sine), turned_im = fma(re, sine, im * cosine);
@@ -240,8 +272,7 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
 // weights, slopes: of LINE_TAPS and SLOPE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
 __kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1))) void
 backproject_shared_lines(__global const float *restrict profiles, int stride, int origin,
-                         __global const float *restrict table, __global const float *restrict weights,
-                         __global const float *restrict slopes, int n, int n_used,
+                         tap_table table, line_table weights, slope_table slopes, int n, int n_used,
                          __global const float *restrict constants, __global const int *restrict schedule, float step_x,
                          float step_y, int first, int n_tiles, __global float *restrict image, ulong pixels,
                          __global int *restrict skipped) {
@@ -282,7 +313,7 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
                     __global const int *entry = schedule + (size_t)(h + 1) * N_GROUP - N_ENTRY;
                     for (int f = schedule[(size_t)h * N_GROUP + H_PIXELS]; f > 0; f--, entry -= N_ENTRY)
                         add_pixels(plain, records + (size_t)entry[E_PULSE] * N_LINE, y - SIDE / 2, x - SIDE / 2,
-                                   profiles + 2 * (size_t)entry[E_PULSE] * stride, stride, origin, table, &re, &im);
+                                   profiles + 2 * (size_t)entry[E_PULSE] * stride, stride, origin, table.of, &re, &im);
                 }
                 add_compensated(out.image, out.image + 2 * pixels, y * SIDE + x, re);
                 add_compensated(out.image + pixels, out.image + 3 * pixels, y * SIDE + x, im);
@@ -306,13 +337,11 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
             __global const float *entry = (__global const float *)entries + N_ENTRY * f;
             __local pulse_lines *pulse = &halves[made++ & 1];
             __global const float *row = profiles + 2 * (size_t)as_int(entry[E_PULSE]) * stride;
-            int tasks = SIDE + as_int(entry[E_COUNT]);
-            for (int k = item; k < tasks; k += ITEMS) {
-                if (k < SIDE)
-                    weigh_line(pulses, entry, k, weights, slopes, pulse);
-                else
-                    take_sample(entry, k - SIDE, row, stride, origin, table, pulse->T);
-            }
+            int count = as_int(entry[E_COUNT]);
+            // few samples are more than there are items: the first items make those, the last ones the weights
+#pragma unroll 1
+            for (int k = item; k < count; k += ITEMS) take_sample(pulses, entry, k, row, stride, origin, table.of, pulse->T);
+            if (item >= ITEMS - SIDE) weigh_line(pulses, entry, item - (ITEMS - SIDE), weights.of, slopes.of, pulse);
             // the other half may still be read: it is not written before the next barrier
             barrier(CLK_LOCAL_MEM_FENCE);
             sum_lines(&s, r0, lane, pulse);

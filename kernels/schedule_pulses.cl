@@ -22,15 +22,17 @@
 // they are too many to be stored, as for a steep pulse, or have no spacing.
 INLINED int samples_needed(group pulses, line_geometry line, int *from) {
     if (!(fabs(line.along) >= LEAST_STEP)) return 0;
-    float position[5], lowest = INFINITY, highest = -INFINITY, bend = 0, samples_of_T = FINE / line.along;
+    float position[5], lowest = INFINITY, highest = -INFINITY, bend = 0, per_sample = 1 / line.along;
 #pragma unroll
     for (int k = 0; k < 5; k++) {
         float i = (k - 2) * (SIDE / 4), centre = curvature_at(line, i, 0, q_of_line(pulses, i));
-        position[k] = fma(in_position_of(pulses, line, i, centre), line.sigma, i * line.across) * samples_of_T;
+        float shift = in_position_of(pulses, line, i, centre), across = line.across * per_sample;
+        float place = place_of(pulses, i, across, line.sigma * per_sample, shift);
+        position[k] = FINE * fma(shift - pulses.bend * place * place, line.sigma * per_sample, i * across);
         lowest = fmin(lowest, position[k]);
         highest = fmax(highest, position[k]);
     }
-    // positions are a cubic of i: between two of five, no one lies farther outside than 3/8 of the largest second difference
+    // positions are nearly a cubic of i: between two of five, no one lies farther outside than 3/8 of the largest second difference
 #pragma unroll
     for (int k = 1; k < 4; k++) bend = fmax(bend, fabs(position[k - 1] - 2 * position[k] + position[k + 1]));
     lowest -= fma(0.5f, bend, 2.0f);

@@ -1,6 +1,7 @@
 // Trial of a device: operations that every other kernel relies on, on numbers whose results the host knows.
 //
-//   compute   exact sums and products, wide numbers, rounding, sine and cosine, path_difference with structs by pointer
+//   compute   exact sums and products, wide numbers, rounding, sine and cosine, path_difference with structs by pointer,
+//             a struct by value
 //   exchange  local memory of a given size, with a barrier
 //   chains    a_k <- a_k x + y, over and over: timed
 //
@@ -26,6 +27,11 @@ typedef CAT(CHAIN_UNIT, VW) chain_v;
 #define STORE_CHAIN(v, i, p) CAT(vstore, VW)(v, i, p)
 #endif
 #define CHAINS 8
+#define NUMBERS 30
+
+typedef struct {
+    float of[NUMBERS];
+} numbers;
 
 static inline void put_wide(wv value, int i, __global float *out, int n) {
     STORE(w_float(value), i, out);
@@ -35,8 +41,9 @@ static inline void put_wide(wv value, int i, __global float *out, int n) {
 // global size (n / VW)
 //   x        (10, n)  a and b, hi then lo;  a point's x, y, z, hi parts then lo parts, m
 //   antenna  (2, N_PULSE)  hi then lo parts of the antenna's x, y, z and distance from the centre, m; the rest is not read
-//   out      (22, n)  in the order of _trial.py:RESULTS; integers by their bits
-__kernel void compute(__global const float *restrict x, __global const float *restrict antenna, int n,
+//   given    a struct by value: the sum of its numbers, each times its place
+//   out      (23, n)  in the order of _trial.py:RESULTS; integers by their bits
+__kernel void compute(__global const float *restrict x, __global const float *restrict antenna, int n, numbers given,
                       __global float *restrict out) {
     int i = get_global_id(0);
     fv high = LOAD(i, x), other = LOAD(i, x + 2 * n);
@@ -66,6 +73,10 @@ __kernel void compute(__global const float *restrict x, __global const float *re
     put_wide(delta, i, out + 16 * n, n);
     put_wide(distance, i, out + 18 * n, n);
     put_wide(d.y, i, out + 20 * n, n);
+    float sum_of_given = 0;
+#pragma unroll
+    for (int k = 0; k < NUMBERS; k++) sum_of_given = fma((float)(k + 1), given.of[k], sum_of_given);
+    STORE((fv)sum_of_given, i, out + 22 * n);
 }
 
 // global size (groups times group), in groups: each work-item writes `each` numbers to local memory and reads those of

@@ -35,13 +35,13 @@ LINE_GROUP = 0.4  # per pixel and group of pulses
 # 2026-11-23 (make gpu-static) with polynomials for sine and cosine.
 SHARED_TAP = 4.0  # per contribution and tap, of the weights and of their slopes
 SHARED_READ = 1.0  # per number of local memory that a work-item reads
-SHARED_PULSE = 41.0  # per work-item and pulse, of 16 contributions
-SHARED_SAMPLE, SHARED_SAMPLE_TAP = 50.0, 14.0  # per sample of a line's profile, and per tap of its interpolation
-SHARED_LINE, SHARED_LINE_TAP = 40.0, 39.0  # per line and pulse, and per tap of its weights
-SHARED_TURN = 60.0  # per contribution over the pulses of a group
-SHARED_TILE = 1500.0  # per tile and pulse: its record and what is done with it
+SHARED_PULSE = 50.0  # per work-item and pulse, of 16 contributions
+SHARED_SAMPLE, SHARED_SAMPLE_TAP = 45.0, 12.0  # per sample of a line's profile, and per tap of its interpolation
+SHARED_LINE, SHARED_LINE_TAP = 96.0, 17.0  # per line and pulse, and per tap of its weights
+SHARED_TURN = 84.0  # per contribution over the pulses of a group
+SHARED_TILE = 1700.0  # per tile and pulse: its record and what is done with it
 SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
-GATHERED = 72.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
+GATHERED = 54.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
 # Merging of sub-apertures, in contributions (2026-11-21).
 # Per sample that is moved to a new tile: per tap of the interpolation, per tap of the filter that decimates pulses.
@@ -111,8 +111,8 @@ class Gathering(NamedTuple):
 # On a CPU, and from instructions on sm_90 per contribution, on 2026-11-23 (make gpu-static): on GPUs with fast float64,
 # and on GPUs that compute wide numbers in pairs of float32 or with a float64 that is slower than these.
 ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_MODE[1], RANGE_MODE[2]))
-ON_GPU = Gathering((1.0, 1.32, 1.57, 1.99), (1.0, 1.4, 2.4))
-ON_GPU_IN_PAIRS = Gathering((1.0, 1.32, 1.57, 1.99), (1.0, 2.9, 9.4))
+ON_GPU = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 1.28, 2.67))
+ON_GPU_IN_PAIRS = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 3.62, 12.5))
 
 
 class DeviceClass(NamedTuple):

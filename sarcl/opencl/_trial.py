@@ -29,6 +29,7 @@ GROUPS = 3
 LASTS = 2e-3  # s: a timed launch is made longer until it lasts that
 ITEMS, STEPS = 2**18, 2**14  # most work-items, and most steps of each, of a timed launch
 CHAINS = 8  # of kernels/trial.cl
+GIVEN = np.arange(1, 31, dtype=np.float32) ** 2  # numbers of its struct by value: sums of them are exact
 SLOW = 6.0  # a hot loop has a float64 operation for six of float32 that pairs of float32 take more
 
 
@@ -62,6 +63,7 @@ RESULTS = (
     Result("path_difference (m)", 2, 1e-9, 0),
     Result("the distance of path_difference (m)", 2, 0, WIDE),
     Result("the vector of path_difference (m)", 2, 1e-7, 0),
+    Result("the sum of the numbers of a struct by value", 1, 0, 0),
 )
 
 
@@ -167,6 +169,7 @@ def wanted(x: np.ndarray, antenna: np.ndarray) -> list[np.ndarray]:
         a + b, a * b, a / b, np.sqrt(a),
         whole.astype(np.int64).astype(np.int32), a - whole, np.sin(angle), np.cos(angle),
         ((points**2).sum(axis=0) - 2 * at @ points) / (distance + length), distance, vector[1],
+        np.full(N, np.arange(1, len(GIVEN) + 1) @ GIVEN, np.float32),
     ]  # fmt: skip
 
 
@@ -179,7 +182,7 @@ def _wrong_numbers(queue: Any, kernel: Any, lanes: int) -> str:
     buffers = [pyopencl.Buffer(queue.context, flags, hostbuf=np.ascontiguousarray(v)) for v in (x, antenna)]
     rows = np.full((sum(r.rows for r in RESULTS), N), np.nan, np.float32)
     out = pyopencl.Buffer(queue.context, flags, hostbuf=rows)
-    kernel(queue, (N // lanes,), None, *buffers, np.int32(N), out)
+    kernel(queue, (N // lanes,), None, *buffers, np.int32(N), GIVEN, out)
     pyopencl.enqueue_copy(queue, rows, out)
     at = 0
     for result, right in zip(RESULTS, wanted(x, antenna), strict=True):

@@ -79,19 +79,20 @@ def choose(
     distance = antennas.distance(grid.bounds)
     best: SharedLinePlan | None = None
     choices = list(itertools.product(SIDES, GROUP_SIZES))
-    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance):
+    for side, group, curvature in curvatures(grid, antennas, choices, highest, distance, bent=True):
         radius = curvature.radius
         order, fixed = series(tolerance, radius, distance, highest)
-        turns = CHUNK // group  # of a sum, each by a sine and cosine of its own
-        fixed += error_bounds.phase_rounding(0.0, highest, True) * (2 + turns)
+        # sines and cosines: of T; of weights, whose taps are turned by another; and of each turn of a sum
+        turns = CHUNK // group
+        fixed += error_bounds.phase_rounding(0.0, highest, True) * (3 + turns)
         native = on.native_pays(tolerance)
-        fixed += (2 + turns) * on.native_error if native else 0.0
+        fixed += (3 + turns) * on.native_error if native else 0.0
         fixed += error_bounds.two_part_position_rounding(radius, distance, bandwidth)
         fixed += 2 * error_bounds.curvature_rounding(radius, distance, highest)
         if fixed > MOST_FIXED * tolerance:
             continue
         fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
-        shift, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
+        shift, cells = curvature.shift(bandwidth), curvature.bent_cells(bandwidth)
         for fine, taps, slope_taps in itertools.product(FINES, interpolation.LINE_TERMS, (0, 2, 4, 6, 8)):
             if cells * 1.2 >= fine or slope_taps > taps or local_bytes(side, fine, taps, slope_taps) > on.local_memory:
                 continue

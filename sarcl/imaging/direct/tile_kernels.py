@@ -48,7 +48,9 @@ class GatherKernel:
         self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
-        self.table = device.upload(plan.interpolator.table)
+        table = plan.interpolator.table
+        apart = self.lanes == 1 and not beam and weights["WEIGHT"] < 2  # APART of kernels/backproject.cl
+        self.table = np.ravel(table) if apart else device.upload(table)
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
@@ -68,6 +70,7 @@ class GatherKernel:
         centers, radius, offsets = on.buffers
         constants = self.constants.compute(pulse, n, centers, radius, (low, high), tiles.n_tiles, on.skip)
         items = tiles.per_tile // self.lanes // VECTORS
+        assert self.lanes > 1 or items % 16 == 0, "NEIGHBOURS of kernels/backproject.cl have pixels together"
         device.run(
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
             source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
@@ -161,7 +164,7 @@ class SharedLineKernel(_Lines):
         self.schedule = device.kernel("schedule_pulses.cl", "schedule_pulses", **self.macros)
         self.kernel = device.kernel("backproject_shared_lines.cl", "backproject_shared_lines", **self.macros)
         tables = (plan.interpolator, plan.line, plan.slopes or plan.line)
-        self.tables = [device.upload(made.table) for made in tables]
+        self.tables = [np.ravel(made.table) for made in tables]  # structs of the kernel's arguments
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
