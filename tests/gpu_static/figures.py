@@ -104,6 +104,8 @@ def _counted(variant: Variant) -> dict[str, Figures]:
                     out[kernel][COUNTED]["error"] = str(exc)
                 else:
                     out[kernel][COUNTED]["instructions"] = round(found.each, 1)
+                    if round(found.each_at_most, 1) != round(found.each, 1):
+                        out[kernel][COUNTED]["both sides"] = round(found.each_at_most, 1)
                     out[kernel][COUNTED]["loads"] = round(found.by_kind.get("load global", 0) / found.contributions, 1)
     return out
 

@@ -7,7 +7,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass
 
-from gpu_static.sass import Code, Loop, kinds
+from gpu_static.sass import Code, Loop, kind, kinds
 
 
 @dataclass(frozen=True)
@@ -17,28 +17,59 @@ class Hot:
     contributions  of one trip of the loop, by one work-item: an expression
     unit           what a contribution is
     loop           "innermost": the innermost loop with most instructions;  "barrier": the smallest loop with a barrier,
-                   through which the items of a work-group go together;  "around": the smallest loop around such a loop
+                   through which the items of a work-group go together;  "around": the smallest loop around such a loop;
+                   "kernel": all of it, each instruction once
     trips          trips of each loop inside the hot one, in order of addresses, loops inside these right after each:
                    expressions
+    sides          shares of the trips in which a work-item's warp takes each side of a branch that is SIDE instructions
+                   long or more, the shortest first, inner loops' after those of the loops around them: expressions.
+                   For branches that whole warps take alike; where lanes of a warp may differ there is no entry, and
+                   both sides count, as they do where the machine code has other branches than these
+    around         trips of the hot loop per trip of the loop around it, whose share is then counted too: an expression
+    trips_around   as `trips`, of the loops inside that loop, but for the hot one
     """
 
     contributions: str
     unit: str
     loop: str = "innermost"
     trips: tuple[str, ...] = ()
+    sides: tuple[str, ...] = ()
+    around: str = ""
+    trips_around: tuple[str, ...] = ()
+
+
+SIDE = 64  # instructions of the shortest side of a branch that may count for a share
 
 
 # By file and kernel. For kernels that are not listed the figure is the instructions of one trip of their largest
 # innermost loop, or of the kernel where it has no loop.
 HOT = {
-    ("backproject.cl", "backproject"): Hot("VECTORS * VW", "pulse and pixel"),
+    # pairs that lie inside of windows; the longer side looks at each pixel of tiles that cross their edges
+    ("backproject.cl", "backproject"): Hot("VECTORS * VW", "pulse and pixel", sides=("1", "0")),
     ("backproject_float64.cl", "backproject"): Hot("VW", "pulse and pixel"),
     ("backproject_lines.cl", "backproject_lines"): Hot("VW", "pulse and pixel"),
-    # the loop inside makes SIDE weights of lines and about FINE SIDE + 16 samples: a trip of a work-item makes one of
-    # both, and is counted as if it made both
+    # The loop inside makes samples of T: those that all lines read, and up to ten more where lines lie across the
+    # range. The last SIDE items make the weights of a line each. Whole warps do both.
     ("backproject_shared_lines.cl", "backproject_shared_lines"): Hot(
-        "SIDE * SIDE / ITEMS", "pulse and pixel", loop="barrier", trips=("(SIDE + FINE * SIDE + 16) / ITEMS",)
+        "SIDE * SIDE / ITEMS",
+        "pulse and pixel",
+        loop="barrier",
+        trips=("-(-(FINE * SIDE + LINE_TAPS + 10) // 32) * 32 / ITEMS",),
+        sides=("SIDE / ITEMS",),
+        # Per group of pulses: sums are turned by its curvature, line by line; they join the image where that ends a
+        # chunk, else those of the next group. Pulses pixel by pixel (two loops in a third) are none of these pairs.
+        around="GROUP",
+        trips_around=(
+            "SIDE * SIDE / ITEMS / 4 * (GROUP >= CHUNK)",
+            "0",
+            "0",
+            "0",
+            "SIDE * SIDE / ITEMS / 4 * (GROUP < CHUNK)",
+        ),
     ),
+    ("schedule_pulses.cl", "schedule_pulses"): Hot("1", "pulse and tile", loop="kernel", trips=("1", "1", "1")),
+    ("tile_constants.cl", "line_constants"): Hot("VW", "pulse and tile", loop="kernel"),
+    ("tile_constants.cl", "tile_constants"): Hot("VW", "pulse and tile", loop="kernel"),
     ("beam.cl", "add"): Hot("USED * VW", "element and value of the beam"),
     ("beam.cl", "paths"): Hot("VW", "element and entry"),
     ("beam.cl", "times"): Hot("VW", "element and entry"),
@@ -58,17 +89,26 @@ HOT = {
 
 @dataclass(frozen=True)
 class Cost:
-    """Instructions of one trip of a hot loop, in all and by kind, and the contributions that a trip makes."""
+    """Instructions of one trip of a hot loop, in all and by kind, and the contributions that a trip makes.
+
+    most  instructions of one trip that took both sides of every branch
+    """
 
     trip: float
     contributions: float
     unit: str
     by_kind: dict[str, float]
+    most: float
 
     @property
     def each(self) -> float:
         """Instructions per contribution."""
         return self.trip / self.contributions
+
+    @property
+    def each_at_most(self) -> float:
+        """Instructions per contribution, both sides of every branch counted."""
+        return self.most / self.contributions
 
 
 class NotCounted(Exception):
@@ -87,6 +127,8 @@ def described(code: Code) -> str:
 def hot_loop(code: Code, which: str) -> Loop | None:
     """The hot loop; None where the kernel has no loop."""
     loops = code.every_loop()
+    if which == "kernel":
+        return Loop(0, len(code.opcodes) - 1, list(code.loops))
     if which == "innermost":
         loops = [loop for loop in loops if not loop.inside]
     else:
@@ -103,30 +145,70 @@ def cost(code: Code, hot: Hot | None, macros: dict[str, int]) -> Cost:
     if loop is None:
         if hot:
             raise NotCounted(f"no loop of the kind {hot.loop!r} is there; found: {described(code) or 'no loop at all'}")
-        return Cost(len(code.opcodes), 1.0, "work-item", {k: float(v) for k, v in kinds(code.opcodes).items()})
+        n = len(code.opcodes)
+        return Cost(n, 1.0, "work-item", {k: float(v) for k, v in kinds(code.opcodes).items()}, n)
     if hot is None:
-        found = kinds(code.own(loop))
-        return Cost(len(code.own(loop)), 1.0, "trip", {k: float(v) for k, v in found.items()})
-    inner = inside(loop)
-    if len(inner) != len(hot.trips):
-        raise NotCounted(
-            f"trips of {len(hot.trips)} loops inside the hot one are known, {len(inner)} are there; "
-            f"found: {described(code)}; write their trips in tests/gpu_static/hot_loops.py"
-        )
-    values = {**macros}
-    trips = {id(loop): 1.0}
-    given = dict(zip(map(id, inner), hot.trips, strict=True))
-    total: dict[str, float] = {}
-    todo = [loop]
-    while todo:
-        here = todo.pop(0)
-        for name, count in kinds(code.own(here)).items():
-            total[name] = total.get(name, 0.0) + count * trips[id(here)]
-        for child in here.inside:
-            trips[id(child)] = trips[id(here)] * float(eval(given[id(child)], {}, values))
-            todo.append(child)
-    each = float(eval(hot.contributions, {}, values))
-    return Cost(sum(total.values()), each, hot.unit, total)
+        own = code.own(loop)
+        return Cost(len(own), 1.0, "trip", {k: float(v) for k, v in kinds(own).items()}, len(own))
+    count = Counter()
+    sides = [side for here in (loop, *inside(loop)) for side in code.sides(here, SIDE)] if hot.sides else []
+    shares = {}
+    if len(sides) == len(hot.sides):
+        shares = {(side.first, side.last): share for side, share in zip(sides, hot.sides, strict=True)}
+    count.add(code, loop, 1.0, hot.trips, shares, macros)
+    if hot.around:
+        outer = min((o for o in code.every_loop() if o.holds(loop)), key=lambda o: o.last - o.first, default=None)
+        if outer is None:
+            raise NotCounted(f"no loop is around the hot one; found: {described(code)}")
+        rest = Loop(outer.first, outer.last, [o for o in outer.inside if o.first != loop.first])
+        count.add(code, rest, 1 / evaluated(hot.around, macros), hot.trips_around, {}, macros, but=loop)
+    return Cost(
+        sum(count.by_kind.values()), evaluated(hot.contributions, macros), hot.unit, dict(count.by_kind), count.most
+    )
+
+
+class Counter:
+    """Instructions, each as often as it runs: by kind, and the sum with both sides of every branch."""
+
+    def __init__(self) -> None:
+        self.by_kind: dict[str, float] = {}
+        self.most = 0.0
+
+    def add(
+        self, code: Code, loop: Loop, trips: float, inner_trips: tuple[str, ...], shares: dict[tuple[int, int], str],
+        macros: dict[str, int], but: Loop | None = None,
+    ) -> None:  # fmt: skip
+        """Add a loop that runs `trips` times, and those inside it, without the instructions of the loop `but`."""
+        inner = inside(loop)
+        if len(inner) != len(inner_trips):
+            raise NotCounted(
+                f"trips of {len(inner_trips)} loops inside the one counted are known, {len(inner)} are there; "
+                f"found: {described(code)}; write their trips in tests/gpu_static/hot_loops.py"
+            )
+        all_trips = {id(loop): trips}
+        given = dict(zip(map(id, inner), inner_trips, strict=True))
+        todo = [loop]
+        while todo:
+            here = todo.pop(0)
+            for child in here.inside:
+                all_trips[id(child)] = all_trips[id(here)] * evaluated(given[id(child)], macros)
+                todo.append(child)
+            skipped = [*here.inside, *([but] if but and here is loop else [])]
+            sides = [side for side in code.sides(here, SIDE) if (side.first, side.last) in shares]
+            for n in range(here.first, here.last + 1):
+                if any(part.first <= n <= part.last for part in skipped):
+                    continue
+                often, name = all_trips[id(here)], kind(code.opcodes[n])
+                self.most += often
+                for side in sides:
+                    if side.first <= n <= side.last:
+                        often *= evaluated(shares[side.first, side.last], macros)
+                self.by_kind[name] = self.by_kind.get(name, 0.0) + often
+
+
+def evaluated(expression: str, macros: dict[str, int]) -> float:
+    """Value of an expression of macros."""
+    return float(eval(expression, {}, dict(macros)))
 
 
 def inside(loop: Loop) -> list[Loop]:

@@ -21,6 +21,9 @@ GATHER = {
     "1e-3": ({"TAPS": "4", "TERMS": "4", "RANGE": "0"}, 49152),
     "3e-5": ({"TAPS": "6", "TERMS": "5", "RANGE": "1"}, 20480),
 }
+GATHER_TILE = 1024  # pixels of its tiles
+# Kernels that make records, of the gather kernel and of lines that a work-group shares.
+RECORDS = ({"tile_constants"}, {"line_constants", "schedule_pulses"})
 PLAIN = {"BEAM": "0", "BISTATIC": "0", "FP64": "1", "LOCAL": "0", "ORDER": "2", "WEIGHT": "0", "WRAP": "0"}
 
 
@@ -43,9 +46,11 @@ def _first(record: dict[str, Any]) -> list[str]:
         "8192 x 8192 pixels of 0.25 m from 770 km, X band, 600 MHz: per pulse and pixel on sm_90. Instructions are "
         "counted, wavefronts replayed; the ceilings in 10^9 pulses times pixels per second on an H200 are inferred "
         "from both: no GPU has run this.\n",
-        "| tolerance | program | instructions | loads | wavefronts of 32 pairs, range along a line of pixels / across "
-        "| ceiling by instructions, inferred | by wavefronts, inferred |",
-        "|---|---|---|---|---|---|---|",
+        "Instructions are those of this program for pairs that lie inside of windows, then with both sides of every "
+        "branch, then with the records of tiles and pulses, which other programs make.\n",
+        "| tolerance | program | instructions | both sides | with records | loads | wavefronts of 32 pairs, range "
+        "along a line of pixels / across | ceiling by instructions with records, inferred | by wavefronts, inferred |",
+        "|---|---|---|---|---|---|---|---|---|",
     ]
     rows = [(task.split()[1], name) for task, names in record["first"].items() for name in names]
     for tolerance, (wanted, _) in GATHER.items():
@@ -61,11 +66,25 @@ def _first(record: dict[str, Any]) -> list[str]:
         chosen = ", ".join(f"{k} {macros[k]}" for k in SHOWN if k in macros)
         ceilings = " / ".join(f"{WAVEFRONTS * 32 / f / 1e9:.0f}" for f in fronts)
         each, words = here["instructions"], " / ".join(f"{f:.0f}" for f in fronts)
+        whole = each + _of_records(record, file, macros)
         out.append(
-            f"| {tolerance} | {file}, {chosen} | {each:g} | {here['loads']:g} | {words} | "
-            f"{LANE_INSTRUCTIONS / each / 1e9:.0f} | {ceilings} |"
+            f"| {tolerance} | {file}, {chosen} | {each:g} | {here.get('both sides', each):g} | {whole:.1f} | "
+            f"{here['loads']:g} | {words} | {LANE_INSTRUCTIONS / whole / 1e9:.0f} | {ceilings} |"
         )
     return [*out, ""]
+
+
+def _of_records(record: dict[str, Any], file: str, macros: dict[str, str]) -> float:
+    """Instructions per pair of pulse and pixel that make the records of tiles and pulses which a program reads."""
+    total, shared = 0.0, file == "backproject_shared_lines.cl"
+    pixels = int(macros["SIDE"]) ** 2 if shared else GATHER_TILE
+    for name, kernels in record["figures"].items():
+        other = {**{"SHARED": "0"}, **_macros(name)}
+        wanted = {"SHARED": "0", "LOCAL": "0", "RANGE": "0", **macros}
+        if all(wanted.get(key) == value for key, value in other.items()):
+            for kernel in RECORDS[shared] & set(kernels):
+                total += kernels[kernel][COUNTED]["instructions"] / pixels
+    return total
 
 
 def _macros(name: str) -> dict[str, str]:

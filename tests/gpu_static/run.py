@@ -47,7 +47,10 @@ def count(file: str, macros: list[str], text: str, folder: Path) -> int:
         except hot_loops.NotCounted as exc:
             print(f"  not counted: {exc}")
         else:
-            print(f"  sm_90: {cost.each:.1f} instructions per {cost.unit} ({cost.trip:.0f} per trip of the hot loop)")
+            print(
+                f"  sm_90: {cost.each:.1f} instructions per {cost.unit} ({cost.trip:.0f} per trip of the hot loop), "
+                f"{cost.each_at_most:.1f} with both sides of every branch"
+            )
             print("  per trip: " + ", ".join(f"{name} {n:g}" for name, n in cost.by_kind.items()))
         print(f"  loops: {hot_loops.described(code) or 'none'}")
     return 1 if refused else 0

@@ -47,15 +47,36 @@ class Loop:
 
 @dataclass
 class Code:
-    """A kernel's instructions in the order of their addresses, opcodes with modifiers, and its outermost loops."""
+    """A kernel's instructions in the order of their addresses, opcodes with modifiers, its outermost loops, and its
+    branches: instructions that branch, and those they branch to."""
 
     opcodes: list[str]
     loops: list[Loop]
+    branches: list[tuple[int, int]] = field(default_factory=list)
 
     def own(self, loop: Loop) -> list[str]:
         """Opcodes of a loop, those of loops inside it left out."""
         inner = [range(i.first, i.last + 1) for i in loop.inside]
         return [self.opcodes[n] for n in range(loop.first, loop.last + 1) if not any(n in r for r in inner)]
+
+    def sides(self, loop: Loop, least: int) -> list[Loop]:
+        """Instructions of a loop, `least` at least, that a branch within it passes over, the shortest first.
+
+        Of sides within sides the innermost are taken. Loops inside the loop are left whole: a side that holds one, or
+        lies within one, is not among these. A side into whose midst a branch leads from elsewhere is not either.
+        """
+        found = []
+        for at, target in self.branches:
+            side = Loop(at + 1, target - 1)
+            if not (loop.first <= at and target <= loop.last and side.last - side.first + 1 >= least):
+                continue
+            if any(side.first <= inner.last and inner.first <= side.last for inner in loop.inside):
+                continue
+            entries = [t for a, t in self.branches if side.first < t <= side.last and not side.first <= a <= side.last]
+            if not entries:
+                found.append(side)
+        innermost = {(s.first, s.last): s for s in found if not any(s.holds(other) for other in found)}
+        return sorted(innermost.values(), key=lambda s: (s.last - s.first, s.first))
 
     def every_loop(self) -> list[Loop]:
         """All loops, outer ones before those inside them."""
@@ -84,6 +105,7 @@ def code_of(listing: str, kernel: str) -> Code:
         raise ValueError(f"kernel {kernel} is not in the listing, which begins {listing[:80]!r}")
     opcodes: list[str] = []
     labels: dict[str, int] = {}
+    targets: list[tuple[int, str]] = []
     backward: dict[int, int] = {}  # first instruction of a loop: the last that branches back to it
     for line in body[1].splitlines():
         if label := LABEL.match(line.strip()):
@@ -92,6 +114,8 @@ def code_of(listing: str, kernel: str) -> Code:
             at = len(opcodes)
             opcodes.append(found[3])
             target = TARGET.search(found[4])
+            if target and found[3].startswith(("BRA", "JMP", "CALL")):
+                targets.append((at, target[1]))
             # a branch to itself is no loop: it follows the kernel's end, so that nothing behind it is ever run
             if found[3].startswith("BRA") and target and labels.get(target[1], at) < at:
                 first = labels[target[1]]
@@ -100,4 +124,5 @@ def code_of(listing: str, kernel: str) -> Code:
     for loop in loops:
         inside = [o for o in loops if loop.holds(o)]
         loop.inside = sorted((o for o in inside if not any(p.holds(o) for p in inside)), key=lambda o: o.first)
-    return Code(opcodes, sorted((o for o in loops if not any(p.holds(o) for p in loops)), key=lambda o: o.first))
+    outermost = sorted((o for o in loops if not any(p.holds(o) for p in loops)), key=lambda o: o.first)
+    return Code(opcodes, outermost, [(at, labels[name]) for at, name in targets if name in labels])

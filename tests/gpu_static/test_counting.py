@@ -82,6 +82,47 @@ def test_cost_counts_each_trip_of_the_loops_inside():
     assert cost(code_of(LISTING, "other"), None, {}).unit == "work-item"
 
 
+# A loop whose work-items take one of two sides of 64 and 66 instructions, with a short side before them.
+SIDES = "\n".join(
+    [".text.sides:", ".L_x_1:", "/*0000*/ @P1 BRA `(.L_x_2) ;", "/*0000*/ FADD R1 ;", ".L_x_2:",
+     "/*0000*/ @P0 BRA `(.L_x_3) ;", *["/*0000*/ FFMA R1 ;"] * 63,
+     "/*0000*/ BRA `(.L_x_4) ;", ".L_x_3:", *["/*0000*/ LDG.E R1 ;"] * 66, ".L_x_4:",
+     "/*0000*/ @P0 BRA `(.L_x_1) ;"]
+)  # fmt: skip
+
+
+def test_sides_of_branches_that_whole_warps_take_count_for_their_shares():
+    code = code_of(SIDES, "sides")
+    (loop,) = code.loops
+    assert [(side.first, side.last) for side in code.sides(loop, 64)] == [(3, 66), (67, 132)]
+    assert code.sides(loop, 65) == [side for side in code.sides(loop, 64) if side.first == 67]
+    both = cost(code, Hot("1", "pair"), {})
+    assert both.trip == both.most == 3 + 1 + 64 + 66
+    one = cost(code, Hot("1", "pair", sides=("SHARE", "0")), {"SHARE": 1})
+    assert one.trip == 3 + 1 + 64 and one.most == both.trip and one.by_kind["load global"] == 0
+    assert cost(code, Hot("2", "pair", sides=("1", "1 / 4")), {}).each == (3 + 1 + 64 + 66 / 4) / 2
+    # as many shares as there are sides, or both sides count
+    assert cost(code, Hot("1", "pair", sides=("0",)), {}).trip == both.trip
+
+
+def test_a_side_into_whose_midst_a_branch_leads_is_no_side():
+    lines = SIDES.splitlines()
+    midst = lines.index(".L_x_3:") + 9
+    led = [*lines[:2], "/*0000*/ @P3 BRA `(.L_x_9) ;", *lines[2:midst], ".L_x_9:", *lines[midst:]]
+    code = code_of("\n".join(led), "sides")
+    assert [(side.first, side.last) for side in code.sides(code.loops[0], 64)] == [(4, 67)]
+
+
+def test_the_work_of_the_loop_around_counts_by_its_share():
+    code = code_of(LISTING, "kernel_1")
+    inner = cost(code, Hot("1", "pair"), {})
+    around = cost(code, Hot("1", "pair", around="GROUP"), {"GROUP": 8})
+    assert (inner.trip, around.trip) == (4, 4 + 4 / 8)
+    with pytest.raises(NotCounted, match="no loop is around"):
+        cost(code, Hot("1", "pair", loop="barrier", trips=("1",), around="2"), {})
+    assert cost(code, Hot("1", "pulse and tile", loop="kernel", trips=("1", "1", "1")), {}).trip == 13
+
+
 def test_loops_that_nobody_expected_are_not_counted_but_named():
     code = code_of(LISTING, "kernel_1")
     with pytest.raises(NotCounted, match=r"trips of 0 loops inside .* 1 are there.*instructions 3 to 6.*hot_loops.py"):

@@ -9,6 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
+NEIGHBOURS = 16  # of kernels/backproject.cl
 LINE, SECTOR, BANKS, WARP = 128, 32, 32, 32  # bytes of a line and of a sector of L1; banks; lanes
 
 
@@ -68,11 +69,11 @@ def samples_of_pixels(
 def gather(samples: np.ndarray, taps: int, per_item: int = 4, width: int = 4) -> tuple[float, float]:
     """Wavefronts and sectors per 32 contributions of the gather kernel's loads of samples.
 
-    samples  as `samples_of_pixels` gives them: neighbouring work-items have `per_item` neighbouring pixels each
+    samples  as `samples_of_pixels` gives them: of `per_item` pixels each, NEIGHBOURS work-items have neighbouring ones
     width    bytes per load: 4 loads a real number, 8 a complex one
     """
-    items = samples.reshape(len(samples), -1, per_item)  # pixels of a tile, row by row
-    warps = items.reshape(-1, WARP, per_item).transpose(0, 2, 1)
+    parts = samples.reshape(-1, WARP // NEIGHBOURS, per_item, NEIGHBOURS)  # pixels of a tile, row by row
+    warps = parts.transpose(0, 2, 1, 3).reshape(-1, per_item, WARP)
     loads = np.arange(taps * 8 // width) * width
     addresses = 8 * warps[:, :, None, :] + loads[:, None]
     fronts = global_wavefronts(addresses, width).sum(axis=(1, 2)).mean() / per_item
