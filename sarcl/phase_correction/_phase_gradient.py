@@ -40,7 +40,8 @@ def gradient(v: np.ndarray, widths: list[float]) -> np.ndarray:
     phase = np.zeros(n)
     for width in widths:
         cut = _windowed(_centered(turned(v, phase), width), width)
-        second, fourth = (abs(cut) ** 2).mean(axis=0), (abs(cut) ** 4).mean(axis=0)
+        # means in float64, where the square of the least second moment, of empty columns, is not rounded to 0
+        second, fourth = ((abs(cut) ** power).mean(axis=0, dtype=np.float64) for power in (2, 4))
         second = np.maximum(second, 1e-30)
         # |a + clutter|: fourth moment over squared second is 2 - (a^2/(a^2 + clutter^2))^2
         point = np.sqrt(np.clip(2 - fourth / second**2, 1e-4, 0.9999))

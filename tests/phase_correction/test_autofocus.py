@@ -561,6 +561,15 @@ def test_gradient_finds_the_phase_of_points_beside_their_places():
     assert np.std(flat(found - phase)) <= 0.2
 
 
+@pytest.mark.filterwarnings("error")
+def test_gradient_passes_over_columns_without_echoes():
+    n = 64
+    one = np.exp(1j * smooth(n, 16, rms=8))[:, None].astype(np.complex64)
+    widths = [n, n / 2, n / 4, n / 8]
+    among_empty_ones = _phase_gradient.gradient(one * np.array([0, 1, 0], np.complex64), widths)
+    assert np.abs(among_empty_ones - _phase_gradient.gradient(one, widths)).max() <= 1e-5
+
+
 def test_smoothing_does_not_slip_in_noise():
     worst, plain = 1.0, 1.0
     for seed in range(20):
