@@ -202,7 +202,7 @@ def lit(
     ]
     _, offered, turns = pulse_blocks(ends, bounds, limits)
     # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one of
-    # two antennas send back a part of their echo (scattering/physical_optics.py:lit_share)
+    # two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
     edge_on = 0.0 if rx is None else 2 * EDGE_ON
     slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(

@@ -117,14 +117,20 @@ def test_a_device_that_fails_ends_the_run_with_its_error(raw, pair, monkeypatch)
 
 
 def lost_after(monkeypatch, lost, blocks):
-    """The devices in `lost` fail, each in its block after so many, as where the driver has lost them."""
-    fill, count = Direct.fill, dict.fromkeys(map(id, lost), 0)
+    """The devices in `lost` fail, each in its block after so many, as where the driver has lost them.
+
+    The others wait for it: they would have made all blocks where a device begins late.
+    """
+    fill, count, failed = Direct.fill, dict.fromkeys(map(id, lost), 0), threading.Event()
 
     def failing(self, *rest):
         if id(self.device) in count:
             count[id(self.device)] += 1
             if count[id(self.device)] > blocks:
+                failed.set()
                 raise DeviceFailed("kernel backproject failed: DEVICE_NOT_AVAILABLE")
+        else:
+            failed.wait(10)
         return fill(self, *rest)
 
     monkeypatch.setattr(Direct, "fill", failing)

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import heapq
+import threading
 
 import numpy as np
 import pytest
@@ -110,9 +111,11 @@ def test_blocks_end_where_they_must():
 def test_two_alike_devices_make_the_profiles_of_each_row_once_each(monkeypatch):
     first = open_device()
     pair, made = [first, Device(first.info, first._raw)], {}
-    upload = RowProfiles.upload
+    upload, both_have_work = RowProfiles.upload, threading.Barrier(2, timeout=60)
 
     def counted(self, start, stop):
+        if self.device not in made:
+            both_have_work.wait()  # neither makes all blocks before the other has begun
         made[self.device] = made.get(self.device, 0) + stop - start
         return upload(self, start, stop)
 
