@@ -41,10 +41,18 @@ class UnseenPixels:
     @property
     def warning(self) -> str:
         """Share, cause and cure, in words; empty where so few are unseen that nothing need be said."""
+        return self.warned()
+
+    def warned(self, wraps: bool = True) -> str:
+        """The same; wraps: False for functions that have no argument `wrap`."""
         if self.share < WORTH_SAYING:
             return ""
         (near, far), (low, high) = self.ranges, self.window
-        if low < 0:
+        if not wraps:
+            cure = "Move the grid into the window"
+            if low < 0:
+                cure += ", or make the data with PhaseHistory.from_time, whose reference is the middle of the record"
+        elif low < 0:
             cure = (
                 "That window begins at negative ranges, because the reference lies near range 0: pass wrap=True for "
                 "data that start at range 0, or make them with PhaseHistory.from_time, whose reference is the middle "

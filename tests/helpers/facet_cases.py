@@ -50,6 +50,20 @@ def far_amplitude(triangles, permittivity, frequency, u, r=None):
     return (facet.facet_amplitude(triangles, permittivity, frequency, u, r) * turned[:, None, None]).sum(axis=0)
 
 
+def echo_and_integral(scene, waveform, tx, rx, vertical, **options):
+    """First and last sample of the only row of each polarisation, by `sarcl.echo` and by the float64 reference.
+
+    tx, rx  m (3,);  returns two arrays (2 samples, 2, 2)
+    """
+    raw = sarcl.echo(
+        scene, waveform, still(tx), receiver=still(rx), polarization="all", check=False, vertical=vertical, **options
+    )
+    f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)[[0, -1]]
+    eps = np.array([[m.permittivity(v) for m in scene.materials] for v in f])[:, scene.material]
+    wanted = facet.facet_echo(scene.triangles, eps, f, tx, rx, raw.reference_range[0], up=vertical)
+    return raw.samples[:, [0, -1]].T.reshape(2, 2, 2), wanted
+
+
 def adversarial_phases(random):
     """Phases (n, 2), rad: zero, equal, opposite, nearly so, tiny, huge, and both sides of the switch to the series."""
     corner = [0.0, 1e-300, 1e-9, 1e-3, 0.25, 0.5, 0.5 + 1e-12, 1.0, np.pi, 2 * np.pi, 100.0, 1e4, -1e-9, -0.5, -1e4]

@@ -363,6 +363,7 @@ def test_pixels_outside_every_range_window_are_warned_of_once(points):
     with pytest.warns(sarcl.SarclWarning, match="of the pixels lie outside the range window of every row") as caught:
         _, errors = sarcl.autofocus(disturbed(points, smooth(N_PULSES, 14, rms=4)), grid, range_errors=False)
     assert errors.found and len(caught) == 1
+    assert "wrap" not in str(caught[0].message)  # autofocus has no such argument
 
 
 def test_scale_and_listed_pixels_do_not_matter(points):

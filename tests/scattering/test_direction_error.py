@@ -4,14 +4,13 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.facet_cases import WET, plate, random_units, still
+from helpers.facet_cases import WET, echo_and_integral, plate, random_units, still
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.base.vectors import unit
 from sarcl.numerics.pulse_geometry import PulseGeometry
-from sarcl.reference import facet
 from sarcl.scattering._direction_error import FLOAT32_DIRECTION, DirectionError, _rotations
 from sarcl.scattering.facets import FacetSet
 from sarcl.scattering.physical_optics import polarisation, scattering_matrix
@@ -141,14 +140,7 @@ def test_grazing_facets_are_computed_as_exactly_as_the_tolerance_says(height, ma
     """Where the cosine is small its rounding counts: at 4e-3, float32 sums of soil had 1.6 times the tolerance."""
     tx, rx = np.array([5e3, 1e3, height]), np.array([1e3, 4e3, 2e3])
     scene = sarcl.Scene.facets(plate(0.5), material=material, two_sided=False)
-    raw = sarcl.echo(
-        scene, TONE, still(tx), receiver=still(rx), polarization="all", tolerance=1e-3, shadows=False, check=False,
-        vertical=(0.6, 0.0, 0.8),
-    )  # fmt: skip
-    f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)[[0, -1]]
-    eps = np.array([[m.permittivity(v) for m in scene.materials] for v in f])[:, scene.material]
-    wanted = facet.facet_echo(scene.triangles, eps, f, tx, rx, raw.reference_range[0], up=(0.6, 0.0, 0.8))
-    got = raw.samples[:, [0, -1]].T.reshape(2, 2, 2)
+    got, wanted = echo_and_integral(scene, TONE, tx, rx, (0.6, 0.0, 0.8), tolerance=1e-3, shadows=False)
     assert np.linalg.norm(got - wanted) <= 1e-3 * np.linalg.norm(wanted)
 
 

@@ -4,13 +4,12 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.facet_cases import CONDUCTOR, WET, plate, random_units, still
+from helpers.facet_cases import CONDUCTOR, WET, echo_and_integral, plate, random_units, still
 
 import sarcl
 from sarcl.base.constants import EDGE_ON, SPEED_OF_LIGHT
 from sarcl.base.vectors import unit
 from sarcl.numerics.pulse_geometry import PulseGeometry
-from sarcl.reference import facet
 from sarcl.scattering.facets import FacetSet
 from sarcl.scattering.physical_optics import lit_share, scattering_matrix, turned
 from sarcl.scattering.scatterers import faces_away
@@ -142,14 +141,7 @@ def test_both_sides_of_a_sheet_fade_into_each_other():
 def test_the_echo_of_a_plate_edge_on_is_that_of_the_integral(material):
     scene = sarcl.Scene.facets(plate(0.5), material=material, two_sided=False)
     tx, rx = np.array([5e3, 1e3, 4.0]), np.array([1e3, 4e3, 2e3])  # at grazing incidence soil takes all off
-    raw = sarcl.echo(
-        scene, TONE, still(tx), receiver=still(rx), polarization="all", tolerance=1e-3, shadows=True, check=False,
-        vertical=(0.6, 0.0, 0.8),
-    )  # fmt: skip
-    f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)[[0, -1]]
-    eps = np.array([[m.permittivity(v) for m in scene.materials] for v in f])[:, scene.material]
-    wanted = facet.facet_echo(scene.triangles, eps, f, tx, rx, raw.reference_range[0], up=(0.6, 0.0, 0.8))
-    got = raw.samples[:, [0, -1]].T.reshape(2, 2, 2)
+    got, wanted = echo_and_integral(scene, TONE, tx, rx, (0.6, 0.0, 0.8), tolerance=1e-3, shadows=True)
     assert np.linalg.norm(wanted) > 0
     assert np.linalg.norm(got - wanted) <= 1e-3 * np.linalg.norm(wanted)
 
