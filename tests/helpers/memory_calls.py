@@ -20,10 +20,22 @@ from typing import Any
 import numpy as np
 
 import sarcl
+from sarcl.experiments import fda
+from sarcl.experiments.fda import file as fda_file
 from sarcl.scenario.scenario import loads
 
 from .cases import noise_on, straight
 from .scenario_cases import SCENARIO
+
+EXPERIMENT = """[fda]
+n = 16
+frequency_step = 50e6
+n_pulses = 44
+aperture = 43.0
+distance = 500.0
+points = [0.0, 0.63]
+separations = [0.2, 0.3]
+"""
 
 
 def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
@@ -37,6 +49,7 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
     tones = sarcl.echo(
         points, sarcl.Waveform.tone(center=1e10, duration=1e-6), track, array=array, reference=(0, 0, 0), check=False
     )
+    chirps = sarcl.echo(points, chirp, track, check=False)
     image = sarcl.backproject(raw, grid, check=False)
     sharp = sarcl.backproject(
         sarcl.PhaseHistory(np.ones((64, 64), np.complex64), frequency=9e9, frequency_step=5e6,
@@ -47,6 +60,11 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
     orbit = sarcl.Orbit.kepler(7e6, 0.001, 1.7, span=(-100, 100))
     heights = np.random.default_rng(0).random((8, 9))
     model = sarcl.ElevationModel(12 + np.arange(9) * 1e-3, 42 + np.arange(8) * 1e-3, heights)
+    experiment = folder / "experiment.toml"
+    experiment.write_text(EXPERIMENT)
+    long_waves = sarcl.Waveform.chirp(center=1.25e9, bandwidth=1e8, duration=2e-8)
+    full = {"cells": 10, "model_error": False, "tolerance": 0.1}
+    looks = sarcl.Trajectory(None, [[40.0, 0, 0]])
     scenario = loads(SCENARIO)
     h5, png, pixels = folder / "a.h5", folder / "a.png", folder / "b.h5"
 
@@ -69,10 +87,13 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
         "echo, facets": lambda: sarcl.echo(box, chirp, track, check=False),
         "echo, array": lambda: sarcl.echo(points, chirp, track, array=array, channels="separated", check=False),
         "echo to a file": lambda: sarcl.echo(points, chirp, track, out=h5, check=False),
+        "fullwave_echo": lambda: sarcl.fullwave_echo(box, long_waves, looks, **full),
+        "plan_fullwave_echo": lambda: sarcl.plan_fullwave_echo(box, long_waves, looks, **full),
         "spectral_echo": lambda: sarcl.spectral_echo(points, chirp, track, check=False),
         "plan_echo": lambda: sarcl.plan_echo(points, chirp, track),
         "compress": lambda: sarcl.compress(sarcl.echo(points, chirp, track, compressed=False, check=False)),
         "map_aperture": lambda: sarcl.map_aperture(tones, "corrected"),
+        "fda": lambda: fda.run(fda_file.load(experiment)[1]),
         "beam": lambda: sarcl.beam(array, 1e10, times=[0.0], positions=np.ones((20, 3)) * 1e3),
         "measure": lambda: sarcl.measure(sharp),
         "multilook": lambda: image.multilook((2, 3)),
@@ -82,6 +103,11 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
         "from_time": lambda: sarcl.PhaseHistory.from_time(
             np.ones((4, 64)) + 0j, rate=1e8, carrier=9e9, tx=np.ones((4, 3))
         ),
+        "concatenate": lambda: sarcl.concatenate([raw, raw]).samples[3:40],
+        "doppler_centroid": lambda: sarcl.doppler_centroid(raw),
+        "stop_and_go": lambda: sarcl.stop_and_go.stop_and_go_error(track, [[0.0, 0, 0]], chirp),
+        "pulse_motion": lambda: sarcl.stop_and_go.pulse_motion(chirps, (0, 0, 0)).samples[2:5],
+        "devices": sarcl.devices,
         "motion": lambda: sarcl.motion.perturbed(track, rms=0.1, correlation_time=1.0, seed=3),
         "illumination": lambda: sarcl.illumination.lit(box.triangles, track.positions),
         "scenario": lambda: loads(scenario.dumps()).simulate(check=False),
