@@ -1,7 +1,7 @@
 """Random legal tasks over all verbs: right, or refused in words; never a bare error, NaN, crash or hang.
 
-`make tasks` runs the long part: SARCL_TASKS of them (10000), from SARCL_TASKS_SEED on (random, printed). The tests run the
-same ones each time: a few, and where CI is set as many as SECONDS of CPU allow. A failure names its number:
+`make tasks` runs the long part: SARCL_TASKS of them (10000), from SARCL_TASKS_SEED on (random, printed). The tests run
+the same ones each time: a few, and where CI is set as many as SECONDS of CPU allow. A failure names its number:
 `python -m helpers.tasks NUMBER`, in the folder tests, repeats it.
 """
 
