@@ -307,6 +307,14 @@ def test_the_forecast_says_memory_steps_and_runs_before_the_work(monkeypatch):
     assert "about 4 runs of 38 x 42 x 48 cells" in str(forecast)
 
 
+def test_a_run_of_half_the_frequencies_takes_between_half_and_all_of_the_time():
+    options = {"polarization": "all", "cells": 8, "model_error": False, "range_window": (-100, 100)}
+    whole = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
+    halves = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), max_bytes=0.75 * whole.run_bytes, **options)
+    assert halves.runs == 2 * whole.runs
+    assert 0.5 * whole.run_seconds < halves.run_seconds < whole.run_seconds
+
+
 def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
     sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
