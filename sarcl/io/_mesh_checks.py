@@ -9,10 +9,12 @@ import bz2
 import re
 import zipfile
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 
 from ..base.text import size_text
+from . import _polygons
 
 HEAD = 2**16  # bytes in which a header ends
 UNPACKED = 2**26  # bytes that an archive may always hold
@@ -61,6 +63,26 @@ def check_indices(vertices: np.ndarray, faces: np.ndarray, what: str) -> None:
     if wrong.any():
         at = int(np.flatnonzero(wrong.any(axis=1))[0])
         raise ValueError(f"{what}: face {at} names vertex {faces[at][wrong[at]][0]} of {len(vertices)}: {TAKE}")
+
+
+def check_polygons(scene: Any, what: str) -> None:
+    """ValueError where a .ply file has polygons that the fans of trimesh about their first corners do not cover."""
+    for mesh in scene.geometry.values():
+        raw = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
+        if not isinstance(raw, dict):  # a table: all faces have one number of corners
+            names = getattr(getattr(raw, "dtype", None), "names", None)
+            if names is None:
+                continue
+            raw = {name: raw[name]["f1"] for name in names if raw[name].dtype.names}
+        faces = next((raw[name] for name in ("vertex_index", "vertex_indices") if name in raw), None)
+        if faces is None:
+            continue
+        wrong = _polygons.wrong_fans([np.ravel(face).tolist() for face in faces], np.asarray(mesh.vertices))
+        if wrong:
+            raise ValueError(
+                f"{what}: face {wrong[0]}, of {len(faces[wrong[0]])} corners, is concave, and its triangles are not in "
+                "the file; export it as triangles"
+            )
 
 
 def _of_stl(path: Path, head: bytes, what: str) -> int | None:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import io
 import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
-from . import _mesh_checks, _other_files, input_paths
+from . import _gltf_checks, _mesh_checks, _mesh_text, _other_files, input_paths
 
 log = logging.getLogger(__name__)
 
@@ -86,11 +87,12 @@ def _read(path: Path, what: str, external: bool) -> tuple[Any, int | None]:
     if path.suffix.lower().lstrip(".") not in known:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
     declared = _mesh_checks.declared_faces(path, what)
+    given = _changed(path, what)
     others = _other_files.Resolver(path, external)
     resolver: Any = others  # what trimesh asks of a resolver, without being one of its classes
     try:
         # process=False: merging and reordering corners is not needed and hides what the file holds
-        made = trimesh.load_scene(path, process=False, resolver=resolver)
+        made = trimesh.load_scene(given, file_type=path.suffix[1:].lower(), process=False, resolver=resolver)
     except Exception as exc:
         _check_refused(others, what)
         # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
@@ -101,7 +103,18 @@ def _read(path: Path, what: str, external: bool) -> tuple[Any, int | None]:
             "says; export it again"
         ) from exc
     _check_refused(others, what)
+    _mesh_checks.check_polygons(made, what)
     return made, declared
+
+
+def _changed(path: Path, what: str) -> Path | io.BytesIO:
+    """The file, or its text with faces as trimesh reads them right; ValueError for what trimesh would leave out."""
+    kind = path.suffix.lower()
+    if kind in (".glb", ".gltf"):
+        _gltf_checks.check(input_paths.contents(path, "mesh file"), what)
+    text = {".obj": _mesh_text.of_obj, ".off": _mesh_text.of_off}.get(kind)
+    made = None if text is None else text(input_paths.contents(path, "mesh file"), what)
+    return path if made is None else io.BytesIO(made)
 
 
 def _check_refused(others: _other_files.Resolver, what: str) -> None:

@@ -1,0 +1,141 @@
+"""Text of .obj and .off files as trimesh reads it right: absolute indices, no comments behind numbers, no concave face.
+
+trimesh counts negative indices from the end of the file, where the format counts them back from the line of the face;
+it takes index 0 for 1, and covers every polygon by a fan about its first corner.
+"""
+
+from __future__ import annotations
+
+import re
+
+import numpy as np
+
+from . import _polygons
+
+# what makes it necessary to look closer at the text of an .obj file
+ODD = re.compile(
+    r"^[ \t]*f[ \t].*[ \t/]-\d|^[ \t]*f[ \t](?:.*[ \t])?0+(?:[/ \t]|$)|^[ \t]*f(?:[ \t]+[^\s#]+){4}"
+    r"|^[ \t]*(?:v|vt|vn|f)[ \t].*#",
+    re.MULTILINE,
+)
+CONCAVE = "its triangles cannot be told: it crosses itself or has more than 500 corners; export it as triangles"
+
+
+def of_obj(data: bytes, what: str) -> bytes | None:
+    """The text of an .obj file for trimesh; None where that is the file as it is.
+
+    ValueError names the line of a face whose indices, or corners, are none.
+    """
+    text = _decoded(data)
+    if text is None or not ODD.search(text := text.replace("\\\n", " ")):
+        return None
+    lines = text.split("\n")
+    seen = {"v": 0, "vt": 0, "vn": 0}
+    vertices: list[list[str]] = []
+    faces: list[tuple[int, list[list[int | None]]]] = []  # number of the line, and v/vt/vn of its corners
+    for at, line in enumerate(lines):
+        word, *rest = line.split("#")[0].split() or [""]
+        if word in seen:
+            seen[word] += 1
+            lines[at] = line.partition("#")[0]
+            if word == "v":
+                vertices.append(rest[:3])
+        elif word == "f":
+            corners = [_corner(corner, seen, f"{what}, line {at + 1}") for corner in rest]
+            faces.append((at, corners))
+            lines[at] = _face(corners)
+    points = _numbers(vertices)
+    if points is not None:
+        polygons = [[(corner[0] or 0) - 1 for corner in corners] for _, corners in faces]
+        for number in _polygons.wrong_fans(polygons, points):
+            at, corners = faces[number]
+            made = _polygons.triangles_of(points[polygons[number]])
+            if made is None:
+                raise ValueError(f"{what}, line {at + 1}: a face of {len(corners)} corners: {CONCAVE}")
+            lines[at] = "\n".join(_face([corners[i] for i in triangle]) for triangle in made)
+    return "\n".join(lines).encode()
+
+
+def _corner(word: str, seen: dict[str, int], where: str) -> list[int | None]:
+    """Indices v/vt/vn of a corner, counted from 1; None where one is left out."""
+    made: list[int | None] = []
+    for name, digits in zip(seen, word.split("/"), strict=False):
+        if not digits:
+            made.append(None)
+            continue
+        try:
+            index = int(digits)
+        except ValueError:
+            raise ValueError(
+                f"{where}: {word!r:.40} is no corner of a face, wanted v, v/vt, v//vn or v/vt/vn"
+            ) from None
+        absolute = seen[name] + 1 + index if index < 0 else index
+        if absolute < 1:
+            raise ValueError(
+                f"{where}: index {index} of {name}, of which {seen[name]} come before this line; they are counted from "
+                "1, or back from -1: export it again"
+            )
+        made.append(absolute)
+    return made
+
+
+def _face(corners: list[list[int | None]]) -> str:
+    return " ".join(["f", *("/".join("" if i is None else str(i) for i in corner) for corner in corners)])
+
+
+def of_off(data: bytes, what: str) -> bytes | None:
+    """The text of an .off file for trimesh; None where that is the file as it is.
+
+    ValueError for vertices of four coordinates, or of another number than three, and for polygons without triangles.
+    """
+    text = _decoded(data)
+    if text is None:
+        return None
+    text = re.sub(r"#[^\n]*", "", text)
+    head = re.match(r"\s*((?:ST)?C?N?(4?n?)OFF)\b", text)
+    if head is None:
+        return None
+    if head[2]:
+        raise ValueError(
+            f"{what} is of the kind {head[1]}, whose vertices have not three coordinates; export it as OFF"
+        )
+    lines = [line for line in text[head.end() :].split("\n") if line.strip()]
+    try:
+        n, k = (int(word) for word in lines[0].split()[:2])
+        polygons = [
+            [int(word) for word in line.split()[1 : 1 + int(line.split()[0])]] for line in lines[n + 1 : n + k + 1]
+        ]
+    except (ValueError, IndexError):
+        return None  # which trimesh refuses
+    points = _numbers([line.split()[:3] for line in lines[1 : n + 1]])
+    if points is None or not (wrong := _polygons.wrong_fans(polygons, points)):
+        return None
+    made: dict[int, list[tuple[int, int, int]]] = {}
+    for number in wrong:
+        found = _polygons.triangles_of(points[polygons[number]])
+        if found is None:
+            raise ValueError(f"{what}: face {number} of {len(polygons[number])} corners: {CONCAVE}")
+        made[number] = found
+    faces = [
+        one
+        for number, polygon in enumerate(polygons)
+        for one in ([[polygon[i] for i in triangle] for triangle in made[number]] if number in made else [polygon])
+    ]
+    rows = [" ".join(map(str, (len(face), *face))) for face in faces]
+    return "\n".join([head[1], f"{n} {len(faces)} 0", *lines[1 : n + 1], *rows, ""]).encode()
+
+
+def _decoded(data: bytes) -> str | None:
+    try:
+        return data.decode("utf-8-sig").replace("\r\n", "\n")
+    except UnicodeDecodeError:
+        return None
+
+
+def _numbers(rows: list[list[str]]) -> np.ndarray | None:
+    """Rows of three numbers, (n, 3); None where they are not."""
+    try:
+        made = np.array(rows, np.float64)
+    except ValueError:
+        return None
+    return made if made.ndim == 2 and made.shape[1] == 3 else None
