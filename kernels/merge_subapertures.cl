@@ -26,6 +26,10 @@
 // Record of a (new tile, pulse): first sample, then TAPS complex weights.
 #define N_SHIFT (2 + 2 * TAPS)
 
+typedef struct {
+    int n_parents, n, n_used, n_tiles, first, reach, samples, stride, origin;
+} shifts_numbers;
+
 // global size (n/VW, new tiles of this call)
 //   pulse   (2, N_PULSE, n)     see geometry.clh
 //   parents (2, 3, n_parents)   x of the old tiles about the scene's centre, m, hi and lo parts
@@ -34,25 +38,24 @@
 //   used    n_used <= n         pulses that are real
 //   reach   samples before the new profiles' centre, and `samples` in all; stride, origin: of the old profiles
 //   out     (tiles of this call, n_used, N_SHIFT)
-__kernel void shifts(__global const float *restrict pulse, __global const float *restrict parents,
-                     int n_parents,
-                     __global const float *restrict tile, __global const int *restrict parent,
-                     __global const float *restrict table, int n, int n_used, int n_tiles, int first, int reach,
-                     int samples, int stride, int origin, __global float *restrict out) {
-    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x = load_point(tile, k, n_tiles), d;
+__kernel void shifts(shifts_numbers given, __global const float *restrict pulse,
+                     __global const float *restrict parents, __global const float *restrict tile,
+                     __global const int *restrict parent, __global const float *restrict table,
+                     __global float *restrict out) {
+    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * given.n;
+    point x = load_point(tile, k, given.n_tiles), d;
     wv r;
-    point T = load_antenna(pulse, P_TX, g, n, 0);
-    wv length = w_load(pulse + P_TR * n, g, lo);
+    point T = load_antenna(pulse, P_TX, g, given.n, 0);
+    wv length = w_load(pulse + P_TR * given.n, g, lo);
 #if BISTATIC
-    point R = load_antenna(pulse, P_RX, g, n, 0);
-    wv rx_length = w_load(pulse + P_RR * n, g, lo);
+    point R = load_antenna(pulse, P_RX, g, given.n, 0);
+    wv rx_length = w_load(pulse + P_RR * given.n, g, lo);
 #endif
 #if !FROM_CENTRE
     point c;
-    c.x = w_load1(parents, parent[k], 3 * (size_t)n_parents);
-    c.y = w_load1(parents + n_parents, parent[k], 3 * (size_t)n_parents);
-    c.z = w_load1(parents + 2 * n_parents, parent[k], 3 * (size_t)n_parents);
+    c.x = w_load1(parents, parent[k], 3 * (size_t)given.n_parents);
+    c.y = w_load1(parents + given.n_parents, parent[k], 3 * (size_t)given.n_parents);
+    c.z = w_load1(parents + 2 * given.n_parents, parent[k], 3 * (size_t)given.n_parents);
     x.x = w_sub(x.x, c.x);
     x.y = w_sub(x.y, c.y);
     x.z = w_sub(x.z, c.z);
@@ -72,10 +75,11 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
     wv second = path_difference(R, rx_length, x, &r, &d);
     delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
 #endif
-    wv wide_cycles = w_mul(delta, w_load(pulse + P_KAPPA * n, g, lo)), wide_position = w_mul(delta, w_load(pulse + P_SIGMA * n, g, lo));
+    wv wide_cycles = w_mul(delta, w_load(pulse + P_KAPPA * given.n, g, lo));
+    wv wide_position = w_mul(delta, w_load(pulse + P_SIGMA * given.n, g, lo));
 #if FROM_CENTRE
-    wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * n, g, lo));
-    wide_position = w_add(wide_position, w_load(pulse + P_POSITION * n, g, lo));
+    wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * given.n, g, lo));
+    wide_position = w_add(wide_position, w_load(pulse + P_POSITION * given.n, g, lo));
 #endif
     iv unused, base;
     fv cycles = w_split(wide_cycles, &unused);
@@ -87,7 +91,8 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
     at -= nearest_int(TO_FLOAT_INT(at) * (1.0f / WRAP)) * WRAP;
 #endif
     // tiles that leave their rows are kept from here by the host; no rounding may touch memory that is not the row's
-    iv safe = clamp(at, (iv)(reach - origin), (iv)(stride - origin + reach - samples - TAPS));
+    int before = given.reach - given.origin;
+    iv safe = clamp(at, (iv)before, (iv)(given.stride + before - given.samples - TAPS));
     fv w[TAPS], sine, cosine;
     tap_weights(z, table, w);
     sincos_cycles(cycles, &sine, &cosine);
@@ -99,8 +104,8 @@ __kernel void shifts(__global const float *restrict pulse, __global const float 
         STORE(w[b] * cosine, 0, re[b]);
         STORE(w[b] * sine, 0, im[b]);
     }
-    out += (get_global_id(1) * (size_t)n_used + g * VW) * N_SHIFT;
-    int count = min(VW, n_used - (int)g * VW);
+    out += (get_global_id(1) * (size_t)given.n_used + g * VW) * N_SHIFT;
+    int count = min(VW, given.n_used - (int)g * VW);
     for (int l = 0; l < count; l++) {
         out[l * N_SHIFT] = as_float(sample[l]);
         out[l * N_SHIFT + 1] = 0;
@@ -127,24 +132,27 @@ typedef float8 cv;
 #define TURNED(x) ((x).s10325476 * (float8)(-1, 1, -1, 1, -1, 1, -1, 1))
 #endif
 
+typedef struct {
+    int stride, origin, first_parent, n_used, n_blocks, reach, first, out_first, n_kept, out_stride;
+} merge_numbers;
+
 // global size (spans of a profile, new tiles of this call)
 //   source     profiles (old tiles from `first_parent` on, n_used, stride, 2); delay 0 or x stands at `origin`
 //   shift      from `shifts`
 //   blocks     (n_blocks, 4): first pulse, pulses, first kept pulse, first row of `filter`
 //   filter     (rows, FILTER_TAPS): W
 //   out        (tiles from out_first on, n_kept, out_stride, 2), added to; x' stands at `reach`
-__kernel void merge(__global const float *restrict source, int stride, int origin, int first_parent,
-                    __global const int *restrict parent, __global const float *restrict shift, int n_used,
-                    __global const int *restrict blocks, int n_blocks, __global const float *restrict filter, int reach,
-                    int first, int out_first, int n_kept, int out_stride, __global float *restrict out) {
-    int span = get_global_id(0) * SPAN, k = first + get_global_id(1);
-    __global const float *records = shift + get_global_id(1) * (size_t)n_used * N_SHIFT;
+__kernel void merge(merge_numbers given, __global const float *restrict source, __global const int *restrict parent,
+                    __global const float *restrict shift, __global const int *restrict blocks,
+                    __global const float *restrict filter, __global float *restrict out) {
+    int span = get_global_id(0) * SPAN, k = given.first + get_global_id(1);
+    __global const float *records = shift + get_global_id(1) * (size_t)given.n_used * N_SHIFT;
 #if !FROM_CENTRE
-    source += 2 * (size_t)(parent[k] - first_parent) * n_used * stride;
+    source += 2 * (size_t)(parent[k] - given.first_parent) * given.n_used * given.stride;
 #endif
-    out += (size_t)(k - out_first) * n_kept * out_stride * 2;
-    int last = min(span + SPAN, (2 * out_stride + WIDTH - 1) / WIDTH);
-    for (int b = 0; b < n_blocks; b++) {
+    out += (size_t)(k - given.out_first) * given.n_kept * given.out_stride * 2;
+    int last = min(span + SPAN, (2 * given.out_stride + WIDTH - 1) / WIDTH);
+    for (int b = 0; b < given.n_blocks; b++) {
         int p0 = blocks[4 * b], count = blocks[4 * b + 1], kept = blocks[4 * b + 2], row = blocks[4 * b + 3];
         for (int v = span; v < last; v++) {
             cv total[FILTER_TAPS];
@@ -152,7 +160,8 @@ __kernel void merge(__global const float *restrict source, int stride, int origi
             for (int a = 0; a < FILTER_TAPS; a++) total[a] = 0;
             for (int i = 0; i < count; i++) {
                 __global const float *c = records + (size_t)(p0 + i) * N_SHIFT;
-                __global const float *s = source + 2 * ((size_t)(p0 + i) * stride + origin - reach + as_int(c[0])) + v * WIDTH;
+                size_t first_sample = (size_t)(p0 + i) * given.stride + given.origin - given.reach + as_int(c[0]);
+                __global const float *s = source + 2 * first_sample + v * WIDTH;
                 cv x = 0, y = 0;
 #pragma unroll
                 for (int t = 0; t < TAPS; t++) {
@@ -167,7 +176,7 @@ __kernel void merge(__global const float *restrict source, int stride, int origi
             }
 #pragma unroll
             for (int a = 0; a < FILTER_TAPS; a++) {
-                __global float *o = out + (size_t)(kept + a) * out_stride * 2 + v * WIDTH;
+                __global float *o = out + (size_t)(kept + a) * given.out_stride * 2 + v * WIDTH;
                 STORE_CV(LOAD_CV(o) + total[a], o);
             }
         }

@@ -58,6 +58,11 @@ static inline void put_channel(__global float *out, int channel, complex_v a, fv
     STORE(scale * a.im, 0, out + (2 * channel + 1) * PLANE);
 }
 
+typedef struct {
+    int n, n_offsets, second, first;
+    float range;
+} facet_amplitudes_numbers;
+
 // Amplitudes at pulse nodes. global size (pulse nodes, times the group where GROUPED; tiles of this call).
 //   constants  of the nodes, n of them per tile, as in backproject.cl, of all tiles
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
@@ -71,16 +76,17 @@ static inline void put_channel(__global float *out, int channel, complex_v a, fv
 //   first    this call's first tile
 //   out      (pulse nodes, tiles of this call, TILE/VW, CHANNELS, 2, VW), GROUPED: (., ., CHANNELS, 2, TILE)   re, im
 //   marks    (pulse nodes, tiles of this call, TILE)                       FRONT, BRIGHT
-__kernel void facet_amplitudes(int n, __global const float *restrict constants, __global const float *restrict offsets,
-                               int n_offsets, __global const float *restrict facets, __global const uchar *restrict seen,
-                               __global const uchar *restrict later, __global const float *restrict moments,
-                               __global const float *restrict nodes, __global const float *restrict up,
-                               __global const float *restrict patterns, int second, __global const float *restrict axes,
-                               float range, __global const float *restrict reach, __global const float *restrict radius,
-                               int first, __global float *restrict out, __global uchar *restrict marks) {
-    int q = get_global_id(0) / ITEMS, k = first + get_global_id(1);
+__kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const float *restrict constants,
+                               __global const float *restrict offsets, __global const float *restrict facets,
+                               __global const uchar *restrict seen, __global const uchar *restrict later,
+                               __global const float *restrict moments, __global const float *restrict nodes,
+                               __global const float *restrict up, __global const float *restrict patterns,
+                               __global const float *restrict axes, __global const float *restrict reach,
+                               __global const float *restrict radius, __global float *restrict out,
+                               __global uchar *restrict marks) {
+    int q = get_global_id(0) / ITEMS, k = given.first + get_global_id(1);
     float3 vertical = vload3(0, up), other = vload3(1, up);
-    __global const float *c = constants + (k * (size_t)n + q) * N_CONST;
+    __global const float *c = constants + (k * (size_t)given.n + q) * N_CONST;
     size_t here = (size_t)q * get_global_size(1) + get_global_id(1);
     direction from_tx = load_direction(c, C_UX, C_LOW);
 #if BISTATIC
@@ -102,10 +108,10 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
             share[l] = unseen ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
         }
 
-        offset x = load_offset(offsets, at, n_offsets);
-        triple edge_1 = load_triple(facets + F_EDGE * (size_t)n_offsets, at, n_offsets);
-        triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)n_offsets, at, n_offsets);
-        fv factor = LOAD(at, facets + F_FACTOR * (size_t)n_offsets);
+        offset x = load_offset(offsets, at, given.n_offsets);
+        triple edge_1 = load_triple(facets + F_EDGE * (size_t)given.n_offsets, at, given.n_offsets);
+        triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)given.n_offsets, at, given.n_offsets);
+        fv factor = LOAD(at, facets + F_FACTOR * (size_t)given.n_offsets);
         fv tx_range, rx_range, twice_area;
         triple u_t = toward(from_tx, x, &tx_range), h_t, v_t;
         polarisation(u_t, vertical, other, &h_t, &v_t);
@@ -133,7 +139,7 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
         fv path_1 = t_dot(u_sum, edge_1), path_2 = t_dot(u_sum, edge_2);
         scattering S;
 #if WEIGHTS
-        antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, range);
+        antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, given.range);
         complex_v gain;
 #endif
         for (int m = 0; m < NODES; m++) {
@@ -141,8 +147,8 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #if METAL
                 complex_v inverse_root = c_make((fv)0.0f, (fv)0.0f);
 #else
-                __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)n_offsets;
-                complex_v inverse_root = c_make(LOAD(at, root_planes), LOAD(at, root_planes + n_offsets));
+                __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)given.n_offsets;
+                complex_v inverse_root = c_make(LOAD(at, root_planes), LOAD(at, root_planes + given.n_offsets));
 #endif
 #if BISTATIC
                 S = scatter(normal, u_t, h_t, v_t, u_r, h_r, v_r, inverse_root);
@@ -154,10 +160,10 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 #if ROUGH
             fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
             mean = rough_mean(mean, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area, nodes[m],
-                              facets + F_ROUGH * (size_t)n_offsets, at, n_offsets);
+                              facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
 #endif
 #if WEIGHTS
-            if (m == 0 || VARIES) gain = weight(view, patterns, second, nodes[2 * NODES + m]);
+            if (m == 0 || VARIES) gain = weight(view, patterns, given.second, nodes[2 * NODES + m]);
             mean = c_mul(mean, gain);
 #endif
             fv scale = amplitude * nodes[NODES + m];
@@ -181,6 +187,10 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
     }
 }
 
+typedef struct {
+    int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
+} spread_facets_numbers;
+
 // What facets send back at a pulse node, or between two, added to profiles. global size (pulses of this call, times
 // the group where GROUPED; splits): work-item, or group, (p, s) adds tiles s, s + splits, ... of this call to row (s, p).
 //   pulse, constants, tile, offsets, table   as in backproject.cl, constants of all tiles
@@ -193,14 +203,13 @@ __kernel void facet_amplitudes(int n, __global const float *restrict constants, 
 //   rows     (splits, n_used, CHANNELS, 3, stride, 2)   zeroed by the caller: sum, total, its error; delay 0 at `origin`
 //   done     (3, splits, n_used)      counts go on: facets in the range window; of those seen from their front; left out of
 //            the beam
-__kernel void spread_facets(__global const float *restrict pulse, int n, int n_used,
-                            __global const float *restrict constants, __global const float *restrict tile, int n_tiles,
-                            __global const float *restrict offsets, int n_offsets,
-                            __global const float *restrict amplitudes, __global const uchar *restrict marks, int first,
-                            int n_here, __global const int *restrict pulse_nodes, __global const float *restrict shares,
-                            __global const float *restrict axes, __global const float *restrict reach,
-                            __global const float *restrict radius, __global const float *restrict table, int last, int flush,
-                            __global float *rows, int stride, int origin, __global int *restrict done) {
+__kernel void spread_facets(spread_facets_numbers given, __global const float *restrict pulse,
+                            __global const float *restrict constants, __global const float *restrict tile,
+                            __global const float *restrict offsets, __global const float *restrict amplitudes,
+                            __global const uchar *restrict marks, __global const int *restrict pulse_nodes,
+                            __global const float *restrict shares, __global const float *restrict axes,
+                            __global const float *restrict reach, __global const float *restrict radius,
+                            __global const float *restrict table, __global float *rows, __global int *restrict done) {
 #if GROUPED
     __local row_window window;
     int p = get_global_id(0) / ITEMS, item = get_local_id(0), start = -1;
@@ -209,13 +218,13 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
     int p = get_global_id(0), item = 0;
 #endif
     int split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
-    __global float *sum = rows + 6 * ((size_t)split * n_used + p) * CHANNELS * stride;
+    __global float *sum = rows + 6 * ((size_t)split * given.n_used + p) * CHANNELS * given.stride;
     int from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
-    for (int k = first + split; k < first + n_here; k += get_global_size(1)) {
-        __global const float *c = constants + (k * (size_t)n + p) * N_CONST;
+    for (int k = given.first + split; k < given.first + given.n_here; k += get_global_size(1)) {
+        __global const float *c = constants + (k * (size_t)given.n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
         if (state == OUTSIDE) continue;
-        int n_facets = k == n_tiles - 1 ? last : TILE;
+        int n_facets = k == given.n_tiles - 1 ? given.last : TILE;
 #if CULL
         direction from_tx = load_direction(c, C_UX, C_LOW), from_rx = from_tx;
 #if BISTATIC
@@ -229,11 +238,11 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
         for (int i = item; i < TILE / VW; i += ITEMS) {
             size_t at = (size_t)k * (TILE / VW) + i, tile_at_node[PULSE_NODES];
 #pragma unroll
-            for (int q = 0; q < PULSE_NODES; q++) tile_at_node[q] = ((size_t)from + q) * n_here + (k - first);
-            size_t at_nearest = ((size_t)nearest_node * n_here + (k - first)) * (TILE / VW) + i;
-            offset x = load_offset(offsets, at, n_offsets);
-            about_centre(&x, tile, k, n_tiles);
-            phase_position where = locate(c, pulse, p, n, x);
+            for (int q = 0; q < PULSE_NODES; q++) tile_at_node[q] = ((size_t)from + q) * given.n_here + (k - given.first);
+            size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
+            offset x = load_offset(offsets, at, given.n_offsets);
+            about_centre(&x, tile, k, given.n_tiles);
+            phase_position where = locate(c, pulse, p, given.n, x);
             fv inside = 1;
             if (state == CROSSING) inside = keep_inside(c, &where);
             float is_inside[VW];
@@ -256,9 +265,9 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
             sine *= inside;
             cosine *= inside;
             iv j;
-            tap_weights(first_tap(where.t, where.base, stride, origin, &j), table, w);
+            tap_weights(first_tap(where.t, where.base, given.stride, given.origin, &j), table, w);
 #if GROUPED
-            int tap = any_mark & BRIGHT ? origin + j : NOWHERE;
+            int tap = any_mark & BRIGHT ? given.origin + j : NOWHERE;
 #endif
             for (int channel = 0; channel < CHANNELS; channel++) {
                 complex_v a = c_make((fv)0.0f, (fv)0.0f);
@@ -271,36 +280,38 @@ __kernel void spread_facets(__global const float *restrict pulse, int n, int n_u
                 }
                 // times exp(-j 2 pi cycles)
                 fv echo_re = fma(a.re, cosine, a.im * sine), echo_im = fma(a.im, cosine, -a.re * sine);
-                __global float *channel_sum = sum + 6 * (size_t)channel * stride;
+                __global float *channel_sum = sum + 6 * (size_t)channel * given.stride;
 #if GROUPED
-                start = add_scatterers(&window, channel_sum, stride, start, item, tap, w, (float2)(echo_re, echo_im));
+                start = add_scatterers(&window, channel_sum, given.stride, start, item, tap, w, (float2)(echo_re, echo_im));
 #if CHANNELS > 1
                 // the next channel has a row of its own
-                if (start >= 0) empty_window(&window, channel_sum, stride, start, item);
+                if (start >= 0) empty_window(&window, channel_sum, given.stride, start, item);
                 start = -1;
 #endif
 #else
-                add_taps(channel_sum + 2 * origin, j, w, echo_re, echo_im);
+                add_taps(channel_sum + 2 * given.origin, j, w, echo_re, echo_im);
 #endif
             }
         }
 #if GROUPED
-        if (++added % flush == 0 && start >= 0) {
-            empty_window(&window, sum, stride, start, item);
+        if (++added % given.flush == 0 && start >= 0) {
+            empty_window(&window, sum, given.stride, start, item);
             start = -1;
         }
     }
-    if (start >= 0) empty_window(&window, sum, stride, start, item);
+    if (start >= 0) empty_window(&window, sum, given.stride, start, item);
     inside_count = sum_of_items(&window, item, inside_count);
     front_count = sum_of_items(&window, item, front_count);
 #else
-        if (++added % flush == 0)
-            for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+        if (++added % given.flush == 0)
+            for (int channel = 0; channel < CHANNELS; channel++)
+                empty_into_total(sum + 6 * (size_t)channel * given.stride, given.stride);
     }
-    for (int channel = 0; channel < CHANNELS; channel++) empty_into_total(sum + 6 * (size_t)channel * stride, stride);
+    for (int channel = 0; channel < CHANNELS; channel++)
+        empty_into_total(sum + 6 * (size_t)channel * given.stride, given.stride);
 #endif
     if (item == 0) {
-        size_t at = (size_t)split * n_used + p, n_counts = (size_t)get_global_size(1) * n_used;
+        size_t at = (size_t)split * given.n_used + p, n_counts = (size_t)get_global_size(1) * given.n_used;
         done[at] += inside_count;
         done[n_counts + at] += front_count;
         done[2 * n_counts + at] += unlit_count;

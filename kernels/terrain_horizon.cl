@@ -75,30 +75,34 @@ static inline Edge gap_edge(Grid g, int i, float from, float rise, int ra, int r
                   : edge_of(z[0], z[g.n_along + 1], from - there, g.across[r + 1] - there - rise);
 }
 
-__kernel void sweep(__global const float *restrict z, __global const float *restrict along,
-                    __global const float *restrict across, int n_along, int n_across, float per_across, float eye,
-                    float eye_z, float ref, __global const float2 *restrict line, int first, int step, int columns,
-                    int offset, __global float *restrict table) {
+typedef struct {
+    int n_along, n_across, first, step, columns, offset;
+    float per_across, eye, eye_z, ref;
+} sweep_numbers;
+
+__kernel void sweep(sweep_numbers given, __global const float *restrict z, __global const float *restrict along,
+                    __global const float *restrict across, __global const float2 *restrict line,
+                    __global float *restrict table) {
     size_t j = get_global_id(0);
-    Grid g = {z, along, across, n_along, n_across, per_across, ref, eye, eye_z};
-    __global float *out = table + offset + j * columns;
+    Grid g = {z, along, across, given.n_along, given.n_across, given.per_across, given.ref, given.eye, given.eye_z};
+    __global float *out = table + given.offset + j * given.columns;
     float most = NONE, slope = line[j].y;
-    for (int c = 0; c < columns; c++) {
-        int i = first + c * step, gap = step > 0 ? i - 1 : i;
-        if (gap >= 0 && gap < n_along - 1) {
-            float wide = along[gap + 1] - along[gap], rise = slope * wide, from = line[j].x + slope * (along[gap] - ref);
-            int ra = interval_of(across, n_across, from, (from - across[0]) * per_across);
-            int rb = interval_of(across, n_across, from + rise, (from + rise - across[0]) * per_across);
+    for (int c = 0; c < given.columns; c++) {
+        int i = given.first + c * given.step, gap = given.step > 0 ? i - 1 : i;
+        if (gap >= 0 && gap < given.n_along - 1) {
+            float wide = along[gap + 1] - along[gap], rise = slope * wide, from = line[j].x + slope * (along[gap] - given.ref);
+            int ra = interval_of(across, given.n_across, from, (from - across[0]) * given.per_across);
+            int rb = interval_of(across, given.n_across, from + rise, (from + rise - across[0]) * given.per_across);
             for (int k = 0; k < (ra == rb ? 1 : 3); k++) {
                 Edge e = gap_edge(g, gap, from, rise, ra, rb, k);
                 float u = ratio(e.share, e.whole), at = along[gap] + u * wide;
-                if (met(e) && (at - eye) * step > 0) most = fmax(most, zeta(g, e.low + u * (e.high - e.low), at));
+                if (met(e) && (at - given.eye) * given.step > 0) most = fmax(most, zeta(g, e.low + u * (e.high - e.low), at));
             }
         }
-        float at = line[j].x + slope * (along[i] - ref);
+        float at = line[j].x + slope * (along[i] - given.ref);
         Edge e = column_edge(g, i, at);
         // lines half a cell outside still help those inside
-        if (fmax(across[0] - at, at - across[n_across - 1]) * per_across <= 0.5f)
+        if (fmax(across[0] - at, at - across[given.n_across - 1]) * given.per_across <= 0.5f)
             most = fmax(most, zeta(g, e.low + ratio(e.share, e.whole) * (e.high - e.low), along[i]));
         out[c] = most;
     }
@@ -158,19 +162,24 @@ static inline int behind(float3 p, float3 eye, __global const float *grid_x, __g
     return row[0] + (at - j) * (row[columns] - row[0]) > zeta(g, p.z, x);
 }
 
-__kernel void horizon(__global const float *restrict facet, __global const int *restrict index,
-                      __global const float2 *restrict place, int samples, float ex, float ey, float ez, float ox, float oy,
-                      float oz, __global const float *restrict x, __global const float *restrict y,
-                      __global const float *restrict z_rows, __global const float *restrict z_columns, int nx, int ny,
-                      float per_x, float per_y, __global const float *restrict number, __global const int *restrict whole,
-                      __global const float *restrict table, __global ulong *restrict hidden) {
+typedef struct {
+    int samples, nx, ny;
+    float eye[3], other[3], per_x, per_y;
+} horizon_numbers;
+
+__kernel void horizon(horizon_numbers given, __global const float *restrict facet, __global const int *restrict index,
+                      __global const float2 *restrict place, __global const float *restrict x,
+                      __global const float *restrict y, __global const float *restrict z_rows,
+                      __global const float *restrict z_columns, __global const float *restrict number,
+                      __global const int *restrict whole, __global const float *restrict table,
+                      __global ulong *restrict hidden) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 eye = (float3)(ex, ey, ez), other = (float3)(ox, oy, oz);
+    float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
     ulong bits = hidden[i];
-    for (int s = 0; s < samples; s++)
-        if (!(bits >> s & 1) && behind(lifted(f, place[s], eye, other), eye, x, y, z_rows, z_columns, nx, ny, per_x,
-                                       per_y, number, whole, table))
+    for (int s = 0; s < given.samples; s++)
+        if (!(bits >> s & 1) && behind(lifted(f, place[s], eye, other), eye, x, y, z_rows, z_columns, given.nx, given.ny,
+                                       given.per_x, given.per_y, number, whole, table))
             bits |= 1UL << s;
     hidden[i] = bits;
 }

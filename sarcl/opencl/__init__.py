@@ -8,6 +8,7 @@ For other folders:
     failures       errors of OpenCL as errors that name the device, the need and the remedy
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
     native_functions  the error of a device's own sine and cosine
+    launch_numbers  numbers of a kernel's launch as one struct by value, given by name
     memory_budget  bytes that a computation may take on a device
     pipeline       blocks of work on a device: the upload of one while the device works on the one before
 
@@ -23,4 +24,14 @@ For this folder alone:
     _programs      source texts of kernels, and precautions for building programs
 """
 
-__all__ = ["choose_device", "device", "device_list", "failures", "fft", "memory_budget", "native_functions", "pipeline"]
+__all__ = [
+    "choose_device",
+    "device",
+    "device_list",
+    "failures",
+    "fft",
+    "launch_numbers",
+    "memory_budget",
+    "native_functions",
+    "pipeline",
+]

@@ -15,6 +15,7 @@ from ..numerics.device_profiles import SpreadSamples
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
@@ -24,6 +25,7 @@ from ..visibility.illumination import Span
 from ._kernel_images import sample_patches
 from .spreading import GROUP, Band, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
 
+KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
 NODES_SHARE = 0.2  # of the tolerance that is left: the most that interpolation between pulse nodes may take
 
@@ -110,7 +112,7 @@ class FacetSpreader:
         }
         self.constants = TileConstants(device, plan, bistatic=bistatic)
         self.amplitudes, self.spread = (
-            device.kernel("spread_facets.cl", name, **macros) for name in ("facet_amplitudes", "spread_facets")
+            device.kernel(KERNELS, name, **macros) for name in ("facet_amplitudes", "spread_facets")
         )
         at_nodes = nodes / SPEED_OF_LIGHT, held.facet_plan.scales(), nodes / weights.frequency
         self.nodes = device.upload(np.stack(at_nodes).astype(np.float32))
@@ -190,15 +192,22 @@ class FacetSpreader:
             here = min(self.tiles_at_once, tiles.n_tiles - first)
             device.run(
                 self.amplitudes, (each * len(at), here), ends,
-                n_nodes, node_constants, held.offsets, n_offsets, held.planes, seen, later, moments, self.nodes,
-                self.up, self.patterns, self.second, node_axes, np.float32(self.weights.range), self.reach,
-                held.radius, first, made, marks,
+                launch_numbers(
+                    KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
+                    range=self.weights.range, first=first,
+                ),
+                node_constants, held.offsets, held.planes, seen, later, moments, self.nodes, self.up, self.patterns,
+                node_axes, self.reach, held.radius, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (each * used, self.splits), ends,
-                pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, n_offsets, made, marks, first,
-                here, which_here, shares_here, axes, self.reach, held.radius, self.table, held.last, self.flush, rows,
-                self.stride, self.stride // 2, done, steps=here / self.splits,
+                launch_numbers(
+                    KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
+                    first=first, n_here=here, last=held.last, flush=self.flush, stride=self.stride,
+                    origin=self.stride // 2,
+                ),
+                pulse, constants, held.references, held.offsets, made, marks, which_here, shares_here, axes,
+                self.reach, held.radius, self.table, rows, done, steps=here / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)

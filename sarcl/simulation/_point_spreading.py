@@ -14,6 +14,7 @@ from ..numerics.plan import Plan
 from ..numerics.pulse_geometry import PulseGeometry
 from ..numerics.tile_constants import TileConstants
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from ._kernel_images import sample_patches
@@ -79,9 +80,13 @@ def spread_points(
             size, ends = (GROUP * used, parts), (GROUP, 1)
         device.run(
             kernel, size, ends,
-            pulse, n, used, constants, held.references, tiles.n_tiles, held.offsets, tiles.offsets.shape[1],
-            held.planes, ratios, patterns, second, axes, np.float32(weights.range), reach, held.radius, table,
-            held.last, flush, rows, stride, stride // 2, done, steps=tiles.n_tiles / parts,
+            launch_numbers(
+                "spread_points.cl", "spread", n=n, n_used=used, n_tiles=tiles.n_tiles,
+                n_offsets=tiles.offsets.shape[1], second=second, range=weights.range, last=held.last, flush=flush,
+                stride=stride, origin=stride // 2,
+            ),
+            pulse, constants, held.references, held.offsets, held.planes, ratios, patterns, axes, reach, held.radius,
+            table, rows, done, steps=tiles.n_tiles / parts,
         )  # fmt: skip
         device.finish()
         clock.lap("echo")

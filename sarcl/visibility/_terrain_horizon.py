@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ._ray_casting import DeviceFacets, Frame
 
 FINE = 2  # range lines per cell at the border of the terrain
@@ -37,12 +38,14 @@ class Terrain:
             if not s.columns:
                 continue
             z, along, across = (self.z_columns, self.y, self.x) if s.axis else (self.z_rows, self.x, self.y)
-            sizes = (len(self.axes[s.axis]), len(self.axes[1 - s.axis]))
-            numbers = np.array([self.per[1 - s.axis], eye[s.axis], eye[2], s.end], np.float32)
+            numbers = launch_numbers(
+                "terrain_horizon.cl", "sweep", n_along=len(self.axes[s.axis]), n_across=len(self.axes[1 - s.axis]),
+                per_across=self.per[1 - s.axis], eye=eye[s.axis], eye_z=eye[2], ref=s.end, first=s.first, step=s.step,
+                columns=s.columns, offset=int(offset),
+            )  # fmt: skip
             lines = self.device.upload(s.lines.astype(np.float32))
             held.append(lines)
-            last = (s.first, s.step, s.columns, int(offset))
-            self.device.run(kernel, (len(s.lines),), None, z, along, across, *sizes, *numbers, lines, *last, table)
+            self.device.run(kernel, (len(s.lines),), None, numbers, z, along, across, lines, table)
         whole = [
             (s.first, s.step, s.columns, len(s.lines), o, 0, 0, 0) for s, o in zip(sectors, offsets[:4], strict=True)
         ]
@@ -66,10 +69,15 @@ class Horizons:
         """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
         t = self.terrain
         kernel = t.device.kernel("terrain_horizon.cl", "horizon")
-        eye = (*t.frame.eye(self.viewpoint)[:3], *t.frame.eye(other)[:3])
-        grid = (t.x, t.y, t.z_rows, t.z_columns, len(t.axes[0]), len(t.axes[1]), *np.array(t.per, np.float32))
-        arguments = (facets.buffer, index, *points, *eye, *grid, self.number, self.whole, self.table, hidden)
-        t.device.run(kernel, (n,), None, *arguments)
+        place, samples = points
+        numbers = launch_numbers(
+            "terrain_horizon.cl", "horizon", samples=samples, nx=len(t.axes[0]), ny=len(t.axes[1]), per_x=t.per[0],
+            per_y=t.per[1], eye=t.frame.eye(self.viewpoint)[:3], other=t.frame.eye(other)[:3],
+        )  # fmt: skip
+        t.device.run(
+            kernel, (n,), None, numbers, facets.buffer, index, place, t.x, t.y, t.z_rows, t.z_columns, self.number,
+            self.whole, self.table, hidden,
+        )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

@@ -17,14 +17,7 @@ def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doub
         "__kernel void probe(__global const float *x, __global const float *table, int n, __global float *out) {\n"
         f"    int i = get_global_id(0);\n    {body}\n}}\n"
     )
-    expanded = _programs.source.__wrapped__
-
-    def source(file):
-        if file != "probe.cl":
-            return expanded(file)
-        return "\n".join(expanded(line.split('"')[1]) if "#include" in line else line for line in text.split("\n"))
-
-    monkeypatch.setattr("sarcl.opencl.device.source", source)
+    placed(monkeypatch, "probe.cl", text)
     table = macros.pop("table", None)
     built = device._build("probe.cl", {"VW": lanes, "FP64": int(device.info.fp64), **macros})["probe"]
     buffer = device.upload(padded)
@@ -32,3 +25,16 @@ def probe(device, monkeypatch, body, inputs, n_out, headers=("common.clh", "doub
     out = device.zeros(4 * n_out * n)
     device.run(built, (n // lanes,), None, buffer, weights, n, out)
     return device.download(out, np.empty((n_out, n), np.float32))[:, : inputs.shape[1]]
+
+
+def placed(monkeypatch, name, text):
+    """OpenCL source text in place of the file kernels/<name>, with its #include lines expanded."""
+    expanded = _programs.source.__wrapped__
+
+    def source(file):
+        if file != name:
+            return expanded(file)
+        return "\n".join(expanded(line.split('"')[1]) if "#include" in line else line for line in text.split("\n"))
+
+    for module in ("device", "launch_numbers"):
+        monkeypatch.setattr(f"sarcl.opencl.{module}.source", source)

@@ -18,6 +18,7 @@ from ...base import float_pairs
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.stage_timer import Clock
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from ..direct.direct import Direct
 from ..direct.tile_kernels import TilesOnDevice, kernel_of
 from ..engine import Engine, RowProfiles, Skipped
@@ -28,6 +29,7 @@ from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
 from .plan import GUARD, FactorPlan, Level
 
+MERGE = "merge_subapertures.cl"
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
 
 
@@ -73,8 +75,8 @@ class Factorized(Engine):
             }
             self.merges.append(
                 (
-                    device.kernel("merge_subapertures.cl", "shifts", **macros),
-                    device.kernel("merge_subapertures.cl", "merge", **macros),
+                    device.kernel(MERGE, "shifts", **macros),
+                    device.kernel(MERGE, "merge", **macros),
                 )
             )
         self.leaves = kernel_of(device, plan.leaf, tiling, bistatic=bistatic, wrap=False, local=True, beam=False)
@@ -243,13 +245,20 @@ class Factorized(Engine):
                     in_use.append(cut_buffer)
                     device.run(
                         shifts, (n // self.lanes, count), None,
-                        pulse, centers, roots, centers, nowhere, self.tables[0], n, used, roots, tile, level.reach,
-                        self.strides[0], stride, stride // 2, records,
+                        launch_numbers(
+                            MERGE, "shifts", n_parents=roots, n=n, n_used=used, n_tiles=roots, first=tile,
+                            reach=level.reach, samples=self.strides[0], stride=stride, origin=stride // 2,
+                        ),
+                        pulse, centers, centers, nowhere, self.tables[0], records,
                     )  # fmt: skip
                     device.run(
                         merge, (self._spans(0), count), None,
-                        source, stride, stride // 2, 0, nowhere, records, used, cut_buffer, len(seen), self.filters[0],
-                        level.reach, tile, low, self.kept[0][2], self.strides[0], out, steps=used,
+                        launch_numbers(
+                            MERGE, "merge", stride=stride, origin=stride // 2, first_parent=0, n_used=used,
+                            n_blocks=len(seen), reach=level.reach, first=tile, out_first=low, n_kept=self.kept[0][2],
+                            out_stride=self.strides[0],
+                        ),
+                        source, nowhere, records, cut_buffer, self.filters[0], out, steps=used,
                     )  # fmt: skip
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
@@ -280,6 +289,7 @@ class Factorized(Engine):
         shifts, merge = self.merges[level + 1]
         below, parents = plan.levels[level + 1], down.parents[level + 1]
         n_kept, stride = self.kept[level + 1][2], self.strides[level + 1]
+        above = {"stride": self.strides[level], "origin": plan.levels[level].reach}  # of the profiles read
         children = tree.children[level]
         whole = int(children[low]), int(children[high])
         for begin, end in _runs(*whole, within / self.memory.tile_bytes(level + 1)):
@@ -287,15 +297,19 @@ class Factorized(Engine):
             records = device.empty(4 * (2 + 2 * plan.between.taps) * used * (end - begin))
             device.run(
                 shifts, (n // self.lanes, end - begin), None,
-                pulse, down.centers[level], len(tree.centers[level]), down.centers[level + 1], parents, self.tables[1],
-                n, used, len(tree.centers[level + 1]), begin, below.reach, stride, self.strides[level],
-                plan.levels[level].reach, records,
+                launch_numbers(
+                    MERGE, "shifts", n_parents=len(tree.centers[level]), n=n, n_used=used,
+                    n_tiles=len(tree.centers[level + 1]), first=begin, reach=below.reach, samples=stride, **above,
+                ),
+                pulse, down.centers[level], down.centers[level + 1], parents, self.tables[1], records,
             )  # fmt: skip
             device.run(
                 merge, (self._spans(level + 1), end - begin), None,
-                source, self.strides[level], plan.levels[level].reach, first, parents, records, used,
-                self.blocks_of[level + 1], len(below.decimation.blocks), self.filters[level + 1], below.reach, begin,
-                begin, n_kept, stride, made, steps=used,
+                launch_numbers(
+                    MERGE, "merge", first_parent=first, n_used=used, n_blocks=len(below.decimation.blocks),
+                    reach=below.reach, first=begin, out_first=begin, n_kept=n_kept, out_stride=stride, **above,
+                ),
+                source, parents, records, self.blocks_of[level + 1], self.filters[level + 1], made, steps=used,
             )  # fmt: skip
             self._descend(down, level + 1, begin, end, made, begin, within)
             if (begin, end) != whole:

@@ -1,0 +1,46 @@
+"""Numbers of a kernel's launch as one struct by value: given by name, so that none takes another's place."""
+
+from __future__ import annotations
+
+import functools
+import re
+
+import numpy as np
+
+from ._programs import source
+
+TYPES = {"int": np.int32, "uint": np.uint32, "ulong": np.uint64, "float": np.float32}
+
+
+def launch_numbers(file: str, kernel: str, **values: float | np.ndarray) -> np.ndarray:
+    """The argument of type `<kernel>_numbers` of a kernel of kernels/<file>, as Device.run takes it.
+
+    values  one for each member of the struct; for an array of the struct, as many numbers
+
+    TypeError: values are missing, or the struct has no such members; OverflowError: an integer that is too large.
+    """
+    layout = _layout(file, f"{kernel}_numbers")
+    if values.keys() != set(layout.names or ()):
+        missing, unknown = set(layout.names or ()) - values.keys(), values.keys() - set(layout.names or ())
+        raise TypeError(f"{kernel}_numbers of {file}: missing {sorted(missing)}, unknown {sorted(unknown)}")
+    made = np.zeros(1, layout)
+    for name, value in values.items():
+        made[name] = value
+    return made
+
+
+@functools.cache
+def _layout(file: str, struct: str) -> np.dtype:
+    """Types and places of the members of a struct in a kernel's source text, as C lays them out."""
+    found = re.search(r"typedef struct \{([^}]*)\} " + struct + ";", re.sub(r"//.*", "", source(file)))
+    if found is None:
+        raise TypeError(f"kernels/{file} has no `typedef struct {{ ... }} {struct};`")
+    members: list[tuple[str, type, tuple[int, ...]]] = []
+    for line in filter(str.strip, found[1].split(";")):
+        kind, names = line.strip().split(" ", 1)
+        for name in names.split(","):
+            at = re.fullmatch(r"\s*(\w+)(?:\[(\d+)\])?\s*", name)
+            if at is None or kind not in TYPES:
+                raise TypeError(f"{struct} of kernels/{file}: cannot read {line.strip()!r}")
+            members.append((at[1], TYPES[kind], (int(at[2]),) if at[2] else ()))
+    return np.dtype(members, align=True)
