@@ -6,13 +6,14 @@ import functools
 import re
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from ._programs import source
 
 TYPES = {"int": np.int32, "uint": np.uint32, "ulong": np.uint64, "float": np.float32}
 
 
-def launch_numbers(file: str, kernel: str, **values: float | np.ndarray) -> np.ndarray:
+def launch_numbers(file: str, kernel: str, **values: ArrayLike) -> np.ndarray:
     """The argument of type `<kernel>_numbers` of a kernel of kernels/<file>, as Device.run takes it.
 
     values  one for each member of the struct; for an array of the struct, as many numbers
