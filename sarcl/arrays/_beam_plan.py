@@ -8,7 +8,8 @@ import numpy as np
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
-from ..base.tolerances import rounded_up
+from ..base.tolerances import askable, rounded_up
+from ..base.validation import LARGEST_TOLERANCE
 from ..opencl.device import Device
 
 FLUSH = 16  # elements summed plainly before they are added to the compensated total
@@ -68,10 +69,10 @@ def make_plan(
         return found
     least = fixed + _rounding(fp64)
     best = rounded_up(least if fp64 else max(FINE, least + U32))
-    while best < 1 and not met(best):
+    while best <= LARGEST_TOLERANCE and not met(best):
         best = rounded_up(1.05 * best)
     raise ToleranceUnreachable(
-        tolerance, best if best < 1 else None, "rounding of path differences",
+        tolerance, askable(best), "rounding of path differences",
         how=f"on {device.info.name!r}{'' if fp64 else ' without float64'}, for points "
         f"{highest * farthest / SPEED_OF_LIGHT:.1e} wavelengths away and an array of {cycles:.1e}",
     )  # fmt: skip

@@ -16,6 +16,11 @@ def rounded_up(value: float) -> float:
     return float(_UP.create_decimal(decimal.Decimal(float(value))))
 
 
+def askable(best: float) -> float | None:
+    """`best` where a user may ask for it, as a tolerance of at most LARGEST_TOLERANCE; else None."""
+    return best if best <= LARGEST_TOLERANCE else None
+
+
 def reachable(plan: Callable[[float], object], above: float) -> float | None:
     """The smallest tolerance found for which `plan` raises no ToleranceUnreachable; None where none is found
     that may be asked for.

@@ -13,6 +13,9 @@ from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 
+ITERATIONS = 60  # half the change after each: 1e-18 of the first remains
+ROUNDING = 1e-14  # of coordinates and delays: smaller changes are rounding, which iterations need not reduce
+
 
 @dataclass(frozen=True, eq=False)
 class StopAndGo:
@@ -162,14 +165,28 @@ def _delays(track: Trajectory, moving: Trajectory, points: np.ndarray) -> tuple[
     c, at, from_tx = constants.SPEED_OF_LIGHT, _Path(moving), _Path(track)
     out = _distance(track.positions[:, None], points)
     start = np.broadcast_to(track.known_times[:, None], out.shape)
-    tau = (out + _distance(at(start), points)) / c
-    for _ in range(20):  # each iteration reduces the error by a factor of c/speed
+    tau, change = (out + _distance(at(start), points)) / c, np.inf
+    for _ in range(ITERATIONS):  # each divides the change by c/speed
         rx = at(start + tau)
         last, tau = tau, (out + _distance(rx, points)) / c
-        if np.abs(tau - last).max() <= 4e-16 * tau.max():
+        before, change = change, float(np.abs(tau - last).max())
+        if change <= 4e-16 * tau.max():
             break
+        rounding = np.spacing(np.abs(start + last).max()) + ROUNDING * (tau.max() + np.abs(rx).max() / c)
+        if change > max(before / 2, rounding):
+            raise _too_fast(moving, start + last, at)
     speed = from_tx(track.known_times, 1)[:, None]
     return tau, _slope(track.positions[:, None] - points, speed, rx - points, at(start + tau, 1))
+
+
+def _too_fast(moving: Trajectory, arrivals: np.ndarray, at: _Path) -> ValueError:
+    """The error of a receiver whose positions change by half as much as light travels, or more."""
+    speed = float(np.linalg.norm(at(arrivals, 1), axis=-1).max())
+    return ValueError(
+        f"the receiver would move at {speed:.3g} m/s when echoes arrive, at up to {arrivals.max():.6g} s: its track of "
+        f"{len(moving)} pulses ends at {moving.known_times[-1]:.6g} s, and is continued by a polynomial from there. "
+        "Give Trajectory(..., velocities=...), times that fit the positions, or a longer track as receiver="
+    )
 
 
 def _slope(to_tx: np.ndarray, tx_velocity: np.ndarray, to_rx: np.ndarray, rx_velocity: np.ndarray) -> np.ndarray:

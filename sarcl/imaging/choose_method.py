@@ -8,7 +8,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
-from ..base.tolerances import reachable, rounded_up
+from ..base.tolerances import askable, reachable, rounded_up
+from ..base.validation import LARGEST_TOLERANCE
 from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.cost_model import CPU, DeviceClass
@@ -30,7 +31,6 @@ from .tiling.tiling import Tiling
 METHODS = ("auto", "direct", "factorized")
 TINY = 1e-35  # rms amplitude of the samples of a row below which pixels approach the smallest numbers of complex64
 ROUNDING = 0.5  # largest share of a tolerance for rounding errors from echoes that lie away from the pixels
-MOST_TOLERANCE = 0.99  # largest tolerance that the search for a reachable one tries
 
 
 @dataclass(frozen=True, eq=False)
@@ -151,7 +151,7 @@ class _Float32:
             raise refused.restated(self.tolerance, None) from None
         return self._offer("factorized", made, Factorized)
 
-    def _best(self) -> float:
+    def _best(self) -> float | None:
         """The smallest tolerance that `direct` meets: rounding takes half of it at most, and the plan the rest."""
         least = max(
             LEAST_TOLERANCE,
@@ -159,7 +159,7 @@ class _Float32:
         )
         least = np.hypot(least + self.gains, self.coordinates)
         least = max(least, *(error / ROUNDING for error in (self.rounding, self.coordinates, self.gains)))
-        return rounded_up(float(least) * (1 + 1e-9))
+        return askable(rounded_up(float(least) * (1 + 1e-9)))
 
     def _must_round_less(self, how: str, best: float | None) -> None:
         if self.gains > ROUNDING * self.tolerance:
@@ -188,8 +188,11 @@ def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool
     if tolerance >= LEAST_TOLERANCE:
         try:
             return _Float32(task, tolerance).direct(on)
-        except ToleranceUnreachable:
-            if not float64 or task.antenna is not None or float64_plan.too_long(task):
+        except ToleranceUnreachable as refused:
+            remedy = _without_float64(task, float64)
+            if remedy and not refused.remedy:
+                raise refused.restated(tolerance, None, remedy) from None
+            if remedy:
                 raise
     elif task.antenna is not None:
         best = reachable(lambda t: _Float32(task, t).direct(on), LEAST_TOLERANCE)
@@ -202,6 +205,15 @@ def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool
     return _float64(task, tolerance)
 
 
+def _without_float64(task: FocusingTask, float64: bool) -> str:
+    """What to do where complex64 cannot meet a tolerance and no sums in complex128 can be made; "": they can."""
+    if task.antenna is not None:
+        return "give the beam an angle"
+    if not float64:
+        return float64_direct.remedy()
+    return float64_plan.too_long(task) or ""
+
+
 def _factorized(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
     """Sub-apertures, in complex64 alone. Where they cannot meet the tolerance, the best one is found by a search."""
     try:
@@ -209,17 +221,18 @@ def _factorized(task: FocusingTask, tolerance: float, on: DeviceClass, float64: 
             raise ToleranceUnreachable(tolerance, None, "float32 range profiles", how="with sub-apertures")
         return _Float32(task, tolerance).factorized(on)
     except ToleranceUnreachable as refused:
+        remedy, otherwise = "method='direct' can", ""
         try:
             _direct(task, tolerance, on, float64)
-            remedy = "method='direct' can"
-        except ToleranceUnreachable:
+        except ToleranceUnreachable as direct:
             remedy = ""
+            otherwise = f"method='direct' cannot either{': ' if direct.remedy else ''}{direct.remedy}"
         best = _search(lambda t: _Float32(task, t).factorized(on), max(tolerance, LEAST_TOLERANCE))
-        raise refused.restated(tolerance, best, remedy) from None
+        raise refused.restated(tolerance, best, remedy or (otherwise if best is None else "")) from None
 
 
 def _search(plan: Callable[[float], object], above: float) -> float | None:
-    """A tolerance of `above` or more that `plan` meets, at most 1.5 times the smallest one; None: none below 1.
+    """A tolerance of `above` or more that `plan` meets, at most 1.5 times the smallest one; None: none that is allowed.
 
     Plans take long, so few are tried: each at twice the tolerance before, then one halfway back.
     """
@@ -233,9 +246,9 @@ def _search(plan: Callable[[float], object], above: float) -> float | None:
 
     failed, best = 0.0, rounded_up(above)
     while not met(best):
-        if best >= MOST_TOLERANCE:
+        if best >= LARGEST_TOLERANCE:
             return None
-        failed, best = best, min(rounded_up(2 * best), MOST_TOLERANCE)
+        failed, best = best, min(rounded_up(2 * best), LARGEST_TOLERANCE)
     middle = rounded_up(float(np.sqrt(best * failed))) if failed else best
     return middle if middle < best and met(middle) else best
 

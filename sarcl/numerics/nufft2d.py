@@ -11,7 +11,7 @@ import numpy as np
 from ..base.errors import ToleranceUnreachable
 from ..base.stage_timer import Clock
 from ..base.text import size_text
-from ..base.tolerances import rounded_up
+from ..base.tolerances import askable, rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
 from . import cost_model, shared_tile
@@ -84,7 +84,7 @@ def make_plan(
             least = min(least, error_of(interpolator(taps, oversample), length))
     reach = rounded_up(max(least, LEAST_TOLERANCE))
     raise ToleranceUnreachable(
-        tolerance, reach if reach < 1 else None, "rounding of the float32 grid", "backproject goes further",
+        tolerance, askable(reach), "rounding of the float32 grid", "backproject goes further",
         how="by a polar format image",
     )  # fmt: skip
 

@@ -179,7 +179,7 @@ def plan_facets(
             "pass another vertical=(x, y, z), farther from the lines of sight",
             how="where H and V change their directions over facets that an antenna sees along `vertical`",
         )  # fmt: skip
-    if best is None and least_rounding >= tolerance:
+    if best is None and tolerance <= least_rounding < np.inf:  # inf: even the largest pieces are too many
         raise ToleranceUnreachable(tolerance, reach, "float32 integrals over facets", how="with facets in float32")
     if best is None:
         how, remedy = f"without cutting these facets into more than {most:,.0f}", "take a smaller scene"

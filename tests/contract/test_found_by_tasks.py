@@ -9,6 +9,9 @@ import pytest
 from helpers.cases import image_error, noise_on, straight
 
 import sarcl
+from sarcl.imaging import choose_method
+from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
+from sarcl.numerics import windows
 from sarcl.reference.polar_format import polar_format as plane_waves
 
 GRID = sarcl.ImageGrid.plane(shape=(5, 4), spacing=0.4)
@@ -206,3 +209,59 @@ def test_needles_have_the_normals_of_their_corners():
     chirp = sarcl.Waveform.chirp(center=2e9, bandwidth=6e7, duration=6e-6)
     report = sarcl.echo(scene, chirp, track, tolerance=1e-5, check=True).report
     assert report.measured_error <= report.predicted_error <= 1e-5
+
+
+def test_a_receiver_that_its_polynomial_continues_faster_than_light_is_refused():
+    """The cubic through these pulses of 3 ms is at 1e9 m/s when echoes arrive, 60 ms later: positions overflowed."""
+    chirp = sarcl.Waveform.chirp(center=1e9, bandwidth=1e6, duration=1e-4)
+    positions = np.array([[-6e6, y, 6.5e6] for y in (0.0, 5, 10, 15)])
+    track = sarcl.Trajectory([0, 1e-3, 1.01e-3, 3e-3], positions)
+    with pytest.raises(ValueError, match=r"would move at .* m/s when echoes arrive.* 4 pulses ends at 0\.003 s"):
+        sarcl.stop_and_go.stop_and_go_error(track, np.zeros((1, 3)), chirp)
+    speed = 0.4 * 299792458.0  # away from the point: c tau = 2 r + speed tau
+    away = sarcl.Trajectory([2e9], [[0, 0, 3e5]], velocities=[[0, 0, speed]])
+    found = sarcl.stop_and_go.stop_and_go_error(away, np.zeros((1, 3)), chirp)
+    assert found.flight[0, 0] == pytest.approx(3e5 * (1 / (1 - 0.4) - 1), rel=1e-4)  # times of 2e9 s have 2e-7 s
+
+
+def test_a_window_beside_the_direction_of_flight_counts_no_rows_beyond_it():
+    """The window's smooth end reaches sines above 1, under which no row sees anything: the share of rows was NaN."""
+    made = ApertureWindow.over(0.9, 1.0, windows.table("hamming"), 0.002, 3e-2)
+    assert made.sines[-1] > 1
+    rows = made.weights[made.sines < 1] / (1 - made.sines[made.sines < 1] ** 2) ** 1.5
+    beyond = made.sines[made.sines < 1] < 0.9
+    assert made.outside(0.9, 1.0) == pytest.approx(rows[beyond].sum() / rows.sum(), rel=1e-12)
+
+
+def test_a_tolerance_that_cannot_be_asked_for_is_not_named_as_the_best():
+    """The beam looks aside, 400 dB below its peak: 1e14 was named as the best tolerance, which nobody may ask for."""
+    raw = noise_on(straight(6, distance=700.0), n_samples=24)
+    beam = sarcl.Antenna.gaussian(width=(0.1, 0.1)), raw.tx.mean(axis=0) * (-1, 1, -1) + (0, 300, 0)
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"gains of the antenna have .*; aim it at the grid") as said:
+        sarcl.backproject(raw, GRID, beam=beam, tolerance=0.1)
+    assert said.value.best is None
+
+    def needs(least):
+        def plan(tolerance):
+            if tolerance < least:
+                raise sarcl.ToleranceUnreachable(tolerance, None, "it")
+
+        return plan
+
+    assert choose_method._search(needs(0.4), 0.02) is None  # 0.46 was named for sub-apertures
+    assert 0.22 <= choose_method._search(needs(0.22), 0.02) <= 0.3
+
+
+def test_refusals_without_a_best_tolerance_have_a_remedy(device):
+    raw = noise_on(straight(6, distance=700.0), n_samples=24)
+    with pytest.raises(sarcl.ToleranceUnreachable, match=r"method='direct' cannot either: (choose device=|no device)"):
+        sarcl.backproject(raw, GRID, tolerance=1e-8, method="factorized", device=device.without_fp64())
+
+
+def test_facets_refused_for_their_number_are_told_so(monkeypatch):
+    """Where even the largest pieces were too many, float32 was blamed, whose rounding had not been looked at."""
+    monkeypatch.setattr("sarcl.scattering.facet_plan.MOST_FACETS", 1)
+    track = sarcl.Trajectory.line(start=(-700, -5, 700), velocity=(0, 10, 0), prf=4.0, n_pulses=4)
+    chirp = sarcl.Waveform.chirp(center=1e10, bandwidth=1e8, duration=1e-6)
+    with pytest.raises(sarcl.ToleranceUnreachable, match="without cutting these facets into more than 1; take a small"):
+        sarcl.echo(sarcl.shapes.plate((0.3, 0.2)), chirp, track)

@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
-from ...base.tolerances import rounded_up
+from ...base.tolerances import askable, rounded_up
 from ...numerics import cost_model, error_bounds, interpolation
 from ...numerics.interpolation import Interpolator
 from .. import profile_energy
@@ -88,7 +88,7 @@ def make_plan(task: FocusingTask, tolerance: float) -> tuple[Float64Plan, Tiling
         ratio = 20 * np.log10(energy.near_pixels)
         dark = f": these pixels are {ratio:.0f} dB darker than their surroundings in the same rows"
         raise ToleranceUnreachable(
-            tolerance, rounded_up(min(p.predicted_error for p in plans)), "float64 range profiles",
+            tolerance, askable(rounded_up(min(p.predicted_error for p in plans))), "float64 range profiles",
             how=f"in complex128{dark if energy.near_pixels > 10 else ''}",
         )  # fmt: skip
     cheaper = [p for p in plans if p.cost < good.cost]

@@ -58,8 +58,10 @@ class ApertureWindow:
 
     def outside(self, low: float, high: float) -> float:
         """Share of the weights that rows have which see the point beyond a beam from `low` to `high`, sines."""
-        rows = self.weights / (1 - self.sines**2) ** 1.5  # even in the tangent
-        return float(rows[(self.sines < low) | (self.sines > high)].sum() / rows.sum())
+        seen = np.abs(self.sines) < 1  # rows are even in the tangent, and none sees anything under a sine of 1 or more
+        sines, weights = self.sines[seen], self.weights[seen]
+        rows = weights / (1 - sines**2) ** 1.5
+        return float(rows[(sines < low) | (sines > high)].sum() / rows.sum())
 
     @classmethod
     def _smoothed(

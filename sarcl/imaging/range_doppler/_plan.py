@@ -10,7 +10,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
-from ...base.tolerances import rounded_up
+from ...base.tolerances import askable, rounded_up
 from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.interpolation import Interpolator, choose_interpolator
@@ -116,9 +116,7 @@ def make_plan(
     if spare <= 0.2 * tolerance:
         best = rounded_up(2 * fixed)
         limit = "rounding of complex64" if model_error < ROUNDING else "the track's ranges, which are no hyperbolas"
-        raise ToleranceUnreachable(
-            tolerance, best if best < 1 else None, limit, "use backproject, which takes any track"
-        )
+        raise ToleranceUnreachable(tolerance, askable(best), limit, "use backproject, which takes any track")
     frequencies = band_frequencies(raw)
     center = float(frequencies[raw.n_samples // 2])
     steepest = max(abs(s) for s in extent.band.ends)

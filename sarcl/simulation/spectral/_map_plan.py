@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.errors import ToleranceUnreachable
-from ...base.tolerances import rounded_up
+from ...base.tolerances import askable, rounded_up
 from ...numerics.error_bounds import FLOAT32
 from ...numerics.interpolation import Interpolator, interpolator
 from ...opencl import fft
@@ -106,7 +106,7 @@ def plan_map(
             return MapPlan(kernel, tile, columns, rows, n_range, spacing, origin, error)
     reach = rounded_up(best * asked / tolerance)
     raise ToleranceUnreachable(
-        asked, reach if reach < 1 else None, "float32 grids of the reflectivity map", "echo goes further",
+        asked, askable(reach), "float32 grids of the reflectivity map", "echo goes further",
         how="by spectral_echo",
     )  # fmt: skip
 

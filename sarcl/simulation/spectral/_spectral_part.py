@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import NotApplicable, ToleranceUnreachable
-from ...base.tolerances import rounded_up
+from ...base.tolerances import askable, rounded_up
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_function
@@ -213,7 +213,7 @@ def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allow
     if error > allowed:
         best = rounded_up(1.05 * asked * error / allowed)
         raise ToleranceUnreachable(
-            asked, best if best < 1 else None, "SARAS's transfer function", "take variant='exact', or echo",
+            asked, askable(best), "SARAS's transfer function", "take variant='exact', or echo",
             "by variant='saras': stationary phase, parabolas and the grid deformation differ from the responses along "
             f"the track by {of_transfer:.1e}, amplitudes of one aspect by {of_amplitudes:.1e}",
         )  # fmt: skip
