@@ -145,6 +145,7 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tupl
     than +-0.42 of the +-0.5 cycles per pixel.
     Source: the image equation of sarcl/__init__.py for the carrier; the figures are those of sin(x)/x.
     """
+    validation.instance("image", image, Image)
     _check(image)
     if near is None:
         return _measured(image, *brightest(image))

@@ -15,6 +15,7 @@ Multiplied by exp(j 2 pi f0 t') the factor is the far field, except for the phas
 from __future__ import annotations
 
 from collections.abc import Sequence
+from itertools import zip_longest
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -30,7 +31,7 @@ _TWO_PI = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
 
 def reduced(x: ArrayLike) -> tuple[np.ndarray, np.ndarray]:
     """x, rad, reduced to [-pi, pi], and the number of whole cycles that are removed; |x| up to 6e6."""
-    x = np.asarray(x, np.float64)
+    x = validation.values("angle", x)
     validation.finite("angle", x)
     whole = np.rint(x / (2 * np.pi))
     if whole.size and np.abs(whole).max() >= 2**20:
@@ -77,14 +78,26 @@ def diverse_factor(
     f0 = validation.number("f0", f0, above=0)
     d = validation.array("spacing", spacing, np.float64, (2,))
     df = validation.array("frequency_step", frequency_step, np.float64, (2,))
-    ky, kz = (np.asarray(k, np.float64) for k in cosines)
-    t = np.asarray(retarded, np.float64)
+    if not isinstance(cosines, (list, tuple, np.ndarray)) or len(cosines) != 2:
+        raise ValueError(f"cosines is {cosines!r:.60}; give (ky, kz)")
+    ky, kz = (validation.values("cosines", k) for k in cosines)
+    t = validation.values("retarded", retarded)
+    lengths = zip_longest(*(each.shape[::-1] for each in (ky, kz, t)), fillvalue=1)
+    if any(len(set(along) - {1}) > 1 for along in lengths):
+        raise ValueError(f"cosines have shapes {ky.shape} and {kz.shape} and retarded has {t.shape}; give equal ones")
     out = np.ones(np.broadcast_shapes(ky.shape, kz.shape, t.shape), np.complex128)
+    _pair("shape", shape)
     for i, cosine in enumerate((ky, kz)):
         cycles = df[i] * t
         x = 2 * np.pi * ((cycles - np.rint(cycles)) + f0 * d[i] * cosine / SPEED_OF_LIGHT)
         out = out * geometric(x, validation.count(f"shape[{i}]", shape[i]))
     return out
+
+
+def _pair(name: str, value: object) -> None:
+    """ValueError unless the value has two entries."""
+    if not isinstance(value, (list, tuple, np.ndarray)) or len(value) != 2:
+        raise ValueError(f"{name} is {value!r:.60}; give two, along y and z")
 
 
 def power_pattern(factor: ArrayLike, peak: float | None = None) -> np.ndarray:
@@ -101,6 +114,7 @@ def quadratic_phase(
     Farooq accepts up to pi/4. Cosines of 1 give (3.40); (1, 0) is the plane of azimuth alone, (3.59). Moduli are summed
     because steps of opposite signs cancel at the corner (N, P), which the paper considers, but not elsewhere.
     """
+    _pair("shape", shape)
     n, p = (validation.count(f"shape[{i}]", shape[i]) for i in range(2))
     dy, dz = np.abs(
         validation.array("spacing", spacing, np.float64, (2,)) * validation.array("cosines", cosines, np.float64, (2,))
@@ -190,6 +204,7 @@ def waveform(
     )
     cycles = f0 * t
     out = np.exp(2j * np.pi * (cycles - np.rint(cycles))) * factor
+    pulsed = validation.flag("pulsed", pulsed)
     return np.asarray(out * (np.abs(t) <= period(frequency_step) / 2) if pulsed else out)
 
 

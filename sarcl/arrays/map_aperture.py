@@ -70,6 +70,7 @@ def map_aperture(
         )
     rotation = None if attitude is None else _rotations(attitude, int(pulse.max()) + 1)[pulse]
     element = _elements(raw, array, pulse)
+    quadratic = validation.flag("quadratic", quadratic)
     if mapping == "channels":
         return _separate(raw, array, element, rotation)
     towards = point - raw.tx

@@ -45,6 +45,34 @@ def flag(name: str, value: Any) -> bool:
     return bool(value)
 
 
+def flags(name: str, value: Any) -> Any:
+    """`value`, one or several of True, False, 1 and 0; TypeError for anything else, which NumPy may take for True."""
+    given = np.asarray(value) if ndim(name, value) else None
+    if given is None:
+        return flag(name, value)
+    if given.dtype.kind not in "biuf" or not ((given == 0) | (given == 1)).all():
+        raise TypeError(f"{name} is {' '.join(repr(value).split()):.60}; give True or False for each")
+    return value
+
+
+def without_unit(name: str, value: Any) -> None:
+    """ValueError for numbers that carry a unit (astropy, unyt, pint): NumPy would take 1 km for 1."""
+    kind = type(value)
+    if kind in (float, int, np.ndarray, list, tuple):
+        return
+    if (isinstance(value, np.ndarray) and not isinstance(value, np.ma.MaskedArray)) or hasattr(kind, "magnitude"):
+        unit = str(getattr(value, "unit", getattr(value, "units", None)) or "")
+        if unit and unit != "dimensionless":
+            raise ValueError(
+                f"{name} carries the unit {unit:.20}; give plain numbers, in the units of the documentation"
+            )
+
+
+def values(name: str, value: Any, dtype: Any = np.float64) -> np.ndarray:
+    """`value` of any shape as an array of `dtype`, NaN and Inf left in it; ValueError for what are no numbers."""
+    return np.asarray(value) if type(value) is float else converted(name, value, dtype)
+
+
 def room(what: str, n_bytes: float, remedy: str) -> None:
     """MemoryError where more bytes are needed than the machine has; remedy  what to give instead."""
     if n_bytes > installed():
@@ -61,6 +89,7 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
     """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
     wanted = np.dtype(dtype)
     ndim(name, value)
+    without_unit(name, value)
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "biufcO":
@@ -77,7 +106,11 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
             raise TypeError(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
         if wanted.kind in "iu" and given.dtype.kind == "f" and not (given == np.rint(given)).all():
             raise TypeError("not all are whole numbers")
-        return np.array(given, dtype=wanted, order="C")
+        with np.errstate(all="ignore"):
+            made = np.array(given, dtype=wanted, order="C")
+        if wanted.kind in "iu" and not (made == given).all():  # the largest numbers come back as negative ones
+            raise TypeError("not all are small enough")
+        return made
     except (TypeError, ValueError, OverflowError) as exc:
         shown = " ".join(repr(value).split())
         raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({exc})") from None
@@ -116,8 +149,10 @@ def finite(name: str, value: np.ndarray, first_row: int = 0) -> None:
 def number(name: str, value: Any, *, above: float | None = None, least: float | None = None) -> float:
     """Return `value` as a finite float, greater than `above` and not less than `least`."""
     try:
-        if isinstance(value, (str, bytes, bool, np.bool_)):
+        # of complex numbers NumPy would drop the imaginary part, and of masked ones use what is behind the mask
+        if isinstance(value, (str, bytes, bool, np.bool_)) or np.iscomplexobj(value) or np.ma.is_masked(value):
             raise TypeError
+        without_unit(name, value)
         out = float(value)
     except (TypeError, ValueError, OverflowError):
         raise ValueError(f"{name} must be a number, got {value!r:.80}") from None
@@ -149,6 +184,8 @@ def tolerance(value: Any) -> float:
 def count(name: str, value: Any, least: int = 1) -> int:
     """Return `value` as an int of at least `least`; a float with a fraction is refused."""
     try:
+        if np.iscomplexobj(value) or np.ma.is_masked(value):
+            raise TypeError
         out = int(value)
         whole = out == value
     except (TypeError, ValueError, OverflowError):

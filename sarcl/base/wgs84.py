@@ -5,6 +5,8 @@ from __future__ import annotations
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from . import validation
+
 SEMI_MAJOR = 6_378_137.0  # m, defining
 FLATTENING = 1 / 298.257223563  # defining
 ECCENTRICITY_SQUARED = FLATTENING * (2 - FLATTENING)
@@ -23,7 +25,8 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
 
     Source: NGA.STND.0036 (WGS84), eq. (4-14): x = (N + h) cos(lat) cos(lon), ..., z = (N (1 - e^2) + h) sin(lat).
     """
-    longitude, latitude, height = np.radians(longitude), np.radians(latitude), np.asarray(height)
+    longitude, latitude = _radians(longitude, latitude)
+    height = validation.values("height", height)
     s, c = np.sin(latitude), np.cos(latitude)
     normal = SEMI_MAJOR / np.sqrt(1 - ECCENTRICITY_SQUARED * s**2)  # radius of curvature in the prime vertical
     across = (normal + height) * c
@@ -37,14 +40,17 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
 
 def up(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
     """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
-    longitude, latitude = np.radians(longitude), np.radians(latitude)
+    longitude, latitude = _radians(longitude, latitude)
     c = np.cos(latitude)
     return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
 
 
 def local_axes(longitude: float, latitude: float) -> NDArray[np.float64]:
     """Rows east, north, up (3, 3) in Earth-centred coordinates: local = axes @ (position - origin)."""
-    lon, lat = np.radians(longitude), np.radians(latitude)
+    lon, lat = (
+        np.radians(validation.number("longitude", longitude)),
+        np.radians(validation.number("latitude", latitude)),
+    )
     east = np.array([-np.sin(lon), np.cos(lon), 0.0])
     north = np.array([-np.sin(lat) * np.cos(lon), -np.sin(lat) * np.sin(lon), np.cos(lat)])
     return np.stack([east, north, up(longitude, latitude)])
@@ -68,7 +74,10 @@ def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     equally near. The longitude on the axis is 0.
     Source: C. F. F. Karney, Geodesics on an ellipsoid of revolution, arXiv:1102.1215, appendix B.
     """
-    x, y, z = np.moveaxis(np.asarray(positions, np.float64), -1, 0)
+    positions = validation.values("positions", positions)
+    if positions.ndim == 0 or positions.shape[-1] != 3:
+        raise ValueError(f"positions has shape {positions.shape}, wanted (..., 3)")
+    x, y, z = np.moveaxis(positions, -1, 0)
     e2, e4, rest = ECCENTRICITY_SQUARED, ECCENTRICITY_SQUARED**2, 1 - ECCENTRICITY_SQUARED
     across = np.hypot(x, y)
     p, q = (across / SEMI_MAJOR) ** 2, rest * (z / SEMI_MAJOR) ** 2
@@ -95,3 +104,8 @@ def geodetic(positions: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.floa
     sine, cosine = long[3] / length, long[4] / length
     height = np.sqrt(long[0] ** 2 + long[1] ** 2) * cosine + long[2] * sine - SEMI_MAJOR * np.sqrt(1 - e2 * sine**2)
     return np.degrees(np.arctan2(y, x)), latitude, height.astype(np.float64)
+
+
+def _radians(longitude: ArrayLike, latitude: ArrayLike) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
+    """Degrees as radians in float64: in float32, as files hold them, sines are off by half a metre on the ground."""
+    return np.radians(validation.values("longitude", longitude)), np.radians(validation.values("latitude", latitude))

@@ -103,7 +103,7 @@ class ElevationModel:
 
     def heights_at(self, longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
         """Heights above the ellipsoid, m (...), at degrees (...); NaN outside the grid and in cells without data."""
-        lon, lat = np.asarray(longitude, np.float64), np.asarray(latitude, np.float64)
+        lon, lat = validation.values("longitude", longitude), validation.values("latitude", latitude)
         try:
             lon, lat = np.broadcast_arrays(lon, lat)
         except ValueError:

@@ -50,7 +50,7 @@ class KeplerElements:
         angles = [validation.number(n, value) for n, value in zip(names, given, strict=True)]
         if not 0 <= angles[0] <= np.pi:
             raise ValueError(f"inclination is {angles[0]:g} rad; it reaches from 0 to pi: was it in degrees?")
-        return cls(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, bool(j2))
+        return cls(a, e, angles[0], angles[1], angles[2], angles[3], greenwich, validation.flag("j2", j2))
 
     @property
     def mean_motion(self) -> float:

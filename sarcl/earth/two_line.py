@@ -61,6 +61,10 @@ class TwoLineElements:
         epoch = epoch + np.timedelta64(nanoseconds, "ns")
         return cls(satellite, epoch, sidereal_time(epoch), (line1, line2))
 
+    def __reduce__(self) -> Any:
+        """By the lines: sgp4's own object cannot be copied."""
+        return type(self).parsed, self.lines
+
     def teme(self, times: NDArray[np.float64]) -> tuple[NDArray[np.float64], NDArray[np.float64]]:
         """Positions, m, and velocities, m/s (n, 3), as SGP4 gives them: true equator, mean equinox of date (TEME)."""
         positions, velocities = np.empty((len(times), 3)), np.empty((len(times), 3))

@@ -5,7 +5,7 @@ Intra-pulse motion is in stop_and_go.py.
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import Any, Literal
 
@@ -73,7 +73,9 @@ def sinusoidal(
     validation.instance("track", track, Trajectory)
     size = validation.array("amplitude", amplitude, np.float64, (3,))
     rate = 2 * np.pi * validation.number("frequency", frequency, above=0)
-    phase = validation.array("phase", np.broadcast_to(phase, (3,)), np.float64, (3,))
+    if validation.ndim("phase", phase) == 0:
+        phase = np.full(3, validation.number("phase", phase))
+    phase = validation.array("phase", phase, np.float64, (3,))
     angle = rate * track.known_times[:, None] + phase
     return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
@@ -87,6 +89,7 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
     antennas, at the delays of the reference ranges. ValueError where times do not match.
     """
     validation.instance("raw", raw, PhaseHistory)
+    validation.instance("track", track, Trajectory)
     changes: dict[str, Any] = {}
     for side, given in (("tx", track), ("rx", receiver)):
         if given is None:
@@ -158,6 +161,8 @@ def combined(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     rows, frequencies and polarisations: give `sarcl.echo` the same range_window for all, wide enough for the true
     ranges of each part. ValueError names what differs, or the row where a part lies outside the window of the first.
     """
+    if isinstance(parts, PhaseHistory) or not isinstance(parts, Iterable):
+        raise TypeError(f"parts is a {type(parts).__name__}; give a list of phase histories")
     parts = list(parts)
     if not parts:
         raise ValueError("combined was given no echoes; give at least one")

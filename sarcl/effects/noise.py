@@ -11,12 +11,13 @@ from numpy.typing import ArrayLike
 from ..base import counter_rng
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.types import LazyRows
-from ..base.validation import array, count, direction, instance, number
+from ..base.validation import array, count, direction, instance, ndim, number
 from ..model.image_grid import ImageGrid
 from ..model.lazy_rows import RowsOnDemand
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 
+MOST_DECIBELS = 300.0  # of noise
 STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
 
 
@@ -56,13 +57,13 @@ def add_noise(
         raise ValueError(f"noise has one level; give one of {', '.join(given)}, got {', '.join(named) or 'none'}")
     if named[0] not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
         raise ValueError(f"{named[0]} is the level of samples; grid and cell_area go with nesz or nesz_db")
-    if nesz is not None and not nesz > 0:
+    if nesz is not None and not number("nesz", nesz) > 0:
         raise ValueError(f"nesz is {nesz:g}, wanted a ratio above 0, m^2/m^2; in decibels it is nesz_db={nesz:g}")
     if nesz is not None or nesz_db is not None:
-        ratio = number("nesz", nesz, above=0) if nesz is not None else 10 ** (number("nesz_db", nesz_db) / 10)
+        ratio = number("nesz", nesz, above=0) if nesz is not None else _power(nesz_db)
         level: Any = ratio * _cells(raw, grid, cell_area) / float((_filtered(raw) ** 2).mean())
     elif variance is not None:
-        level = variance
+        level = number("variance", variance) if ndim("variance", variance) == 0 else variance
     else:
         level = noise_variance(raw, _kelvin(radar) if temperature is None else temperature)
     level = array("variance", np.full(raw.n_rows, level) if np.ndim(level) == 0 else level, np.float64, (raw.n_rows,))
@@ -72,6 +73,14 @@ def add_noise(
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
 
 
+def _power(decibels: Any) -> float:
+    """A power ratio, of dB within those of float32."""
+    given = number("nesz_db", decibels)
+    if abs(given) > MOST_DECIBELS:
+        raise ValueError(f"nesz_db is {given:g}; levels reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB")
+    return float(10 ** (given / 10))
+
+
 class Noisy(RowsOnDemand):
     """Rows of a source plus noise of deviation (n_rows,) times shape (n_samples,), computed for the rows of a slice."""
 
@@ -79,9 +88,9 @@ class Noisy(RowsOnDemand):
         self.source, self.deviation, self.profile, self.seed = source, deviation, shape, seed
         self.shape, self.dtype = source.shape, np.dtype(source.dtype)
 
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        index = np.arange(self.shape[0])[rows]
-        clean = np.asarray(self.source[rows])
+    def rows(self, some: slice) -> np.ndarray:
+        index = np.arange(self.shape[0])[some]
+        clean = np.asarray(self.source[some])
         noise = complex_gaussian(index, self.shape[1], self.seed) * (self.deviation[index, None] * self.profile)
         return (clean + noise).astype(self.dtype.newbyteorder("="))
 
@@ -116,6 +125,7 @@ def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0
     lambda/(2 angle), where the track is straight and short. Only rows of the first polarisation count; they must pass
     the point in one direction.
     """
+    instance("raw", raw, PhaseHistory)
     return float(_density(raw, point, normal) / (_one_image(raw).sum() * raw.n_samples))
 
 

@@ -62,6 +62,11 @@ def stop_and_go_error(
     spectrum is P(f (1 + tau')). For a chirp of rate k = waveform.sweep_rate, P = exp(-j pi (f - fc)^2/k), that is
     an additional delay of tau' fc/k, and little else (docs/theory/radar.md). ValueError for pulses that are not chirps.
     """
+    validation.instance("track", track, Trajectory)
+    validation.instance("waveform", waveform, Waveform)
+    for name, other in (("receiver", receiver), ("used", used)):
+        if other is not None:
+            validation.instance(name, other, Trajectory)
     if waveform.sweep_rate is None:
         raise ValueError(f"the error of stop and go is known for chirps, not for a {waveform.kind!r} waveform")
     x = validation.array("points", points, np.float64, ("n", 3))
@@ -90,6 +95,9 @@ def receiver_at_arrival(track: Trajectory, point: ArrayLike, *, receiver: Trajec
     `center`; `stop_and_go_error(..., used=...)` gives its error elsewhere. The frame must be inertial: on the rotating
     Earth, give positions in a frame that does not rotate (the Sagnac effect is of the same size).
     """
+    validation.instance("track", track, Trajectory)
+    if receiver is not None:
+        validation.instance("receiver", receiver, Trajectory)
     x = validation.array("point", point, np.float64, (3,))
     moving = track if receiver is None else receiver
     tau, _ = _delays(track, moving, x[None])
@@ -106,6 +114,7 @@ def pulse_motion(raw: PhaseHistory, point: ArrayLike, *, undo: bool = False) -> 
     raw has no velocities, or no chirp.
     """
     validation.instance("raw", raw, PhaseHistory)
+    undo = validation.flag("undo", undo)
     if raw.waveform is None or raw.waveform.sweep_rate is None:
         raise ValueError(
             "raw names no chirp, so its rate is unknown; set raw.waveform to the Waveform.chirp that was sent"
@@ -128,11 +137,11 @@ class _Chirped(RowsOnDemand):
         self.center, self.rate = raw.waveform.center, raw.waveform.sweep_rate
         self.shape, self.dtype = raw.samples.shape, np.dtype(raw.samples.dtype)
 
-    def __getitem__(self, rows: slice) -> np.ndarray:
-        f = self.first[rows, None] + self.step[rows, None] * np.arange(self.shape[1])
-        moved = f * self.slope[rows, None]
+    def rows(self, some: slice) -> np.ndarray:
+        f = self.first[some, None] + self.step[some, None] * np.arange(self.shape[1])
+        moved = f * self.slope[some, None]
         phase = np.pi * moved * (2 * (f - self.center) + moved) / self.rate
-        block = np.asarray(self.source[rows])
+        block = np.asarray(self.source[some])
         return (block * np.exp(-1j * self.sign * phase)).astype(self.dtype.newbyteorder("="))
 
 

@@ -17,6 +17,7 @@ SMALLEST, LARGEST = 500, 2400  # pixels along the longer side of what is drawn
 THINNEST = 1 / 6  # smallest ratio of shorter to longer side; a longer strip is stretched across
 CURVE = (22, 82, 148)
 PNG_NOISE, PNG_AXES = 2.2, 6e4  # bytes per pixel of noise, and of axes, caption and scale
+MOST_DECIBELS = 1e4  # of levels: float64 holds powers from -3200 to 3100 dB
 PERCENTILE = 99.5  # default of white: one in 200 pixels of the scene is clipped
 # Levels that tell a scene from an object in front of nothing, dB. FILLED: largest difference of percentile 99.5 and the
 # median in a scene. It is 9 dB for speckle and about 20 with shadows, but over 40 for the side lobes of a lone point.
@@ -81,10 +82,11 @@ def check_scale(
     other.
     """
     floor_name, top_name, percentile_name = names or ("floor_db", "top_db", "percentile")
-    if not validation.number(floor_name, floor_db) < 0:
+    if not -MOST_DECIBELS <= validation.number(floor_name, floor_db) < 0:
         raise ValueError(f"{floor_name} is {floor_db:g}; black is that many dB below white: give e.g. -50")
     if top_db is not None:
-        validation.number(top_name, top_db)
+        if abs(validation.number(top_name, top_db)) > MOST_DECIBELS:
+            raise ValueError(f"{top_name} is {top_db:g} dB; pixels lie within {MOST_DECIBELS:g} dB: give less")
         if percentile is not None:
             raise ValueError(f"{top_name} and {percentile_name} both set the level of white; give one of them")
     if percentile is not None and not validation.number(percentile_name, percentile, above=0) <= 100:

@@ -14,6 +14,7 @@ from ..numerics import cost_model, error_bounds
 from ..numerics import plan as numerics_plan
 from ..numerics.cost_model import CPU, DeviceClass
 from ..numerics.plan import LEAST_TOLERANCE
+from ..numerics.range_profiles import TINY
 from ..opencl.device import Device
 from . import antenna_beam, profile_energy
 from .direct import direct as direct_method
@@ -29,7 +30,6 @@ from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
-TINY = 1e-35  # rms amplitude of the samples of a row below which pixels approach the smallest numbers of complex64
 ROUNDING = 0.5  # largest share of a tolerance for rounding errors from echoes that lie away from the pixels
 
 

@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base.errors import warn
 from ..base.rows import spread_over
-from ..base.validation import sealed
+from ..base.validation import instance, sealed
 from ..model.phase_history import PhaseHistory
 from ..model.waveform import Waveform
 
@@ -23,13 +23,14 @@ def compress(raw: PhaseHistory, waveform: Waveform | None = None) -> PhaseHistor
     SarclWarning where the result has less contrast than noise would, or half of what the filter of a chirp of the other
     sign gives: the pulse that was sent is another one.
     """
+    instance("raw", raw, PhaseHistory)
+    if waveform is not None and not isinstance(waveform, Waveform):
+        raise TypeError(f"waveform is a {type(waveform).__name__}; give a sarcl.Waveform")
     if raw.compressed:
         return raw
     pulse = raw.waveform if waveform is None else waveform
     if pulse is None:
         raise ValueError("raw names no waveform, so its matched filter is unknown; pass compress(raw, waveform)")
-    if not isinstance(pulse, Waveform):
-        raise TypeError(f"waveform is a {type(pulse).__name__}; give a sarcl.Waveform")
     samples = raw.read(0, raw.n_rows)
     out = np.empty_like(samples)
     n = np.arange(raw.n_samples)

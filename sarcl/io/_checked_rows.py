@@ -21,6 +21,14 @@ class CheckedRows(h5py.Dataset):
         self._sums = sums
         self._good = np.zeros(len(sums.blocks), bool)
 
+    def __reduce__(self) -> Any:
+        """Refused: copy, pickle and multiprocessing cannot hand an open file on."""
+        raise TypeError(
+            f"the samples or pixels are rows of the open file {self.file.filename!r}, which cannot be copied or sent "
+            "to another process: read the file there, sarcl.read(path), or take them into memory first, such as "
+            "dataclasses.replace(raw, samples=raw.read(0, raw.n_rows))"
+        )
+
     def __getitem__(self, args: Any, new_dtype: Any = None) -> Any:
         first = args[0] if isinstance(args, tuple) and args else args
         low, high = self._touched(first)

@@ -16,6 +16,7 @@ from .trajectory import Trajectory
 Kind = Literal["isotropic", "aperture", "gaussian", "table"]
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
+MOST_DECIBELS = 300.0  # of gains: the squares of both antennas' amplitudes stay within float32
 HEADER = 16  # floats before the coefficients of a table, as kernels/pattern.clh reads them
 ANGLE_ERROR = 5e-7  # rad, of float32 directions in antenna axes
 COSINE = 1e-5  # added to limits of direction cosines, which kernels compute in float32
@@ -30,7 +31,7 @@ class Antenna:
     atan2(y, x) and elevation atan2(z, hypot(x, y)).
 
     kind        "isotropic", "aperture", "gaussian" or "table"
-    gain_db     gain at the peak, dBi; with 0 the peak is 1
+    gain_db     gain at the peak, dBi, from -300 to 300; with 0 the peak is 1
     two_way     pattern and gain_db are those of transmitting and receiving together
     size        m (azimuth, elevation), of an aperture;  taper  illumination at its edges, 0 ... 1 of that at the centre
     width       rad (azimuth, elevation), half-power width of a Gaussian pattern
@@ -74,6 +75,11 @@ class Antenna:
     def __post_init__(self) -> None:
         validation.choice("antenna kind", self.kind, KINDS)
         self._set("gain_db", validation.number("antenna gain_db", self.gain_db))
+        if abs(self.gain_db) > MOST_DECIBELS:
+            raise ValueError(
+                f"antenna gain_db is {self.gain_db:g}; gains reach from {-MOST_DECIBELS:g} to {MOST_DECIBELS:g} dB: "
+                "was it a factor?"
+            )
         if not isinstance(self.two_way, (bool, np.bool_)):
             raise ValueError(f"antenna two_way is {self.two_way!r}; give True or False")
         self._set("mount", rotations("antenna mount", self.mount, ()))
@@ -146,7 +152,8 @@ class Antenna:
         taper  illumination at the edges, one or per axis, of a raised cosine on a pedestal: 1 uniform, 0.08 Hamming's,
                0 Hann's
         """
-        taper = np.broadcast_to(np.asarray(taper), (2,))
+        if validation.ndim("antenna taper", taper) == 0:
+            taper = np.full(2, validation.number("antenna taper", taper))
         return cls(kind="aperture", size=size, taper=taper, gain_db=gain_db, two_way=two_way, mount=mount)
 
     @classmethod
@@ -187,6 +194,7 @@ class Antenna:
 
         Raises ValueError where the track has no attitude, unless the antenna is isotropic, or it is not a rotation.
         """
+        validation.instance("track", track, Trajectory)
         if track.attitude is None:
             if self.kind == "isotropic":
                 return np.tile(self.mount, (len(track), 1, 1))
@@ -201,7 +209,10 @@ class Antenna:
         """Complex amplitude gain (...) at directions in antenna axes (..., 3), of any length, at `frequency` Hz."""
         from .antenna_pattern import pattern_gain
 
-        return pattern_gain(self, np.asarray(directions, np.float64), frequency)
+        directions = validation.values("directions", directions)
+        if directions.ndim == 0 or directions.shape[-1] != 3:
+            raise ValueError(f"directions has shape {directions.shape}, wanted (..., 3)")
+        return pattern_gain(self, directions, validation.number("frequency", frequency, above=0))
 
     def ratio(self, frequency: float | np.ndarray) -> Any:
         """Factor by which angles are multiplied before the pattern is evaluated."""
@@ -277,7 +288,9 @@ def pair_of(antenna: Any, bistatic: bool) -> tuple[Antenna, Antenna | None]:
 
 
 def _pair(name: str, value: Any) -> np.ndarray:
-    out = validation.array(name, np.broadcast_to(value, (2,)) if np.ndim(value) == 0 else value, np.float64, (2,))
+    if validation.ndim(name, value) == 0:
+        value = np.full(2, validation.number(name, value))
+    out = validation.array(name, value, np.float64, (2,))
     if not (out > 0).all():
         raise ValueError(f"{name} is {out.tolist()}; both must be greater than 0")
     return out

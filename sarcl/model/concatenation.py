@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Iterable, Sequence
 from dataclasses import fields
 from typing import Any
 
@@ -20,6 +20,8 @@ def concatenate(parts: Sequence[PhaseHistory]) -> PhaseHistory:
     """
     if isinstance(parts, PhaseHistory):
         raise TypeError("concatenate takes a list of phase histories, got one; give [raw, ...]")
+    if not isinstance(parts, Iterable):
+        raise TypeError(f"parts is a {type(parts).__name__}; give a list of phase histories")
     parts = list(parts)
     if not parts:
         raise ValueError("concatenate was given no phase history; give at least one")

@@ -100,6 +100,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
             validation.ndim("image data", self.data)
             object.__setattr__(self, "data", np.asarray(self.data))
         object.__setattr__(self, "data", validation.unmasked("image data", self.data))
+        validation.instance("image grid", self.grid, ImageGrid)
         if tuple(np.shape(self.data)) != tuple(self.grid.shape):
             raise ValueError(
                 f"image data has shape {tuple(np.shape(self.data))} but its grid {tuple(self.grid.shape)}; "

@@ -334,8 +334,8 @@ class ImageGrid:
         self._need_plane("at")
         assert self.center is not None and self.spacing is not None
         assert self.y_axis is not None and self.x_axis is not None
-        i = (np.asarray(row) - self.shape[0] // 2) * self.spacing[0]
-        j = (np.asarray(column) - self._middle) * self.spacing[1]
+        i = (validation.values("row", row) - self.shape[0] // 2) * self.spacing[0]
+        j = (validation.values("column", column) - self._middle) * self.spacing[1]
         return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
 
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
@@ -346,7 +346,7 @@ class ImageGrid:
         assert (
             self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None
         )
-        d = np.asarray(position, np.float64) - self.center
+        d = validation.values("position", position) - self.center
         row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
         return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
 

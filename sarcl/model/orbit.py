@@ -21,7 +21,7 @@ from ..io import orbit_files
 from ._orbit_arguments import places, span_of, together
 from ._orbit_attitude import Attitude, axes_of, ellipse
 from .dates import Date, date, seconds
-from .trajectory import Trajectory
+from .trajectory import BYTES_PER_PULSE, Trajectory
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
@@ -177,6 +177,7 @@ class Orbit:
         if duration is not None:
             n_pulses = max(1, round(validation.number("duration", duration, above=0) * prf))
         n_pulses = validation.count("n_pulses", n_pulses)
+        validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
             raise ValueError(
                 "the time of the track is start or center (s since the epoch, or a date); give one of them"

@@ -31,6 +31,9 @@ PER_ROW = {
 }
 
 
+LEAST_STEP = 1e-20  # Hz: a range window of 1e28 m
+
+
 class RowFields(TypedDict, total=False):
     """The optional fields of a PhaseHistory that have one entry per row."""
 
@@ -50,7 +53,7 @@ class PhaseHistory:
     samples          complex; an array, memmap, HDF5 dataset or anything with shape, dtype and row slicing.
                      A writeable array is copied, a read-only one is not
     frequency        of sample 0, Hz, one or per row
-    frequency_step   Hz, one or per row, positive
+    frequency_step   Hz, one or per row, positive, at least 1e-20
     tx, rx           antenna positions, m (n_rows, 3); rx=None: one antenna. Such data stay monostatic:
                      dataclasses.replace(raw, tx=...) moves rx too, for a receiver that stays give rx=raw.rx.copy()
     reference_range  m, one or per row: half the two-way path whose phase is already removed
@@ -128,6 +131,11 @@ class PhaseHistory:
                 f"frequency_step[{int(np.argmin(self.frequency_step))}] is {self.frequency_step.min():g} Hz; "
                 "it must be positive: reverse the samples of a falling sweep"
             )
+        if not (self.frequency_step >= LEAST_STEP).all():
+            raise ValueError(
+                f"frequency_step is {self.frequency_step.min():g} Hz; steps are at least {LEAST_STEP:g} Hz, below "
+                "which range windows are longer than float32 counts"
+            )
         if not (self.frequency > 0).all():
             bad = int(np.argmin(self.frequency))
             raise ValueError(f"frequency[{bad}] is {self.frequency[bad]:g} Hz; it must be positive")
@@ -144,6 +152,7 @@ class PhaseHistory:
         if self.weight is not None and (self.weight < 0).any():
             bad = int(np.argmin(self.weight))
             raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
+        self._set("compressed", validation.flag("compressed", self.compressed))
         if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
             raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
         if self.array is not None and not hasattr(self.array, "offsets_at"):
@@ -178,7 +187,8 @@ class PhaseHistory:
         """`value` with one entry per row; with `spread`, a single number is taken for all rows."""
         n = self.samples.shape[0]
         if validation.ndim(name, value) == 0 and spread:
-            value = np.full(n, value)
+            validation.without_unit(name, value)
+            value = np.full(n, validation.unmasked(name, value))
         out = _words(name, value) if dtype == "U2" else validation.converted(name, value, dtype)
         if out.ndim != 1 + len(tail) or out.shape[1:] != tail:
             raise ValueError(f"{name} has shape {out.shape}, wanted {(n, *tail)}")

@@ -21,12 +21,14 @@ UP = (0.0, 0.0, 1.0)
 
 def fixed(track: Trajectory, direction: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
     """Boresight along one direction, (3,) or (n, 3), at every pulse. up: vertical, (3,) or (n, 3)."""
+    validation.instance("track", track, Trajectory)
     look = _units("direction", direction, len(track))
     return _looking(track, look, _vertical(track, up))
 
 
 def spotlight(track: Trajectory, point: ArrayLike, *, up: ArrayLike | None = None) -> Trajectory:
     """Boresight towards a point, m (3,), or (n, 3) if it moves. ValueError where an antenna stands on it."""
+    validation.instance("track", track, Trajectory)
     target = _vectors("point", point, len(track))
     return _looking(track, _units("point - position", target - track.positions, len(track)), _vertical(track, up))
 
@@ -44,6 +46,7 @@ def stripmap(
     side  "right" or "left" of the velocity, seen from above. The azimuth axis is in the plane of boresight and
     velocity, so that rows of an aperture lie along the track; its sense follows from z, which points up.
     """
+    validation.instance("track", track, Trajectory)
     look = validation.number("look", look, least=0)
     squint = validation.number("squint", squint)
     if look > np.pi or abs(squint) >= np.pi / 2:
@@ -72,13 +75,14 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
 
     The pattern rotates as a whole, as if the antenna did: sliding spotlight, scans, platform errors.
     """
+    validation.instance("track", track, Trajectory)
     axes = _attitude(track)
     a, e = (
-        np.broadcast_to(validation.converted(n, v, np.float64), (len(track),))
+        np.full(len(track), validation.number(n, v))
+        if validation.ndim(n, v) == 0
+        else validation.array(n, v, np.float64, (len(track),))
         for n, v in (("azimuth", azimuth), ("elevation", elevation))
     )
-    for name, values in (("azimuth", a), ("elevation", e)):
-        validation.finite(name, values)
     zero = np.zeros(len(track))
     ahead = [np.cos(e) * np.cos(a), np.cos(e) * np.sin(a), np.sin(e)]
     side = [-np.sin(a), np.cos(a), zero]
@@ -89,6 +93,7 @@ def steered(track: Trajectory, azimuth: ArrayLike, elevation: ArrayLike = 0.0) -
 
 def turned(track: Trajectory, angles: ArrayLike) -> Trajectory:
     """The track's attitude rotated by rotation vectors, rad (3,) or (n, 3), in its own axes x, y, z."""
+    validation.instance("track", track, Trajectory)
     from scipy.spatial.transform import Rotation
 
     rotation = Rotation.from_rotvec(_vectors("angles", angles, len(track)).copy()).as_matrix()
@@ -99,6 +104,8 @@ def from_quaternions(track: Trajectory, quaternions: ArrayLike, *, scalar_first:
     """Attitude from unit quaternions (n, 4), rotations from body to scene axes; w, x, y, z, or x, y, z, w."""
     from scipy.spatial.transform import Rotation
 
+    validation.instance("track", track, Trajectory)
+    scalar_first = validation.flag("scalar_first", scalar_first)
     q = validation.array("quaternions", quaternions, np.float64, (len(track), 4))
     length = np.linalg.norm(q, axis=1)
     if np.abs(length - 1).max() > 1e-3:
@@ -156,7 +163,7 @@ def _looking(track: Trajectory, look: np.ndarray, up: np.ndarray) -> Trajectory:
 
 def _vectors(name: str, value: ArrayLike, n: int) -> np.ndarray:
     """`value` (3,) or (n, 3) as (n, 3)."""
-    out = validation.array(name, value, np.float64, (3,) if np.ndim(value) == 1 else (n, 3))
+    out = validation.array(name, value, np.float64, (3,) if validation.ndim(name, value) == 1 else (n, 3))
     return np.broadcast_to(out, (n, 3))
 
 

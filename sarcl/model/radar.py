@@ -12,6 +12,7 @@ from ..base import constants, validation
 from .phase_history import PhaseHistory
 from .waveform import Waveform
 
+MOST_DECIBELS = 300.0  # of losses: amplitudes stay within float32
 BOLTZMANN = 1.380649e-23  # J/K, exact
 
 
@@ -20,7 +21,7 @@ class Radar:
     """Factors of the radar equation other than range and antenna gains.
 
     power                W, transmitted power at the peak of the pulse
-    losses_db            dB, sum of all losses, both ways, 0 or more
+    losses_db            dB, sum of all losses, both ways, 0 to 300
     noise_temperature    K, of the whole receiving system; None: unknown
 
     ValueError names the wrong argument. Samples with a Radar are in sqrt(W): |sample|^2 is the power received from the
@@ -35,13 +36,18 @@ class Radar:
     def __post_init__(self) -> None:
         object.__setattr__(self, "power", validation.number("radar power", self.power, above=0))
         object.__setattr__(self, "losses_db", validation.number("radar losses_db", self.losses_db, least=0))
+        if self.losses_db > MOST_DECIBELS:
+            raise ValueError(f"radar losses_db is {self.losses_db:g}; at most {MOST_DECIBELS:g} dB: was it a factor?")
         if self.noise_temperature is not None:
             value = validation.number("radar noise_temperature", self.noise_temperature, above=0)
             object.__setattr__(self, "noise_temperature", value)
 
     def factor(self, frequency: ArrayLike) -> NDArray[np.float64]:
         """sqrt(P lambda^2/((4 pi)^3 L)), sqrt(W) m, at `frequency` Hz (...): all that does not depend on position."""
-        wave = constants.SPEED_OF_LIGHT / np.asarray(frequency, np.float64)
+        given = validation.values("frequency", frequency)
+        if not (given > 0).all():
+            raise ValueError(f"frequency is {given.min():g} Hz; it must be positive")
+        wave = constants.SPEED_OF_LIGHT / given
         loss = 10 ** (self.losses_db / 10)
         return np.asarray(np.sqrt(self.power / ((4 * np.pi) ** 3 * loss)) * wave)
 
@@ -63,7 +69,7 @@ class Radar:
 
 def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
     """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
-    out = np.asarray(tx_range, np.float64) * np.asarray(rx_range, np.float64)
+    out = validation.values("tx_range", tx_range) * validation.values("rx_range", rx_range)
     if not (out > 0).all():
         raise ValueError("an antenna stands on a scatterer (range 0), where the radar equation is not defined; move it")
     return 1 / out
@@ -76,6 +82,9 @@ def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | N
     noise of k T_s W/Hz over one period 1/df of the row contributes k T_s/df. A chirp has E = duration/bandwidth, so a
     point's focused signal-to-noise ratio is (its power) duration n_pulses/(k T_s): the energy over the noise density.
     """
+    validation.instance("raw", raw, PhaseHistory)
+    if waveform is not None:
+        validation.instance("waveform", waveform, Waveform)
     temperature = validation.number("temperature", temperature, above=0)
     pulse = raw.waveform if waveform is None else waveform
     if pulse is None:

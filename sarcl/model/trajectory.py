@@ -73,6 +73,7 @@ class Trajectory:
         if self.accelerations is not None:
             a = validation.array("trajectory accelerations", self.accelerations, np.float64, (n, 3))
             object.__setattr__(self, "accelerations", a)
+        object.__setattr__(self, "stop_and_go", validation.flag("stop_and_go", self.stop_and_go))
         if not self.stop_and_go and (self.velocities is None or self.accelerations is None):
             raise ValueError(
                 "stop_and_go is False, but the trajectory has no velocities or no accelerations, which say where the "

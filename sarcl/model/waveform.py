@@ -105,7 +105,7 @@ class Waveform:
         A chirp has its stationary-phase form exp(-j pi (f - fc)^2 duration/bandwidth), of modulus 1 in the
         band and 0 outside; a down-chirp has the conjugate.
         """
-        f = np.asarray(frequency, dtype=np.float64) - self.center
+        f = validation.values("frequency", frequency) - self.center
         if self.sweep_rate is not None:
             inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
             made = np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside

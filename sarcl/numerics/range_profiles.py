@@ -9,7 +9,16 @@ from ..opencl.device import Device
 from .interpolation import Interpolator
 
 # Largest modulus of a profile: sums of ten thousand such rows still fit in complex64, of any number in complex128.
+TINY = 1e-35  # amplitude of samples below which pixels approach the smallest numbers of complex64
 LARGEST: dict[type[np.complexfloating], float] = {np.complex64: 1e34, np.complex128: 1e290}
+
+
+def check_digits(largest: float) -> None:
+    """ValueError where the largest of all samples times weights is so small that complex64 loses digits of it."""
+    if 0 < largest < TINY:
+        raise ValueError(
+            f"samples times weights reach {largest:.1e}; complex64 loses digits below {TINY:.0e}: scale the samples up"
+        )
 
 
 def padding(interpolator: Interpolator) -> int:

@@ -26,6 +26,8 @@ def revolved(profile: Sequence[tuple[float, float]], edge: float | None, section
     if edge is not None:
         # rings and sections so dense that the diagonal of a cell is at most `edge`
         side = validation.number("edge", edge, above=0) / np.sqrt(2)
+        if float(np.abs(line).max()) > MOST_FACETS * side:
+            raise MemoryError(f"edge {edge:g} m needs more than {MOST_FACETS:,} facets; take a larger one")
         if sections is None:
             n = max(n, int(np.ceil(2 * np.pi * line[:, 0].max() / side)))
         steps = np.ceil(np.linalg.norm(np.diff(line, axis=0), axis=1) / side).astype(int)
@@ -33,6 +35,8 @@ def revolved(profile: Sequence[tuple[float, float]], edge: float | None, section
             raise MemoryError(f"edge {edge:g} m needs {2 * n * steps.sum():,} facets; take a larger one")
         between = np.concatenate([[0.0], *(i + np.arange(1, m + 1) / m for i, m in enumerate(steps))])
         line = np.stack([np.interp(between, np.arange(len(line)), v) for v in line.T], axis=-1)
+    if 2 * n * (len(line) - 1) > MOST_FACETS:
+        raise MemoryError(f"sections is {n:.3g}, more than {MOST_FACETS:,} facets; take fewer")
     angle = 2 * np.pi * np.arange(n) / n
     circle = np.stack([np.cos(angle), np.sin(angle)], axis=-1)[np.arange(n + 1) % n]  # ends exactly where it begins
     rings = np.concatenate([line[:, None, :1] * circle, np.broadcast_to(line[:, None, 1:], (len(line), n + 1, 1))], -1)

@@ -52,6 +52,8 @@ class Material:
             "eps_r": 1.0,
             "conductivity": np.inf if conducting else 0.0,
             "height": 0.0 if self.diagram in COHERENT else np.inf,
+            "width": 0.0,
+            "reflectivity": 1.0,
         }
         for name in ("eps_r", "conductivity", "height", "width", "reflectivity"):
             value = getattr(self, name)

@@ -195,7 +195,7 @@ class Scene:
             scale = validation.number("scale", scale, above=0)
         position = validation.array("position", position, np.float64, (3,))
         rotate = geometry.rotation(rotation)
-        loaded = load(mesh, repair, validation.flag("external", external))
+        loaded = load(mesh, validation.flag("repair", repair), validation.flag("external", external))
         parts = part_materials(material, loaded)
         if scale is None:
             scale = 1.0 if loaded.unit is None else loaded.unit
@@ -393,6 +393,7 @@ class Scene:
         Raises MemoryError when more than `max_facets` would result, ValueError for point_roughness not yet realized.
         """
         max_edge = validation.number("max_edge", max_edge, above=0)
+        max_facets = validation.count("max_facets", max_facets)
         if len(self.triangles) == 0:
             return self
         if self.has_random_points:

@@ -143,9 +143,8 @@ def sphere(
         n = _cuts(validation.count("facets", 2000 if facets is None else facets))
         return _placed(radius * _solids.geodesic(n), None, **options)
     edge = validation.number("edge", edge, above=0)
-    n = max(
-        1, int(np.ceil(1.05 * radius / edge))
-    )  # from the icosahedron's edge; facets in the middle of its faces are larger
+    # from the icosahedron's edge; facets in the middle of its faces are larger
+    n = max(1, int(np.ceil(min(1.05 * radius / edge, 1e9))))
     while (longest := radius * geometry.edges(unit := _solids.geodesic(n)).max()) > edge:
         n = max(n + 1, int(n * longest / edge))
     return _placed(radius * unit, None, **options)

@@ -84,6 +84,8 @@ def surface(
 
 def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float64) -> np.ndarray:
     """`value` for every facet, cell or point: one number for all, or an array of `shape`; read-only."""
+    if dtype == np.bool_:
+        value = validation.flags(name, value)
     if validation.ndim(name, value) == 0:
         return np.broadcast_to(validation.array(name, value, dtype, ()), shape)
     return validation.array(name, value, dtype, shape)

@@ -150,6 +150,7 @@ def echo(
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
+    compressed = flag("compressed", compressed)
     if check is not None:
         flag("check", check)
     request = echo_request(

@@ -31,6 +31,7 @@ from ._point_spreading import spread_points, tiled_points
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW, refuse_unseen
 from .spreading import PER_TILE, Band, Counts, TiledScatterers
 
+LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
@@ -393,7 +394,10 @@ def _warned(*judgements: facet_error.FacetError | speckle_contrast.Speckle) -> d
 
 
 def bounded(largest: float) -> None:
-    """ValueError for an amplitude too large for complex64."""
+    """ValueError for amplitudes whose largest is too large for complex64, or so small that digits are lost."""
+    if 0 < largest < LEAST:
+        text = f"amplitudes reach {largest:g}; echoes in complex64 lose digits below {LEAST:g}"
+        raise ValueError(text + ": scale them up")
     if largest > LARGEST:
         text = f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}"
         raise ValueError(text + ": scale them down")

@@ -364,6 +364,8 @@ MAY_CATCH = {
     "io/input_paths.py": "names that no system takes",
     "io/_gotcha.py": "scipy's reader of damaged files; the file is put before a message, which is raised again",
     "io/_checksums.py": "text that is no JSON",
+    "io/_gltf_checks.py": "text that is no JSON",
+    "io/_mesh_text.py": "text that is no UTF-8 and no numbers",
     "io/mesh.py": "trimesh's readers of damaged files",
     "io/_other_files.py": "paths that are no names of files, XML that cannot be read",
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",

@@ -13,14 +13,14 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import SarclWarning, ToleranceMissed
 from ...base.report import Report
 from ...base.stage_timer import Clock
-from ...base.validation import instance
+from ...base.validation import flag, instance
 from ...base.validation import tolerance as allowed_error
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
-from ...numerics.range_profiles import LARGEST
+from ...numerics.range_profiles import LARGEST, check_digits
 from ...numerics.windows import Window
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
@@ -69,6 +69,8 @@ def polar_format(
     error above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
+    if check is not None:
+        flag("check", check)
     clock = Clock()
     made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance
@@ -76,9 +78,12 @@ def polar_format(
     clock.lap("plan")
 
     energy = np.zeros(task.raw.n_rows)
+    largest = 0.0
 
     def read(start: int, stop: int) -> np.ndarray:
-        made = _weighted(task, waves, start, stop, tolerance)
+        nonlocal largest
+        made, here = _weighted(task, waves, start, stop, tolerance)
+        largest = max(largest, here)
         energy[start:stop] = (made.real.astype(np.float64) ** 2 + made.imag.astype(np.float64) ** 2).sum(axis=1)
         return made
 
@@ -87,6 +92,7 @@ def polar_format(
             progress("polar format", round(1000 * share), 1000)
 
     data = engine.image(read, grid.shape, budget, clock, on_progress)
+    check_digits(largest)
     norm, random = float(np.linalg.norm(data)), float(np.sqrt(energy.sum() * grid.size))
     details = plan.describe()
     if norm < random:
@@ -180,8 +186,9 @@ def _prepare(
     return _Prepared(tolerance, task, waves, bent, engine, budget)
 
 
-def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> np.ndarray:
-    """Samples of rows start ... stop - 1 times their weights, with phases relative to the grid's centre: complex64."""
+def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> tuple[np.ndarray, float]:
+    """Samples of rows start ... stop - 1 times their weights, with phases relative to the grid's centre: complex64; and
+    the largest modulus, before it is rounded."""
     raw, rows = task.raw, slice(start, stop)
     made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
     shift = waves.shift[rows, None]
@@ -198,7 +205,7 @@ def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance
             f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
             f"{LARGEST[np.complex64]:.0e}: scale the samples down"
         )
-    return made.astype(np.complex64)
+    return made.astype(np.complex64), largest
 
 
 def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:

@@ -100,8 +100,12 @@ def _azimuth_spectra(
     A track longer than the FFT is folded: the plan's length keeps what is folded out of the pixels' Doppler band.
     """
     rows = host_memory.zeros((raw.n_rows, raw.n_samples), budget.host / ARRAYS, "rows of samples")
+    largest = 0.0
     for start in range(0, raw.n_rows, PIECE):
-        rows[start : start + PIECE] = _referenced(raw, start, min(start + PIECE, raw.n_rows), plan.center, weights)
+        made, here = _referenced(raw, start, min(start + PIECE, raw.n_rows), plan.center, weights)
+        rows[start : start + PIECE] = made
+        largest = max(largest, here)
+    range_profiles.check_digits(largest)
     clock.lap("samples")
     out = host_memory.zeros((plan.length, raw.n_samples), budget.host / ARRAYS, "spectra along the track")
     width = _columns(out, budget)
@@ -118,8 +122,8 @@ def _azimuth_spectra(
 
 def _referenced(
     raw: PhaseHistory, start: int, stop: int, center: float, weights: tuple[np.ndarray, np.ndarray]
-) -> np.ndarray:
-    """Weighted rows start ... stop - 1 with the reference range `center`, m: complex64."""
+) -> tuple[np.ndarray, float]:
+    """Weighted rows start ... stop - 1 with the reference range `center`, m: complex64; and their largest modulus."""
     sample_weight, row_weight = weights
     samples = raw.read(start, stop) * np.outer(row_weight[start:stop], sample_weight).astype(np.float32)
     largest = float(np.abs(samples).max(initial=0.0))
@@ -135,7 +139,7 @@ def _referenced(
     high = np.exp(2j * np.pi * (first + step * width * np.arange(-(-raw.n_samples // width)))).astype(np.complex64)
     low = np.exp(2j * np.pi * step * np.arange(width)).astype(np.complex64)
     turned = (high[:, :, None] * low[:, None, :]).reshape(stop - start, -1)[:, : raw.n_samples]
-    return (samples * turned).astype(np.complex64)
+    return (samples * turned).astype(np.complex64), largest
 
 
 class _Bins:

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike
 from ...base.errors import ToleranceMissed
 from ...base.report import Report
 from ...base.types import PathLike
-from ...base.validation import choice, instance
+from ...base.validation import choice, flag, instance
 from ...model.antenna import Antenna
 from ...model.antenna_array import AntennaArray
 from ...model.phase_history import PhaseHistory
@@ -91,6 +91,9 @@ def spectral_echo(
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     choice("variant", variant, ("exact", "saras"))
+    ripple, compressed = flag("ripple", ripple), flag("compressed", compressed)
+    if check is not None:
+        flag("check", check)
     if ripple and waveform.sweep_rate is None:
         raise ValueError(f"ripple is that of a rectangular chirp's spectrum, and the waveform is a {waveform.kind}")
     request = echo_request(
