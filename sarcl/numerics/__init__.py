@@ -15,7 +15,13 @@ For other folders:
     shared_tile             tiles of a grid that a work-group sums in local memory
     tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
+    transforms              FFTs of rows or columns of arrays that are on a device
+    weighted_samples        samples times weights, turned to other reference ranges, on a device
     windows                 windows over frequency and over the aperture
+
+For this folder alone:
+
+    _grid_image             from a grid of wavenumbers on a device to the image, there or on the host
 """
 
 __all__ = [
@@ -32,5 +38,7 @@ __all__ = [
     "shared_tile",
     "tile_constants",
     "tiles",
+    "transforms",
+    "weighted_samples",
     "windows",
 ]

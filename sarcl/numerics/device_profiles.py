@@ -5,7 +5,6 @@ Kernels: kernels/range_profiles.cl, before and after an FFT of rows.
 
 from __future__ import annotations
 
-from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -13,13 +12,11 @@ import numpy as np
 from ..base import float_pairs
 from ..opencl import fft
 from ..opencl.device import Device
+from ..opencl.fft_batches import Batches
 from . import range_profiles
 from .interpolation import Interpolator
-from .range_profiles import LARGEST
+from .weighted_samples import sums_hold
 
-# An FFT of any length convolves with a chirp, whose sums are larger than those of the profile by length^1.5 at most.
-SPARE = 1e10
-WEIGHTS = 1e18  # largest weights of rows and of samples lie between one over this and this: pairs of float32 hold them
 SINGLE = {"REAL64": 0, "FROM64": 0}  # macros of the kernels
 
 
@@ -47,7 +44,7 @@ class DeviceProfiles:
         self._sample_weight = sample_weight
         self._across: Any = None
         self._made: Any = None
-        self._batches = _Batches(device, length, dtype)
+        self._batches = Batches(device, length, dtype)
 
     def nbytes(self, rows: int) -> float:
         """Bytes on the device for the profiles of so many rows, and for the samples of two such blocks."""
@@ -66,17 +63,8 @@ class DeviceProfiles:
 
         A bound, several orders of magnitude below what the host can sum: what fails it, the host must do.
         """
-        if samples.dtype == np.complex128:
-            if not self.device.info.fp64:
-                return False
-        elif samples.dtype != np.complex64:
-            return False
-        along = float(np.abs(row_weight).max())
-        if not all(1 / WEIGHTS <= w <= WEIGHTS for w in (along, self._largest)):
-            return False
-        parts = np.ascontiguousarray(samples).view(samples.real.dtype)
-        largest = max(float(parts.max()), -float(parts.min()))
-        return 1.5 * largest * along * self._largest * self.n_samples <= LARGEST[self.dtype] / SPARE
+        weights = float(np.abs(row_weight).max()), self._largest
+        return sums_hold(self.device, samples, weights, self.n_samples, self.dtype)
 
     def weights(self, row_weight: np.ndarray) -> np.ndarray:
         """Weights of rows (n,) as `make` takes them in a buffer."""
@@ -118,7 +106,7 @@ class SpreadSamples:
     def __init__(self, device: Device, n_samples: int, interpolator: Interpolator, length: int) -> None:
         self.device, self.n_samples, self.interpolator, self.length = device, n_samples, interpolator, length
         self.pad = range_profiles.padding(interpolator)
-        self._batches = _Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
+        self._batches = Batches(device, length, np.complex64) if possible(device, length, np.complex64) else None
         self._correction: Any = None
         self._out: Any = None
 
@@ -150,37 +138,3 @@ class SpreadSamples:
             self._batches.transform()
             device.run(cut, (self.n_samples, count), None, work, self.length, self._correction, first, self._out)
         return device.download(self._out, np.empty((rows, self.n_samples), np.complex64))
-
-
-class _Batches:
-    """Rows of a block that are transformed at a time, in one buffer.
-
-    most       rows at a time;  row_bytes  of the buffer, and of what the FFT takes beside it, per row
-    All transforms are of whole batches, because each number of rows would need an FFT program of its own: of the last
-    batch some rows are not used.
-    """
-
-    def __init__(self, device: Device, length: int, dtype: type[np.complexfloating]) -> None:
-        self.device, self.length, self.dtype = device, length, dtype
-        self.most = fft.rows_at_once(device, length)
-        self.row_bytes = float(np.dtype(dtype).itemsize) * length + fft.temporary_bytes(length, dtype)
-        self._rows = 0
-        self._work: Any = None
-
-    def reserve(self, rows: int) -> bool:
-        """Make room for blocks of so many rows; whether there was less before."""
-        if rows <= self._rows:
-            return False
-        self._work = None
-        self._work = self.device.zeros(np.dtype(self.dtype).itemsize * min(rows, self.most) * self.length)
-        self._rows = rows
-        return True
-
-    def of(self, rows: int) -> Iterator[tuple[int, int, Any]]:
-        """(first row, number of rows, buffer) of each batch of a block."""
-        for first in range(0, rows, self.most):
-            yield first, min(self.most, rows - first), self._work
-
-    def transform(self) -> None:
-        """Enqueue the FFT of all rows of the buffer."""
-        fft.in_place(self.device, self._work, (min(self._rows, self.most), self.length), self.dtype)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -14,12 +14,15 @@ from ..base.text import size_text
 from ..base.tolerances import askable, rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
+from ..opencl.pipeline import Pipeline
 from . import cost_model, shared_tile
+from ._grid_image import WORK, OnDevice, OnHost
 from .error_bounds import FLOAT32, sum_rounding
 from .interpolation import TERMS, Interpolator, interpolator, lower_bound
 from .plan import LEAST_TOLERANCE
 
 OVERSAMPLE = (1.25, 1.5, 2.0, 2.5, 3.0, 4.0, 6.0, 8.0, 12.0, 16.0, 24.0, 32.0)
+UPLOAD = 2**26  # bytes of samples that are uploaded at a time where a device holds the whole grid
 MOST_COUNTED = 2**20  # samples that are counted to find the most in a cell
 CELLS = 64, 8  # cells per side of a tile of one work-item: on CPUs it stays in a cache, on GPUs many are at work
 
@@ -158,10 +161,39 @@ class Gridder:
         self.kernel = device.kernel("nufft2d.cl", "spread", **macros, VW=1, GROUPED=int(shared_tile.used_by(device)))
         self.table = device.upload(plan.interpolator.table)
 
-    def blocks(self, budget: float) -> tuple[int, int]:
-        """Tile rows of the grid, and rows of samples, at a time in `budget` bytes. MemoryError where none fits."""
-        across, sample_row = 8 * self.plan.length[1] * self.tile, 8 * self.n_samples + 32
-        budget = min(budget, 2 * self.device.info.max_alloc)
+    def blocks(self, budget: float, shape: tuple[int, ...], row_bytes: float = 0) -> tuple[int, int]:
+        """Tile rows of the grid, and rows of samples, at a time in `budget` bytes. MemoryError where none fits.
+
+        shape      of the image;  row_bytes  of a row of samples beside its 8 n_samples
+        """
+        return self._parts(budget, shape, row_bytes)[1]
+
+    def _parts(
+        self, budget: float, shape: tuple[int, ...], row_bytes: float
+    ) -> tuple[OnHost | OnDevice, tuple[int, int]]:  # fmt: skip
+        """What makes the image of the grid, and the `blocks`: the device where it can, at once where it fits."""
+        device, length = self.device, self.plan.length
+        flat = [
+            1 / self.plan.interpolator.transform((np.arange(n) - n // 2) / m)
+            for n, m in zip(shape, length, strict=True)
+        ]
+        sample_row, n_rows, n_tiles = 8 * self.n_samples + 32 + row_bytes, len(self.cell), -(-length[0] // self.tile)
+        if OnDevice.possible(device, length, WORK * budget):
+            end = OnDevice(device, length, flat, WORK * budget, True)
+            grid, half = 8.0 * length[0] * length[1], 8.0 * shape[1] * length[0]
+            left = budget - end.nbytes - grid
+            if left >= sample_row and max(grid, half) <= device.info.max_alloc:
+                return end, (n_tiles, max(1, int(min(left, n_rows * sample_row, UPLOAD) // sample_row)))
+            end = OnDevice(device, length, flat, WORK * budget, False)
+            if end.nbytes + end.across(self.tile) + sample_row <= budget:
+                return end, self._divided(budget, end, sample_row)
+        host = OnHost(device, length, flat)
+        return host, self._divided(budget, host, sample_row)
+
+    def _divided(self, budget: float, end: OnHost | OnDevice, sample_row: float) -> tuple[int, int]:
+        """`blocks` beside what makes the image of the grid."""
+        across = end.across(self.tile)
+        budget = min(budget - end.nbytes, 2 * self.device.info.max_alloc)
         if across + sample_row > budget:
             raise MemoryError(
                 f"max_bytes leaves {size_text(budget)}, but a row of samples and {self.tile} rows of the grid need "
@@ -173,7 +205,7 @@ class Gridder:
 
     def image(
         self,
-        read: Callable[[int, int], np.ndarray],
+        samples: Samples,
         shape: tuple[int, ...],
         budget: float,
         clock: Clock,
@@ -181,56 +213,74 @@ class Gridder:
     ) -> np.ndarray:
         """The image complex64 of `shape`, its pixel (rows//2, columns//2) where every phase is that of the samples.
 
-        read         weighted samples start ... stop - 1 of all rows, complex64
         on_progress  called with the share that is done
         """
         m0, m1 = self.plan.length
-        band, block = self.blocks(budget)
+        end, (band, block) = self._parts(budget, shape, samples.row_bytes)
         n_rows, n_tiles = len(self.cell), -(-m0 // self.tile)
-        half = np.empty((shape[1], m0), np.complex64)  # columns of the image, rows of the grid
-        samples = None
-        for first in range(0, n_tiles, band):
-            last = min(first + band, n_tiles)
-            rows = min(last * self.tile, m0) - first * self.tile
-            out = self.device.empty(8 * rows * m1)
-            for start in range(0, n_rows, block):
-                stop = min(start + block, n_rows)
-                if samples is None or block < n_rows:
-                    samples = self.device.upload(read(start, stop))
-                    clock.lap("samples")
-                cell, line = self.device.upload(self.cell[start:stop]), self.device.upload(self.line[start:stop])
-                self.device.run(
-                    self.kernel, *shared_tile.launch(self.device, (-(-m1 // self.tile), last - first)),
-                    samples, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
-                    steps=stop - start,
-                )  # fmt: skip
-                self.device.finish()
-                clock.lap("gridding")
-                on_progress(0.8 * (first + (last - first) * stop / n_rows) / n_tiles)
-            made = self.device.download(out, np.empty((rows, m1), np.complex64))
-            wave = fft.rows(self.device, made, inverse=True)
-            _transposed(wave, half[:, first * self.tile : first * self.tile + rows])
-            clock.lap("fft")
-        image = np.empty(shape, np.complex64)
-        _transposed(fft.rows(self.device, half, inverse=True), image)
-        flat = [
-            1 / self.plan.interpolator.transform((np.arange(n) - n // 2) / m)
-            for n, m in zip(shape, self.plan.length, strict=True)
-        ]
-        image *= flat[0].astype(np.float32)[:, None]
-        image *= flat[1].astype(np.float32)
+        pipeline = Pipeline(self.device)
+        given = out = None
+        with pipeline:
+            for first in range(0, n_tiles, band):
+                last = min(first + band, n_tiles)
+                rows = min(last * self.tile, m0) - first * self.tile
+                out = None  # frees the band before
+                out = self.device.empty(8 * rows * m1)
+                for start in range(0, n_rows, block):
+                    stop = min(start + block, n_rows)
+                    pipeline.new_block()
+                    if given is None or block < n_rows:
+                        given = samples.buffer(pipeline, start, stop)
+                        clock.lap("samples")
+                    cell, line = (pipeline.upload(a[start:stop]) for a in (self.cell, self.line))
+                    self.device.run(
+                        self.kernel, *shared_tile.launch(self.device, (-(-m1 // self.tile), last - first)),
+                        given, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
+                        steps=stop - start,
+                    )  # fmt: skip
+                    done = 0.8 * (first + (last - first) * stop / n_rows) / n_tiles
+
+                    def spread(done: float = done) -> None:
+                        clock.lap("gridding")
+                        on_progress(done)
+
+                    pipeline.step(spread)
+                if not samples.held and not isinstance(end, OnHost):  # known once all rows were read
+                    end = OnHost(self.device, self.plan.length, end.flat)
+                end.add(out, first * self.tile, rows)
+                clock.lap("fft")
+            given = out = None
+            image = end.image()
         clock.lap("fft")
         on_progress(1.0)
         return image
 
 
-def _transposed(wave: np.ndarray, out: np.ndarray) -> None:
-    """Transpose columns -n//2 ... of a spectrum (m, ...) into `out` (n, m), a few rows at a time for the cache."""
-    low = len(out) // 2
-    for start in range(0, len(wave), 32):
-        part = slice(start, start + 32)
-        out[:low, part] = wave[part, wave.shape[1] - low :].T
-        out[low:, part] = wave[part, : len(out) - low].T
+class Samples(Protocol):
+    """Weighted samples of rows, complex64.
+
+    row_bytes  on the device per row, beside 8 n_samples
+    held       whether the device can sum them, known once all were asked for: else the host makes the image
+    """
+
+    row_bytes: float
+    held: bool
+
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+        """Rows start ... stop - 1 in a buffer, which may be the one of the call before."""
+
+
+class Uploaded:
+    """Weighted samples that the host makes: `read(start, stop)` is complex64."""
+
+    row_bytes, held = 0.0, True
+
+    def __init__(self, device: Device, read: Callable[[int, int], np.ndarray]) -> None:
+        self.device, self.read = device, read
+
+    def buffer(self, pipeline: Pipeline, start: int, stop: int) -> Any:
+        """The samples of these rows, uploaded."""
+        return self.device.upload(self.read(start, stop))
 
 
 def tile_of(device: Device) -> int:

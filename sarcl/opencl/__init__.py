@@ -7,6 +7,7 @@ For other folders:
     device_list    OpenCL devices of this machine, tried with a small kernel before they are used
     failures       errors of OpenCL as errors that name the device, the need and the remedy
     fft            FFT of rows: reikna on GPUs, scipy.fft on CPU devices
+    fft_batches    rows that a device transforms some at a time, all in one buffer
     native_functions  the error of a device's own sine and cosine
     launch_numbers  numbers of a kernel's launch as one struct by value, given by name
     memory_budget  bytes that a computation may take on a device
@@ -30,6 +31,7 @@ __all__ = [
     "device_list",
     "failures",
     "fft",
+    "fft_batches",
     "launch_numbers",
     "memory_budget",
     "native_functions",

@@ -24,6 +24,8 @@ For other folders:
     range_doppler  reading of a profile along the range migration
     shadow         which samples of facets are hidden
     spectral_echo  spectrum of a reflectivity map, and the steps of its grid
+    transposition  what comes before and after an FFT of columns
+    weighted_samples  samples times weights, turned to other reference ranges
 """
 
 __all__ = [
@@ -45,4 +47,6 @@ __all__ = [
     "range_doppler",
     "shadow",
     "spectral_echo",
+    "transposition",
+    "weighted_samples",
 ]

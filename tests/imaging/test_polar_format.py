@@ -165,8 +165,9 @@ def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
                 return np.fft.ifft(data, axis=1, norm="forward").astype(np.complex64)
 
             monkeypatch.setattr(fft, "rows", rows)
+            monkeypatch.setattr(fft, "on_device", lambda *given: False)
             engine = nufft2d.Gridder(device, plan, turns, step, raw.n_samples)
-            engine.image(raw.read, GRID.shape, 1e9, Clock(), lambda share: None)
+            engine.image(nufft2d.Uploaded(device, raw.read), GRID.shape, 1e9, Clock(), lambda share: None)
             n = np.arange(90) - 45
             place = (turns[:, None] + step[:, None] * n[:, None]) % 1 * plan.length
             wanted = spread(raw.samples.ravel(), place.reshape(-1, 2), plan.interpolator, plan.length)
@@ -186,11 +187,12 @@ def test_tiles_that_a_work_group_shares_are_those_of_single_work_items(device, m
             return data
 
         monkeypatch.setattr(fft, "rows", rows)
+        monkeypatch.setattr(fft, "on_device", lambda *given: False)
         monkeypatch.setattr(shared_tile, "used_by", lambda device, shared=shared: shared)
         monkeypatch.setattr(nufft2d, "tile_of", lambda device: shared_tile.CELLS)
         engine = nufft2d.Gridder(gpu, plan, turns, step, raw.n_samples)
-        assert engine.blocks(57200) == (1, 25)
-        engine.image(raw.read, GRID.shape, 57200, Clock(), lambda share: None)
+        assert engine.blocks(57200, GRID.shape) == (1, 25)
+        engine.image(nufft2d.Uploaded(gpu, raw.read), GRID.shape, 57200, Clock(), lambda share: None)
     for got, wanted in zip(seen[True], seen[False], strict=True):
         assert np.array_equal(got, wanted)
 

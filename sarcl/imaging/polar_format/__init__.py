@@ -6,6 +6,7 @@ For other folders:
 
 For this folder alone:
 
+    _samples       weighted samples, made on the device or on the host
     _wavefront     wavenumbers of plane waves, and the error of neglected curvature
 """
 

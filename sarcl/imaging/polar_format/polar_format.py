@@ -9,7 +9,6 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import SarclWarning, ToleranceMissed
 from ...base.report import Report
 from ...base.stage_timer import Clock
@@ -20,7 +19,7 @@ from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
-from ...numerics.range_profiles import LARGEST, check_digits
+from ...numerics.range_profiles import check_digits
 from ...numerics.windows import Window
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
@@ -28,6 +27,7 @@ from ...opencl.device import DeviceChoice
 from ..collection import collection
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import Forecast, speed
+from ._samples import WeightedRows
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
 DEFOCUS = np.pi / 2  # rad: blurring phase at the border of the grid above which a warning is given
@@ -74,26 +74,16 @@ def polar_format(
     clock = Clock()
     made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance
-    plan, opened, budget = made.engine.plan, made.engine.device, made.budget
+    plan, opened, budget = engine.plan, engine.device, made.budget
     clock.lap("plan")
-
-    energy = np.zeros(task.raw.n_rows)
-    largest = 0.0
-
-    def read(start: int, stop: int) -> np.ndarray:
-        nonlocal largest
-        made, here = _weighted(task, waves, start, stop, tolerance)
-        largest = max(largest, here)
-        energy[start:stop] = (made.real.astype(np.float64) ** 2 + made.imag.astype(np.float64) ** 2).sum(axis=1)
-        return made
 
     def on_progress(share: float) -> None:
         if progress:
             progress("polar format", round(1000 * share), 1000)
 
-    data = engine.image(read, grid.shape, budget, clock, on_progress)
-    check_digits(largest)
-    norm, random = float(np.linalg.norm(data)), float(np.sqrt(energy.sum() * grid.size))
+    data = engine.image(made.samples, grid.shape, budget, clock, on_progress)
+    check_digits(made.samples.largest)
+    norm, random = float(np.linalg.norm(data)), float(np.sqrt(made.samples.energy() * grid.size))
     details = plan.describe()
     if norm < random:
         details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
@@ -158,6 +148,7 @@ class _Prepared:
     waves: Waves
     bent: Curvature
     engine: Gridder
+    samples: WeightedRows
     budget: float
 
 
@@ -182,30 +173,9 @@ def _prepare(
     cycles, step = waves.pixel_cycles(task.raw, grid)
     plan = make_plan(tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(opened))
     engine = Gridder(opened, plan, cycles, step, raw.n_samples)
-    engine.blocks(budget)
-    return _Prepared(tolerance, task, waves, bent, engine, budget)
-
-
-def _weighted(task: FocusingTask, waves: Waves, start: int, stop: int, tolerance: float) -> tuple[np.ndarray, float]:
-    """Samples of rows start ... stop - 1 times their weights, with phases relative to the grid's centre: complex64; and
-    the largest modulus, before it is rounded."""
-    raw, rows = task.raw, slice(start, stop)
-    made = raw.read(start, stop) * np.outer(task.row_weight[rows], task.sample_weight).astype(np.float32)
-    shift = waves.shift[rows, None]
-    # where the reference is the centre, the shift is rounding alone
-    if float(np.abs(shift).max()) * 4 * np.pi * task.highest / SPEED_OF_LIGHT > 1e-3 * tolerance:
-        n = np.arange(raw.n_samples)
-        first = 2 / SPEED_OF_LIGHT * shift * raw.frequency[rows, None] % 1
-        cycles = first + (2 / SPEED_OF_LIGHT * shift * raw.frequency_step[rows, None] % 1) * n
-        made = made * np.exp(2j * np.pi * cycles)
-    largest = float(np.abs(made).max(initial=0.0))
-    n_samples = raw.n_rows * raw.n_samples
-    if largest > LARGEST[np.complex64] / n_samples:
-        raise ValueError(
-            f"samples times weights reach {largest:.1e}; sums of {n_samples} in complex64 hold up to "
-            f"{LARGEST[np.complex64]:.0e}: scale the samples down"
-        )
-    return made.astype(np.complex64), largest
+    samples = WeightedRows(opened, task, waves, tolerance)
+    engine.blocks(budget, grid.shape, samples.row_bytes)
+    return _Prepared(tolerance, task, waves, bent, engine, samples, budget)
 
 
 def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
