@@ -3,7 +3,7 @@
 //   out[q, i] = s~_q(t_q(i)) exp(+j 2 pi phase_q(i)),   i a column of the image
 //   t_q(i) = cell + rest + (i - i0) step,   phase_q(i) = first + (i - i0) slope,   i0 the first column of its segment
 //
-// source    docs/theory/range_doppler.md; sarcl/imaging/range_doppler/_focus.py
+// source    docs/theory/range_doppler.md; sarcl/imaging/range_doppler/_bins.py
 // symbols   s~_q      profile of Doppler bin q, samples `oversample` times finer than 1/bandwidth
 //           cell      (bins, segments) int: whole samples from delay 0;  line (bins, segments, 4): rest, step, in samples,
 //                     first, slope, in cycles
@@ -13,6 +13,27 @@
 
 #include "common.clh"
 #include "interp.clh"
+
+#if VW == 1
+// global size (columns, bins), on GPUs: a work-item reads one column
+//   share   (columns of the image): a factor;  begin  first column here, of the image
+//   out     (..., n_ranges, 2): bin q adds to row (first + q) modulo `period`, or where `add` is 0 overwrites it
+__kernel void straighten_onto(__global const float *restrict profiles, int stride, int origin,
+                              __global const int *restrict cell, __global const float *restrict line,
+                              __global const float *restrict table, __global const float *restrict share, int begin,
+                              int first, int period, int n_ranges, int add, __global float *restrict out) {
+    int i = get_global_id(0), n_segments = ((int)get_global_size(0) + SEGMENT - 1) / SEGMENT;
+    size_t q = get_global_id(1), at = q * n_segments + i / SEGMENT;
+    __global const float *l = line + 4 * at;
+    float column = i % SEGMENT, re, im, s, c;
+    look_up(profiles + 2 * (q * stride + origin), stride, origin, cell[at], fma(column, l[1], l[0]), table, &re, &im);
+    float cycles = fma(column, l[3], l[2]);
+    sincos_cycles(cycles - nearest(cycles), &s, &c);
+    size_t to = (size_t)((first + (int)q) % period) * n_ranges + begin + i;
+    float2 made = share[begin + i] * (float2)(fma(re, c, -im * s), fma(re, s, im * c));
+    vstore2(add ? vload2(to, out) + made : made, to, out);
+}
+#endif
 
 // global size (segments, bins)
 //   profiles  (bins, stride, 2): delay 0 stands at `origin`;  out (bins, segments * SEGMENT, 2)

@@ -14,7 +14,7 @@ from ..opencl import fft
 from ..opencl.device import Device
 from .transforms import Transforms
 
-WORK = 1 / 4  # largest share of a budget for the rows that are transformed at a time
+WORK = 1 / 6  # largest share of a budget for the rows, or columns, that are transformed at a time
 
 
 class OnHost:
@@ -53,7 +53,8 @@ class OnDevice:
     """The device transforms. Where it holds all (`whole`), nothing but the image is downloaded.
 
     Else its columns before the second transform go through the memory of the host.
-    nbytes  on the device, beside bands of the grid: what is transformed at a time, and the columns where they stay
+    nbytes  on the device, beside bands of the grid: what is transformed at a time, whose programs keep what they take,
+            and the columns where they stay
     """
 
     def __init__(
@@ -64,7 +65,7 @@ class OnDevice:
         self.shape = len(flat[0]), len(flat[1])
         self._work, self._grid = work, None
         along, across = (Transforms(device, m, m, work).nbytes for m in length)
-        self.nbytes = max(along, across) + (8.0 * self.shape[1] * length[0] if whole else 0.0)
+        self.nbytes = along + across + (8.0 * self.shape[1] * length[0] if whole else 0.0)
         self._flat = [device.copied(f.astype(np.float32)) for f in flat]
         self._transforms: Any = None
         self._half: Any = None

@@ -65,7 +65,7 @@ class WeightedSamples:
     def holds(self, samples: np.ndarray, row_weight: np.ndarray) -> bool:
         """Whether the device can sum samples (n, n_samples) with weights (n,): by their types and sizes.
 
-        Faint samples are the host's too, which refuses those that complex64 does not hold (range_profiles.check_digits).
+        Faint samples are the host's too, which refuses those that complex64 does not hold (`check_digits`).
         """
         weights = float(np.abs(row_weight).max()), self._largest
         if 0 < 1.5 * largest_part(samples) * weights[0] * weights[1] < FAINT:

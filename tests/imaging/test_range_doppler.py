@@ -12,7 +12,7 @@ from helpers.cases import image_error, noise_on
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.range_doppler import _focus
-from sarcl.imaging.range_doppler._focus import _Bins
+from sarcl.imaging.range_doppler._bins import Bins
 from sarcl.imaging.range_doppler._plan import curved
 from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
 from sarcl.numerics.interpolation import interpolator
@@ -247,7 +247,7 @@ def test_profiles_are_read_as_the_twin_says(device):
     random = np.random.default_rng(2)
     for taps in (2, 4, 6, 8):
         kernel = interpolator(taps, 2.0)
-        bins = _Bins.__new__(_Bins)
+        bins = Bins.__new__(Bins)
         plan = type("Plan", (), {"profile_length": 100})
         bins.device, bins.plan, bins.pad = device, plan, 200
         bins.kernel = device.kernel("range_doppler.cl", "straighten", TAPS=taps, TERMS=kernel.terms, SEGMENT=64)
@@ -255,7 +255,7 @@ def test_profiles_are_read_as_the_twin_says(device):
         profiles = from_samples(device, raw.samples[:5], correction(kernel, 50, 100).astype(np.float32), 100, 200)
         cell = random.integers(-50, 50, (5, 2)).astype(np.int32)
         line = random.uniform(-0.5, 0.5, (5, 2, 4)).astype(np.float32)
-        bins._lines = lambda doppler, ranges, made=(cell, line): made
+        bins.lines = lambda doppler, ranges, made=(cell, line): made
         made = bins._straightened(profiles, np.zeros(5), np.zeros(100))
         column = np.arange(64)
         for q in range(5):

@@ -1,0 +1,308 @@
+"""The work of a range-Doppler image on a GPU: samples go up once, the image comes down once (equations in _focus.py).
+
+Two arrays are large: the rows, which their spectra along the track replace, and the compressed Doppler bins, which the
+image replaces. Both stay on the device where it holds them; one that does not fit is kept on the host and goes up and
+down in blocks.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from typing import Any
+
+import numpy as np
+
+from ...base import float_pairs, host_memory
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.stage_timer import Clock
+from ...model.phase_history import PhaseHistory
+from ...numerics.range_profiles import check_digits
+from ...numerics.transforms import Transforms
+from ...numerics.weighted_samples import WeightedSamples, sums_hold
+from ...opencl.device import Device
+from ...opencl.fft_batches import Batches
+from ...opencl.pipeline import SLOTS, Pipeline
+from ._bins import Bins
+from ._doppler import EVANESCENT
+from ._host_rows import ARRAYS, Budget, referenced, turns
+from ._plan import SEGMENT, FocusPlan
+from ._track import Track
+
+LENGTHS = 3  # of FFTs: along the track, of range profiles, back; the programs of each keep what they take
+WORK = 1 / 16  # share of a budget for the rows that are transformed at a time, with one of these lengths
+UPLOAD = 2**26  # bytes of samples that are uploaded at a time
+PIECE = 64  # rows that the host refers to one range at a time
+BLOCKS = 8  # blocks of Doppler bins, at least, so that the host works on one while the device does another
+
+
+def focus_on_device(
+    device: Device, plan: FocusPlan, raw: PhaseHistory, track: Track, weights: tuple[np.ndarray, np.ndarray],
+    budget: Budget, clock: Clock, on_progress: Callable[[float], None],
+) -> np.ndarray | None:  # fmt: skip
+    """The image complex64 (times, ranges), as `focus` makes it; None where the host must make it.
+
+    That is where the device has no room for a row of a transform, or may not hold the sums of the samples.
+    """
+    weigher = WeightedSamples(device, weights[0], raw.n_rows, np.dtype(raw.samples.dtype))
+    bins = Bins(device, plan, raw, track)
+    room = Room.for_task(device, plan, bins, raw.n_rows, weigher.row_bytes, budget.device)
+    if room is None:
+        return None
+    spectra = _Array(device, (max(raw.n_rows, plan.length), raw.n_samples), room.spectra)
+    if not (_refer if room.spectra else _refer_on_host)(device, spectra, plan, raw, weights, weigher, room, budget):
+        return None
+    clock.lap("samples")
+    del weigher
+    spectra.transform(plan.length, raw.n_rows, plan.length, 1, room)
+    clock.lap("fft")
+    on_progress(0.3)
+    period = plan.length * plan.finer
+    folded = _Array(device, (period, len(plan.ranges)), room.folded)
+    if room.folded:
+        folded.buffer = device.zeros(8 * folded.shape[0] * folded.shape[1])
+    else:
+        folded.host = host_memory.zeros(folded.shape, budget.host / ARRAYS, "Doppler bins of the columns")
+
+    def on_bins(done: float) -> None:
+        clock.lap("migration")
+        on_progress(0.3 + 0.5 * done)
+
+    _Migration(device, plan, bins, room).compressed(spectra, folded, on_bins)
+    del spectra
+    folded.transform(period, period, len(plan.times), -1, room)
+    image = folded.rows(len(plan.times))
+    clock.lap("fft")
+    on_progress(1.0)
+    return image
+
+
+class Room:
+    """What fits on a device.
+
+    spectra, folded  whether the rows and their spectra stay there, and the compressed Doppler bins
+    work     bytes for the rows of a transform;  left  for blocks of all else;  bins  Doppler bins at a time
+    """
+
+    def __init__(self, spectra: bool, folded: bool, work: float, left: float, bins: int) -> None:
+        self.spectra, self.folded, self.work, self.left, self.bins = spectra, folded, work, left, bins
+
+    @classmethod
+    def for_task(
+        cls, device: Device, plan: FocusPlan, bins: Bins, n_rows: int, row_bytes: float, budget: float
+    ) -> Room | None:  # fmt: skip
+        """The room of a task; None where a row of a transform, or a Doppler bin, does not fit.
+
+        row_bytes  of the samples of a row that are being uploaded
+        """
+        n_samples, n_ranges, period = len(bins.frequencies), len(plan.ranges), plan.length * plan.finer
+        spectra, folded = 8.0 * max(n_rows, plan.length) * n_samples, 8.0 * period * n_ranges
+        work = WORK * budget
+        if max(Batches(device, n, np.complex64).row_bytes for n in (period, plan.profile_length)) > work:
+            return None
+        widest = max(b - a for a, b in plan.blocks)
+        profiles = 8.0 * len(bins.near(0)) * (plan.profile_length + 2 * bins.pad)
+        uploads = SLOTS * (20.0 * (widest / SEGMENT + 1) + 12 * len(bins.near(0)))
+        tables = 4.0 * (len(bins.near(0)) * n_ranges + 4 * n_samples + period + len(plan.times))
+        tables += 4.0 * plan.interpolator.taps * plan.interpolator.terms
+        if plan.band.window is not None:
+            tables += 4.0 * len(plan.band.window.weights)
+        column = 16.0 * max(n_rows, period)  # of an array on the host: as it goes up, and as it comes down
+        order = [(True, True), (True, False), (False, True), (False, False)]
+        if folded > spectra:  # the larger one costs more to move
+            order[1:3] = order[2], order[1]
+        for keeps in order:
+            held = [n for n, kept in zip((spectra, folded), keeps, strict=True) if kept]
+            left = budget - LENGTHS * work - tables - sum(held)
+            each = profiles + uploads + (0 if keeps[0] else 8 * n_samples) + (0 if keeps[1] else 8 * n_ranges)
+            if (
+                left >= max(each, row_bytes, 0 if all(keeps) else column)
+                and max(held, default=0) <= device.info.max_alloc
+            ):
+                most = min(period, max(PIECE, -(-len(plan.bins) // BLOCKS)))
+                largest = max(8.0 * (plan.profile_length + 2 * bins.pad), 8.0 * n_samples, 8.0 * n_ranges)
+                return cls(*keeps, work, left, max(1, int(min(most, left / each, device.info.max_alloc / largest))))
+        return None
+
+
+class _Array:
+    """An array complex64 on the device, in `buffer`, or in `host`: in memory or a file."""
+
+    buffer: Any = None
+    host: Any = None
+
+    def __init__(self, device: Device, shape: tuple[int, int], resident: bool) -> None:
+        self.device, self.shape, self.resident = device, shape, resident
+
+    def transform(self, length: int, n_rows: int, n: int, sign: int, room: Room) -> None:
+        """Replace the columns of the first `n_rows`, padded or folded to a length, by n bins of their transforms.
+
+        sign  1, or -1 for transforms with exp(+j ...)
+        """
+        device, width = self.device, self.shape[1]
+        made = Transforms(device, length, width, room.work)
+        weights = device.copied(np.ones(n, np.float32)), n
+        if self.resident:
+            for first in range(0, width, made.most):
+                count = min(made.most, width - first)
+                made.columns(self.buffer, (n_rows, width), first, count)
+                made.lay(self.buffer, width, first, count, weights, 0, sign)
+            return
+        at_once = max(1, min(made.most, int(room.left // (8 * (n_rows + n)))))
+        for first in range(0, width, at_once):
+            part = np.ascontiguousarray(self.host[:n_rows, first : first + at_once])
+            count = part.shape[1]
+            made.columns(device.upload(part), part.shape, 0, count)
+            out = device.empty(8 * n * count)
+            made.lay(out, count, 0, count, weights, 0, sign)
+            self.host[:n, first : first + count] = device.download(out, np.empty((n, count), np.complex64))
+
+    def rows(self, n: int) -> np.ndarray:
+        """The first n rows."""
+        if self.resident:
+            return self.device.download(self.buffer, np.empty((n, self.shape[1]), np.complex64))
+        return np.array(self.host[:n])
+
+
+def _refer(
+    device: Device, rows: _Array, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray],
+    weigher: WeightedSamples, room: Room, budget: Budget,
+) -> bool:  # fmt: skip
+    """Weighted rows of one reference range, made on the device; False where it may not hold their sums."""
+    rows.buffer = device.empty(8 * rows.shape[0] * rows.shape[1])
+    at_once = max(1, int(min(room.left, UPLOAD) // weigher.row_bytes))
+    with Pipeline(device) as pipeline:
+        for start in range(0, raw.n_rows, at_once):
+            stop = min(start + at_once, raw.n_rows)
+            samples, along = raw.read(start, stop), weights[1][start:stop]
+            if not weigher.holds(samples, along):
+                return False
+            pipeline.new_block()
+            weigher.make(pipeline, samples, along, turns(raw, start, stop, plan.center), rows.buffer, start)
+            pipeline.step()
+    return True
+
+
+def _refer_on_host(
+    device: Device, rows: _Array, plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray],
+    weigher: WeightedSamples, room: Room, budget: Budget,
+) -> bool:  # fmt: skip
+    """The same, made on the host."""
+    rows.host = host_memory.zeros(rows.shape, budget.host / ARRAYS, "spectra along the track")
+    largest = 0.0
+    for start in range(0, raw.n_rows, PIECE):
+        stop = min(start + PIECE, raw.n_rows)
+        made, here = referenced(raw, start, stop, plan.center, weights)
+        rows.host[start:stop], largest = made, max(largest, here)
+        if not sums_hold(device, made, (1.0, 1.0), weigher.n_terms, np.complex64):
+            return False
+    check_digits(largest)
+    return True
+
+
+class _Migration:
+    """Secondary range compression, migration and azimuth compression of Doppler bins, on a device."""
+
+    def __init__(self, device: Device, plan: FocusPlan, bins: Bins, room: Room) -> None:
+        self.device, self.plan, self.bins, self.room = device, plan, bins, room
+        kernel, window = plan.interpolator, plan.band.window
+        macros = {"TAPS": kernel.taps, "TERMS": kernel.terms, "SEGMENT": SEGMENT}
+        self._compress = device.kernel("compression_filter.cl", "compress")
+        self._pad = device.kernel("range_profiles.cl", "pad", REAL64=0, FROM64=0)
+        self._straighten = device.kernel("range_doppler.cl", "straighten_onto", VW=1, **macros)
+        self._frequencies = device.copied(float_pairs.wide(bins.frequencies))
+        self._factors = device.copied(bins.correction.astype(np.float32))
+        values = np.ones(1, np.float32) if window is None else window.weights.astype(np.float32)
+        self._window = device.copied(values)
+        first, step = (0.0, 1.0) if window is None else (window.sines[0], window.sines[1] - window.sines[0])
+        band = (plan.band.low, plan.band.high, plan.band.taper, first, step)
+        self._band = (*(np.float32(value) for value in band), len(values))
+        # the part of the amplitude that depends on the slant range alone; its phase of 1/8 cycle is in the lines
+        level = np.abs(bins.level(plan.ranges))
+        self._shares = [device.copied((share * level).astype(np.float32)) for share in bins.shares()]
+        self._batches = Batches(device, plan.profile_length, np.complex64, room.work)
+        self._stride = plan.profile_length + 2 * bins.pad
+
+    def compressed(self, spectra: _Array, folded: _Array, on_progress: Callable[[float], None]) -> None:
+        """Add the Doppler bins, compressed, to the rows of `folded` that they fall on, modulo its number of rows.
+
+        on_progress  called with the share that is done
+        """
+        device, plan, bins, blocks = self.device, self.plan, self.bins, self.plan.blocks
+        at_once, period = min(self.room.bins, len(plan.bins)), folded.shape[0]
+        self._batches.reserve(at_once)
+        free = [device.empty(8 * at_once * self._stride) for _ in bins.near(0)]
+        made: dict[int, Any] = {}  # profiles of the nodes about a block
+        chosen = spectra.buffer if spectra.resident else device.empty(8 * at_once * spectra.shape[1])
+        out = folded.buffer if folded.resident else device.empty(8 * at_once * folded.shape[1])
+        with Pipeline(device) as pipeline:
+            for start in range(0, len(plan.bins), at_once):
+                numbers = plan.bins[start : start + at_once]
+                doppler = numbers / (plan.length * bins.track.step)
+                given = chosen, int(numbers[0] % plan.length), plan.length
+                to = int(numbers[0] % period), period
+                if not spectra.resident:
+                    device.write(chosen, spectra.host[numbers % plan.length])
+                    given = chosen, 0, len(numbers)
+                if not folded.resident:
+                    to = 0, len(numbers)
+                free += made.values()
+                made.clear()
+                for i, block in enumerate(blocks):
+                    pipeline.new_block()
+                    near = bins.near(i)
+                    free += [made.pop(k) for k in [*made] if k not in near]
+                    for k in near:
+                        if k not in made:
+                            made[k] = free.pop()
+                            self._profiles(pipeline, given, doppler, bins.nodes[k], made[k])
+                    profiles = [made[k] for k in near]
+                    self._add(pipeline, profiles, doppler, block, (out, *to), not folded.resident)
+                    done = (start + len(numbers) * (i + 1) / len(blocks)) / len(plan.bins)
+                    pipeline.step(lambda done=done: on_progress(done))  # type: ignore[misc]
+                if not folded.resident:
+                    part = np.empty((len(numbers), folded.shape[1]), np.complex64)
+                    folded.host[numbers % period] += device.download(out, part)
+
+    def _profiles(
+        self, pipeline: Pipeline, given: tuple[Any, int, int], doppler: np.ndarray, distance: float, out: Any
+    ) -> None:  # fmt: skip
+        """Range profiles after the secondary range compression of one slant range, m, of spectra that are `given`."""
+        device, bins, n = self.device, self.bins, len(doppler)
+        spectra, first, period = given
+        bend = bins.bend(doppler, distance)
+        kept = np.abs(bend) < EVANESCENT * bins.frequencies.min()
+        bends = pipeline.upload(np.concatenate([float_pairs.wide(bend), kept[None].astype(np.float32)]))
+        constants = [
+            *float_pairs.wide(np.array(bins.center)),
+            *float_pairs.wide(np.array(2 / SPEED_OF_LIGHT * distance)),
+        ]
+        length = self.plan.profile_length
+        for start, count, work in self._batches.of(n):
+            device.run(
+                self._compress, (length, count), None, spectra, len(bins.frequencies), first, period,
+                self._frequencies, self._factors, bends, n, start, *(np.float32(c) for c in constants), *self._band,
+                self._window, work,
+            )  # fmt: skip
+            self._batches.transform()
+            device.run(self._pad, (self._stride, count), None, work, length, bins.pad, start, out)
+
+    def _add(
+        self, pipeline: Pipeline, profiles: list[Any], doppler: np.ndarray, block: tuple[int, int],
+        to: tuple[Any, int, int], anew: bool,
+    ) -> None:  # fmt: skip
+        """Add profiles, read along the migration and turned, in the columns of a block: each with its shares.
+
+        to    buffer, the first row, and the number after which rows begin again
+        anew  overwrite what is there
+        """
+        device, bins, (begin, end) = self.device, self.bins, block
+        cell, line = bins.lines(doppler, self.plan.ranges[begin:end])
+        line[..., 2] += np.float32(0.125)
+        places = pipeline.upload(cell), pipeline.upload(line)
+        buffer, first, period = to
+        for number, (profile, share) in enumerate(zip(profiles, self._shares, strict=True)):
+            device.run(
+                self._straighten, (end - begin, len(doppler)), None, profile, self._stride,
+                bins.pad + self.plan.profile_length // 2, *places, bins.table, share, begin, first, period,
+                len(self.plan.ranges), int(not anew or number > 0), buffer,
+            )  # fmt: skip
