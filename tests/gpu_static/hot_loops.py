@@ -73,11 +73,12 @@ HOT = {
     ("beam.cl", "add"): Hot("USED * VW", "element and value of the beam"),
     ("beam.cl", "paths"): Hot("VW", "element and entry"),
     ("beam.cl", "times"): Hot("VW", "element and entry"),
+    ("compression_filter.cl", "compress"): Hot("1", "sample of a Doppler bin", loop="kernel"),
     ("current_sums.cl", "current_sums"): Hot("8 * VW", "cell, frequency and pulse"),  # BLOCK in the kernel
     ("merge_subapertures.cl", "merge"): Hot("1", "pulse and sample of a profile"),
     # a trip of a group's 64 items adds up to 64 samples: instructions of all items per sample
     ("nufft2d.cl", "spread"): Hot("1", "sample and tile of the grid", loop="barrier", trips=("64",)),
-    ("range_doppler.cl", "straighten"): Hot("VW", "sample"),
+    ("range_doppler.cl", "straighten_onto"): Hot("1", "sample", loop="kernel"),
     ("ray_casting.cl", "hidden"): Hot("1", "node of the tree and ray"),
     ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
     ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency"),

@@ -233,7 +233,7 @@ TASKS: dict[str, Callable[[], Errors]] = {
 # Tasks that reach kernels or branches of them that differ without float64.
 WITHOUT_FP64 = (
     "direct 1e-5", "direct bistatic", "shared lines 3e-5", "factorized", "echo points bistatic", "echo facets",
-    "echo antenna", "beam", "spectral_echo",
+    "echo antenna", "beam", "spectral_echo", "range_doppler",
 )  # fmt: skip
 NO_FP64 = " without float64"
 NAMES = [*TASKS, *(name + NO_FP64 for name in WITHOUT_FP64)]
