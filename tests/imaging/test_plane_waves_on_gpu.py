@@ -73,6 +73,9 @@ def test_sums_that_a_device_may_not_hold_are_the_hosts_or_refused(device):
     scaled = replace(raw, samples=raw.samples * np.float32(1e34))
     with pytest.raises(ValueError, match=r"samples times weights reach .*; sums of 5760 in complex64 hold up to"):
         sarcl.polar_format(scaled, GRID, tolerance=1e-3, device=gpu)
+    faint = replace(raw, samples=raw.samples.astype(np.complex128) * 1e-37)
+    with pytest.raises(ValueError, match="complex64 loses digits below 1e-35"):
+        sarcl.polar_format(faint, GRID, tolerance=1e-3, device=gpu)
 
 
 def test_a_dark_image_is_reported_by_the_energy_that_the_device_sums(device):

@@ -117,6 +117,9 @@ def test_sums_that_a_device_may_not_hold_are_the_hosts_or_refused(device):
         scaled = replace(raw, samples=raw.samples * np.float32(1e34))
         with pytest.raises(ValueError, match=r"samples times weights reach .*; sums of 8000 in complex64 hold up to"):
             sarcl.range_doppler(scaled, device=gpu, **options)
+        faint = replace(raw, samples=raw.samples.astype(np.complex128) * 1e-37)
+        with pytest.raises(ValueError, match="complex64 loses digits below 1e-35"):
+            sarcl.range_doppler(faint, device=gpu, **options)
 
 
 def test_blocks_of_rows_may_weigh_nothing(device, monkeypatch):
