@@ -42,6 +42,7 @@ if TYPE_CHECKING:
     import distributed
 
 log = logging.getLogger(__name__)
+NOTHING_SEEN = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
 
 MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
 # Relative distance from the edge of a range window or beam. Pixels closer to it may fall on either side by rounding,
@@ -188,8 +189,7 @@ def backproject(
         done = task.pairs - skipped.window - skipped.beam - no_data
         if done == 0:
             where, remedy = ("range window", "") if skipped.beam == 0 else ("range window and beam", " and the beam")
-            text = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
-            log.warning(text, where, remedy)
+            log.warning(NOTHING_SEEN, where, remedy)
         unseen = unseen_pixels(task)
         if unseen and unseen.warning and done:
             warn(unseen.warning)
@@ -201,7 +201,12 @@ def backproject(
         if task.antenna is None:
             seen = seen_by(task, chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
         else:
-            seen = {"gain": _antenna_gain(task, chosen, open_devices(None if cluster else device)[0], options)}
+            gain = _antenna_gain(task, chosen, open_devices(None if cluster else device)[0], options)
+            if gain is None:  # the image is zero, and a gain is not
+                gain = float(task.antenna.peak**2 * task.row_weight.sum() * task.sample_weight.sum())
+                if done:
+                    log.warning(NOTHING_SEEN, "range window and beam", " and the beam")
+            seen = {"gain": gain}
         clock.lap("gain")
         plan = chosen.plan.describe(chosen.method)
         if kept:
@@ -338,7 +343,7 @@ def _fill(
 
 def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: FocusOptions) -> Any:
     """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
-    the same in all pixels."""
+    the same in all pixels; None where they are 0 in all: the antenna sees no pixel inside a range window."""
     engine: Any = chosen.engine
     tiling, budget = chosen.tiling, options.budget(device)
     sums = engine(device, task, chosen.plan, tiling, gain=True)
@@ -348,6 +353,8 @@ def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, opti
         sums.fill(first, last, made, budget, Clock(), lambda rows: None)
         flat[tiling.extent(first, last)] = made.values.real
     flat *= task.sample_weight.sum()
+    if not flat.any():
+        return None
     return float(flat.flat[0]) if flat.min() == flat.max() > 0 else flat.reshape(task.grid.shape)
 
 

@@ -203,7 +203,16 @@ def of_pulses(
         turns = cycles[rows, None] - step * (lowest + np.arange(kept)) * offset[rows, None]
         return np.asarray(factor * made * np.exp(2j * np.pi * turns))
 
-    return Spectra(_by_rows(samples, kept, spectra), carrier + lowest * step, step, reference)
+    lows = carrier + lowest * step
+    _check_positive(lows, "the band reaches half the bandwidth below carrier; check bandwidth, rate and carrier, in Hz")
+    return Spectra(_by_rows(samples, kept, spectra), lows, step, reference)
+
+
+def _check_positive(lowest: np.ndarray, why: str) -> None:
+    """ValueError for rows whose lowest frequency, Hz (n_rows,), is not positive."""
+    if not (lowest > 0).all():
+        row = int(np.argmin(lowest))
+        raise ValueError(f"row {row} would have frequencies from {lowest[row]:g} Hz; they must be positive: {why}")
 
 
 def of_beats(
@@ -243,11 +252,16 @@ def of_beats(
         return made if sweep_rate > 0 else made[:, ::-1]
 
     first = start - late + (0.0 if sweep_rate > 0 else (n - 1) / rate)
+    lows = carrier + sweep_rate * first
+    _check_positive(
+        lows, "the sweep passes carrier at a time of 0, of which start= and scene_range= are counted; check these, "
+        "carrier (Hz) and sweep_rate (Hz/s)",
+    )  # fmt: skip
     made = _by_rows(samples, n, spectra)
     if beat is not None and not reference.any():
         _check_beat(made, beat, 0 if scene is None else float(np.median(late)) * abs(sweep_rate) / rate)
     moved = reference if scene is None else scene
-    return Spectra(made, carrier + sweep_rate * first, abs(sweep_rate) / rate, moved)
+    return Spectra(made, lows, abs(sweep_rate) / rate, moved)
 
 
 def _check_beat(samples: np.ndarray, beat: str, zero: float) -> None:

@@ -265,3 +265,36 @@ def test_facets_refused_for_their_number_are_told_so(monkeypatch):
     chirp = sarcl.Waveform.chirp(center=1e10, bandwidth=1e8, duration=1e-6)
     with pytest.raises(sarcl.ToleranceUnreachable, match="without cutting these facets into more than 1; take a small"):
         sarcl.echo(sarcl.shapes.plate((0.3, 0.2)), chirp, track)
+
+
+def test_an_antenna_that_sees_no_pixel_makes_an_image_of_zero(caplog):
+    """As an angle does: it was refused, for the gain of an Image that nobody had given."""
+    raw = noise_on(straight(6, distance=700.0), n_samples=24)
+    width = np.linspace(-0.01, 0.01, 5)  # 0 beyond it
+    table = sarcl.Antenna.table(width, width, np.full((5, 5), 2.0), two_way=True)
+    outside = sarcl.ImageGrid.plane(shape=(3, 2), spacing=0.4, center=(3e3, 0, 0))
+    aside = sarcl.ImageGrid.points([[0, 0, 0], [3e3, 0, 0]])  # out of the beam; out of the range window
+    to_outside = table, np.array([3e3, 0, 0]) - raw.tx.mean(axis=0)
+    for grid, beam in ((outside, sarcl.Antenna.isotropic(gain_db=3.0)), (aside, to_outside)):
+        caplog.clear()
+        image = sarcl.backproject(raw, grid, beam=beam, check=True)
+        assert not image.data.any() and np.ptp(image.gain) == 0 < image.gain and not image.normalized().any()
+        assert len(caplog.messages) == 1 and "the image is zero; check the grid's center" in caplog.messages[0]
+
+
+@pytest.mark.parametrize(
+    ("rate", "options", "says"),
+    [
+        (
+            2e8,
+            {"kind": "compressed"},
+            "row 1 would have frequencies from -4.* the band reaches half the bandwidth below",
+        ),
+        (1e5, {"kind": "dechirped", "beat": "positive", "sweep_rate": -1e12}, "row 1 would .* start= and scene_range="),
+    ],
+)
+def test_time_records_below_zero_hertz_are_refused_in_the_words_of_their_arguments(rate, options, says):
+    """frequency[0] was named, which is no argument of from_time."""
+    samples, tx = np.ones((2, 16), complex), np.array([[-700, 0, 700], [-700, 1, 700.0]])
+    with pytest.raises(ValueError, match=says):
+        sarcl.PhaseHistory.from_time(samples, rate=rate, start=1e-6, carrier=[1e8, 5e7], tx=tx, **options)
