@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import replace
 from typing import Any
 
@@ -18,6 +19,7 @@ from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar, noise_variance
 
 MOST_DECIBELS = 300.0  # of noise
+LEVELS = ("nesz_db", "nesz", "temperature", "radar", "variance")
 STREAM = 0x6E6F697365  # of random numbers: independent of those of roughness and speckle with the same seed
 
 
@@ -52,11 +54,8 @@ def add_noise(
     instance("raw", raw, PhaseHistory)
     seed = count("seed", seed, 0)
     given = {"nesz_db": nesz_db, "nesz": nesz, "temperature": temperature, "radar": radar, "variance": variance}
-    named = [name for name, value in given.items() if value is not None]
-    if len(named) != 1:
-        raise ValueError(f"noise has one level; give one of {', '.join(given)}, got {', '.join(named) or 'none'}")
-    if named[0] not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
-        raise ValueError(f"{named[0]} is the level of samples; grid and cell_area go with nesz or nesz_db")
+    if level_of(given) not in ("nesz", "nesz_db") and (grid is not None or cell_area is not None):
+        raise ValueError(f"{level_of(given)} is the level of samples; grid and cell_area go with nesz or nesz_db")
     if nesz is not None and not number("nesz", nesz) > 0:
         raise ValueError(f"nesz is {nesz:g}, wanted a ratio above 0, m^2/m^2; in decibels it is nesz_db={nesz:g}")
     if nesz is not None or nesz_db is not None:
@@ -71,6 +70,14 @@ def add_noise(
         raise ValueError(f"variance[{int(np.argmin(level))}] is {level.min():g}; it cannot be negative")
     shape = _filtered(raw) if raw.compressed else np.ones(raw.n_samples)
     return replace(raw, samples=Noisy(raw.samples, np.sqrt(level), shape, seed))
+
+
+def level_of(given: Mapping[str, Any]) -> str:
+    """The name of the one level among the arguments of `add_noise`; ValueError where there is none, or several."""
+    named = [name for name in LEVELS if given.get(name) is not None]
+    if len(named) != 1:
+        raise ValueError(f"noise has one level; give one of {', '.join(LEVELS)}, got {', '.join(named) or 'none'}")
+    return named[0]
 
 
 def _power(decibels: Any) -> float:

@@ -51,6 +51,10 @@ def weights(window: Window | None, n: int) -> np.ndarray:
         made = validation.array("window", window, np.float64, (n,))
     else:
         made = _named(*_name(window), n)
+    if not np.isfinite(made).all():
+        raise ValueError(
+            f"window {_shown(window)} of {n} cells has weights that are not finite; its parameters are too large or 0"
+        )
     if (made < 0).any() or not made.any():
         raise ValueError(f"window {_shown(window)} has weights of {made.min():g} to {made.max():g}; a weight is not "
                          "below zero, and not all are zero")  # fmt: skip
@@ -156,10 +160,8 @@ def _name(window: Any) -> tuple[str, tuple[Any, ...]]:
         raise ValueError(f"window is {_shown(window)}; known are {KNOWN}")
     if name == "taylor" and len(rest) in (0, 2):
         level, nbar = rest or (30.0, 4)
-        return name, (
-            validation.number("taylor sidelobe_db", level, above=0),
-            validation.count("taylor nbar", nbar),
-        )
+        level = _bounded("taylor sidelobe_db", validation.number("taylor sidelobe_db", level, above=0))
+        return name, (level, int(_bounded("taylor nbar", validation.count("taylor nbar", nbar))))
     if name == "hamming" and not rest:
         return name, ()
     from scipy.signal import windows
@@ -175,10 +177,22 @@ def _name(window: Any) -> tuple[str, tuple[Any, ...]]:
         if p.name == "a":
             validation.array("general_cosine a", value, np.float64, ("n",))
         elif value is not None:
-            validation.number(f"{name} {p.name}", value)
+            given = validation.number(f"{name} {p.name}", value)
+            if p.name in LARGEST:
+                _bounded(f"{name} {p.name}", given)
     return name, tuple(rest)
 
 
+def _bounded(name: str, value: float) -> float:
+    """`value`; ValueError where it is so large that the formulas of the window overflow, or take all memory."""
+    most = LARGEST[name.split()[-1]]
+    if abs(value) > most:
+        raise ValueError(f"{name} is {value:g}; windows take at most {most:g}")
+    return value
+
+
+# largest moduli of parameters: dB below 1e-15, terms of a series, and an argument whose Bessel function is finite
+LARGEST = {"sidelobe_db": 300.0, "nbar": 200, "at": 300.0, "beta": 700.0}
 # parameters of SciPy's windows; others of its arguments say how they are sampled and on what device
 PARAMETERS = ("beta", "std", "p", "sig", "a", "alpha", "at", "center", "tau", "NW")
 
@@ -193,7 +207,14 @@ def _named(name: str, parameters: tuple[Any, ...], n: int) -> np.ndarray:
         return _taylor(u, *parameters)
     from scipy.signal import windows
 
+    if name == "dpss" and not 0 < parameters[0] < n / 2:
+        raise ValueError(f"dpss NW is {parameters[0]:g}; it lies above 0 and below half the number of cells, {n}")
     function = getattr(windows, name)
+    with np.errstate(all="ignore"):  # weights that are not finite are refused by the name of the window
+        return _of_scipy(function, name, parameters, n)
+
+
+def _of_scipy(function: Any, name: str, parameters: tuple[Any, ...], n: int) -> np.ndarray:
     if name in EDGE_TO_EDGE:  # every other of 2 n + 1 samples from edge to edge is the middle of a cell
         return np.asarray(function(2 * n + 1, *parameters, sym=True)[1::2], np.float64)
     if name == "kaiser_bessel_derived" and n % 2:

@@ -208,20 +208,32 @@ class Scenario:
         With [spectral_echo] or [fullwave_echo] they are computed by that function, whose options these are then.
         """
         check_window(self)
+        level = self._noise_level()
         raw: PhaseHistory = _simulating.call(self, options, forecast=False)
         if self.noise is None:
             return raw
         from ..effects.noise import add_noise
 
-        level = Builder(self).options("noise", {})
         if "nesz" in level or "nesz_db" in level:
             level.setdefault("grid", None if "cell_area" in level else self.build_grid())
         with self.where.blame(("noise",), level):
             return add_noise(raw, **level)
 
+    def _noise_level(self) -> dict[str, Any]:
+        """Arguments of `add_noise`; ValueError, before echoes are computed, where they are not one level."""
+        if self.noise is None:
+            return {}
+        from ..effects.noise import level_of
+
+        level = Builder(self).options("noise", {})
+        with self.where.blame(("noise",), level):
+            level_of(level)
+        return level
+
     def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast | FullwaveForecast:
         """Forecast of `simulate` with these options: rows, bytes, seconds, predicted error or number of runs."""
         check_window(self)
+        self._noise_level()
         made: EchoForecast | FullwaveForecast = _simulating.call(self, options, forecast=True)
         return made
 
@@ -280,12 +292,21 @@ def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scena
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as exc:
         raise ValueError(_syntax(name, text, str(exc))) from None
+    except RecursionError:
+        raise _too_deep(name) from None
     where = Where(name, locate(text.replace("\r\n", "\n")))
     for section, value in tables.items():
         if section not in _schema.SECTIONS:
             what = "table" if isinstance(value, (dict, list)) else "key"
             raise ValueError(f"{where.text((), section)} {unknown(section, list(_schema.SECTIONS), what)}")
-    return Scenario(**tables, folder=folder, where=where)
+    try:
+        return Scenario(**tables, folder=folder, where=where)
+    except RecursionError:
+        raise _too_deep(name) from None
+
+
+def _too_deep(name: str) -> ValueError:
+    return ValueError(f"{name}: arrays or tables lie hundreds deep in each other; write them flat")
 
 
 def _syntax(name: str, text: str, message: str) -> str:

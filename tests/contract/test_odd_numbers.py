@@ -14,6 +14,19 @@ import sarcl
 from sarcl.base import validation
 from sarcl.model.lazy_rows import RowsOnDemand
 
+SCENARIO = """
+[waveform.chirp]
+center = 9e9
+bandwidth = 1e8
+duration = 1e-6
+[trajectory.line]
+start = [-700, -5, 700]
+velocity = [0, 10, 0]
+prf = 16.0
+n_pulses = 4
+[[scene.points]]
+positions = [[0, 0, 0]]
+"""
 RAW = noise_on(straight(16), n_samples=32, time=np.linspace(0, 0.1, 16))
 TRACK = sarcl.Trajectory.line(start=(-700, -5, 1e3), velocity=(0, 10, 0), prf=16.0, n_pulses=8)
 CHIRP = sarcl.Waveform.chirp(center=9e9, bandwidth=1e8, duration=1e-6)
@@ -214,3 +227,37 @@ def test_two_line_elements_are_copied_and_open_files_are_said_not_to_be(tmp_path
         for handed in (pickle.dumps, copy.deepcopy):
             with pytest.raises(TypeError, match=r"rows of the open file '.*a\.h5', .*sarcl\.read\(path\)"):
                 handed(made)
+
+
+@pytest.mark.parametrize(
+    "window, words",
+    [
+        (("taylor", 1e9, 5), r"taylor sidelobe_db is 1e\+09; windows take at most 300"),
+        (("taylor", 35, 10**8), r"taylor nbar is 1e\+08; windows take at most 200"),
+        (("chebwin", 1e6), r"chebwin at is 1e\+06; windows take at most 300"),
+        (("kaiser", 1e9), r"kaiser beta is 1e\+09; windows take at most 700"),
+        (("dpss", 1e9), r"dpss NW is 1e\+09; it lies above 0 and below half the number of cells, "),
+        (("gaussian", 0.0), r"window \('gaussian', 0.0\) "),
+        (("general_cosine", [1e308, 1e308, 1e308]), r"has weights that are not finite"),
+    ],
+)
+def test_parameters_of_windows_that_overflow_are_refused(window, words):
+    with pytest.raises(ValueError, match=words):
+        sarcl.backproject(RAW, GRID, window=window)
+
+
+def test_text_that_is_nested_without_end_is_refused_and_noise_is_checked_before_the_work(tmp_path):
+    from sarcl.experiments.fda import file as experiment
+    from sarcl.scenario import scenario
+
+    (tmp_path / "deep.toml").write_text("x = " + "[" * 3000 + "]" * 3000)
+    for load in (scenario.load, experiment.load):
+        with pytest.raises(ValueError, match=r"deep\.toml: arrays or tables lie hundreds deep"):
+            load(tmp_path / "deep.toml")
+    with pytest.raises(ValueError, match=r"^scenario: arrays or tables lie hundreds deep"):
+        scenario.loads("[echo]\n" + ".".join("a" * 3000) + " = 1")
+    for levels in ("", "variance = 1.0\nnesz_db = 3.0"):
+        made = scenario.loads(f"{SCENARIO}\n[noise]\n{levels}")
+        for call in (made.simulate, made.plan):
+            with pytest.raises(ValueError, match=r"noise has one level; give one of nesz_db"):
+                call()

@@ -30,6 +30,8 @@ def load(path: Any) -> tuple[str, list[Case]]:
         tables = tomllib.loads(input_paths.contents(path, "experiment").decode("utf-8"))
     except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
         raise ValueError(f"{path}: {exc}; this is not valid TOML") from None
+    except RecursionError:
+        raise ValueError(f"{path}: arrays or tables lie hundreds deep in each other; write them flat") from None
     for name in tables:
         if name not in TABLES:
             raise ValueError(f"{path}: {text.unknown(name, TABLES, 'table')}")
