@@ -21,11 +21,11 @@ For this folder alone:
     _hdf5_safety   what an HDF5 file may do to its reader: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
     _mesh_checks   what a mesh file declares, compared with what it holds
-    _mesh_text     text of .obj and .off files with indices and faces as trimesh reads them right
+    _mesh_text     text of .obj and .off files: as trimesh reads it right, or refused
     _other_files   files that a mesh or an elevation model names: those of its own folder
     _part          files that are being written: random names, locked, removed where no process owns them
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
-    _polygons      polygons of mesh files as triangles, concave ones too
+    _polygons      polygons of mesh files that fans about their first corners do not cover
 """
 
 __all__ = ["elevation", "formats", "hdf5", "input_paths", "mesh", "orbit_files", "output_paths", "sarcl_hdf5", "toml"]

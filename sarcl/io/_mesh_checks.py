@@ -79,10 +79,7 @@ def check_polygons(scene: Any, what: str) -> None:
             continue
         wrong = _polygons.wrong_fans([np.ravel(face).tolist() for face in faces], np.asarray(mesh.vertices))
         if wrong:
-            raise ValueError(
-                f"{what}: face {wrong[0]}, of {len(faces[wrong[0]])} corners, is concave, and its triangles are not in "
-                "the file; export it as triangles"
-            )
+            raise ValueError(f"{what}: face {wrong[0]}, of {len(faces[wrong[0]])} corners, {_polygons.CONCAVE}")
 
 
 def _of_stl(path: Path, head: bytes, what: str) -> int | None:

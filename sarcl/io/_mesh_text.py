@@ -1,4 +1,4 @@
-"""Text of .obj and .off files as trimesh reads it right: absolute indices, no comments behind numbers, no concave face.
+"""Text of .obj and .off files: as trimesh reads it right, or refused where it would not.
 
 trimesh counts negative indices from the end of the file, where the format counts them back from the line of the face;
 it takes index 0 for 1, and covers every polygon by a fan about its first corner.
@@ -18,7 +18,6 @@ ODD = re.compile(
     r"|^[ \t]*(?:v|vt|vn|f)[ \t].*#",
     re.MULTILINE,
 )
-CONCAVE = "its triangles cannot be told: it crosses itself or has more than 500 corners; export it as triangles"
 
 
 def of_obj(data: bytes, what: str) -> bytes | None:
@@ -49,10 +48,7 @@ def of_obj(data: bytes, what: str) -> bytes | None:
         polygons = [[(corner[0] or 0) - 1 for corner in corners] for _, corners in faces]
         for number in _polygons.wrong_fans(polygons, points):
             at, corners = faces[number]
-            made = _polygons.triangles_of(points[polygons[number]])
-            if made is None:
-                raise ValueError(f"{what}, line {at + 1}: a face of {len(corners)} corners: {CONCAVE}")
-            lines[at] = "\n".join(_face([corners[i] for i in triangle]) for triangle in made)
+            raise ValueError(f"{what}, line {at + 1}: a face of {len(corners)} corners {_polygons.CONCAVE}")
     return "\n".join(lines).encode()
 
 
@@ -83,18 +79,15 @@ def _face(corners: list[list[int | None]]) -> str:
     return " ".join(["f", *("/".join("" if i is None else str(i) for i in corner) for corner in corners)])
 
 
-def of_off(data: bytes, what: str) -> bytes | None:
-    """The text of an .off file for trimesh; None where that is the file as it is.
-
-    ValueError for vertices of four coordinates, or of another number than three, and for polygons without triangles.
-    """
+def check_off(data: bytes, what: str) -> None:
+    """ValueError for vertices of another number of coordinates than three, and for concave polygons."""
     text = _decoded(data)
     if text is None:
-        return None
+        return
     text = re.sub(r"#[^\n]*", "", text)
     head = re.match(r"\s*((?:ST)?C?N?(4?n?)OFF)\b", text)
     if head is None:
-        return None
+        return
     if head[2]:
         raise ValueError(
             f"{what} is of the kind {head[1]}, whose vertices have not three coordinates; export it as OFF"
@@ -106,23 +99,10 @@ def of_off(data: bytes, what: str) -> bytes | None:
             [int(word) for word in line.split()[1 : 1 + int(line.split()[0])]] for line in lines[n + 1 : n + k + 1]
         ]
     except (ValueError, IndexError):
-        return None  # which trimesh refuses
+        return  # which trimesh refuses
     points = _numbers([line.split()[:3] for line in lines[1 : n + 1]])
-    if points is None or not (wrong := _polygons.wrong_fans(polygons, points)):
-        return None
-    made: dict[int, list[tuple[int, int, int]]] = {}
-    for number in wrong:
-        found = _polygons.triangles_of(points[polygons[number]])
-        if found is None:
-            raise ValueError(f"{what}: face {number} of {len(polygons[number])} corners: {CONCAVE}")
-        made[number] = found
-    faces = [
-        one
-        for number, polygon in enumerate(polygons)
-        for one in ([[polygon[i] for i in triangle] for triangle in made[number]] if number in made else [polygon])
-    ]
-    rows = [" ".join(map(str, (len(face), *face))) for face in faces]
-    return "\n".join([head[1], f"{n} {len(faces)} 0", *lines[1 : n + 1], *rows, ""]).encode()
+    if points is not None and (wrong := _polygons.wrong_fans(polygons, points)):
+        raise ValueError(f"{what}: face {wrong[0]}, of {len(polygons[wrong[0]])} corners, {_polygons.CONCAVE}")
 
 
 def _decoded(data: bytes) -> str | None:

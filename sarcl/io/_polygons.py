@@ -1,4 +1,4 @@
-"""Polygons of mesh files as triangles: trimesh takes fans about the first corner, which leave concave polygons."""
+"""Polygons of mesh files that fans about their first corners, which trimesh takes, do not cover."""
 
 from __future__ import annotations
 
@@ -7,9 +7,7 @@ from collections.abc import Sequence
 import numpy as np
 
 FLAT = 1e-9  # of a polygon's area: a triangle of a fan that is turned by less is a line
-MOST_CORNERS = (
-    500  # of a concave polygon: the search for its triangles takes a time of the cube of their number at most
-)
+CONCAVE = "is concave or crosses itself, and its triangles are not in the file; export it as triangles"
 
 
 def fans_fit(corners: np.ndarray) -> np.ndarray:
@@ -42,51 +40,3 @@ def wrong_fans(polygons: Sequence[Sequence[int]], vertices: np.ndarray) -> list[
             there &= np.isfinite(vertices[np.where(there[:, None], index, 0)]).all(axis=(1, 2))
         found += np.array(numbers)[there & ~fits].tolist()
     return sorted(found)
-
-
-def triangles_of(corners: np.ndarray) -> list[tuple[int, int, int]] | None:
-    """Triangles of a simple polygon, (k, 3), by cutting off ears (Meisters 1975), as indices of its corners.
-
-    None where there is no ear: the polygon crosses itself, or has more than MOST_CORNERS.
-    """
-    if len(corners) > MOST_CORNERS:
-        return None
-    from_first = corners - corners[0]
-    normal = np.cross(from_first[:-1], from_first[1:]).sum(axis=0)
-    across = int(np.argmax(np.abs(normal)))
-    x, y = (from_first[:, (across + step) % 3] for step in (1, 2))
-    if normal[across] < 0:
-        x, y = y, x
-    flat = np.stack([x, y], axis=1)
-    least = FLAT * float(np.abs(normal[across]))
-    left, made = list(range(len(corners))), []
-    at = misses = 0
-    while len(left) > 3:
-        a, b, c = (left[(at + step) % len(left)] for step in (-1, 0, 1))
-        turn = _turn(flat[a], flat[b], flat[c])
-        # corners on a straight line are no ears until nothing else is left
-        ear = abs(turn) <= least if misses >= len(left) else turn > least
-        if ear and (misses >= len(left) or not _holds(flat[[a, b, c]], flat[left])):
-            made.append((a, b, c))
-            del left[at % len(left)]
-            at, misses = at - 1, 0
-        elif misses >= 2 * len(left):
-            return None
-        else:
-            at, misses = at + 1, misses + 1
-    if _turn(*flat[left]) < -least:
-        return None
-    return [*made, (left[0], left[1], left[2])]
-
-
-def _turn(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> float:
-    """Twice the area of a triangle in the plane, positive where it turns left."""
-    return float((b[0] - a[0]) * (c[1] - b[1]) - (b[1] - a[1]) * (c[0] - b[0]))
-
-
-def _holds(triangle: np.ndarray, points: np.ndarray) -> bool:
-    """Whether one of the points (n, 2) lies in a triangle (3, 2) or on its edges, its corners left out."""
-    points = points[~(points[:, None] == triangle).all(axis=2).any(axis=1)]
-    a, b = triangle, np.roll(triangle, -1, axis=0)
-    side = (b[:, 0] - a[:, 0]) * (points[:, 1, None] - a[:, 1]) - (b[:, 1] - a[:, 1]) * (points[:, 0, None] - a[:, 0])
-    return bool((side >= 0).all(axis=1).any())

@@ -112,8 +112,9 @@ def _changed(path: Path, what: str) -> Path | io.BytesIO:
     kind = path.suffix.lower()
     if kind in (".glb", ".gltf"):
         _gltf_checks.check(input_paths.contents(path, "mesh file"), what)
-    text = {".obj": _mesh_text.of_obj, ".off": _mesh_text.of_off}.get(kind)
-    made = None if text is None else text(input_paths.contents(path, "mesh file"), what)
+    if kind == ".off":
+        _mesh_text.check_off(input_paths.contents(path, "mesh file"), what)
+    made = _mesh_text.of_obj(input_paths.contents(path, "mesh file"), what) if kind == ".obj" else None
     return path if made is None else io.BytesIO(made)
 
 
