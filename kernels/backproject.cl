@@ -12,16 +12,19 @@
 
 #define APART (VW == 1 && !BEAM && WEIGHT < 2)  // whole tiles inside of windows have code of their own
 #if APART
-#define BY_VALUE 1
+#define IN_REGISTERS 1
 #define RECORD const float *
+#define SHIFTED (RANGE != 2)  // positions count from the middle between the taps: the shift is made once per pulse
 #else
 #define RECORD __global const float *restrict
+#define SHIFTED 0
 #endif
 // The r-th vector of pixels of a work-item. With one lane, NEIGHBOURS items have neighbouring pixels, which read
-// neighbouring samples.
+// neighbouring samples; 32 items have pixels of four rows of a tile, so that few samples lie between them whether the
+// range grows along a row or across.
 #if VW == 1
 #define VECTOR(r) ((get_global_id(0) / NEIGHBOURS * VECTORS + (r)) * NEIGHBOURS + get_global_id(0) % NEIGHBOURS)
-#define NEIGHBOURS 16  // no tile has fewer work-items
+#define NEIGHBOURS 8  // no tile has fewer work-items than 16
 #else
 #define VECTOR(r) (get_global_id(0) * VECTORS + (r))
 #endif
@@ -78,7 +81,11 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
         continue;
 #endif
         fv g, h, sine, cosine;
+#if SHIFTED
+        look_up_shifted(row, stride, origin, at.base, at.t, table, &g, &h);
+#else
         look_up(row, stride, origin, at.base, at.t, table, &g, &h);
+#endif
         sincos_cycles(at.cycles, &sine, &cosine);
         if (crossing) {
             g *= v;
@@ -113,7 +120,7 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
 //   row_weight    (n_used), axes (n_used, 18), patterns, second: as in gains.clh; where WEIGHT is 2 or 3
 //   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 __kernel void backproject(__global const float *restrict profiles, int stride, int origin,
-                          TAP_TABLE table, __global const float *restrict pulse, int n,
+                          __global const float *restrict table, __global const float *restrict pulse, int n,
                           int n_used, __global const float *restrict constants,
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
@@ -146,6 +153,13 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
         inverse[r] = LOAD(i, aperture + pixels);
     }
 #endif
+#if APART
+    float held[TAPS * TERMS];  // in registers: an instruction takes at most one operand of a kernel's arguments
+#pragma unroll
+    for (int i = 0; i < TAPS * TERMS; i++) held[i] = table[i];
+#else
+#define held table
+#endif
     int missed = 0, unlit = 0;
     for (int start = 0; start < n_used; start += CHUNK) {
         fv re[VECTORS], im[VECTORS];
@@ -170,13 +184,16 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
             float loaded[N_CONST];
 #pragma unroll
             for (int i = 0; i < N_CONST; i += 4) vstore4(((__global const float4 *)record)[i / 4], 0, loaded + i);
+#if SHIFTED
+            loaded[C_FRAC] -= 0.5f * (TAPS - 1);
+#endif
             // whole tiles take one of the two: those that lie inside of windows never look at each pixel
             if (state == INSIDE)
-                add_pulse(0, loaded, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
+                add_pulse(0, loaded, pulse, p, n, x, row, stride, origin, held, re, im WEIGHING);
             else
-                add_pulse(1, loaded, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
+                add_pulse(1, loaded, pulse, p, n, x, row, stride, origin, held, re, im WEIGHING);
 #else
-            add_pulse(state == CROSSING, record, pulse, p, n, x, row, stride, origin, TAPS_OF(table), re, im WEIGHING);
+            add_pulse(state == CROSSING, record, pulse, p, n, x, row, stride, origin, held, re, im WEIGHING);
 #endif
         }
 #pragma unroll

@@ -98,21 +98,28 @@ class Gathering(NamedTuple):
 
     taps        of 2, 4, 6 and 8 taps
     range_mode  by range mode of kernels/range_phase.clh
+    wavefront   of L1 per 32 contributions, which pass while instructions do; 0: memory is not counted
+    fitted      interpolation kernels have as few terms as their taps allow (interpolation.fitted)
     """
 
     taps: tuple[float, float, float, float]
     range_mode: tuple[float, float, float]
+    wavefront: float = 0.0
+    fitted: bool = False
 
-    def of_taps(self, taps: int) -> float:
-        """Cost of so many taps."""
-        return self.taps[taps // 2 - 1]
+    def of_taps(self, taps: int, oversample: float) -> float:
+        """Cost of so many taps in profiles so many times finer than 1/bandwidth."""
+        return max(self.taps[taps // 2 - 1], self.wavefront * taps * (1 + LINES_APART * oversample))
 
 
+# Lines of 128 bytes, beyond the first, that a load of a sample for 8 x 4 pixels touches, per unit of oversampling:
+# pixels half a resolution cell apart along the range, eight of them in a row.
+LINES_APART = 0.25
 # On a CPU, and from instructions on sm_90 per contribution, on 2026-11-23 (make gpu-static): on GPUs with fast float64,
 # and on GPUs that compute wide numbers in pairs of float32 or with a float64 that is slower than these.
 ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_MODE[1], RANGE_MODE[2]))
-ON_GPU = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 1.28, 2.67))
-ON_GPU_IN_PAIRS = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 3.62, 12.5))
+ON_GPU = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 1.28, 2.67), 0.08, True)
+ON_GPU_IN_PAIRS = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 3.62, 12.5), 0.08, True)
 
 
 class DeviceClass(NamedTuple):

@@ -6,6 +6,7 @@ docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py meas
 from __future__ import annotations
 
 import functools
+import math
 from dataclasses import dataclass
 from typing import Any
 
@@ -22,6 +23,7 @@ OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
 LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 # Polynomial terms of each half (even, odd) of a tap's weight, by taps: the error of the fit is below the kernel's.
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
+FITS = 12  # of the polynomials with as few terms as taps allow: their error no longer falls
 # The same for lines of pixels, whose weights are not deconvolved.
 LINE_TERMS = {2: 2, 4: 3, 6: 4, 8: 5}
 # Choices in float64, where each kernel takes as few of these terms as its error allows.
@@ -91,6 +93,48 @@ def deconvolved(taps: int, oversample: float, terms: int, dtype: Any = np.float3
     table = table.astype(dtype)
     nu = np.linspace(0, 0.5 / oversample, 33)
     return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
+
+
+@functools.lru_cache(maxsize=256)
+def fitted(taps: int, oversample: float) -> Interpolator:
+    """The interpolation kernel of taps/2 terms with the smallest mean square error in the band, for float32 profiles.
+
+    Polynomials of degree taps - 1, fitted together with the transform by which spectra are divided: each step fits the
+    polynomials to waves times the transform of those before, beginning with the Kaiser-Bessel kernel.
+    """
+    if taps == 2:
+        return interpolator(taps, oversample)
+    terms = taps // 2
+    nu = 0.5 / oversample * np.cos(np.pi * (np.arange(40) + 0.5) / 80)  # denser at the band's edge, where errors are
+    z = 0.5 * np.cos(np.pi * (np.arange(24) + 0.5) / 48)[:, None]
+    powers = z ** (2 * np.arange(terms))
+    angle = 2 * np.pi * nu[:, None] * _positions(taps)[: taps // 2]
+    wave = 2 * np.pi * nu * z
+    table = _kaiser_bessel(taps, oversample, terms)
+    for _ in range(FITS):
+        correction = _transform(table, nu) / _transform(table, np.zeros(1))
+        halves = (np.cos(angle), powers, np.cos(wave)), (np.sin(angle), powers * z, np.sin(wave))
+        for i, (turns, parts, wanted) in enumerate(halves):
+            # waves of taps k and taps - 1 - k together: (z, nu, tap, term)
+            waves = 2 * (turns / correction[:, None])[:, :, None] * parts[:, None, None, :]
+            found = np.linalg.lstsq(waves.reshape(wanted.size, -1), wanted.ravel(), rcond=None)[0]
+            table[:, i] = found.reshape(taps // 2, terms)
+    table = table.astype(np.float32)
+    nu = np.linspace(0, 0.5 / oversample, 33)
+    return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
+
+
+def fitted_lower_bound(taps: int, oversample: float) -> float:
+    """A lower bound on the error of `fitted`, as `lower_bound`.
+
+    The even part approximates cos(w z), |z| <= 1/2, w = pi/oversample at the band's edge, by a polynomial of degree
+    n - 1, n = taps. The error of the best is at least the smallest n-th derivative, w^n cos(w/2), over n!, times 2/4^n,
+    the largest value of the smallest monic polynomial of degree n (de la Vallee Poussin; Chebyshev).
+    """
+    if taps == 2:
+        return lower_bound(taps, oversample)
+    w = np.pi / oversample
+    return float(2 * (w / 4) ** taps / math.factorial(taps) * np.cos(w / 2))
 
 
 def line_interpolator(taps: int, oversample: float) -> Interpolator:
@@ -263,21 +307,25 @@ def choose_interpolator(
 
     n_samples      samples of a row before oversampling
     pairs_per_row  contributions read from a row: they weigh the cost of taps against that of the FFT
-    gathering      costs of taps on the devices that read the rows
+    gathering      costs of taps on the devices that read the rows, and the kernels that they read with
     carrier        centre frequency in steps between samples, for evenly spaced scatterers: see off_carrier
     The choice never depends on memory, so that results do not.
     ToleranceUnreachable names the smallest error that can be met.
     """
 
     def cost(candidate: tuple[int, float, int]) -> float:
-        taps, _, length = candidate
-        return pairs_per_row * gathering.of_taps(taps) + cost_model.profile(length)
+        taps, oversample, length = candidate
+        return pairs_per_row * gathering.of_taps(taps, oversample) + cost_model.profile(length)
 
+    families = [(lower_bound, interpolator)]
+    if gathering.fitted:
+        families.insert(0, (fitted_lower_bound, fitted))
     for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
-        if lower_bound(taps, oversample) <= error:
-            made = interpolator(taps, oversample)
-            if made.error <= error:
-                return made, length, cost((taps, oversample, length)) / pairs_per_row
+        for least_of, make in families:
+            if least_of(taps, oversample) <= error:
+                made = make(taps, oversample)
+                if made.error <= error:
+                    return made, length, cost((taps, oversample, length)) / pairs_per_row
     least = rounded_up(least_error(n_samples, carrier))
     raise ToleranceUnreachable(error, least, "interpolation of float32 range profiles")
 

@@ -18,8 +18,8 @@ LANE_INSTRUCTIONS, WAVEFRONTS = 31.4e12, 132 * 1.75e9
 # Programs of the gather kernel for the same pulses and pixels, which take what lines cannot hold: the macros by which
 # they are found, and samples of a range profile per pulse as plans would choose them.
 GATHER = {
-    "1e-3": ({"TAPS": "4", "TERMS": "4", "RANGE": "0"}, 49152),
-    "3e-5": ({"TAPS": "6", "TERMS": "5", "RANGE": "1"}, 20480),
+    "1e-3": ({"TAPS": "4", "TERMS": "2", "RANGE": "0"}, 32768),
+    "3e-5": ({"TAPS": "4", "TERMS": "2", "RANGE": "1"}, 65536),
 }
 GATHER_TILE = 1024  # pixels of its tiles
 # Kernels that make records, of the gather kernel and of lines that a work-group shares.

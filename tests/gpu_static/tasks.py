@@ -22,20 +22,22 @@ LEFT_OUT = (
 )  # fmt: skip
 # Tasks that are run on a GPU without float64 too: those that reach kernels or branches of them that differ there.
 WITHOUT_FP64 = (
-    "spaceborne", "direct 1e", "direct points", "direct bistatic", "direct wide", "direct wrap", "direct beam",
+    "spaceborne", "listed spaceborne", "direct 1e", "direct points", "direct bistatic", "direct wide", "direct wrap", "direct beam",
     "factorized 1e-02", "factorized 1e-03", "factorized bistatic", "factorized points", "echo points 1e",
     "echo points far", "echo points bistatic", "echo antenna pair", "echo facets 1e-4", "echo facets bistatic",
     "echo terrain tank",
     "array facets", "beam", "antenna beam", "pixel taper", "spectral_echo", "polar_format", "range_doppler",
 )  # fmt: skip
 # Tasks of which the plan alone is wanted: they end at the first launch of a kernel whose name begins so.
-UNTIL = {"spaceborne": "backproject"}
+UNTIL = {"spaceborne": "backproject", "listed spaceborne": "backproject"}
 
 
-def spaceborne(tolerance: float) -> Any:
+def spaceborne(tolerance: float, listed: bool = False) -> Any:
     """Direct backprojection of 8192 x 8192 pixels of 0.25 m, from 770 km: X band, 600 MHz, 11 566 pulses.
 
     The rows of samples share memory, and blocks are small: the task ends at the first of them.
+
+    listed  the middle 2048 x 2048 pixels alone, as listed points, which lines cannot hold
     """
     rows, samples = 11566, 8192
     along = (np.arange(rows) - rows / 2) * 1.5
@@ -46,6 +48,8 @@ def spaceborne(tolerance: float) -> Any:
         reference_range=np.linalg.norm(tx, axis=1),
     )  # fmt: skip
     grid = sarcl.ImageGrid.plane(shape=(8192, 8192), spacing=0.25)
+    if listed:
+        grid = sarcl.ImageGrid.points(grid.part(slice(3072, 5120), slice(3072, 5120)).positions)
     return sarcl.backproject(raw, grid, tolerance=tolerance, method="direct", check=False, max_bytes=2e9)
 
 
@@ -93,6 +97,7 @@ def antenna_beam(**options: Any) -> Any:
 
 OWN: dict[str, Callable[[], Any]] = {
     **{f"spaceborne {t:.0e}".replace("-0", "-"): lambda t=t: spaceborne(t) for t in (1e-3, 3e-5)},
+    **{f"listed spaceborne {t:.0e}".replace("-0", "-"): lambda t=t: spaceborne(t, True) for t in (1e-3, 3e-5)},
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),

@@ -9,7 +9,7 @@ from __future__ import annotations
 
 import numpy as np
 
-NEIGHBOURS = 16  # of kernels/backproject.cl
+NEIGHBOURS = 8  # of kernels/backproject.cl
 LINE, SECTOR, BANKS, WARP = 128, 32, 32, 32  # bytes of a line and of a sector of L1; banks; lanes
 
 

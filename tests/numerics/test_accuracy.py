@@ -7,13 +7,14 @@ import pytest
 
 from sarcl.base import constants
 from sarcl.numerics import cost_model, error_bounds, interpolation, nufft2d, range_profiles
-from sarcl.numerics.interpolation import interpolator
+from sarcl.numerics.interpolation import fitted, interpolator
 
 
+@pytest.mark.parametrize("make", [interpolator, fitted])
 @pytest.mark.parametrize("taps", interpolation.TERMS)
 @pytest.mark.parametrize("oversample", [2.0, 4.0, 10.0])
-def test_interpolation_error_is_bounded_at_every_frequency_and_place(taps, oversample):
-    made = interpolator(taps, oversample)
+def test_interpolation_error_is_bounded_at_every_frequency_and_place(make, taps, oversample):
+    made = make(taps, oversample)
     random = np.random.default_rng(0)
     nu = random.uniform(-0.5, 0.5, 300) / oversample
     t = random.uniform(20, 30, 300)
@@ -46,6 +47,40 @@ def test_the_lower_bound_of_an_interpolation_error_is_below_it_and_close(taps):
     for oversample in (*interpolation.OVERSAMPLE, *nufft2d.OVERSAMPLE):
         bound, error = interpolation.lower_bound(taps, oversample), interpolator(taps, float(oversample)).error
         assert bound <= error <= 5 * bound
+
+
+@pytest.mark.parametrize("taps", [4, 6, 8])
+@pytest.mark.parametrize("oversample", [1.5, 2.0, 3.0, 4.0])
+def test_fitted_kernels_have_smaller_errors_with_half_the_terms_than_kaiser_bessel_kernels(taps, oversample):
+    made, other = fitted(taps, oversample), interpolator(taps, oversample)
+    assert made.terms == taps // 2 < other.terms
+    assert made.error < 0.9 * other.error
+    assert made.edge_gain == pytest.approx(other.edge_gain, rel=0.01)  # so that sums round alike
+
+
+@pytest.mark.parametrize("taps", interpolation.TERMS)
+def test_the_lower_bound_of_fitted_kernels_is_below_their_error(taps):
+    for oversample in map(float, interpolation.OVERSAMPLE):
+        bound, error = interpolation.fitted_lower_bound(taps, oversample), fitted(taps, oversample).error
+        assert bound <= error
+        if taps == 4:  # where the degree of the polynomials decides
+            assert error <= 4 * bound
+
+
+def test_kernels_of_gpus_are_the_cheapest_of_both_families():
+    for error in (1e-7, 1e-5, 1e-4, 1e-3):
+        made, length, cost = interpolation.choose_interpolator(error, 1000, 1e6, 0.0, cost_model.ON_GPU)
+        every = [(t, s, n) for t, s, n in interpolation._candidates(1000, 0.0) if fitted(t, s).error <= error]
+        costs = [1e6 * cost_model.ON_GPU.of_taps(t, s) + cost_model.profile(n) for t, s, n in every]
+        assert made.error <= error and cost * 1e6 == pytest.approx(min(costs))
+        assert (made.taps, made.oversample, length) in every and made.terms == max(made.taps // 2, 1)
+
+
+def test_wavefronts_of_long_profiles_cost_more_than_taps():
+    # with float32 ranges in a tile of a satellite's image: six taps, or four in profiles eight times as long
+    gpu, cpu = cost_model.ON_GPU, cost_model.ON_CPU
+    assert cpu.of_taps(4, 32.0) == cpu.of_taps(4, 2.0) == cost_model.TAPS[4]
+    assert gpu.of_taps(4, 2.0) == gpu.taps[1] < gpu.of_taps(6, 4.0) < gpu.of_taps(4, 32.0)
 
 
 @pytest.mark.parametrize("n_samples, carrier", [(1, 0.0), (100, 0.0), (3000, 1024.0), (2**19, 0.0)])

@@ -48,9 +48,7 @@ class GatherKernel:
         self.constants = TileConstants(device, plan, bistatic=bistatic, wrap=wrap, local=local, beam=beam)
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
-        table = plan.interpolator.table
-        apart = self.lanes == 1 and not beam and weights["WEIGHT"] < 2  # APART of kernels/backproject.cl
-        self.table = np.ravel(table) if apart else device.upload(table)
+        self.table = device.upload(plan.interpolator.table)
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
