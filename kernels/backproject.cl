@@ -86,7 +86,11 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
 #else
         look_up(row, stride, origin, at.base, at.t, table, &g, &h);
 #endif
+#if RANGE == 3
+        sincos_sum(at.cycles, at.rest, &sine, &cosine);
+#else
         sincos_cycles(at.cycles, &sine, &cosine);
+#endif
         if (crossing) {
             g *= v;
             h *= v;
@@ -116,6 +120,7 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
 //   image       (4, pixels)            totals re, im and their errors re, im; tiles in a row
 //   skipped     (tiles)                pulses in whose window no pixel of the tile is; not used where LOCAL
 //               BEAM: (2, tiles)       and those in whose window they are, but not in the beam
+//   magic         1.5 2^23 times the step of the offsets' high parts, a power of two, m; where RANGE is 3
 //   place         (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
 //   row_weight    (n_used), axes (n_used, 18), patterns, second: as in gains.clh; where WEIGHT is 2 or 3
 //   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
@@ -125,6 +130,9 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
                           __global const float *restrict tile, int n_tiles, int first,
                           __global const float *restrict offsets, int n_offsets, int offset_step,
                           __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset
+#if RANGE == 3
+                          , float magic
+#endif
 #if WEIGHT == 1
                           , __global const float *restrict place, __global const float *restrict taper,
                           __global const float *restrict aperture
@@ -142,6 +150,9 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
 #pragma unroll
     for (int r = 0; r < VECTORS; r++) {
         x[r] = load_offset(offsets, (size_t)k * offset_step + VECTOR(r), n_offsets);
+#if RANGE == 3
+        split_offset(&x[r], offsets, (size_t)k * offset_step + VECTOR(r), n_offsets, magic);
+#endif
         about_centre(&x[r], tile, k, n_tiles);
     }
 #if WEIGHT == 1

@@ -5,7 +5,8 @@
 //
 // source    geometry.clh, line_geometry.clh
 // symbols   delta, kappa, sigma, u, R0   as in geometry.clh;  beta   as in line_geometry.clh
-// macros    VW, FP64, BISTATIC, BEAM as in the headers;  RANGE  1: records hold low parts too; 0: they need none
+// macros    VW, FP64, BISTATIC, BEAM as in the headers
+//           RANGE  1: records hold low parts too; 0: they need none; 3: kappa u in two float32 parts, see range_phase.clh
 //           LOCAL  1: every tile has profiles of its own, about its reference point (factorised); 0: pulses' own
 //           SHARED  as in line_geometry.clh
 // reference: sarcl/reference/geometry.py:half_path
@@ -17,18 +18,18 @@
 #include "range_phase.clh"
 #include "line_geometry.clh"
 
-static inline void put_direction(__global float *records, int first, int low, point d, wv r) {
+// u: the direction, in wide numbers
+static inline void put_direction(__global float *records, int first, int low, point d, wv r, wv *u) {
     fv R0 = w_float(r);
     // an antenna on the reference point has no direction: any will do, R0 = 0 says so
     wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
-    wv u[3];
     u[0] = w_mul(d.x, inverse);
     u[1] = w_mul(d.y, inverse);
     u[2] = w_mul(d.z, inverse);
 #pragma unroll
     for (int i = 0; i < 3; i++) {
         put(records, N_CONST, first + i, w_float(u[i]));
-#if N_BASE > 16
+#if N_BASE > 16 && RANGE != 3
         put(records, N_CONST, low + i, w_low(u[i]));
 #endif
     }
@@ -44,9 +45,14 @@ static inline void put_direction(__global float *records, int first, int low, po
 //   out     (tiles of this call, n, N_CONST)   see the enum above
 //   skip    SKIP_WINDOW, SKIP_BEAM: leave tiles out, instead of looking at each of their points
 //   wrap    M > 0: profiles repeat every M samples; 0: they do not
+//   magic   1.5 2^23 times the step of the high parts of kappa u, a power of two, cycles per metre; where RANGE is 3
 __kernel void tile_constants(__global const float *restrict pulse, __global const float *restrict tile,
                              __global const float *restrict radius, int n, int n_tiles, int first, int skip, int wrap,
-                             __global float *restrict out) {
+                             __global float *restrict out
+#if RANGE == 3
+                             , float magic
+#endif
+                             ) {
     size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
     point x = load_point(tile, k, n_tiles);
     out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
@@ -54,14 +60,18 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
     point d;
     wv r;
     wv delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &r, &d);
-    put_direction(out, C_UX, C_LOW, d, r);
+    wv u[3];
+    put_direction(out, C_UX, C_LOW, d, r, u);
 #if BEAM
     point to_tx = d;
     wv tx_r = r;
 #endif
 #if BISTATIC
+    wv v[3];
     wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &r, &d);
-    put_direction(out, C_RX, C_RX_LOW, d, r);
+    put_direction(out, C_RX, C_RX_LOW, d, r, v);
+#pragma unroll
+    for (int i = 0; i < 3; i++) u[i] = w_mul(w_add(u[i], v[i]), w_make((fv)0.5f, (fv)0));
     delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
 #endif
 
@@ -79,7 +89,17 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
     put(out, N_CONST, C_BASE, AS_FLOAT(base));
     put(out, N_CONST, C_KAPPA, w_float(kappa));
     put(out, N_CONST, C_SIGMA, w_float(sigma));
-#if N_BASE > 16
+#if RANGE == 3
+#pragma unroll
+    for (int i = 0; i < 3; i++) {
+        wv steep = w_sub(w_make((fv)0, (fv)0), w_mul(kappa, u[i]));
+        fv high = (w_float(steep) + magic) - magic;
+        put(out, N_CONST, C_STEEP + i, high);
+        put(out, N_CONST, C_STEEP_LOW + i, w_float(w_sub(steep, w_make(high, (fv)0))));
+    }
+    put(out, N_CONST, C_RATIO, w_float(w_div(sigma, kappa)));
+    put(out, N_CONST, C_METRES, w_float(w_div(w_make((fv)1, (fv)0), kappa)));
+#elif N_BASE > 16
     put(out, N_CONST, C_KAPPA_LOW, w_low(kappa));
     put(out, N_CONST, C_SIGMA_LOW, w_low(sigma));
 #endif

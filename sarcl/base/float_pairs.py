@@ -10,3 +10,8 @@ def wide(values: np.ndarray) -> np.ndarray:
     values = np.asarray(values)
     hi = values.astype(np.float32)
     return np.stack([hi, (values - hi).astype(np.float32)])
+
+
+def magic(step: float) -> np.float32:
+    """The number that rounds to multiples of `step`, a power of two, by adding and subtracting it in float32."""
+    return np.float32(1.5 * 2**23 * step)

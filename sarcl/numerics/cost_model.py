@@ -41,7 +41,7 @@ SHARED_LINE, SHARED_LINE_TAP = 96.0, 17.0  # per line and pulse, and per tap of 
 SHARED_TURN = 84.0  # per contribution over the pulses of a group
 SHARED_TILE = 1700.0  # per tile and pulse: its record and what is done with it
 SHARING_PAYS = 1e7  # pairs of row and pixel below which building these kernels takes longer than they save
-GATHERED = 54.0  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
+GATHERED = 48.2  # instructions per contribution of kernels/backproject.cl with two taps: the unit of the costs of plans
 
 # Merging of sub-apertures, in contributions (2026-11-21).
 # Per sample that is moved to a new tile: per tap of the interpolation, per tap of the filter that decimates pulses.
@@ -97,13 +97,13 @@ class Gathering(NamedTuple):
     """Costs of backprojection pixel by pixel on a class of devices, per contribution with two taps and float32 ranges.
 
     taps        of 2, 4, 6 and 8 taps
-    range_mode  by range mode of kernels/range_phase.clh
+    range_mode  by range mode of kernels/range_phase.clh; the last, in two float32 parts, on GPUs alone
     wavefront   of L1 per 32 contributions, which pass while instructions do; 0: memory is not counted
     fitted      interpolation kernels have as few terms as their taps allow (interpolation.fitted)
     """
 
     taps: tuple[float, float, float, float]
-    range_mode: tuple[float, float, float]
+    range_mode: tuple[float, ...]
     wavefront: float = 0.0
     fitted: bool = False
 
@@ -118,8 +118,8 @@ LINES_APART = 0.25
 # On a CPU, and from instructions on sm_90 per contribution, on 2026-11-23 (make gpu-static): on GPUs with fast float64,
 # and on GPUs that compute wide numbers in pairs of float32 or with a float64 that is slower than these.
 ON_CPU = Gathering((TAPS[2], TAPS[4], TAPS[6], TAPS[8]), (RANGE_MODE[0], RANGE_MODE[1], RANGE_MODE[2]))
-ON_GPU = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 1.28, 2.67), 0.08, True)
-ON_GPU_IN_PAIRS = Gathering((1.0, 1.46, 1.83, 2.5), (1.0, 3.62, 12.5), 0.08, True)
+ON_GPU = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 1.36, 3.07, 1.17), 0.088, True)
+ON_GPU_IN_PAIRS = Gathering((1.0, 1.27, 1.6, 2.02), (1.0, 3.98, 14.0, 1.17), 0.088, True)
 
 
 class DeviceClass(NamedTuple):

@@ -74,6 +74,30 @@ def two_part_position_rounding(radius: float, distance: float, bandwidth: float)
     return 2 * 4 * np.pi * FLOAT32.unit + position_rounding(bend, bandwidth, False)
 
 
+def two_part_steps(radius: float, frequency: float) -> tuple[float, float]:
+    """Steps of the high parts of kappa u, cycles/m, and of offsets, m, in range mode 3: powers of two.
+
+    Products of high parts are multiples of the product of both steps, and their sum is at most kappa radius, with what
+    rounding the parts adds: 2^24 of them at most, so that float32 sums are exact. Both low parts matter alike.
+    """
+    kappa = 2 * frequency / SPEED_OF_LIGHT
+    radius = max(radius, 1e-3 / kappa)  # that of one point is 0
+    both = np.ceil(np.log2(1.01 * kappa * radius)) - 24
+    offset = np.round((both + np.log2(radius / kappa)) / 2)
+    return float(2.0 ** (both - offset)), float(2.0**offset)
+
+
+def two_part_rounding(radius: float, frequency: float) -> float:
+    """Phase error, rad, of the linear term in two parts: range mode 3.
+
+    What the products of high parts leave over is at most sqrt(3)/2 (direction's step x radius + kappa x offset's step),
+    in cycles, with eight roundings of float32.
+    """
+    steep, offset = two_part_steps(radius, frequency)
+    cycles = np.sqrt(0.75) * (steep * radius + 2 * frequency / SPEED_OF_LIGHT * offset)
+    return float(2 * np.pi * cycles * 8 * FLOAT32.unit)
+
+
 def series_error(radius: float, distance: float, frequency: float, order: int) -> float:
     """Phase error, rad, of the range series cut after `order` (2, 3 or 4; 0 is exact) for points within `radius` m.
 
@@ -106,14 +130,18 @@ def root_rounding(radius: float, distance: float, frequency: float) -> float:
 
 
 def range_error(radius: float, distance: float, frequency: float, bandwidth: float, mode: int, order: int) -> float:
-    """Phase error, rad, of differential ranges in float32, in range mode 0, 1 or 2 of kernels/range_phase.clh."""
+    """Phase error, rad, of differential ranges in float32, in range mode 0 to 3 of kernels/range_phase.clh."""
     if mode == 2:
         return phase_rounding(0.0, frequency, True)
-    error = phase_rounding(radius, frequency, mode == 1) + position_rounding(radius, bandwidth, mode == 1)
+    error = phase_rounding(radius, frequency, mode > 0)
+    if mode == 3:  # positions have the rests' rounding too, times half the bandwidth over the carrier: at most 1
+        error += 2 * two_part_rounding(radius, frequency) + position_rounding(radius, bandwidth, False) / 2
+    else:
+        error += position_rounding(radius, bandwidth, mode == 1)
     error += series_error(radius, distance, frequency, order)
     if order == 0:
         error += root_rounding(radius, distance, frequency)
-    return error + (curvature_rounding(radius, distance, frequency) if mode == 1 else 0.0)
+    return error + (curvature_rounding(radius, distance, frequency) if mode > 0 else 0.0)
 
 
 def range_error_float64(radius: float, distance: float, frequency: float, order: int) -> float:

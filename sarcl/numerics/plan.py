@@ -26,6 +26,7 @@ class Plan:
 
     cost    per contribution, relative to one with the hat and ranges in float32
     native  sine and cosine are the device's own, in kernels/backproject.cl
+    steps   of the high parts of directions, cycles/m, and of offsets, m: where the linear term is in two parts
     """
 
     interpolator: Interpolator
@@ -36,6 +37,7 @@ class Plan:
     predicted_error: float
     cost: float = 1.0
     native: bool = False
+    steps: tuple[float, float] = (0.0, 0.0)
 
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
@@ -44,7 +46,7 @@ class Plan:
             "taps": self.interpolator.taps,
             "profile samples": self.length,
             "points per tile": self.per_tile,
-            "ranges": ("float32", "wide linear term", "wide")[self.range_mode],
+            "ranges": ("float32", "wide linear term", "wide", "linear term in two parts")[self.range_mode],
             "series": f"order {self.order}" if self.order else "exact",
         }
 
@@ -61,7 +63,7 @@ class Plan:
 
     def components(self, bistatic: bool, beam: bool = False) -> int:
         """Floats of a (tile, pulse) record: N_CONST of kernels/geometry.clh."""
-        return (32 if bistatic else 24 if self.range_mode == 1 else 16) + 8 * beam
+        return (32 if bistatic else 24 if self.range_mode in (1, 3) else 16) + 8 * beam
 
 
 def cheapest(
@@ -95,7 +97,7 @@ def cheapest(
     steps = carrier_steps(carrier, n_samples, bandwidth)
     for per_tile, radius in tiles:
         for mode, range_cost in enumerate(gathering.range_mode):
-            for order in (2, 3, 0) if mode < 2 else (0,):
+            for order in (2, 3, 0) if mode != 2 else (0,):
                 fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
                 fixed += error_bounds.sum_rounding(chunk, n_samples) + (native_error or 0.0)
                 if fixed > FIXED * tolerance:
@@ -107,14 +109,15 @@ def cheapest(
                 except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
                     continue
                 sigma = 2 * bandwidth / n_samples * length / SPEED_OF_LIGHT
-                if mode == 0 and radius * sigma > 2**20:
-                    continue  # positions in a tile would not fit float32
+                if mode in (0, 3) and radius * max(sigma, 2 * frequency / SPEED_OF_LIGHT) > 2**20:
+                    continue  # positions or cycles in a tile would not fit float32
                 cost += range_cost - 1 + cost_model.TILE / per_tile
-                cost += cost_model.SERIES[order] - 1 if mode < 2 else 0.0
+                cost += cost_model.SERIES[order] - 1 if mode != 2 else 0.0
                 if best is None or cost < best[0]:
                     error = fixed + image_gain * interpolator.error
                     native = native_error is not None
-                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost, native)
+                    parts = error_bounds.two_part_steps(radius, frequency) if mode == 3 else (0.0, 0.0)
+                    best = cost, Plan(interpolator, length, per_tile, mode, order, error, cost, native, parts)
     if best is None or tolerance < least_tolerance:
         reach = rounded_up(max(least_tolerance, least(n_samples, chunk, steps)))
         raise ToleranceUnreachable(tolerance, reach, PROFILES, how="in complex64")

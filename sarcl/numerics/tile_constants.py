@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from typing import Any
 
+from ..base import float_pairs
 from ..opencl.device import Device
 from .plan import Plan
 
@@ -20,7 +21,9 @@ class TileConstants:
     ) -> None:
         self.device, self.wrap = device, plan.length if wrap else 0
         self.nbytes = 4 * plan.components(bistatic, beam)
-        macros = {"BISTATIC": bistatic, "BEAM": beam, "LOCAL": local, "RANGE": plan.range_mode == 1 and not bistatic}
+        mode = 3 if plan.range_mode == 3 else plan.range_mode == 1 and not bistatic
+        macros = {"BISTATIC": bistatic, "BEAM": beam, "LOCAL": local, "RANGE": mode}
+        self.magic = [float_pairs.magic(plan.steps[0])] if plan.range_mode == 3 else []
         self.kernel = device.kernel("tile_constants.cl", "tile_constants", **{k: int(v) for k, v in macros.items()})
 
     def compute(
@@ -37,5 +40,6 @@ class TileConstants:
         self.device.run(
             self.kernel, (n // self.device.info.vector_width, end - first), None,
             pulse, references, radius, n, n_tiles, first, skip, self.wrap, constants,
+            *self.magic,
         )  # fmt: skip
         return constants

@@ -19,7 +19,7 @@ LANE_INSTRUCTIONS, WAVEFRONTS = 31.4e12, 132 * 1.75e9
 # they are found, and samples of a range profile per pulse as plans would choose them.
 GATHER = {
     "1e-3": ({"TAPS": "4", "TERMS": "2", "RANGE": "0"}, 32768),
-    "3e-5": ({"TAPS": "4", "TERMS": "2", "RANGE": "1"}, 65536),
+    "3e-5": ({"TAPS": "4", "TERMS": "2", "RANGE": "3"}, 65536),
 }
 GATHER_TILE = 1024  # pixels of its tiles
 # Kernels that make records, of the gather kernel and of lines that a work-group shares.

@@ -6,7 +6,9 @@ geometry of a satellite at the tolerances whose figures the page prints first.
 
 from __future__ import annotations
 
+import itertools
 from collections.abc import Callable
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -22,7 +24,8 @@ LEFT_OUT = (
 )  # fmt: skip
 # Tasks that are run on a GPU without float64 too: those that reach kernels or branches of them that differ there.
 WITHOUT_FP64 = (
-    "spaceborne", "listed spaceborne", "direct 1e", "direct points", "direct bistatic", "direct wide", "direct wrap", "direct beam",
+    "spaceborne", "listed spaceborne", "direct 1e", "direct points", "direct bistatic", "direct wide", "direct wrap",
+    "direct beam",
     "factorized 1e-02", "factorized 1e-03", "factorized bistatic", "factorized points", "echo points 1e",
     "echo points far", "echo points bistatic", "echo antenna pair", "echo facets 1e-4", "echo facets bistatic",
     "echo terrain tank",
@@ -96,8 +99,10 @@ def antenna_beam(**options: Any) -> Any:
 
 
 OWN: dict[str, Callable[[], Any]] = {
-    **{f"spaceborne {t:.0e}".replace("-0", "-"): lambda t=t: spaceborne(t) for t in (1e-3, 3e-5)},
-    **{f"listed spaceborne {t:.0e}".replace("-0", "-"): lambda t=t: spaceborne(t, True) for t in (1e-3, 3e-5)},
+    **{
+        f"{'listed ' * listed}spaceborne {name}": partial(spaceborne, float(name), listed)
+        for listed, name in itertools.product((False, True), ("1e-3", "3e-5"))
+    },
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),

@@ -72,6 +72,17 @@ def test_a_step_begins_while_the_one_before_runs(device, calls, monkeypatch):
         assert marks[block] < uploads[3 * block + 3] < uploads[3 * block + 5] < marks[block + 1] < waits[block]
 
 
+@pytest.mark.parametrize("spacing, order", [(0.03, "order 2"), (0.25, "order 3")])
+@pytest.mark.parametrize("case", ["monostatic", pytest.param("bistatic", marks=pytest.mark.slow)])
+def test_linear_terms_in_two_parts_are_as_exact_as_wide_ones(device, spacing, order, case):
+    """Their error is far below the bound, which holds for the worst place; each part matters at this tolerance."""
+    raw = noise_history(n_rows=128, n_samples=64, bistatic=case == "bistatic")
+    grid = sarcl.ImageGrid.plane(center=(1, 2, 0), shape=(64, 40), spacing=spacing)
+    image = sarcl.backproject(raw, grid, tolerance=3e-5, method="direct", device=as_gpu(device), check=True)
+    assert (image.report.plan["ranges"], image.report.plan["series"]) == ("linear term in two parts", order)
+    assert image.report.measured_error <= min(5e-6, image.report.predicted_error)
+
+
 @pytest.mark.slow
 def test_subapertures_meet_their_tolerance(device):
     raw = noise_on(straight(400))

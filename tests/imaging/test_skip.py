@@ -312,10 +312,11 @@ def test_empty_cells_are_zero_counted_and_change_no_other_pixel(device, method):
     raw = strip_history(n_samples=64)
     positions, gone = holed(ImageGrid.plane(shape=(120, 140), spacing=0.3))
     grid = ImageGrid.points(positions)
-    options = {"tolerance": 1e-2, "method": method, "device": device}
+    # at 1e-3 plans for all pixels and for those with data are the same; at 1e-2 two plans cost GPUs nearly the same
+    options = {"tolerance": 1e-3 if method == "direct" else 1e-2, "method": method, "device": device}
     image = sarcl.backproject(raw, grid, **options)
     assert not image.data[gone].any() and np.isfinite(image.data).all()
-    assert near(image, raw) <= image.report.predicted_error <= 1e-2
+    assert near(image, raw) <= image.report.predicted_error <= options["tolerance"]
     assert image.report.contributions_skipped["no data"] == raw.n_rows * gone.sum()
     assert total(image) == raw.n_rows * grid.size
     # without them, the same pixels

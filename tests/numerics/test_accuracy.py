@@ -5,7 +5,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from sarcl.base import constants
+from sarcl.base import constants, float_pairs
 from sarcl.numerics import cost_model, error_bounds, interpolation, nufft2d, range_profiles
 from sarcl.numerics.interpolation import fitted, interpolator
 
@@ -93,6 +93,34 @@ def test_the_choice_is_the_cheapest_of_all_interpolators(n_samples, carrier):
         able = [(m.taps, n) for m, n in every if m.error <= error]
         costs = [1e5 * cost_model.TAPS[taps] + cost_model.profile(n) for taps, n in able]
         assert (made, length) in every and cost * 1e5 == pytest.approx(min(costs))
+
+
+@pytest.mark.parametrize("radius", [0.02, 1.0, 5.7, 11.3])
+@pytest.mark.parametrize("frequency", [60e6, 1.3e9, 9.95e9, 94e9])
+def test_the_linear_term_in_two_parts_is_exact_but_for_its_rests(radius, frequency):
+    """As kernels/tile_constants.cl and range_phase.clh split and add, against longdouble."""
+    random, kappa, single = np.random.default_rng(0), 2 * frequency / constants.SPEED_OF_LIGHT, np.float32
+    u, p = random.standard_normal((2, 20000, 3))
+    u[:3], p[:3] = np.eye(3), np.eye(3)  # along axes, where sums are largest
+    u, p = kappa * u / np.linalg.norm(u, axis=1)[:, None], radius * p / np.linalg.norm(p, axis=1)[:, None]
+    steps = error_bounds.two_part_steps(radius, frequency)
+    high, low = [], []
+    for values, step in zip((u, p), steps, strict=True):
+        magic = float_pairs.magic(step)
+        assert np.log2(step) == np.rint(np.log2(step)) and magic.dtype == single
+        high.append((values.astype(single) + magic) - magic)
+        low.append((values - high[-1]).astype(single))
+        assert np.abs(low[-1]).max() <= 0.502 * step
+    exact = [(high[0][:, i].astype(float) * high[1][:, i]) for i in range(3)]
+    for total in (exact[2], exact[1] + exact[2], exact[0] + exact[1] + exact[2]):
+        assert (total == total.astype(single)).all()  # no float32 addition rounds
+    rest = np.zeros(len(u), single)
+    for first, second in ((high[0], low[1]), (low[0], p.astype(single))):
+        for i in (2, 1, 0):
+            rest = (first[:, i].astype(float) * second[:, i] + rest).astype(single)  # one rounding, as fma
+    wanted = (u.astype(np.longdouble) * p).sum(axis=1) - sum(exact)
+    worst, bound = 2 * np.pi * np.abs(wanted - rest).max(), error_bounds.two_part_rounding(radius, frequency)
+    assert 0.05 * bound <= worst <= bound
 
 
 @pytest.mark.parametrize("distance", [20.0, 300.0, 1e4])

@@ -49,6 +49,7 @@ class GatherKernel:
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
+        self.magic = [float_pairs.magic(plan.steps[1])] if plan.range_mode == 3 else []
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
@@ -73,7 +74,8 @@ class GatherKernel:
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
             source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
             tiles.offsets.shape[1], 0 if tiles.shared else tiles.per_tile // self.lanes, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *weights, steps=used,
+            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *self.magic, *weights,
+            steps=used,
         )  # fmt: skip
 
 
