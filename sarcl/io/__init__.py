@@ -6,7 +6,7 @@ For other folders:
     formats        table of the file formats of phase histories and images: names, first bytes, reader, writers
     hdf5           plain values, arrays and reports in HDF5
     input_paths    input files: regular files that can be read, named where they are not
-    mesh           meshes through trimesh: triangles, names of parts, repairs
+    mesh           meshes through trimesh: triangles, names of parts, repaired
     orbit_files    state vectors of orbit files in XML
     output_paths   output files: checked before the computation, written completely or not at all
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
@@ -16,16 +16,19 @@ For this folder alone:
 
     _checked_rows  rows of an HDF5 file, whose checksums are compared when they are read
     _checksums     checksums of sarcl's own HDF5 file, behind its end
+    _collada_checks  what a COLLADA file holds that would be left out or covered wrongly in silence: refused
     _gltf_checks   what a glTF file needs that would be left out in silence: refused
     _gotcha        AFRL Gotcha volumetric SAR data set, MATLAB 5
     _hdf5_safety   what an HDF5 file may do to its reader: refused
     _mat5_checks   the structure of a MATLAB 5 file, walked before scipy reads it
-    _mesh_checks   what a mesh file declares, compared with what it holds
+    _mesh_archive  meshes in archives, unpacked within bounds
+    _mesh_checks   what a mesh file declares, compared with what it holds; polygons and the fans that cover them
+    _mesh_repair   repairs of meshes: winding, faces that collapse or repeat
     _mesh_text     text of .obj and .off files: as trimesh reads it right, or refused
     _other_files   files that a mesh or an elevation model names: those of its own folder
     _part          files that are being written: random names, locked, removed where no process owns them
     _partial_hdf5  an HDF5 file that appears at its path only when it is complete
-    _polygons      polygons of mesh files that fans about their first corners do not cover
+    _ply           PLY files: vertices and polygons, each number of the type that its header declares
 """
 
 __all__ = ["elevation", "formats", "hdf5", "input_paths", "mesh", "orbit_files", "output_paths", "sarcl_hdf5", "toml"]

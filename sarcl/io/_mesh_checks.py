@@ -1,50 +1,33 @@
-"""What a mesh file declares, compared with what it holds: before trimesh reads it, and after.
+"""What a mesh file declares, compared with what it holds; and polygons, as fans of triangles where these cover them.
 
-trimesh reads what it finds of a truncated text file, and unpacks archives of any size.
+trimesh reads what it finds of a truncated text file, and covers every polygon by a fan about its first corner.
 """
 
 from __future__ import annotations
 
-import bz2
+import io
 import re
-import zipfile
-from pathlib import Path
-from typing import Any
 
 import numpy as np
 
-from ..base.text import size_text
-from . import _polygons
-
 HEAD = 2**16  # bytes in which a header ends
-UNPACKED = 2**26  # bytes that an archive may always hold
-RATIO = 100  # bytes per byte of an archive above that; text of meshes is packed to a tenth, at most a thirtieth
-PIECE = 2**20  # bytes unpacked at a time
+FLAT = 1e-9  # of a polygon's area: a triangle of a fan that is turned by less is a line
+CONCAVE = "is concave or crosses itself, and its triangles are not in the file; export it as triangles"
 TAKE = "it is truncated, damaged or not what its name says; export it again"
 
 
-def declared_faces(path: Path, what: str) -> int | None:
-    """Number of faces that a file says it has, None where its format does not say.
+def declared_faces(data: bytes, kind: str, what: str) -> int | None:
+    """Number of faces that a file of the ending `kind` says it has, None where its format does not say.
 
-    ValueError for an archive that unpacks to more than a mesh would, and an STL file that is not as long as it says.
+    ValueError for an STL file that is not as long as it says.
     """
-    kind = path.suffix.lower()
-    if kind in (".zip", ".zae"):
-        _check_zip(path, what)
-    elif kind == ".bz2":
-        _check_bz2(path, what)
-    with open(path, "rb") as file:
-        head = file.read(HEAD)
     if kind == ".stl":
-        return _of_stl(path, head, what)
+        return _of_stl(data, what)
     if kind == ".off":
-        text = re.sub(rb"#[^\n]*", b"", head)
+        text = re.sub(rb"#[^\n]*", b"", data[:HEAD])
         found = re.match(rb"\s*(?:ST)?C?N?4?n?OFF\s+(\d+)\s+(\d+)", text)
-    elif kind == ".ply":
-        found = re.search(rb"\nelement\s+(face)\s+(\d+)", head.partition(b"end_header")[0])
-    else:
-        return None
-    return int(found[2]) if found else None
+        return int(found[2]) if found else None
+    return None
 
 
 def check_held(declared: int | None, held: int, what: str) -> None:
@@ -65,25 +48,8 @@ def check_indices(vertices: np.ndarray, faces: np.ndarray, what: str) -> None:
         raise ValueError(f"{what}: face {at} names vertex {faces[at][wrong[at]][0]} of {len(vertices)}: {TAKE}")
 
 
-def check_polygons(scene: Any, what: str) -> None:
-    """ValueError where a .ply file has polygons that the fans of trimesh about their first corners do not cover."""
-    for mesh in scene.geometry.values():
-        raw = mesh.metadata.get("_ply_raw", {}).get("face", {}).get("data")
-        if not isinstance(raw, dict):  # a table: all faces have one number of corners
-            names = getattr(getattr(raw, "dtype", None), "names", None)
-            if names is None:
-                continue
-            raw = {name: raw[name]["f1"] for name in names if raw[name].dtype.names}
-        faces = next((raw[name] for name in ("vertex_index", "vertex_indices") if name in raw), None)
-        if faces is None:
-            continue
-        wrong = _polygons.wrong_fans([np.ravel(face).tolist() for face in faces], np.asarray(mesh.vertices))
-        if wrong:
-            raise ValueError(f"{what}: face {wrong[0]}, of {len(faces[wrong[0]])} corners, {_polygons.CONCAVE}")
-
-
-def _of_stl(path: Path, head: bytes, what: str) -> int | None:
-    size = path.stat().st_size
+def _of_stl(data: bytes, what: str) -> int | None:
+    size, head = len(data), data[:HEAD]
     if not size:
         return None
     n = int.from_bytes(head[80:84], "little")
@@ -94,11 +60,10 @@ def _of_stl(path: Path, head: bytes, what: str) -> int | None:
             raise ValueError(f"{what} declares {n} facets, {84 + 50 * n} bytes, and has {size} bytes: {TAKE}")
         return n
     counts = {b"endfacet": 0, b"endsolid": 0, b"vertex": 0}
-    with open(path, "rb") as file:
-        for line in file:
-            word = line.strip().partition(b" ")[0].lower()
-            if word in counts:
-                counts[word] += 1
+    for line in io.BytesIO(data):
+        word = line.strip().partition(b" ")[0].lower()
+        if word in counts:
+            counts[word] += 1
     if counts[b"vertex"] != 3 * counts[b"endfacet"] or not counts[b"endsolid"]:
         raise ValueError(
             f"{what} has {counts[b'endfacet']} whole facets, {counts[b'vertex']} vertices and {counts[b'endsolid']} "
@@ -107,34 +72,39 @@ def _of_stl(path: Path, head: bytes, what: str) -> int | None:
     return counts[b"endfacet"]
 
 
-def _most(path: Path) -> int:
-    return max(UNPACKED, RATIO * path.stat().st_size)
+def fans(corners: np.ndarray, index: np.ndarray) -> np.ndarray:
+    """Triangles (k, 3) of polygons of `corners` (n,) corners each; index (sum,): vertices, polygon after polygon."""
+    triangles = corners - 2
+    first = np.repeat(np.cumsum(corners) - corners, triangles)
+    within = np.arange(len(first)) - np.repeat(np.cumsum(triangles) - triangles, triangles)
+    return np.asarray(index[np.stack([first, first + within + 1, first + within + 2], axis=1)])
 
 
-def _check_zip(path: Path, what: str) -> None:
-    try:
-        with zipfile.ZipFile(path) as archive:
-            size = sum(member.file_size for member in archive.infolist())
-    except (zipfile.BadZipFile, NotImplementedError) as exc:
-        raise ValueError(f"{what} cannot be read as a zip file ({exc}): {TAKE}") from None
-    if size > _most(path):
-        raise _too_much(path, what, size_text(size))
+def fans_fit(corners: np.ndarray) -> np.ndarray:
+    """Whether fans about the first corner cover polygons of k corners, (n, k, 3): bool (n,).
+
+    Each triangle of a fan must turn as the polygon does, by Newell's normal: half the sum of p_i x p_(i+1).
+    """
+    from_first = corners[:, 1:] - corners[:, :1]
+    crosses = np.cross(from_first[:, :-1], from_first[:, 1:])  # (n, k - 2, 3): twice the area of each triangle
+    normal = crosses.sum(axis=1)
+    along = np.einsum("nij,nj->ni", crosses, normal)
+    return np.asarray((along >= -FLAT * (normal**2).sum(axis=1, keepdims=True)).all(axis=1))
 
 
-def _check_bz2(path: Path, what: str) -> None:
-    size, most = 0, _most(path)
-    try:
-        with bz2.open(path, "rb") as file:
-            while piece := file.read(PIECE):
-                size += len(piece)
-                if size > most:
-                    raise _too_much(path, what, f"more than {size_text(most)}")
-    except (OSError, EOFError) as exc:
-        raise ValueError(f"{what} cannot be unpacked ({exc}): {TAKE}") from None
+def wrong_fans(corners: np.ndarray, index: np.ndarray, vertices: np.ndarray) -> list[int]:
+    """Numbers of the polygons that a fan about their first corner leaves; corners, index  as of `fans`.
 
-
-def _too_much(path: Path, what: str, size: str) -> ValueError:
-    return ValueError(
-        f"{what} has {size_text(path.stat().st_size)} and unpacks to {size}, more than {RATIO} times as much: unpack "
-        "it yourself if you trust it, and give the mesh in it"
-    )
+    Polygons that name vertices that there are not, of vertices (n, 3), or that are not finite, are left to others.
+    """
+    found: list[int] = []
+    begin = np.cumsum(corners) - corners
+    for length in np.unique(corners[corners > 3]):
+        numbers = np.flatnonzero(corners == length)
+        of_each = index[begin[numbers][:, None] + np.arange(length)]
+        there = np.asarray(((of_each >= 0) & (of_each < len(vertices))).all(axis=1))
+        places = vertices[np.where(there[:, None], of_each, 0)]
+        with np.errstate(all="ignore"):
+            wrong = there & np.isfinite(places).all(axis=(1, 2)) & ~fans_fit(places)
+        found += numbers[wrong].tolist()
+    return sorted(found)

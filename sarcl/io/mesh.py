@@ -3,7 +3,6 @@
 from __future__ import annotations
 
 import io
-import logging
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -12,11 +11,17 @@ from typing import Any
 import numpy as np
 
 from ..base import validation
-from . import _gltf_checks, _mesh_checks, _mesh_text, _other_files, input_paths
-
-log = logging.getLogger(__name__)
-
-SAME_PLACE = 1e-8  # of the mesh's size: corners closer than this are one
+from . import (
+    _collada_checks,
+    _gltf_checks,
+    _mesh_archive,
+    _mesh_checks,
+    _mesh_repair,
+    _mesh_text,
+    _other_files,
+    _ply,
+    input_paths,
+)
 
 
 @dataclass(frozen=True, eq=False)
@@ -37,30 +42,30 @@ class Mesh:
 def load(mesh: Any, repair: bool = True, external: bool = False) -> Mesh:
     """A mesh file, a trimesh.Trimesh or a trimesh.Scene, its parts in place.
 
-    repair  drop repeated faces, give neighbours one winding, face closed bodies outwards; the log gives the numbers
+    repair  drop repeated faces, give neighbours one winding, face closed bodies outwards, but for walls of cavities in
+            them; the log gives the numbers
     external  the file may name others outside its folder
     A mesh is closed where every edge belongs to two faces of one winding. FileNotFoundError, IsADirectoryError,
     ValueError: missing, unreadable, no faces, corners not finite. TypeError: no mesh.
     """
     import trimesh
 
-    what, declared = "mesh", None
+    what = "mesh"
     if isinstance(mesh, (str, Path)):
         what = f"mesh file {Path(mesh).name!r}"
-        mesh, declared = _read(Path(mesh), what, external)
+        mesh = _read(Path(mesh), what, external)
     if isinstance(mesh, trimesh.Trimesh):
         alone, mesh = mesh, trimesh.Scene()
         mesh.add_geometry(alone, geom_name=alone.metadata.get("name"))
     if not isinstance(mesh, trimesh.Scene):
         raise TypeError(f"{what} is a {type(mesh).__name__}; give a file name or a trimesh.Trimesh")
     vertices, faces, part, names = _parts(mesh, what)
-    _mesh_checks.check_held(declared, len(faces), what)
     if len(faces) == 0:
         raise ValueError(
             f"{what} has no faces; nothing would reflect: check what the file holds and how it was exported"
         )
     validation.finite(f"{what} vertices", vertices)
-    kept, turned, closed = _repaired(vertices, faces, repair, what)
+    kept, turned, closed = _mesh_repair.repaired(vertices, faces, repair, what)
     faces = np.where(turned[:, None], faces[:, ::-1], faces)[kept]
     return Mesh(vertices[faces], part[kept], names, closed, _unit(mesh, what))
 
@@ -78,44 +83,74 @@ def _unit(scene: Any, what: str) -> float | None:
     return found.pop()
 
 
-def _read(path: Path, what: str, external: bool) -> tuple[Any, int | None]:
-    """What trimesh makes of a file, and the number of faces that the file says it has."""
+def _read(path: Path, what: str, external: bool) -> Any:
+    """The trimesh.Scene of a file, or of all meshes in an archive."""
     import trimesh
 
     input_paths.check(path, "mesh file")
     known = sorted(trimesh.available_formats())
-    if path.suffix.lower().lstrip(".") not in known:
+    kind = path.suffix.lower()
+    if kind.lstrip(".") not in known:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
-    declared = _mesh_checks.declared_faces(path, what)
-    given = _changed(path, what)
-    others = _other_files.Resolver(path, external)
-    resolver: Any = others  # what trimesh asks of a resolver, without being one of its classes
-    try:
-        # process=False: merging and reordering corners is not needed and hides what the file holds
-        made = trimesh.load_scene(given, file_type=path.suffix[1:].lower(), process=False, resolver=resolver)
-    except Exception as exc:
+    if kind not in _mesh_archive.KINDS:
+        others = _other_files.Resolver(path, external)
+        made = _scene(input_paths.contents(path, "mesh file"), kind, path, what, others)
         _check_refused(others, what)
+        return made
+    files = _mesh_archive.contents(path, what)
+    names = _mesh_archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
+    beside: Any = trimesh.resolvers.ZipResolver({name: io.BytesIO(data) for name, data in files.items()})
+    scenes = [
+        _scene(files[name], Path(name).suffix.lower(), None, f"{what}, its file {name!r:.100}", beside)
+        for name in names
+    ]
+    return trimesh.scene.scene.append_scenes(scenes) if len(scenes) > 1 else scenes[0]
+
+
+def _scene(data: bytes, kind: str, path: Path | None, what: str, others: Any) -> Any:
+    """A trimesh.Scene of the bytes of a mesh file; ValueError for what would be left out or covered wrongly.
+
+    path  gives the mesh its name, where it is a file;  others  gives trimesh the files that this one names
+    """
+    import trimesh
+
+    if kind == ".ply":
+        vertices, faces = _ply.read(data, what)
+        made = trimesh.Scene()
+        made.add_geometry(trimesh.Trimesh(vertices, faces, process=False), geom_name=path.name if path else None)
+        return made
+    declared = _mesh_checks.declared_faces(data, kind, what)
+    if kind == ".off":
+        _mesh_text.check_off(data, what)
+    elif kind == ".obj":
+        data = _mesh_text.of_obj(data, what) or data
+    elif kind in (".glb", ".gltf"):
+        _gltf_checks.check(data, what)
+    elif kind == ".dae":
+        _collada_checks.check_kind(data, what)
+    elif kind in _mesh_archive.ZIPPED:
+        _mesh_archive.check_size(data, what)
+    try:
+        collada = _collada_checks.opened(data) if kind == ".dae" else None
+        # process=False: merging and reordering corners is not needed and hides what the file holds
+        made = trimesh.load_scene(
+            io.BytesIO(data), file_type=str(path.absolute()) if path else kind[1:], process=False, resolver=others
+        )
+    except Exception as exc:
+        if isinstance(others, _other_files.Resolver):
+            _check_refused(others, what)
         # trimesh treats a file that is not binary as text, and asks a package that sarcl does not need for its encoding
         guess = isinstance(exc, ModuleNotFoundError) and exc.name == "charset_normalizer"
         why = "neither a whole binary file nor text" if guess else str(exc) or type(exc).__name__
         raise ValueError(
-            f"{what} cannot be read as {path.suffix} ({why}): it is truncated, damaged or not what its name "
-            "says; export it again"
+            f"{what} cannot be read as {kind} ({why}): it is truncated, damaged or not what its name says; export it "
+            "again"
         ) from exc
-    _check_refused(others, what)
-    _mesh_checks.check_polygons(made, what)
-    return made, declared
-
-
-def _changed(path: Path, what: str) -> Path | io.BytesIO:
-    """The file, or its text with faces as trimesh reads them right; ValueError for what trimesh would leave out."""
-    kind = path.suffix.lower()
-    if kind in (".glb", ".gltf"):
-        _gltf_checks.check(input_paths.contents(path, "mesh file"), what)
-    if kind == ".off":
-        _mesh_text.check_off(input_paths.contents(path, "mesh file"), what)
-    made = _mesh_text.of_obj(input_paths.contents(path, "mesh file"), what) if kind == ".obj" else None
-    return path if made is None else io.BytesIO(made)
+    if collada is not None:
+        _collada_checks.check(collada, what)
+    held = sum(len(one.faces) for one in made.geometry.values() if isinstance(one, trimesh.Trimesh))
+    _mesh_checks.check_held(declared, held, what)
+    return made
 
 
 def _check_refused(others: _other_files.Resolver, what: str) -> None:
@@ -150,119 +185,6 @@ def _parts(scene: Any, what: str) -> tuple[np.ndarray, np.ndarray, np.ndarray, l
         material = getattr(getattr(mesh.visual, "material", None), "name", None)
         names.append(tuple(dict.fromkeys(str(n) for n in (node, geometry, material) if n)))
     return np.concatenate(vertices), np.concatenate(faces), np.concatenate(part), names
-
-
-def _repaired(vertices: np.ndarray, faces: np.ndarray, repair: bool, what: str) -> tuple[np.ndarray, np.ndarray, bool]:
-    """(kept, turned, closed): faces to keep (k,), faces to reverse (k,), and whether there is an outside."""
-    label = _weld(vertices)
-    place = label[faces]  # corners by position: many formats store a corner once per face
-    kept = (place != np.roll(place, 1, axis=1)).all(axis=1)
-    if not kept.any():
-        raise ValueError(f"all {len(faces)} facets are degenerate (zero area); nothing would reflect: check the {what}")
-    turned = np.zeros(len(faces), bool)
-    collapsed, repeated, closed = len(faces) - int(kept.sum()), 0, False
-    # bodies that touch are closed before their corners are merged, and may not be closed afterwards
-    for corners in (faces, place):
-        if repair:
-            turned = _wound(corners, kept, vertices[faces])
-            # closed bodies may share a wall with two faces; elsewhere faces that differ in winding alone are one face
-            alike = _closed(_turn(corners, turned)[kept])
-            first = _first(_turn(place, turned), kept, alike)
-            repeated += int(kept.sum() - first.sum())
-            kept = first
-            if not alike:  # repeated faces have hidden which faces are neighbours
-                turned = _wound(corners, kept, vertices[faces])
-        closed = _closed(_turn(corners, turned)[kept])
-        if closed:
-            break
-    if not closed and repair and not _oriented(place, turned, kept):
-        log.info("%s has faces that no winding could make agree with their neighbours", what)
-    for n, why in (
-        (collapsed, "left out: two of their corners are one"),
-        (repeated, "left out: they repeat another"),
-        (int(turned[kept].sum()), "turned round: wound against their neighbours, or inwards"),
-    ):
-        if n:
-            log.info("%s: %d of %d faces %s", what, n, len(faces), why)
-    return kept, turned, closed
-
-
-def _weld(vertices: np.ndarray) -> np.ndarray:
-    """For each corner (n,) a number that corners at the same position share."""
-    size = float(np.ptp(vertices, axis=0).max()) or 1.0
-    cell = np.rint((vertices - vertices.min(axis=0)) / (SAME_PLACE * size)).astype(np.int64)
-    return np.unique(cell, axis=0, return_inverse=True)[1].reshape(-1)
-
-
-def _turn(faces: np.ndarray, turned: np.ndarray) -> np.ndarray:
-    return np.where(turned[:, None], faces[:, ::-1], faces)
-
-
-def _first(faces: np.ndarray, kept: np.ndarray, alike: bool) -> np.ndarray:
-    """`kept` without faces that repeat an earlier one: the same corners, and if `alike` the same winding."""
-    start = faces.argmin(axis=1)[:, None]
-    key = np.take_along_axis(faces, (start + np.arange(3)) % 3, axis=1) if alike else np.sort(faces, axis=1)
-    rows = np.flatnonzero(kept)
-    out = np.zeros(len(faces), bool)
-    out[rows[np.unique(key[kept], axis=0, return_index=True)[1]]] = True
-    return out
-
-
-def _edges(faces: np.ndarray) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """(number of each edge, its direction, its face), each (3 k,): face by face."""
-    ends = faces[:, [[0, 1], [1, 2], [2, 0]]].reshape(-1, 2)
-    forward = ends[:, 0] < ends[:, 1]
-    low, high = ends.min(axis=1), ends.max(axis=1)
-    number = np.unique(low * (int(high.max(initial=0)) + 1) + high, return_inverse=True)[1].reshape(-1)
-    return number, forward, np.repeat(np.arange(len(faces)), 3)
-
-
-def _closed(faces: np.ndarray) -> bool:
-    """True where every edge belongs to two faces that pass it in opposite directions."""
-    number, forward, _ = _edges(faces)
-    return bool(
-        len(number) and (np.bincount(number) == 2).all() and (np.bincount(number, weights=forward * 2 - 1.0) == 0).all()
-    )
-
-
-def _oriented(faces: np.ndarray, turned: np.ndarray, kept: np.ndarray) -> bool:
-    """True where no two faces that alone share an edge pass it in the same direction."""
-    number, forward, _ = _edges(_turn(faces, turned)[kept])
-    pair = np.bincount(number) == 2
-    return bool((np.bincount(number, weights=forward * 2 - 1.0)[pair] == 0).all())
-
-
-def _wound(faces: np.ndarray, kept: np.ndarray, triangles: np.ndarray) -> np.ndarray:
-    """Faces to reverse, of those kept, so that neighbours have one winding and closed bodies face outwards.
-
-    Every face is two nodes of a graph, one for each winding; neighbours link the nodes that agree. The two halves of
-    a body are then two components, of which the one that reverses fewer faces is taken. A body that is one component
-    (a Moebius strip) has no sides and stays as it is. (trimesh.repair goes face by face and needs networkx.)
-    """
-    from scipy.sparse import coo_array
-    from scipy.sparse.csgraph import connected_components
-
-    rows = np.flatnonzero(kept)
-    k = len(rows)
-    number, forward, face = _edges(faces[rows])
-    uses = np.bincount(number)
-    order = np.argsort(number, kind="stable")
-    first = order[np.flatnonzero(np.diff(number[order], prepend=-1))][uses == 2]
-    second = order[np.flatnonzero(np.diff(number[order], append=-1))][uses == 2]
-    a, b, against = face[first], face[second], forward[first] == forward[second]
-    ends = np.concatenate([a, a + k]), np.concatenate([np.where(against, b + k, b), np.where(against, b, b + k)])
-    links = coo_array((np.ones(len(ends[0]), bool), ends), shape=(2 * k, 2 * k))
-    n, component = connected_components(links, directed=False)
-    plain, mirror = component[:k], component[k:]
-    size = np.bincount(plain, minlength=n)  # faces that a component leaves as they are
-    turn = (size[mirror] > size[plain]) | ((size[mirror] == size[plain]) & (mirror < plain))
-    body = np.minimum(plain, mirror)
-    volume = np.linalg.det(triangles[rows] - triangles[rows].reshape(-1, 3).mean(axis=0)) * np.where(turn, -1, 1)
-    inwards = np.bincount(body, weights=volume, minlength=n) < 0
-    inwards &= np.bincount(body[face], weights=uses[number] != 2, minlength=n) == 0
-    out = np.zeros(len(faces), bool)
-    out[rows] = (turn ^ inwards[body]) & (plain != mirror)
-    return out
 
 
 def part_materials(material: Any, mesh: Mesh) -> dict[str, Any]:

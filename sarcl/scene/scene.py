@@ -182,7 +182,8 @@ class Scene:
         position  m (3,)
         rotation  matrix (3, 3), rotation vector (3,) in rad, one angle about z in rad, or scipy's Rotation
         max_edge  cut facets until no edge is longer, m; `echo` also cuts to what the waveform resolves
-        repair    remove repeated faces, wind neighbours consistently and closed bodies outwards; what is done is logged
+        repair    remove repeated faces, wind neighbours consistently and closed bodies outwards, but for walls of
+                  cavities in them; what is done is logged
         external  the file may name others (buffers, materials) outside its folder: for files that you trust
 
         A mesh that is not watertight reflects from both sides of its facets, so that its winding does not

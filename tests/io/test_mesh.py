@@ -59,6 +59,32 @@ def test_bodies_are_turned_one_by_one():
     assert volume(scene) == pytest.approx(12) and not scene.two_sided.any()
 
 
+@pytest.mark.parametrize("outer", [False, True])
+@pytest.mark.parametrize("store", [lambda m: m, soup], ids=["shared corners", "corners once a face"])
+def test_the_wall_of_a_cavity_stays_wound_inwards(outer, store):
+    """6 m^3 with a hole of 0.125 m^3, in which another body of 0.001 m^3 stands; beside it a body that is wrong."""
+    hole, inside, beside = box((0.1, 0, 0), (0.5, 0.5, 0.5)), box((0.1, 0, 0.1), (0.1, 0.1, 0.1)), box((9, 0, 0))
+    hole.invert()
+    beside.invert()
+    mesh = trimesh.util.concatenate([box(), hole, inside, beside])
+    if outer:  # all of it the wrong way round
+        mesh.invert()
+    scene = sarcl.Scene.from_mesh(store(mesh))
+    assert volume(scene) == pytest.approx(6 - 0.125 + 0.001 + 6) and not scene.two_sided.any()
+    mean = scene.triangles.mean(axis=1)
+    wall = (np.abs(mean - (0.1, 0, 0)).max(axis=1) < 0.26) & (np.abs(mean - (0.1, 0, 0.1)).max(axis=1) > 0.06)
+    assert wall.sum() == 12 and np.linalg.det(scene.triangles[wall]).sum() / 6 == pytest.approx(-0.125)
+
+
+def test_bodies_whose_boxes_overlap_alone_hold_nothing():
+    """A small ball within the box around a large ring, not within the ring: it is turned outwards."""
+    ring = trimesh.creation.torus(3.0, 0.5)
+    ball = trimesh.creation.icosphere(subdivisions=2, radius=0.2)
+    ball.invert()
+    scene = sarcl.Scene.from_mesh(trimesh.util.concatenate([ring, ball]))
+    assert volume(scene) == pytest.approx(ring.volume - ball.volume)  # of which the second is negative as given
+
+
 def test_an_open_sheet_is_wound_alike_and_keeps_both_sides():
     sheet = sarcl.Scene.from_heights(np.arange(9.0), np.arange(7.0), np.zeros((7, 9))).triangles
     sheet = np.where(np.arange(len(sheet))[:, None, None] % 3 == 0, sheet[:, ::-1], sheet)

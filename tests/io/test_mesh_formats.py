@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.io import _polygons
+from sarcl.io import _mesh_checks
 
 CORNERS = [(0, 2), (0, 0), (2, 0), (2, 1), (1, 1), (1, 2)]  # an L, whose fan about the first corner covers 4 m^2 of 3
 
@@ -54,9 +54,9 @@ def test_fans_cover_what_turns_one_way_about_their_first_corner():
     for n in (4, 5, 8, 60):
         angle = 2 * np.pi * (np.arange(n) + random.uniform(0, 0.9, n)) / n
         circle = np.stack([np.cos(angle), np.sin(angle), 0 * angle], axis=1)
-        assert _polygons.fans_fit(np.array([np.roll(circle, i, axis=0) @ turn + 100 for i in range(n)])).all()
+        assert _mesh_checks.fans_fit(np.array([np.roll(circle, i, axis=0) @ turn + 100 for i in range(n)])).all()
     dart = np.array([[0, 0, 0], [2, -1, 0], [1, 0, 0], [2, 1, 0]], float) @ turn + 100
-    assert _polygons.fans_fit(np.array([np.roll(dart, -i, axis=0) for i in range(4)])).tolist() == [
+    assert _mesh_checks.fans_fit(np.array([np.roll(dart, -i, axis=0) for i in range(4)])).tolist() == [
         True, False, True, False,
     ]  # fmt: skip
 

@@ -1,0 +1,83 @@
+"""What a COLLADA file (.dae) holds that trimesh would leave out or cover wrongly in silence: refused."""
+
+from __future__ import annotations
+
+import io
+import zipfile
+from collections.abc import Iterator
+from typing import Any
+
+import numpy as np
+
+from . import _mesh_checks
+
+AGAIN = "export it again"
+
+
+def opened(data: bytes) -> Any:
+    """The file as pycollada reads it, with the list of what it could not read; its exceptions for what is no file."""
+    import collada
+
+    return collada.Collada(io.BytesIO(data), ignore=[collada.common.DaeError])
+
+
+def check_kind(data: bytes, what: str) -> None:
+    """ValueError for a zip file under the name of a COLLADA file."""
+    if zipfile.is_zipfile(io.BytesIO(data)):
+        raise ValueError(f"{what} is a zip file, wanted XML: give it the name .zae")
+
+
+def check(made: Any, what: str) -> None:
+    """ValueError for surfaces that are missing or covered wrongly; made  of `opened`."""
+    tag, root = made.tag, made.xmlnode.getroot()
+    if next(root.iter(tag("instance_controller")), None) is not None:
+        raise ValueError(
+            f"{what} has skins or morphed shapes (controllers), which are not read here; apply them, then {AGAIN}"
+        )
+    if next(root.iter(tag("ph")), None) is not None:
+        raise ValueError(f"{what} has polygons with holes, which are not read here; export it as triangles")
+    wanted = sum(1 for one in root.iter(tag("geometry")) if one.find(tag("mesh")) is not None)
+    lost = wanted - len(made.geometries)
+    if lost > 0:
+        raise ValueError(f"{what}: {lost} of {wanted} geometries cannot be read ({_why(made)}); {AGAIN}")
+    libraries = [*root.iter(tag("library_visual_scenes")), *root.iter(tag("library_nodes"))]
+    wanted = sum(1 for one in libraries for kind in ("geometry", "node") for _ in one.iter(tag(f"instance_{kind}")))
+    placed = [node for one in (*made.scenes, made) for top in one.nodes for node in _instances(top)]
+    lost = wanted - len(placed)
+    if lost > 0:
+        raise ValueError(f"{what}: {lost} of {wanted} placed geometries cannot be read ({_why(made)}); {AGAIN}")
+    for geometry in {id(node.geometry): node.geometry for node in placed if hasattr(node, "geometry")}.values():
+        for primitive in geometry.primitives:
+            _check_primitive(primitive, f"{what}, geometry {geometry.id!r:.60}")
+
+
+def _instances(node: Any) -> Iterator[Any]:
+    """Geometries, and other nodes, that a node and its children place; what those nodes hold is listed there."""
+    if hasattr(node, "geometry") or hasattr(node, "node"):
+        yield node
+        return
+    for child in getattr(node, "children", ()):
+        yield from _instances(child)
+
+
+def _why(made: Any) -> str:
+    return f"{made.errors[0]!s:.120}" if made.errors else "a reference to what is not there"
+
+
+def _check_primitive(primitive: Any, where: str) -> None:
+    if getattr(primitive, "vertex_index", None) is None:
+        return
+    index = np.asarray(primitive.vertex_index, np.int64)
+    if (index < 0).any():
+        raise ValueError(f"{where}: a face names vertex {index.min()} of {len(primitive.vertex)}; {AGAIN}")
+    if not hasattr(primitive, "vcounts"):
+        return
+    corners = np.asarray(primitive.vcounts, np.int64)
+    if (corners < 3).any():
+        at = int(np.argmax(corners < 3))
+        raise ValueError(f"{where}: face {at} has {corners[at]} corners, wanted at least 3; {AGAIN}")
+    if corners.sum() != len(index):
+        raise ValueError(f"{where}: its faces have {corners.sum()} corners, and it holds {len(index)}; {AGAIN}")
+    wrong = _mesh_checks.wrong_fans(corners, index, np.asarray(primitive.vertex))
+    if wrong:
+        raise ValueError(f"{where}: face {wrong[0]}, of {corners[wrong[0]]} corners, {_mesh_checks.CONCAVE}")

@@ -1,0 +1,266 @@
+"""PLY files (G. Turk, 1994), text and binary: vertices and polygons, each number of the type that its header declares.
+
+trimesh takes the length of the first list for that of all, and lets numbers of text wrap around their declared type.
+"""
+
+from __future__ import annotations
+
+import re
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from . import _mesh_checks
+
+TYPES = {
+    "char": "i1", "uchar": "u1", "short": "i2", "ushort": "u2", "int": "i4", "uint": "u4", "float": "f4",
+    "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
+    "int64": "i8", "uint64": "u8", "float16": "f2", "float32": "f4", "float64": "f8",
+}  # fmt: skip
+HEADER = re.compile(rb"ply[ \t]*\r?\n(.*?)end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
+ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}  # of bytes; text has none
+FACES = ("vertex_index", "vertex_indices")
+PIECE = 2**18  # numbers taken from a binary file at a time, so that the list of their bytes stays small
+PLURAL = {"face": "faces", "vertex": "vertices"}
+
+
+@dataclass
+class _Property:
+    """type  of its numbers;  count  type of the number of them, None where it is one number, not a list."""
+
+    name: str
+    type: np.dtype
+    count: np.dtype | None
+
+
+@dataclass
+class _Element:
+    """Rows of properties. start (n,): where the numbers of a property begin;  length (n,): how many a list has."""
+
+    name: str
+    rows: int
+    properties: list[_Property] = field(default_factory=list)
+    start: dict[str, np.ndarray] = field(default_factory=dict)
+    length: dict[str, np.ndarray] = field(default_factory=dict)
+
+
+def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
+    """Vertices (n, 3) and triangles (k, 3) of a PLY file, polygons as fans about their first corners.
+
+    ValueError: a damaged file, numbers beyond their declared types, polygons that fans do not cover.
+    """
+    head = HEADER.match(data)
+    if head is None:
+        raise ValueError(f"{what} has no header of a PLY file, from 'ply' to 'end_header': {_mesh_checks.TAKE}")
+    order, elements = _header(head[1].decode("latin-1"), what)
+    body = _Text(data[head.end() :], what) if not order else _Binary(data[head.end() :], order)
+    at = 0
+    for element in elements:
+        at = _place(element, body, at, what)
+    if at != body.size:
+        raise ValueError(f"{what} holds {body.size - at} {body.unit} more than it declares: {_mesh_checks.TAKE}")
+    named = {element.name: element for element in elements if element.rows}
+    for name in named:
+        if name.startswith("tristrip"):
+            raise ValueError(
+                f"{what} has strips of triangles ({name}), which are not read here; export it as triangles"
+            )
+    if "vertex" not in named or "face" not in named:
+        return np.zeros((0, 3)), np.zeros((0, 3), np.int64)
+    vertices = _vertices(named["vertex"], body, what)
+    return vertices, _triangles(named["face"], body, vertices, what)
+
+
+def _header(text: str, what: str) -> tuple[str, list[_Element]]:
+    """(order of bytes, "" for text; the elements)."""
+    order, elements = None, list[_Element]()
+    for line in text.splitlines():
+        words = line.split()
+        if not words or words[0] in ("comment", "obj_info"):
+            continue
+        try:
+            if words[0] == "format" and order is None:
+                order = ORDER[words[1]]
+            elif words[0] == "element" and len(words) == 3 and re.fullmatch("[0-9]{1,18}", words[2]):
+                elements.append(_Element(words[1], int(words[2])))
+            elif words[0] == "property" and words[1] == "list" and len(words) == 5:
+                elements[-1].properties.append(_Property(words[4], _type(words[3]), _type(words[2])))
+            elif words[0] == "property" and len(words) == 3:
+                elements[-1].properties.append(_Property(words[2], _type(words[1]), None))
+            else:
+                raise KeyError
+        except (KeyError, IndexError):
+            raise ValueError(
+                f"{what}: {line.strip()!r:.60} is no line of the header of a PLY file, wanted a format, element, "
+                f"property or comment: {_mesh_checks.TAKE}"
+            ) from None
+    if order is None:
+        raise ValueError(f"{what} has no line 'format' in its header: {_mesh_checks.TAKE}")
+    return order, elements
+
+
+def _type(name: str) -> np.dtype:
+    return np.dtype(TYPES[name])
+
+
+class _Text:
+    """Numbers of a text file; places count numbers."""
+
+    unit = "numbers"
+
+    def __init__(self, body: bytes, what: str) -> None:
+        words = body.split()
+        try:
+            self.numbers = np.array(words, "S").astype(np.float64) if words else np.zeros(0)
+        except ValueError as exc:
+            raise ValueError(f"{what} has words that are no numbers ({exc}): {_mesh_checks.TAKE}") from None
+        self.size = len(self.numbers)
+
+    def width(self, type_: np.dtype) -> int:
+        return 1
+
+    def one(self, place: int, type_: np.dtype) -> float:
+        return float(self.numbers[place])
+
+    def take(self, places: np.ndarray, type_: np.dtype) -> np.ndarray:
+        """Numbers as written, floating-point ones rounded to their type."""
+        made = self.numbers[places]
+        with np.errstate(over="ignore"):
+            return made.astype(type_).astype(np.float64) if type_.kind == "f" else made
+
+
+class _Binary:
+    """Numbers of a binary file; places count bytes."""
+
+    unit = "bytes"
+
+    def __init__(self, body: bytes, order: Any) -> None:
+        self.body, self.order, self.size = body, order, len(body)
+        self.bytes = np.frombuffer(body, np.uint8)
+
+    def width(self, type_: np.dtype) -> int:
+        return type_.itemsize
+
+    def one(self, place: int, type_: np.dtype) -> float:
+        return float(np.frombuffer(self.body, type_.newbyteorder(self.order), 1, place)[0])
+
+    def take(self, places: np.ndarray, type_: np.dtype) -> np.ndarray:
+        made = np.empty(len(places), type_)
+        for at in range(0, len(places), PIECE):
+            some = self.bytes[places[at : at + PIECE, None] + np.arange(type_.itemsize)]
+            made[at : at + PIECE] = some.view(type_.newbyteorder(self.order)).reshape(-1)
+        return made
+
+
+def _place(element: _Element, body: _Text | _Binary, at: int, what: str) -> int:
+    """Find where the numbers of an element lie, from `at` on, and where the next element begins.
+
+    Lists of one length make rows of one width; where lengths differ, rows are followed one by one.
+    """
+    least = sum(body.width(p.type if p.count is None else p.count) for p in element.properties)
+    if not element.rows or not least:
+        return at
+    if element.rows * least > body.size - at:
+        raise _short(element, (body.size - at) // least, what)
+    first, lengths, width = {}, {}, 0
+    for p in element.properties:
+        if p.count is not None:
+            lengths[p.name] = _count(element, 0, p, body, at + width, what)
+            width += body.width(p.count)
+        first[p.name] = width
+        width += body.width(p.type) * lengths.get(p.name, 1)
+    rows = np.arange(element.rows, dtype=np.int64)
+    if at + element.rows * width <= body.size and all(
+        (body.take(at + first[p.name] - body.width(p.count) + width * rows, p.count) == lengths[p.name]).all()
+        for p in element.properties
+        if p.count is not None
+    ):
+        element.start = {name: at + place + width * rows for name, place in first.items()}
+        element.length = {name: np.full(element.rows, n) for name, n in lengths.items()}
+        return at + element.rows * width
+    element.start = {p.name: np.empty(element.rows, np.int64) for p in element.properties}
+    element.length = {p.name: np.empty(element.rows, np.int64) for p in element.properties if p.count is not None}
+    for row in range(element.rows):
+        for p in element.properties:
+            n = 1
+            if p.count is not None:
+                n = element.length[p.name][row] = _count(element, row, p, body, at, what)
+                at += body.width(p.count)
+            element.start[p.name][row] = at
+            at += n * body.width(p.type)
+        if at > body.size:
+            raise _short(element, row, what)
+    return at
+
+
+def _count(element: _Element, row: int, p: _Property, body: _Text | _Binary, at: int, what: str) -> int:
+    """The length of a list."""
+    if p.count is None or at + body.width(p.count) > body.size:
+        raise _short(element, row, what)
+    given = body.one(at, p.count)
+    largest = np.iinfo(p.count).max if p.count.kind in "iu" else 2.0**31
+    if not (0 <= given <= largest and given == int(given)):
+        raise ValueError(
+            f"{what}: {element.name} {row} has {given:g} {p.name}, wanted a whole number from 0 to {largest:.10g}, the "
+            f"largest of the declared type: {_mesh_checks.TAKE}"
+        )
+    if at + body.width(p.count) + int(given) * body.width(p.type) > body.size:
+        raise _short(element, row, what)
+    return int(given)
+
+
+def _short(element: _Element, rows: int, what: str) -> ValueError:
+    noun = PLURAL.get(element.name, f"rows of {element.name!r:.40}")
+    return ValueError(f"{what} declares {element.rows} {noun} and holds {rows}: {_mesh_checks.TAKE}")
+
+
+def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray:
+    types = {p.name: p.type for p in element.properties if p.count is None}
+    if not {"x", "y", "z"} <= set(types):
+        raise ValueError(
+            f"{what} has vertices of {', '.join(types) or 'nothing'}, wanted x, y and z: {_mesh_checks.TAKE}"
+        )
+    made = [_whole(body.take(element.start[name], types[name]), types[name], name, what) for name in "xyz"]
+    return np.stack(made, axis=1).astype(np.float64)
+
+
+def _triangles(element: _Element, body: _Text | _Binary, vertices: np.ndarray, what: str) -> np.ndarray:
+    lists = [p for p in element.properties if p.count is not None]
+    p = next((p for p in lists if p.name in FACES), lists[0] if len(lists) == 1 else None)
+    if p is None:
+        raise ValueError(f"{what} has faces without a list {' or '.join(FACES)}: {_mesh_checks.TAKE}")
+    corners = element.length[p.name]
+    if (corners < 3).any():
+        at = int(np.argmax(corners < 3))
+        raise ValueError(f"{what}: face {at} has {corners[at]} corners, wanted at least 3: {_mesh_checks.TAKE}")
+    begin = np.cumsum(corners) - corners
+    within = np.arange(int(corners.sum())) - np.repeat(begin, corners)
+    given = body.take(np.repeat(element.start[p.name], corners) + within * body.width(p.type), p.type)
+    owner = np.repeat(np.arange(element.rows), corners)
+    wrong = ~((given >= 0) & (given < len(vertices)))
+    if wrong.any():
+        at = int(np.argmax(wrong))
+        raise ValueError(
+            f"{what}: face {owner[at]} names vertex {given[at]:.20g} of {len(vertices)}: {_mesh_checks.TAKE}"
+        )
+    index = _whole(given, p.type, p.name, what).astype(np.int64)
+    wrong_faces = _mesh_checks.wrong_fans(corners, index, vertices)
+    if wrong_faces:
+        raise ValueError(f"{what}: face {wrong_faces[0]}, of {corners[wrong_faces[0]]} corners, {_mesh_checks.CONCAVE}")
+    return _mesh_checks.fans(corners, index)
+
+
+def _whole(given: np.ndarray, type_: np.dtype, name: str, what: str) -> np.ndarray:
+    """`given`; ValueError for numbers of text that do not fit the whole-number type that is declared for them."""
+    if type_.kind == "f" and name in "xyz":
+        return given
+    low, high = (np.iinfo(type_).min, np.iinfo(type_).max) if type_.kind in "iu" else (-np.inf, np.inf)
+    wrong = ~((given >= low) & (given <= high))
+    wrong[~wrong] = given[~wrong] != np.rint(given[~wrong])
+    if wrong.any():
+        raise ValueError(
+            f"{what}: {name} {given[np.argmax(wrong)]:.10g} does not fit its type, whole numbers from {low:.10g} to "
+            f"{high:.10g}, which the header declares: {_mesh_checks.TAKE}"
+        )
+    return given
