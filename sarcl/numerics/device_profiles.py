@@ -15,7 +15,7 @@ from ..opencl.device import Device
 from ..opencl.fft_batches import Batches
 from . import range_profiles
 from .interpolation import Interpolator
-from .weighted_samples import sums_hold
+from .weighted_samples import bound_of_held
 
 SINGLE = {"REAL64": 0, "FROM64": 0}  # macros of the kernels
 
@@ -64,7 +64,7 @@ class DeviceProfiles:
         A bound, several orders of magnitude below what the host can sum: what fails it, the host must do.
         """
         weights = float(np.abs(row_weight).max()), self._largest
-        return sums_hold(self.device, samples, weights, self.n_samples, self.dtype)
+        return bound_of_held(self.device, samples, weights, self.n_samples, self.dtype) is not None
 
     def weights(self, row_weight: np.ndarray) -> np.ndarray:
         """Weights of rows (n,) as `make` takes them in a buffer."""

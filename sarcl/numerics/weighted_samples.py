@@ -28,22 +28,23 @@ def largest_part(samples: np.ndarray) -> float:
     return max(float(parts.max()), -float(parts.min()))
 
 
-def sums_hold(
+def bound_of_held(
     device: Device, samples: np.ndarray, weights: tuple[float, float], n: int, dtype: type[np.complexfloating]
-) -> bool:  # fmt: skip
-    """Whether a device can sum n finite samples of this type, times weights, in numbers of `dtype`.
+) -> float | None:  # fmt: skip
+    """A modulus that no finite sample times its weights exceeds; None where a device may not sum n of them in `dtype`.
 
     weights  largest of rows and of samples
-    A bound, several orders of magnitude below what the host can sum: what fails it, the host must do.
+    The limit is several orders of magnitude below what the host can sum: what exceeds it, the host must do.
     """
     if samples.dtype == np.complex128:
         if not device.info.fp64:
-            return False
+            return None
     elif samples.dtype != np.complex64:
-        return False
+        return None
     if not all(w == 0 or 1 / WEIGHTS <= w <= WEIGHTS for w in weights):
-        return False
-    return 1.5 * largest_part(samples) * weights[0] * weights[1] * n <= LARGEST[dtype] / SPARE
+        return None
+    bound = 1.5 * largest_part(samples) * weights[0] * weights[1]
+    return bound if bound * n <= LARGEST[dtype] / SPARE else None
 
 
 class WeightedSamples:
@@ -62,15 +63,15 @@ class WeightedSamples:
         self._energies = device.kernel("weighted_samples.cl", "energies", FROM64=0)
         self._n_rows, self._sums, self._scales = n_rows, None, np.zeros(n_rows)
 
-    def holds(self, samples: np.ndarray, row_weight: np.ndarray) -> bool:
-        """Whether the device can sum samples (n, n_samples) with weights (n,): by their types and sizes.
+    def bound(self, samples: np.ndarray, row_weight: np.ndarray) -> float | None:
+        """A modulus that no weighted sample of rows (n, n_samples) with weights (n,) exceeds; None: the host's rows.
 
-        Faint samples are the host's too, which refuses those that complex64 does not hold (`check_digits`).
+        Those that the device may not sum, by their types and sizes, and faint ones: the host refuses samples whose
+        digits complex64 does not hold (`check_digits`).
         """
         weights = float(np.abs(row_weight).max()), self._largest
-        if 0 < 1.5 * largest_part(samples) * weights[0] * weights[1] < FAINT:
-            return False
-        return sums_hold(self.device, samples, weights, self.n_terms, np.complex64)
+        bound = bound_of_held(self.device, samples, weights, self.n_terms, np.complex64)
+        return None if bound is not None and 0 < bound < FAINT else bound
 
     def make(
         self, pipeline: Pipeline, samples: np.ndarray, row_weight: np.ndarray, cycles: tuple[np.ndarray, np.ndarray],

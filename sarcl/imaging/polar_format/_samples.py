@@ -8,7 +8,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...numerics.range_profiles import LARGEST
-from ...numerics.weighted_samples import WeightedSamples, largest_part
+from ...numerics.weighted_samples import WeightedSamples
 from ...opencl import fft
 from ...opencl.device import Device
 from ...opencl.pipeline import Pipeline
@@ -44,11 +44,11 @@ class WeightedRows:
             self._out, self._rows = None, stop - start  # frees the smaller buffer first
             self._out = self.device.empty(8 * self._rows * raw.n_samples)
         samples, weights = raw.read(start, stop), self.task.row_weight[rows]
-        if self._weigher.holds(samples, weights):
+        bound = self._weigher.bound(samples, weights)
+        if bound is not None:
             self._weigher.make(pipeline, samples, weights, self._cycles(rows), self._out, 0)
-            most = 1.5 * largest_part(samples) * float(weights.max()) * float(self.task.sample_weight.max())
-            self.largest = max(self.largest, most)
-            self._weigher.add_energy(self._out, 0, rows, most)
+            self.largest = max(self.largest, bound)
+            self._weigher.add_energy(self._out, 0, rows, bound)
         else:
             self.held = False
             self.device.write(self._out, self._on_host(start, stop))

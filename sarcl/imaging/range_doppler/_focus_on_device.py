@@ -18,7 +18,7 @@ from ...base.stage_timer import Clock
 from ...model.phase_history import PhaseHistory
 from ...numerics.range_profiles import check_digits
 from ...numerics.transforms import Transforms
-from ...numerics.weighted_samples import WeightedSamples, sums_hold
+from ...numerics.weighted_samples import WeightedSamples, bound_of_held
 from ...opencl.device import Device
 from ...opencl.fft_batches import Batches
 from ...opencl.pipeline import SLOTS, Pipeline
@@ -174,7 +174,7 @@ def _refer(
         for start in range(0, raw.n_rows, at_once):
             stop = min(start + at_once, raw.n_rows)
             samples, along = raw.read(start, stop), weights[1][start:stop]
-            if not weigher.holds(samples, along):
+            if weigher.bound(samples, along) is None:
                 return False
             pipeline.new_block()
             weigher.make(pipeline, samples, along, turns(raw, start, stop, plan.center), rows.buffer, start)
@@ -193,7 +193,7 @@ def _refer_on_host(
         stop = min(start + PIECE, raw.n_rows)
         made, here = referenced(raw, start, stop, plan.center, weights)
         rows.host[start:stop], largest = made, max(largest, here)
-        if not sums_hold(device, made, (1.0, 1.0), weigher.n_terms, np.complex64):
+        if bound_of_held(device, made, (1.0, 1.0), weigher.n_terms, np.complex64) is None:
             return False
     check_digits(largest)
     return True
