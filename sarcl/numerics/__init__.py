@@ -7,6 +7,7 @@ For other folders:
     double_double           double-double arithmetic: sums, products and quotients with their rounding errors
     error_bounds            error bounds of the kernels
     interpolation           interpolation kernels for range profiles
+    interpolator_choice     the cheapest interpolation kernel that meets an error
     nufft2d                 two-dimensional nonuniform FFT of type 1
     plan                    the cheapest plan that meets a tolerance, and its predicted error
     polynomials             Lagrange polynomials, Chebyshev nodes
@@ -30,6 +31,7 @@ __all__ = [
     "double_double",
     "error_bounds",
     "interpolation",
+    "interpolator_choice",
     "nufft2d",
     "plan",
     "polynomials",

@@ -1,4 +1,4 @@
-"""Short interpolation kernels for range profiles in float32 and float64: weights, transforms, errors, cheapest choice.
+"""Short interpolation kernels for range profiles in float32 and float64: weights, transforms, errors.
 
 docs/theory/accuracy.md derives the errors; tests/numerics/test_accuracy.py measures them.
 """
@@ -12,23 +12,15 @@ from typing import Any
 
 import numpy as np
 
-from ..base.errors import ToleranceUnreachable
-from ..base.tolerances import rounded_up
-from ..opencl import fft
-from . import cost_model
 from .polynomials import chebyshev
 
 MARGIN = 1.06  # factor on errors that are taken on a grid of frequencies and positions
-OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 10, 12, 16, 20, 24, 32, 48, 64)
-LONGEST = 2**18  # samples of a profile that is oversampled to spare taps
 # Polynomial terms of each half (even, odd) of a tap's weight, by taps: the error of the fit is below the kernel's.
 TERMS = {2: 1, 4: 4, 6: 5, 8: 6}
 FITS = 12  # of the polynomials with as few terms as taps allow: their error no longer falls
 # The same for lines of pixels, whose weights are not deconvolved.
 LINE_TERMS = {2: 2, 4: 3, 6: 4, 8: 5}
-# Choices in float64, where each kernel takes as few of these terms as its error allows.
-FLOAT64_TAPS, FLOAT64_TERMS = (4, 6, 8, 10, 12, 14), (3, 4, 5, 6, 7)
-FLOAT64_OVERSAMPLE = (1.5, 2, 2.5, 3, 4, 5, 6, 8, 12, 16)
+FLOAT64_TERMS = (3, 4, 5, 6, 7)  # in float64 each kernel takes as few of these as its error allows
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,6 +114,18 @@ def fitted(taps: int, oversample: float) -> Interpolator:
     table = table.astype(np.float32)
     nu = np.linspace(0, 0.5 / oversample, 33)
     return Interpolator(taps, oversample, table, _largest_error(table, nu, _transform(table, nu)))
+
+
+def lower_bound(taps: int, oversample: float) -> float:
+    """A lower bound on the error of `interpolator`, known before its table: most candidates need no table.
+
+    The kernel's transform at the first alias of the band's edge, over that at the edge itself: of the hat
+    (nu/(1 - nu))^2 with nu = 1/(2 oversample), of a Kaiser-Bessel kernel s/sinh(s), s = pi taps sqrt(1 - 1/oversample).
+    """
+    if taps == 2:
+        return float(1 / (2 * oversample - 1) ** 2)
+    s = np.pi * taps * np.sqrt(1 - 1 / oversample)
+    return float(s / np.sinh(s))
 
 
 def fitted_lower_bound(taps: int, oversample: float) -> float:
@@ -247,93 +251,3 @@ def _transform(table: np.ndarray, nu: np.ndarray) -> np.ndarray:
     distance = z[:, None] + (taps - 1) / 2 - np.arange(taps)
     waves = np.cos(2 * np.pi * nu[..., None, None] * distance)
     return np.asarray((waves * kernel).sum(axis=(-1, -2)))
-
-
-def profile_length(oversample: float, n_samples: int, taps: int) -> int:
-    """The shortest even length with a fast FFT for rows of n_samples; an even length puts delay 0 on a sample.
-
-    One sample has no bandwidth, but a profile of a few samples keeps its taps apart.
-    """
-    return 2 * fft.good_length(max(int(np.ceil(oversample * n_samples / 2)), 2 * taps))
-
-
-@functools.lru_cache(maxsize=256)
-def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
-    """Taps, oversampling and profile length of every interpolator for rows of n_samples."""
-    out = []
-    for taps in TERMS:
-        for oversample in OVERSAMPLE:
-            length = profile_length(oversample, n_samples, taps)
-            while not off_carrier(length, carrier):
-                length = 2 * fft.good_length(length // 2 + 1)
-            if length <= max(LONGEST, 2 * n_samples * taps):
-                out.append((taps, float(oversample), length))
-    return tuple(out)
-
-
-def lower_bound(taps: int, oversample: float) -> float:
-    """A lower bound on the error of `interpolator`, known before its table: most candidates need no table.
-
-    The kernel's transform at the first alias of the band's edge, over that at the edge itself: of the hat
-    (nu/(1 - nu))^2 with nu = 1/(2 oversample), of a Kaiser-Bessel kernel s/sinh(s), s = pi taps sqrt(1 - 1/oversample).
-    """
-    if taps == 2:
-        return float(1 / (2 * oversample - 1) ** 2)
-    s = np.pi * taps * np.sqrt(1 - 1 / oversample)
-    return float(s / np.sinh(s))
-
-
-@functools.lru_cache(maxsize=256)
-def least_error(n_samples: int, carrier: float = 0.0) -> float:
-    """The smallest error that `choose_interpolator` can meet, for rows of n_samples."""
-    least = np.inf
-    for bound, taps, oversample in sorted((lower_bound(t, s), t, s) for t, s, _ in _candidates(n_samples, carrier)):
-        if bound < least:
-            least = min(least, interpolator(taps, oversample).error)
-    return least
-
-
-@functools.lru_cache(maxsize=4096)
-def choose_interpolator(
-    error: float,
-    n_samples: int,
-    pairs_per_row: float,
-    carrier: float = 0.0,
-    gathering: cost_model.Gathering = cost_model.ON_CPU,
-) -> tuple[Interpolator, int, float]:
-    """The cheapest interpolator whose error is at most `error`, the profile length it needs, and its cost.
-
-    The cost of a contribution is in units of one with the hat; making profiles is counted in.
-
-    n_samples      samples of a row before oversampling
-    pairs_per_row  contributions read from a row: they weigh the cost of taps against that of the FFT
-    gathering      costs of taps on the devices that read the rows, and the kernels that they read with
-    carrier        centre frequency in steps between samples, for evenly spaced scatterers: see off_carrier
-    The choice never depends on memory, so that results do not.
-    ToleranceUnreachable names the smallest error that can be met.
-    """
-
-    def cost(candidate: tuple[int, float, int]) -> float:
-        taps, oversample, length = candidate
-        return pairs_per_row * gathering.of_taps(taps, oversample) + cost_model.profile(length)
-
-    families = [(lower_bound, interpolator)]
-    if gathering.fitted:
-        families.insert(0, (fitted_lower_bound, fitted))
-    for taps, oversample, length in sorted(_candidates(n_samples, carrier), key=cost):
-        for least_of, make in families:
-            if least_of(taps, oversample) <= error:
-                made = make(taps, oversample)
-                if made.error <= error:
-                    return made, length, cost((taps, oversample, length)) / pairs_per_row
-    least = rounded_up(least_error(n_samples, carrier))
-    raise ToleranceUnreachable(error, least, "interpolation of float32 range profiles")
-
-
-def off_carrier(length: int, carrier: float) -> bool:
-    """Whether no image of a kernel, one profile rate from the next, lies within a quarter of that from the carrier.
-
-    At an image evenly spaced scatterers, such as the pieces of a plate, add up although they cancel at the carrier.
-    """
-    images = carrier / length
-    return abs(images - max(round(images), 1)) >= 0.25

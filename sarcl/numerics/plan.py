@@ -11,7 +11,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import ToleranceUnreachable
 from ..base.tolerances import rounded_up
-from . import cost_model, error_bounds, interpolation
+from . import cost_model, error_bounds, interpolator_choice
 from .interpolation import Interpolator
 
 LEAST_TOLERANCE = 1e-6  # smallest tolerance of complex64 results
@@ -87,7 +87,7 @@ def cheapest(
     tiles        choices of (points per tile, radius of the largest tile in m)
     distance     smallest from an antenna to the scene, m; frequency the highest, Hz
     chunk        rows or points summed in float32; least_tolerance: a tolerance below it is refused
-    carrier      Hz, from which images of the kernel keep away (interpolation.off_carrier); 0: no such condition
+    carrier      Hz, from which images of the kernel keep away (interpolator_choice.off_carrier); 0: no such condition
     image_gain   factor on the interpolator's error, for scatterers on which the images of its kernel add up
     gathering    costs on the devices that follow the plan
     native_error  of their own sine and cosine, rad, which the plan takes; None: it takes polynomials
@@ -103,7 +103,7 @@ def cheapest(
                 if fixed > FIXED * tolerance:
                     continue
                 try:
-                    interpolator, length, cost = interpolation.choose_interpolator(
+                    interpolator, length, cost = interpolator_choice.choose_interpolator(
                         (tolerance - fixed) / image_gain, n_samples, points_per_row, steps, gathering
                     )
                 except ToleranceUnreachable:  # another range mode may leave more of the tolerance to the interpolator
@@ -125,7 +125,7 @@ def cheapest(
 
 
 def carrier_steps(carrier: float, n_samples: int, bandwidth: float) -> float:
-    """A carrier, Hz, in steps between the n_samples of a band, Hz: as interpolation.off_carrier takes it."""
+    """A carrier, Hz, in steps between the n_samples of a band, Hz: as interpolator_choice.off_carrier takes it."""
     return carrier * n_samples / bandwidth if bandwidth else 0.0
 
 
@@ -135,7 +135,7 @@ def least(n_samples: int, chunk: int, steps: float = 0.0) -> float:
     Ranges in wide numbers have the smallest error, and the same one in a tile of any size.
     """
     fixed = error_bounds.range_error(0.0, np.inf, 0.0, 0.0, 2, 0) + error_bounds.sum_rounding(chunk, n_samples)
-    return float(max(fixed / FIXED, fixed + interpolation.least_error(n_samples, steps)) * (1 + 1e-9))
+    return float(max(fixed / FIXED, fixed + interpolator_choice.least_error(n_samples, steps)) * (1 + 1e-9))
 
 
 def skips(skip: Any, known: tuple[str, ...]) -> set[str]:

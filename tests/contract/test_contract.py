@@ -12,7 +12,7 @@ from helpers.contract_cases import build, draw
 import sarcl
 from sarcl.bench._exact import backproject as quick_sum
 from sarcl.imaging.direct import direct, line_plan
-from sarcl.numerics import interpolation
+from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.opencl.choose_device import open_device
 
 SLOW = pytest.mark.slow
@@ -86,8 +86,8 @@ def test_a_formula_four_times_too_small_breaks_the_contract(monkeypatch):
 
 
 def clear_choices():
-    interpolation.choose_interpolator.cache_clear()
-    interpolation.least_error.cache_clear()
+    interpolator_choice.choose_interpolator.cache_clear()
+    interpolator_choice.least_error.cache_clear()
 
 
 def hold_worst(tolerance):

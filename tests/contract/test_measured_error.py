@@ -11,7 +11,7 @@ from helpers.cases import noise_history
 
 import sarcl
 from sarcl.imaging.direct import line_plan
-from sarcl.numerics import interpolation
+from sarcl.numerics import interpolation, interpolator_choice
 from sarcl.reference.backproject import backproject as exact
 from sarcl.reference.geometry import half_path
 
@@ -52,8 +52,8 @@ def too_small(monkeypatch):
 
 
 def clear_choices():
-    interpolation.choose_interpolator.cache_clear()
-    interpolation.least_error.cache_clear()
+    interpolator_choice.choose_interpolator.cache_clear()
+    interpolator_choice.least_error.cache_clear()
 
 
 def test_a_tolerance_that_was_missed_is_an_error_that_keeps_the_image(too_small, tmp_path):

@@ -250,9 +250,9 @@ PLANTED = {
     ),
     "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW, PLANE)),
     "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(RAW, PLANE)),
-    "interpolator": ("sarcl.numerics.interpolation.choose_interpolator", lambda: sarcl.backproject(RAW, LISTED)),
+    "interpolator": ("sarcl.numerics.interpolator_choice.choose_interpolator", lambda: sarcl.backproject(RAW, LISTED)),
     "interpolator of lines": (
-        "sarcl.numerics.interpolation.choose_interpolator",
+        "sarcl.numerics.interpolator_choice.choose_interpolator",
         lambda: sarcl.backproject(RAW, PLANE),
     ),
     "float64": ("sarcl.imaging.float64.plan.make_plan", lambda: sarcl.backproject(RAW, PLANE, tolerance=1e-8)),

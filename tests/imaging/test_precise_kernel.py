@@ -12,7 +12,7 @@ from helpers.cases import noise_history
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.float64._pulse_records import packed
 from sarcl.imaging.focusing_task import geometry_of
-from sarcl.numerics import error_bounds, interpolation
+from sarcl.numerics import error_bounds, interpolation, interpolator_choice
 from sarcl.opencl import _programs, fft
 from sarcl.reference.interp import interpolate
 
@@ -127,10 +127,10 @@ def test_taps_never_leave_their_row(double, monkeypatch):
     assert first.min() >= -40 and first.max() + 8 + 3 <= 60
 
 
-@pytest.mark.parametrize("taps", interpolation.FLOAT64_TAPS)
+@pytest.mark.parametrize("taps", interpolator_choice.FLOAT64_TAPS)
 def test_errors_of_kernels_are_within_their_prediction(taps):
     random = np.random.default_rng(taps)
-    for oversample in interpolation.FLOAT64_OVERSAMPLE:
+    for oversample in interpolator_choice.FLOAT64_OVERSAMPLE:
         made = interpolation.interpolator_float64(taps, float(oversample))
         z = random.uniform(-0.5, 0.5, 300)
         place = np.arange(taps) - (taps - 1) / 2

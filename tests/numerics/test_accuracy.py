@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from sarcl.base import constants, float_pairs
-from sarcl.numerics import cost_model, error_bounds, interpolation, nufft2d, range_profiles
+from sarcl.numerics import cost_model, error_bounds, interpolation, interpolator_choice, nufft2d, range_profiles
 from sarcl.numerics.interpolation import fitted, interpolator
 
 
@@ -44,7 +44,7 @@ def test_more_taps_and_finer_profiles_reduce_the_error():
 
 @pytest.mark.parametrize("taps", interpolation.TERMS)
 def test_the_lower_bound_of_an_interpolation_error_is_below_it_and_close(taps):
-    for oversample in (*interpolation.OVERSAMPLE, *nufft2d.OVERSAMPLE):
+    for oversample in (*interpolator_choice.OVERSAMPLE, *nufft2d.OVERSAMPLE):
         bound, error = interpolation.lower_bound(taps, oversample), interpolator(taps, float(oversample)).error
         assert bound <= error <= 5 * bound
 
@@ -60,7 +60,7 @@ def test_fitted_kernels_have_smaller_errors_with_half_the_terms_than_kaiser_bess
 
 @pytest.mark.parametrize("taps", interpolation.TERMS)
 def test_the_lower_bound_of_fitted_kernels_is_below_their_error(taps):
-    for oversample in map(float, interpolation.OVERSAMPLE):
+    for oversample in map(float, interpolator_choice.OVERSAMPLE):
         bound, error = interpolation.fitted_lower_bound(taps, oversample), fitted(taps, oversample).error
         assert bound <= error
         if taps == 4:  # where the degree of the polynomials decides
@@ -69,8 +69,8 @@ def test_the_lower_bound_of_fitted_kernels_is_below_their_error(taps):
 
 def test_kernels_of_gpus_are_the_cheapest_of_both_families():
     for error in (1e-7, 1e-5, 1e-4, 1e-3):
-        made, length, cost = interpolation.choose_interpolator(error, 1000, 1e6, 0.0, cost_model.ON_GPU)
-        every = [(t, s, n) for t, s, n in interpolation._candidates(1000, 0.0) if fitted(t, s).error <= error]
+        made, length, cost = interpolator_choice.choose_interpolator(error, 1000, 1e6, 0.0, cost_model.ON_GPU)
+        every = [(t, s, n) for t, s, n in interpolator_choice._candidates(1000, 0.0) if fitted(t, s).error <= error]
         costs = [1e6 * cost_model.ON_GPU.of_taps(t, s) + cost_model.profile(n) for t, s, n in every]
         assert made.error <= error and cost * 1e6 == pytest.approx(min(costs))
         assert (made.taps, made.oversample, length) in every and made.terms == max(made.taps // 2, 1)
@@ -85,11 +85,11 @@ def test_wavefronts_of_long_profiles_cost_more_than_taps():
 
 @pytest.mark.parametrize("n_samples, carrier", [(1, 0.0), (100, 0.0), (3000, 1024.0), (2**19, 0.0)])
 def test_the_choice_is_the_cheapest_of_all_interpolators(n_samples, carrier):
-    every = [(interpolator(t, s), length) for t, s, length in interpolation._candidates(n_samples, carrier)]
+    every = [(interpolator(t, s), length) for t, s, length in interpolator_choice._candidates(n_samples, carrier)]
     least = min(made.error for made, _ in every)
-    assert interpolation.least_error(n_samples, carrier) == least
+    assert interpolator_choice.least_error(n_samples, carrier) == least
     for error in (least, 1e-6, 1e-4, 1e-2, 0.4):
-        made, length, cost = interpolation.choose_interpolator(error, n_samples, 1e5, carrier)
+        made, length, cost = interpolator_choice.choose_interpolator(error, n_samples, 1e5, carrier)
         able = [(m.taps, n) for m, n in every if m.error <= error]
         costs = [1e5 * cost_model.TAPS[taps] + cost_model.profile(n) for taps, n in able]
         assert (made, length) in every and cost * 1e5 == pytest.approx(min(costs))
@@ -148,16 +148,16 @@ def test_a_series_about_a_near_antenna_is_refused():
 
 def test_the_cheapest_interpolator_meets_its_share_and_the_impossible_is_named():
     for error in (1e-1, 1e-2, 1e-3, 1e-4, 1e-5, 1e-6):
-        made, length, _ = interpolation.choose_interpolator(error, 1000, 1e6)
+        made, length, _ = interpolator_choice.choose_interpolator(error, 1000, 1e6)
         assert made.error <= error
         assert length >= made.oversample * 1000 and length % 2 == 0
     with pytest.raises(ValueError, match="the best here is"):
-        interpolation.choose_interpolator(1e-12, 1000, 1e6)
+        interpolator_choice.choose_interpolator(1e-12, 1000, 1e6)
 
 
 def test_spreading_is_the_adjoint_of_interpolation_profiles(device):
     random = np.random.default_rng(2)
-    made, length, _ = interpolation.choose_interpolator(1e-4, 37, 1e3)
+    made, length, _ = interpolator_choice.choose_interpolator(1e-4, 37, 1e3)
     pad = range_profiles.padding(made)
     samples = (random.standard_normal((3, 37)) + 1j * random.standard_normal((3, 37))).astype(np.complex64)
     rows = random.standard_normal((3, length + 2 * pad)) + 1j * random.standard_normal((3, length + 2 * pad))
@@ -170,8 +170,8 @@ def test_spreading_is_the_adjoint_of_interpolation_profiles(device):
 @pytest.mark.parametrize("carrier", [0.0, 1.3, 40.0, 1024.0, 1e4, 3.21e7])
 @pytest.mark.parametrize("error", [1e-1, 1e-3, 1e-5])
 def test_images_keep_off_the_carrier(error, carrier):
-    made, length, _ = interpolation.choose_interpolator(error, 64, 1e6, carrier)
+    made, length, _ = interpolator_choice.choose_interpolator(error, 64, 1e6, carrier)
     assert made.error <= error
     nearest = np.abs(carrier - length * np.arange(1, carrier / length + 2)).min()
     assert nearest >= 0.25 * length
-    assert length <= 1.6 * interpolation.choose_interpolator(error, 64, 1e6)[1]
+    assert length <= 1.6 * interpolator_choice.choose_interpolator(error, 64, 1e6)[1]

@@ -13,7 +13,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...base.rows import spread_over
 from ...model.image_grid import ImageGrid
-from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics import cost_model, error_bounds, interpolation, interpolator_choice
 from ...numerics.cost_model import DeviceClass
 from ...numerics.interpolation import Interpolator
 from ...numerics.pulse_geometry import PulseGeometry
@@ -280,10 +280,10 @@ def series(tolerance: float, radius: float, distance: float, highest: float) -> 
 
 
 def profile_interpolator(error: float, n_samples: int, reads: float) -> tuple[Interpolator, int, float] | None:
-    """As interpolation.choose_interpolator; None where it finds nothing: other lines may leave more to the
+    """As interpolator_choice.choose_interpolator; None where it finds nothing: other lines may leave more to the
     interpolator."""
     try:
-        return interpolation.choose_interpolator(error, n_samples, reads)
+        return interpolator_choice.choose_interpolator(error, n_samples, reads)
     except ToleranceUnreachable:
         return None
 

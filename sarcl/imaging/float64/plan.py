@@ -11,7 +11,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import askable, rounded_up
-from ...numerics import cost_model, error_bounds, interpolation
+from ...numerics import cost_model, error_bounds, interpolation, interpolator_choice
 from ...numerics.interpolation import Interpolator
 from .. import profile_energy
 from ..focusing_task import FocusingTask
@@ -118,10 +118,10 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
         for per_tile, tiling in tilings.items()
         for order, cost in cost_model.FLOAT64_SERIES.items()
     ]
-    for taps in interpolation.FLOAT64_TAPS:
-        for oversample in interpolation.FLOAT64_OVERSAMPLE:
-            length = interpolation.profile_length(oversample, raw.n_samples, taps)
-            if length > max(interpolation.LONGEST, 2 * raw.n_samples):
+    for taps in interpolator_choice.FLOAT64_TAPS:
+        for oversample in interpolator_choice.FLOAT64_OVERSAMPLE:
+            length = interpolator_choice.profile_length(oversample, raw.n_samples, taps)
+            if length > max(interpolator_choice.LONGEST, 2 * raw.n_samples):
                 continue
             interpolator = interpolation.interpolator_float64(taps, float(oversample))
             fixed = dark * interpolator.error

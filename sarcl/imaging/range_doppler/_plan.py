@@ -13,7 +13,8 @@ from ...base.errors import ToleranceUnreachable
 from ...base.tolerances import askable, rounded_up
 from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
-from ...numerics.interpolation import Interpolator, choose_interpolator
+from ...numerics.interpolation import Interpolator
+from ...numerics.interpolator_choice import choose_interpolator
 from ...opencl import fft
 from ._doppler import EVANESCENT, STEEPEST, Band, delay
 from ._extent import Extent
