@@ -57,9 +57,12 @@ def tile_points(
     order = morton_order(positions) if order is None else order
     n_tiles = -(-len(order) // per_tile)
     order = np.concatenate([order, np.repeat(order[-1:], n_tiles * per_tile - len(order))])
-    local = (positions[order] - center).reshape(n_tiles, per_tile, 3)
-    references = (local.min(axis=1) + local.max(axis=1)) / 2
-    offsets = local - references[:, None]
-    radius = np.sqrt((offsets**2).sum(axis=-1).max(axis=1))
-    packed = float_pairs.wide(offsets.reshape(-1, 3).T).reshape(6, -1)
+    # coordinate by coordinate: reductions along an axis of three, or across one, are slow
+    local = np.empty((3, n_tiles, per_tile))
+    np.subtract(positions[order].T, center[:, None], out=local.reshape(3, -1))
+    references = (local.min(axis=2) + local.max(axis=2)) / 2
+    offsets = local - references[:, :, None]
+    radius = np.sqrt((offsets**2).sum(axis=0).max(axis=1))
+    packed = float_pairs.wide(offsets.reshape(3, -1)).reshape(6, -1)
+    references = np.ascontiguousarray(references.T)
     return Tiles(per_tile, references, radius, packed, shared=False), order

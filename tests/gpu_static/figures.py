@@ -6,10 +6,12 @@ import hashlib
 import json
 import tempfile
 from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import ProcessPoolExecutor, ThreadPoolExecutor
+from multiprocessing import get_context
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import platformdirs
 from gpu_static import compilers, hot_loops, sass, tasks
 from gpu_static.collect import PAPER, WITHOUT_FP64, Use, Variant, collected
@@ -17,6 +19,7 @@ from gpu_static.collect import PAPER, WITHOUT_FP64, Use, Variant, collected
 from sarcl.opencl._programs import source
 
 ROOT = Path(__file__).resolve().parents[2]
+PARTS = 3  # of the tasks of a GPU, each collected by a process
 COUNTED = "sm_90"  # the target whose machine code is counted
 # Figures of one kernel of a variant: {target: {figure: number}}, those that are not zero, or {target: {"error": words}}
 Figures = dict[str, dict[str, Any]]
@@ -72,13 +75,23 @@ def first() -> dict[str, list[str]]:
 def _collect() -> dict[str, Any]:
     """As `variants`: {name of the variant: [tasks, {kernel: work-items per group}]}."""
     out: dict[str, Any] = {}
-    for info, chosen in ((PAPER, tasks.tasks()), (WITHOUT_FP64, tasks.without_fp64())):
-        for variant, use in collected(chosen, info, tasks.UNTIL).items():
-            names, launched = out.setdefault(variant.name, [[], {}])
-            names += use.tasks
-            for kernel, groups in use.groups.items():
-                launched[kernel] = sorted({*launched.get(kernel, []), *groups})
+    parts = [(fp64, part) for fp64 in (True, False) for part in range(PARTS)]
+    with ProcessPoolExecutor(mp_context=get_context("spawn")) as pool:
+        for found in pool.map(_collect_part, parts):
+            for variant, use in found.items():
+                names, launched = out.setdefault(variant.name, [[], {}])
+                names += use.tasks
+                for kernel, groups in use.groups.items():
+                    launched[kernel] = sorted({*launched.get(kernel, []), *groups})
     return out
+
+
+def _collect_part(part: tuple[bool, int]) -> dict[Variant, Use]:
+    """Programs of a part of the tasks, of a GPU with or without float64: (which, number of the part)."""
+    fp64, number = part
+    info, chosen = (PAPER, tasks.tasks()) if fp64 else (WITHOUT_FP64, tasks.without_fp64())
+    names = np.array_split(list(chosen), PARTS)[number].tolist()
+    return collected({name: chosen[name] for name in names}, info, tasks.UNTIL)
 
 
 def _counted(variant: Variant) -> dict[str, Figures]:
