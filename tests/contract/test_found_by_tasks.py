@@ -181,6 +181,7 @@ def test_the_largest_modulus_of_a_sampled_spectrum_is_1():
     assert tone.peak_energy_density == pytest.approx((50 / 1e8) ** 2, rel=1e-12)
 
 
+@pytest.mark.slow
 def test_gains_in_tiles_that_reach_far_beyond_the_grid_keep_their_error():
     """Columns 616 m apart, of which the grid has one: a tile has 32, and its middle lies 9.5 km from the pixels. Seen
     from 15 m, their directions are differences of such positions in float32: off by 2e-5 rad."""
@@ -267,6 +268,7 @@ def test_facets_refused_for_their_number_are_told_so(monkeypatch):
         sarcl.echo(sarcl.shapes.plate((0.3, 0.2)), chirp, track)
 
 
+@pytest.mark.slow
 def test_an_antenna_that_sees_no_pixel_makes_an_image_of_zero(caplog):
     """As an angle does: it was refused, for the gain of an Image that nobody had given."""
     raw = noise_on(straight(6, distance=700.0), n_samples=24)

@@ -125,7 +125,7 @@ print(json.dumps({"bytes": peak() - before, "forecast": sarcl.plan(raw, wide, ma
 
 
 @pytest.mark.skipif(not sys.platform.startswith("linux"), reason="reads /proc")
-@pytest.mark.parametrize("method", ["direct", "factorized"])
+@pytest.mark.parametrize("method", ["direct", pytest.param("factorized", marks=pytest.mark.slow)])
 def test_a_wide_grid_takes_no_more_memory_than_it_was_given(method, tmp_path, pytestconfig):
     """20 million pixels: sums of all would take 330 MB, and fetching them as much again."""
     for _ in range(2):  # a first process may have to compile kernels: the compiler's memory is not the grid's

@@ -72,7 +72,7 @@ def hold_at(few, n, method, device):
     "method, n",
     [
         ("direct", 200_000),
-        ("factorized", 50_000),
+        pytest.param("factorized", 50_000, marks=SLOW),
         pytest.param("direct", 1_000_000, marks=SLOW),
         pytest.param("factorized", 250_000, marks=SLOW),
     ],

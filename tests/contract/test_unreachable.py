@@ -102,7 +102,9 @@ REFUSED = {
 
 
 @pytest.mark.filterwarnings("ignore::sarcl.SarclWarning")
-@pytest.mark.parametrize("name", REFUSED)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if "too many" in n else []) for n in REFUSED]
+)
 def test_a_refusal_is_in_the_numbers_asked_for_and_its_best_works(name, monkeypatch):
     monkeypatch.setattr(
         "sarcl.scattering.facet_plan.MOST_FACETS", 20_000

@@ -58,7 +58,9 @@ def compare(image, raw, g):
     return error, np.abs(image.gain[index] / wanted - 1).max()
 
 
-@pytest.mark.parametrize("name", ANTENNAS)
+@pytest.mark.parametrize(
+    "name", [pytest.param(n, marks=[pytest.mark.slow] if n == "aperture" else []) for n in ANTENNAS]
+)
 def test_the_image_is_the_sum_with_the_conjugate_gains(device, name):
     raw, antenna = noise(), ANTENNAS[name]
     image = sarcl.backproject(raw, GRID, beam=(antenna, TRACK), tolerance=1e-3, device=device)
@@ -68,6 +70,7 @@ def test_the_image_is_the_sum_with_the_conjugate_gains(device, name):
     assert error <= image.report.predicted_error <= 1e-3 and gain <= 1e-4
 
 
+@pytest.mark.slow
 def test_two_antennas_listed_points_and_blocks(device):
     raw, antenna = noise(bistatic=True), ANTENNAS["gaussian"]
     grid = sarcl.ImageGrid.points(GRID.positions + np.random.default_rng(2).uniform(-2, 2, (40, 36, 3)))

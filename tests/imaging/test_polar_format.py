@@ -146,7 +146,7 @@ def test_any_reference_and_any_centre_will_do():
         hold(moved, grid, 1e-4)
 
 
-@pytest.mark.parametrize("tile", [*nufft2d.CELLS, shared_tile.CELLS])
+@pytest.mark.parametrize("tile", [*nufft2d.CELLS, pytest.param(shared_tile.CELLS, marks=pytest.mark.slow)])
 def test_samples_are_spread_as_the_twin_says(device, tile, monkeypatch):
     monkeypatch.setattr(nufft2d, "CELLS", (tile, tile))
     if tile == shared_tile.CELLS:

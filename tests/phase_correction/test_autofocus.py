@@ -182,6 +182,7 @@ def test_bistatic_with_a_receiver_elsewhere():
     assert_as_sharp(better, truth)
 
 
+@pytest.mark.slow
 def test_points_in_speckle_and_noise():
     truth = noisy(echoes(*scatterers(8, 1500, contrast=20, seed=2), arc()), 0.3)
     phase = smooth(N_PULSES, 6, rms=10)

@@ -77,6 +77,7 @@ def test_every_polarisation_of_tilted_facets(device, material, bistatic):
         assert np.linalg.norm(wanted[1]) > 0.01 * np.linalg.norm(wanted[0])
 
 
+@pytest.mark.slow
 def test_rows_are_pulse_by_pulse_and_polarisations_do_not_depend_on_one_another():
     random = np.random.default_rng(4)
     scene = sarcl.Scene.facets(random.uniform(-1, 1, (30, 3, 3)) * [1, 1, 0.3], material=WET, two_sided=True)

@@ -238,6 +238,7 @@ def test_one_carrier_from_few_places_or_element_by_element_is_the_same_to_a_mill
     assert np.linalg.norm(np.asarray(raw.samples) - apart.samples) <= 1e-6 * np.linalg.norm(apart.samples)
 
 
+@pytest.mark.slow
 def test_facets_in_front_of_an_array_of_one_carrier():
     scene, array = (
         shapes.box((0.3, 0.25, 0.2))
