@@ -20,6 +20,7 @@ from .focusing_task import FocusingTask
 
 ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples at most
 ALL = 2**28  # samples up to which every row is read
+IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
 TAPS, FINER, TERMS = 12, 4.0, 6  # of an interpolator with an error of 1e-11
 
 
@@ -95,15 +96,26 @@ def row_norms(task: FocusingTask) -> np.ndarray:
     every = -(-raw.n_rows * raw.n_samples // ALL)
     weight, out = np.repeat(task.sample_weight**2, 2), np.empty(raw.n_rows)
     step = max(1, min(64, 2**20 // raw.n_samples)) if every == 1 else 1
+    at_once = max(1, IN_CACHE // raw.n_samples)
     for start in range(0, raw.n_rows, step * every):
         samples = np.ascontiguousarray(raw.read(start, min(start + step, raw.n_rows)))
-        parts = samples.view(samples.real.dtype).astype(np.float64)
-        largest = float(np.abs(parts).max()) or 1.0  # squares of huge samples overflow
-        parts /= largest
-        norm = largest * np.sqrt(np.square(parts, out=parts) @ weight)
+        norm = np.concatenate([_weighted_norms(samples[at : at + at_once], weight) for at in range(0, step, at_once)])
         out[start : start + step * every] = norm if every == 1 else norm[0]
     _norms[task] = out * task.row_weight
     return _norms[task]
+
+
+def _weighted_norms(samples: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Norms of rows (n, n_samples), float64; weight (2 n_samples,): on the squares of real and imaginary parts."""
+    given = samples.view(samples.real.dtype)
+    largest = max(float(given.max(initial=0.0)), -float(given.min(initial=0.0)))
+    parts = given.astype(np.float64)
+    if 1e-100 < largest < 1e100:
+        largest = 1.0
+    elif largest:  # squares leave the range of float64
+        parts /= largest
+    # einsum, because BLAS starts its threads for a single row
+    return np.asarray(largest * np.sqrt(np.einsum("ij,j->i", np.square(parts, out=parts), weight)))
 
 
 def share(task: FocusingTask) -> float:
