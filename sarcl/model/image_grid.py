@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import validation
+from ..base.boxes import box
 from . import _listed_surface
 
 if TYPE_CHECKING:
@@ -325,7 +326,7 @@ class ImageGrid:
             p = self.listed.reshape(-1, 3) if self.empty is None else self.listed[~self.empty]
         else:
             p = self.at(np.array([0, 0, 1, 1]) * (self.shape[0] - 1), np.array([0, 1, 0, 1]) * (self.shape[1] - 1))
-        return np.stack([p.min(axis=0), p.max(axis=0)])
+        return box(p)
 
     def at(self, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
         """Position, m (..., 3), of (fractional) pixel indices of a plane, or of a grid that `zero_doppler` made."""
@@ -366,6 +367,8 @@ def _side(name: str, value: Any) -> int:
 def _cells(positions: np.ndarray) -> np.ndarray:
     """Positions, m (..., 3), read-only; ValueError for values that are neither finite nor the three NaN of an empty
     cell."""
+    if -FARTHEST < positions.min() and positions.max() < FARTHEST:  # both are NaN where any is
+        return validation.sealed(positions)
     empty = np.isnan(positions).all(axis=-1)
     if empty.all():
         raise ValueError("every cell of the grid is empty (NaN, or not valid); give at least one position")

@@ -101,16 +101,20 @@ class Ground:
         steep = np.linalg.norm(down, axis=1, keepdims=True)
         down = down / steep
         across = sign * np.cross(along, UP) / steep
-        cosine = (height - p[:, 2])[:, None] / (ranges * down[:, 2:])
-        if (np.abs(cosine) > 1).any():
-            i, j = np.argwhere(np.abs(cosine) > 1)[0]
+        fall = ((height - p[:, 2]) / down[:, 2])[:, None]  # along `down`, the cosine times the range
+        short = np.abs(fall) > ranges
+        if short.any():
+            i, j = np.argwhere(short)[0]
             raise ValueError(
                 f"slant range {ranges[j]:.9g} m does not reach the height {height:g} m from {p[i, 2]:.9g} m: give "
                 "ranges=(near, far) beyond it, or the terrain's heights="
             )
-        sine = np.sqrt(1 - cosine**2)
-        turned = cosine[..., None] * down[:, None] + sine[..., None] * across[:, None]
-        return np.asarray(p[:, None] + ranges[:, None] * turned)
+        aside = np.sqrt((ranges - fall) * (ranges + fall))
+        below, out = p + fall * down, np.empty((len(times), len(ranges), 3))
+        for k in range(3):  # coordinate by coordinate: broadcasting over an axis of three is slow
+            np.multiply(aside, across[:, k : k + 1], out=out[..., k])
+            out[..., k] += below[:, k : k + 1]
+        return out
 
 
 def _nodes(axis: np.ndarray, n: int) -> np.ndarray:
