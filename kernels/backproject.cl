@@ -46,7 +46,7 @@
 #define WEIGHING , place[p], taper, from, inverse
 #elif WEIGHT
 #define WEIGHING_OF , float of_row, __global const float *restrict of_axes, __global const float *restrict patterns, int second
-#define WEIGHING , row_weight[p], axes + 18 * (size_t)p, patterns, second
+#define WEIGHING , row_weight[p], axes + 18 * (size_t)p, patterns, given.second
 #else
 #define WEIGHING_OF
 #define WEIGHING
@@ -109,6 +109,12 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
     }
 }
 
+typedef struct {
+    ulong pixels, local_offset;
+    int stride, origin, n, n_used, n_tiles, first, n_offsets, offset_step, second;
+    float magic;
+} backproject_numbers;
+
 // global size (work-items per tile, tiles of this block), local size (work-items per tile, 1)
 //   profiles    (n, stride, 2)         complex range profiles; delay 0 stands at sample `origin`
 //   table                              interpolation weights, see interp.clh
@@ -121,39 +127,37 @@ static inline void add_pulse(int crossing, RECORD record, __global const float *
 //   skipped     (tiles)                pulses in whose window no pixel of the tile is; not used where LOCAL
 //               BEAM: (2, tiles)       and those in whose window they are, but not in the beam
 //   magic         1.5 2^23 times the step of the offsets' high parts, a power of two, m; where RANGE is 3
+//   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
 //   place         (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
 //   row_weight    (n_used), axes (n_used, 18), patterns, second: as in gains.clh; where WEIGHT is 2 or 3
-//   local_offset  complex number of `profiles` where the first tile's begin, where LOCAL
-__kernel void backproject(__global const float *restrict profiles, int stride, int origin,
-                          __global const float *restrict table, __global const float *restrict pulse, int n,
-                          int n_used, __global const float *restrict constants,
-                          __global const float *restrict tile, int n_tiles, int first,
-                          __global const float *restrict offsets, int n_offsets, int offset_step,
-                          __global float *restrict image, ulong pixels, __global int *restrict skipped, ulong local_offset
-#if RANGE == 3
-                          , float magic
-#endif
+__kernel void backproject(backproject_numbers given, __global const float *restrict profiles,
+                          __global const float *restrict table, __global const float *restrict pulse,
+                          __global const float *restrict constants, __global const float *restrict tile,
+                          __global const float *restrict offsets, __global float *restrict image,
+                          __global int *restrict skipped
 #if WEIGHT == 1
                           , __global const float *restrict place, __global const float *restrict taper,
                           __global const float *restrict aperture
 #elif WEIGHT
                           , __global const float *restrict row_weight, __global const float *restrict axes,
-                          __global const float *restrict patterns, int second
+                          __global const float *restrict patterns
 #endif
                           ) {
 #if LOCAL
-    profiles += 2 * (local_offset + (size_t)get_global_id(1) * n_used * stride);
+    profiles += 2 * (given.local_offset + (size_t)get_global_id(1) * given.n_used * given.stride);
 #endif
-    int k = first + get_global_id(1), per_tile = get_global_size(0) * VECTORS;
+    int n = given.n, n_used = given.n_used, stride = given.stride, origin = given.origin;
+    int k = given.first + get_global_id(1), per_tile = get_global_size(0) * VECTORS;
     __global const float *c = constants + get_global_id(1) * (size_t)n * N_CONST;
     offset x[VECTORS];
 #pragma unroll
     for (int r = 0; r < VECTORS; r++) {
-        x[r] = load_offset(offsets, (size_t)k * offset_step + VECTOR(r), n_offsets);
+        size_t at = (size_t)k * given.offset_step + VECTOR(r);
+        x[r] = load_offset(offsets, at, given.n_offsets);
 #if RANGE == 3
-        split_offset(&x[r], offsets, (size_t)k * offset_step + VECTOR(r), n_offsets, magic);
+        split_offset(&x[r], offsets, at, given.n_offsets, given.magic);
 #endif
-        about_centre(&x[r], tile, k, n_tiles);
+        about_centre(&x[r], tile, k, given.n_tiles);
     }
 #if WEIGHT == 1
     fv from[VECTORS], inverse[VECTORS];
@@ -161,7 +165,7 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
     for (int r = 0; r < VECTORS; r++) {
         size_t i = (size_t)k * per_tile + VECTOR(r);
         from[r] = LOAD(i, aperture);
-        inverse[r] = LOAD(i, aperture + pixels);
+        inverse[r] = LOAD(i, aperture + given.pixels);
     }
 #endif
 #if APART
@@ -210,15 +214,15 @@ __kernel void backproject(__global const float *restrict profiles, int stride, i
 #pragma unroll
         for (int r = 0; r < VECTORS; r++) {
             size_t i = (size_t)k * per_tile + VECTOR(r);
-            add_compensated(image, image + 2 * pixels, i, re[r]);
-            add_compensated(image + pixels, image + 3 * pixels, i, im[r]);
+            add_compensated(image, image + 2 * given.pixels, i, re[r]);
+            add_compensated(image + given.pixels, image + 3 * given.pixels, i, im[r]);
         }
     }
 #if !LOCAL
     if (get_global_id(0) == 0) {
         skipped[k] += missed;
 #if BEAM
-        skipped[n_tiles + k] += unlit;
+        skipped[given.n_tiles + k] += unlit;
 #endif
     }
 #endif

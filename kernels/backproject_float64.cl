@@ -49,6 +49,11 @@ static inline lv in_window(__global const double *restrict pulse, size_t n, size
     return room.hi >= 0;
 }
 
+typedef struct {
+    ulong pixels;
+    int stride, origin, n, n_used, n_tiles, first;
+} backproject_numbers;
+
 // global size (vectors of points per tile, tiles of this call), local size (vectors per tile, 1)
 //   profiles    (n, stride, 2)        complex range profiles; delay 0 stands at sample `origin`
 //   table       (TAPS/2, 2, TERMS)    see interp_float64.clh
@@ -58,17 +63,18 @@ static inline lv in_window(__global const double *restrict pulse, size_t n, size
 //   image       (4, pixels)           totals re, im and their errors re, im
 //   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
 //   skipped     (2, n_tiles)          pulses in whose window no point of the tile lies, and those in whose beam none does
-__kernel void backproject(__global const double *restrict profiles, int stride, int origin,
-                          __global const double *restrict table, __global const double *restrict pulse, int n,
-                          int n_used, __global const double *restrict constants, __global const double *restrict tile,
-                          int n_tiles, int first, __global const double *restrict positions,
-                          __global double *restrict image, ulong pixels, __global int *restrict skipped
+__kernel void backproject(backproject_numbers given, __global const double *restrict profiles,
+                          __global const double *restrict table, __global const double *restrict pulse,
+                          __global const double *restrict constants, __global const double *restrict tile,
+                          __global const double *restrict positions, __global double *restrict image,
+                          __global int *restrict skipped
 #if WEIGHT == 1
                           , __global const double *restrict place, __global const double *restrict taper,
                           __global const double *restrict aperture
 #endif
                           ) {
-    size_t k = first + get_global_id(1), i = k * get_global_size(0) + get_global_id(0);
+    size_t k = given.first + get_global_id(1), i = k * get_global_size(0) + get_global_id(0), pixels = given.pixels;
+    int n = given.n, n_used = given.n_used, n_tiles = given.n_tiles, stride = given.stride, origin = given.origin;
     __global const double *record = constants + get_global_id(1) * (size_t)n * N_CONST;
     point x = {LOAD(i, positions), LOAD(i, positions + pixels), LOAD(i, positions + 2 * pixels)};
     point q = {x.x - (dv)tile[k], x.y - (dv)tile[n_tiles + k], x.z - (dv)tile[2 * (size_t)n_tiles + k]};

@@ -231,23 +231,29 @@ INLINED void add_with_step(__global float *total, __global float *error, size_t 
     }
 }
 
+typedef struct {
+    ulong pixels, local_offset;
+    int stride, origin, n, n_used, first, n_tiles;
+    float step_x, step_y, limit_cycles, limit_position, limit_step;
+} backproject_lines_numbers;
+
 // global size (tiles of this block), local size 1. Arguments as of `backproject`; step_x, step_y: m per pixel along j and
 // i; weights: of LINE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
-__kernel void backproject_lines(__global const float *restrict profiles, int stride, int origin,
-                                __global const float *restrict table, __global const float *restrict weights, int n,
-                                int n_used, __global const float *restrict constants, float step_x, float step_y,
-                                int first, int n_tiles, float limit_cycles, float limit_position, float limit_step,
-                                __global float *restrict image, ulong pixels, __global int *restrict skipped,
-                                ulong local_offset) {
+__kernel void backproject_lines(backproject_lines_numbers given, __global const float *restrict profiles,
+                                __global const float *restrict table, __global const float *restrict weights,
+                                __global const float *restrict constants, __global float *restrict image,
+                                __global int *restrict skipped) {
     __local float T[GROUP * T_SIZE];
     __local float W[GROUP * W_SIZE];
     __local int at[GROUP * AT_SIZE];
-    int tile = first + get_global_id(0), missed = 0, unlit = 0;
+    int tile = given.first + get_global_id(0), missed = 0, unlit = 0;
+    int n_used = given.n_used, stride = given.stride, origin = given.origin;
+    size_t pixels = given.pixels;
 #if LOCAL
-    profiles += 2 * (local_offset + (size_t)get_global_id(0) * n_used * stride);
+    profiles += 2 * (given.local_offset + (size_t)get_global_id(0) * n_used * stride);
 #endif
     profiles += 2 * origin;
-    __global const float *records = constants + get_global_id(0) * (size_t)n * N_LINE;
+    __global const float *records = constants + get_global_id(0) * (size_t)given.n * N_LINE;
     for (int start = 0; start < n_used; start += GROUP) {
         int by_lines[GROUP], by_pixels[GROUP], n_lines = 0, n_pixels = 0, made = 0;  // pulses
         for (int p = start; p < min(start + GROUP, n_used); p++) {
@@ -259,13 +265,13 @@ __kernel void backproject_lines(__global const float *restrict profiles, int str
         }
         if (n_lines + n_pixels == 0) continue;
         __global const float *middle = records + (size_t)(n_lines ? by_lines[n_lines / 2] : by_pixels[0]) * N_LINE;
-        group pulses = group_of(middle, step_x, step_y);
+        group pulses = group_of(middle, given.step_x, given.step_y);
 
         for (int f = 0; f < n_lines; f++) {
             line_geometry line = load_line(records + (size_t)by_lines[f] * N_LINE, pulses.transposed);
             __global const float *row = profiles + 2 * (size_t)by_lines[f] * stride;
-            if (make_lines(pulses, line, made, row, stride, origin, table, weights, limit_cycles, limit_position, limit_step, T,
-                           W, at))
+            if (make_lines(pulses, line, made, row, stride, origin, table, weights, given.limit_cycles, given.limit_position,
+                           given.limit_step, T, W, at))
                 made++;
             else
                 by_pixels[n_pixels++] = by_lines[f];
@@ -295,7 +301,7 @@ __kernel void backproject_lines(__global const float *restrict profiles, int str
 #if !LOCAL
     skipped[tile] += missed;
 #if BEAM
-    skipped[n_tiles + tile] += unlit;
+    skipped[given.n_tiles + tile] += unlit;
 #endif
 #endif
 }

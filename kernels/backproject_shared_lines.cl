@@ -267,20 +267,28 @@ INLINED void turn(sums *s, __global const float *restrict from, __global const f
     }
 }
 
+// stride and origin are no neighbours: loaded as a pair, they cost four instructions per pulse on sm_90.
+typedef struct {
+    int stride, n, origin, n_used, first, n_tiles;
+    float step_x, step_y;
+    ulong pixels;
+} backproject_shared_lines_numbers;
+
 // global size (ITEMS, tiles of this block), local size (ITEMS, 1). Arguments as of `backproject`; constants as in
 // tile_constants.cl:line_constants, schedule from schedule_pulses.cl; step_x, step_y: m per pixel along j and i;
 // weights, slopes: of LINE_TAPS and SLOPE_TAPS taps; skipped (n_tiles), BEAM: (2, n_tiles)
 __kernel __attribute__((reqd_work_group_size(ITEMS, 1, 1))) void
-backproject_shared_lines(__global const float *restrict profiles, int stride, int origin,
-                         tap_table table, line_table weights, slope_table slopes, int n, int n_used,
-                         __global const float *restrict constants, __global const int *restrict schedule, float step_x,
-                         float step_y, int first, int n_tiles, __global float *restrict image, ulong pixels,
+backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table, line_table weights, slope_table slopes,
+                         __global const float *restrict profiles, __global const float *restrict constants,
+                         __global const int *restrict schedule, __global float *restrict image,
                          __global int *restrict skipped) {
     __local pulse_lines halves[2];
-    int item = get_local_id(0), lane = item % ACROSS, r0 = item / ACROSS, tile = first + get_global_id(1);
-    int groups = (n_used + GROUP - 1) / GROUP, chunk = 0, by_lines = 0, by_pixels = 0, made = 0, transposed = 0;
-    int missed = 0, unlit = 0;
-    __global const float *records = constants + get_global_id(1) * (size_t)n * N_LINE, *middle = records;
+    int item = get_local_id(0), lane = item % ACROSS, r0 = item / ACROSS, tile = given.first + get_global_id(1);
+    int groups = (given.n_used + GROUP - 1) / GROUP, chunk = 0, by_lines = 0, by_pixels = 0, made = 0, transposed = 0;
+    int missed = 0, unlit = 0, stride = given.stride, origin = given.origin;
+    float step_x = given.step_x, step_y = given.step_y;
+    size_t pixels = given.pixels;
+    __global const float *records = constants + get_global_id(1) * (size_t)given.n * N_LINE, *middle = records;
     schedule += get_global_id(1) * (size_t)groups * N_GROUP;
     profiles += 2 * origin;
     sums s;
@@ -350,7 +358,7 @@ backproject_shared_lines(__global const float *restrict profiles, int stride, in
     if (item == 0) {
         skipped[tile] += missed;
 #if BEAM
-        skipped[n_tiles + tile] += unlit;
+        skipped[given.n_tiles + tile] += unlit;
 #endif
     }
 }

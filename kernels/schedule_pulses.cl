@@ -43,14 +43,18 @@ INLINED int samples_needed(group pulses, line_geometry line, int *from) {
     return count <= MOST ? count : 0;
 }
 
+typedef struct {
+    int n, n_used;
+    float step_x, step_y, limit_cycles, limit_position, limit_step;
+} schedule_pulses_numbers;
+
 // What is done with each pulse of a group, at each tile. global size (groups, tiles of this block)
 //   constants   (tiles, n, N_LINE)      from tile_constants.cl:line_constants
 //   schedule    (tiles, groups, N_GROUP)
-__kernel void schedule_pulses(__global const float *restrict constants, int n, int n_used, float step_x, float step_y,
-                              float limit_cycles, float limit_position, float limit_step,
+__kernel void schedule_pulses(schedule_pulses_numbers given, __global const float *restrict constants,
                               __global int *restrict schedule) {
-    int start = get_global_id(0) * GROUP, stop = min(start + GROUP, n_used);
-    __global const float *records = constants + get_global_id(1) * (size_t)n * N_LINE;
+    int start = get_global_id(0) * GROUP, stop = min(start + GROUP, given.n_used);
+    __global const float *records = constants + get_global_id(1) * (size_t)given.n * N_LINE;
     __global int *head = schedule + (get_global_id(1) * get_global_size(0) + get_global_id(0)) * N_GROUP;
     __global int *entries = head + N_HEAD;
     int inside = 0, crossing = 0, outside = 0, any = start;
@@ -63,13 +67,14 @@ __kernel void schedule_pulses(__global const float *restrict constants, int n, i
     int middle = any, before = inside / 2, n_lines = 0, n_pixels = 0;
     for (int p = start; p < stop && inside; p++)
         if (as_int(records[(size_t)p * N_LINE + L_STATE]) == INSIDE && !before--) middle = p;
-    group pulses = group_of(records + (size_t)middle * N_LINE, step_x, step_y);
+    group pulses = group_of(records + (size_t)middle * N_LINE, given.step_x, given.step_y);
     for (int p = start; p < stop && inside + crossing; p++) {
         __global const float *record = records + (size_t)p * N_LINE;
         int state = as_int(record[L_STATE]), from = 0, count = 0;
         if (state != INSIDE && state != CROSSING) continue;
         line_geometry line = load_line(record, pulses.transposed);
-        if (state == INSIDE && fabs(line.along) <= limit_step && fits(pulses, line, limit_cycles, limit_position))
+        if (state == INSIDE && fabs(line.along) <= given.limit_step &&
+            fits(pulses, line, given.limit_cycles, given.limit_position))
             count = samples_needed(pulses, line, &from);
         __global int *entry = entries + N_ENTRY * (count ? n_lines++ : GROUP - ++n_pixels);
         entry[E_PULSE] = p;

@@ -129,7 +129,7 @@ class AntennaOnDevice:
         self.macros = {**self.beam.macros(1), "WEIGHT": 3 if gain else 2}
 
     def arguments(self, start: int, stop: int) -> tuple[Any, ...]:
-        """The kernel's arguments of rows start ... stop - 1: weights, axes, patterns, index of the second pattern."""
+        """The kernel's arguments of rows start ... stop - 1: weights, axes, patterns."""
         axes = self.beam.packed_axes(np.arange(start, stop))
         weights = self.task.row_weight[start:stop].astype(np.float32)
-        return self.device.upload(weights), self.device.upload(axes), self.patterns, np.int32(self.second)
+        return self.device.upload(weights), self.device.upload(axes), self.patterns

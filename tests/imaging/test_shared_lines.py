@@ -119,7 +119,7 @@ def pixel_by_pixel(monkeypatch):
     """A list that gets, per launch, how many pulses of all tiles are added by lines and how many pixel by pixel."""
     counts, add = [], tile_kernels.SharedLineKernel.add
 
-    def counted(kernel, on, low, high, pulses, *rest):
+    def counted(kernel, on, low, high, pulses, *rest, **options):
         buffers, run = {}, kernel.device.run
 
         def keep(made, size, group, *args, **how):
@@ -128,7 +128,7 @@ def pixel_by_pixel(monkeypatch):
 
         with monkeypatch.context() as patch:
             patch.setattr(kernel.device, "run", keep)
-            add(kernel, on, low, high, pulses, *rest)
+            add(kernel, on, low, high, pulses, *rest, **options)
         schedule, (groups, tiles) = buffers["schedule_pulses"]
         heads = np.empty((groups * tiles, 4 + tile_kernels.ENTRY * kernel.plan.group), np.int32)
         kernel.device.download(schedule, heads)

@@ -307,7 +307,7 @@ def test_includes_are_expanded_once_and_lines_point_at_the_files():
     assert "#include" not in text
     assert text.count('#line 1 "doubleword.clh"') == 1
     line = text.split("\n").index(
-        "__kernel void backproject(__global const float *restrict profiles, int stride, int origin,"
+        "__kernel void backproject(backproject_numbers given, __global const float *restrict profiles,"
     )
     directive = max(i for i, t in enumerate(text.split("\n")[:line]) if t.startswith("#line"))
     number = int(text.split("\n")[directive].split()[1]) + line - directive - 1

@@ -149,6 +149,7 @@ class Direct(DirectEngine):
         rows = most // kernels.chunk * kernels.chunk or most // kernels.least_rows * kernels.least_rows
         image = device.zeros(16 * tiles.n_tiles * tiles.per_tile)
         on = kernels.ready(tiles, self.task.skip_flags)
+        second = self.antenna.second if self.antenna else 0
         apertures = self.taper.apertures(tiles.positions + self.tiling.center) if self.task.taper is not None else None
         clock.lap("prepare")
         with self.profiles.pipeline as pipeline:
@@ -166,7 +167,7 @@ class Direct(DirectEngine):
                 step = max(1, min(tiles.n_tiles, at_once))
                 for tile in range(0, tiles.n_tiles, step):
                     end = min(tile + step, tiles.n_tiles)
-                    kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights)
+                    kernels.add(on, tile, end, pulses, block, stride, stride // 2, 0, image, *weights, second=second)
                     if end < tiles.n_tiles:  # the constants of these tiles are freed before many more are made
                         pipeline.step()
                 pipeline.step(partial(on_progress, stop))

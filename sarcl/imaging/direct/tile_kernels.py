@@ -16,6 +16,7 @@ from ...numerics.plan import Plan
 from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
@@ -49,7 +50,7 @@ class GatherKernel:
         self.kernel = device.kernel("backproject.cl", "backproject", **macros)
         self.group = device.max_group(self.kernel)
         self.table = device.upload(plan.interpolator.table)
-        self.magic = [float_pairs.magic(plan.steps[1])] if plan.range_mode == 3 else []
+        self.magic = float_pairs.magic(plan.steps[1]) if plan.range_mode == 3 else 0.0
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
@@ -59,11 +60,12 @@ class GatherKernel:
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any,
+        offset: int, image: Any, *weights: Any, second: int = 0,
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`.
 
-        weights  of the pulses in the pixels, where they are tapered: `TaperOnDevice.arguments`
+        weights  buffers of the pulses' weights in the pixels: `TaperOnDevice.arguments`, `AntennaOnDevice.arguments`
+        second   where the receiving antenna's pattern begins, as AntennaOnDevice has it
         """
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         centers, radius, offsets = on.buffers
@@ -72,10 +74,13 @@ class GatherKernel:
         assert self.lanes > 1 or items % 16 == 0, "NEIGHBOURS of kernels/backproject.cl have pixels together"
         device.run(
             self.kernel, (items, high - low), (items, 1) if items <= self.group else None,
-            source, stride, origin, self.table, pulse, n, used, constants, centers, tiles.n_tiles, low, offsets,
-            tiles.offsets.shape[1], 0 if tiles.shared else tiles.per_tile // self.lanes, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset), *self.magic, *weights,
-            steps=used,
+            launch_numbers(
+                "backproject.cl", "backproject", stride=stride, origin=origin, n=n, n_used=used, n_tiles=tiles.n_tiles,
+                first=low, n_offsets=tiles.offsets.shape[1],
+                offset_step=0 if tiles.shared else tiles.per_tile // self.lanes, pixels=tiles.n_tiles * tiles.per_tile,
+                local_offset=offset, magic=self.magic, second=second,
+            ),
+            source, self.table, pulse, constants, centers, offsets, image, on.missed, *weights, steps=used,
         )  # fmt: skip
 
 
@@ -95,9 +100,9 @@ class _Lines:
         self.records = device.kernel("tile_constants.cl", "line_constants", **self.geometry, **records, RANGE=0)
         self.wrap_and_fine = plan.length if wrap else 0, plan.fine
         assert tiling.grid.spacing is not None
-        dy, dx = (np.float32(d) for d in tiling.grid.spacing)
-        self.steps, self.axes = (dx, dy), device.upload(float_pairs.wide(steps(tiling.grid)))
-        self.limits = [np.float32(v) for v in (plan.limit_cycles, plan.limit_position, plan.limit_step)]
+        self.steps = dict(zip(("step_y", "step_x"), tiling.grid.spacing, strict=True))
+        self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
+        self.limits = {name: getattr(plan, name) for name in ("limit_cycles", "limit_position", "limit_step")}
 
     def ready(self, tiles: Tiles, skip: int) -> TilesOnDevice:
         """Upload tiles; skip: SKIP_WINDOW and SKIP_BEAM of kernels/geometry.clh."""
@@ -134,16 +139,19 @@ class LineKernel(_Lines):
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any,
+        offset: int, image: Any, *weights: Any, second: int = 0,
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels); profiles begin at sample `offset`."""
         (pulse, n, used), tiles = pulses, on.tiles
         constants = self.constants(on, low, high, pulse, n, self.components)
         self.device.run(
             self.kernel, (high - low,), (1,),
-            source, stride, origin, self.table, self.weights, n, used, constants, *self.steps, low,
-            tiles.n_tiles, *self.limits, image, np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, np.uint64(offset),
-            steps=used,
+            launch_numbers(
+                "backproject_lines.cl", "backproject_lines", stride=stride, origin=origin, n=n, n_used=used, first=low,
+                n_tiles=tiles.n_tiles, pixels=tiles.n_tiles * tiles.per_tile, local_offset=offset, **self.steps,
+                **self.limits,
+            ),
+            source, self.table, self.weights, constants, image, on.missed, steps=used,
         )  # fmt: skip
 
 
@@ -168,18 +176,27 @@ class SharedLineKernel(_Lines):
 
     def add(
         self, on: TilesOnDevice, low: int, high: int, pulses: Pulses, source: Any, stride: int, origin: int,
-        offset: int, image: Any, *weights: Any,
+        offset: int, image: Any, *weights: Any, second: int = 0,
     ) -> None:  # fmt: skip
         """Add a block of pulses to tiles low ... high - 1 of `image` (4, pixels)."""
         device, (pulse, n, used), tiles = self.device, pulses, on.tiles
         groups, items = -(-used // self.plan.group), self.plan.items
         constants = self.constants(on, low, high, pulse, n, self.n_line)
         schedule = device.empty(4 * (4 + ENTRY * self.plan.group) * groups * (high - low))
-        device.run(self.schedule, (groups, high - low), None, constants, n, used, *self.steps, *self.limits, schedule)
+        device.run(
+            self.schedule, (groups, high - low), None,
+            launch_numbers(
+                "schedule_pulses.cl", "schedule_pulses", n=n, n_used=used, **self.steps, **self.limits,
+            ),
+            constants, schedule,
+        )  # fmt: skip
         device.run(
             self.kernel, (items, high - low), (items, 1),
-            source, stride, origin, *self.tables, n, used, constants, schedule, *self.steps, low, tiles.n_tiles, image,
-            np.uint64(tiles.n_tiles * tiles.per_tile), on.missed, steps=used,
+            launch_numbers(
+                "backproject_shared_lines.cl", "backproject_shared_lines", stride=stride, origin=origin, n=n,
+                n_used=used, first=low, n_tiles=tiles.n_tiles, pixels=tiles.n_tiles * tiles.per_tile, **self.steps,
+            ),
+            *self.tables, source, constants, schedule, image, on.missed, steps=used,
         )  # fmt: skip
 
 

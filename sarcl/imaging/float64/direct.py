@@ -12,6 +12,7 @@ from ...base import text
 from ...base.stage_timer import Clock
 from ...opencl.device import Device
 from ...opencl.device_list import devices
+from ...opencl.launch_numbers import launch_numbers
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
 from ..pixel_taper import TaperOnDevice
@@ -119,8 +120,11 @@ class DirectFloat64(DirectEngine):
                     items = positions.shape[1] // self.lanes
                     device.run(
                         self.kernel, (items, count), (items, 1) if items <= self.group else None,
-                        block, stride, stride // 2, self.table, pulse, n, stop - start, constants, tile, n_tiles, at,
-                        where, image, np.uint64(pixels), missed, *weights, steps=stop - start,
+                        launch_numbers(
+                            "backproject_float64.cl", "backproject", stride=stride, origin=stride // 2, n=n,
+                            n_used=stop - start, n_tiles=n_tiles, first=at, pixels=pixels,
+                        ),
+                        block, self.table, pulse, constants, tile, where, image, missed, *weights, steps=stop - start,
                     )  # fmt: skip
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
