@@ -37,6 +37,11 @@ static inline void put_direction(__global float *records, int first, int low, po
     put(records, N_CONST, first + 4, R0);
 }
 
+typedef struct {
+    int n, n_tiles, first, skip, wrap;
+    float magic;
+} tile_constants_numbers;
+
 // Constants that the points of a tile share, for VW pulses per work-item. global size (n/VW, tiles of this call).
 //   pulse   (2, N_PULSE, n)         hi and lo parts
 //   tile    (2, 3, n_tiles)         reference points about the centre, m, hi and lo parts
@@ -46,15 +51,12 @@ static inline void put_direction(__global float *records, int first, int low, po
 //   skip    SKIP_WINDOW, SKIP_BEAM: leave tiles out, instead of looking at each of their points
 //   wrap    M > 0: profiles repeat every M samples; 0: they do not
 //   magic   1.5 2^23 times the step of the high parts of kappa u, a power of two, cycles per metre; where RANGE is 3
-__kernel void tile_constants(__global const float *restrict pulse, __global const float *restrict tile,
-                             __global const float *restrict radius, int n, int n_tiles, int first, int skip, int wrap,
-                             __global float *restrict out
-#if RANGE == 3
-                             , float magic
-#endif
-                             ) {
-    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x = load_point(tile, k, n_tiles);
+__kernel void tile_constants(tile_constants_numbers given, __global const float *restrict pulse,
+                             __global const float *restrict tile, __global const float *restrict radius,
+                             __global float *restrict out) {
+    int n = given.n, skip = given.skip;
+    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * n;
+    point x = load_point(tile, k, given.n_tiles);
     out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
 
     point d;
@@ -84,7 +86,7 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
 #else
     put(out, N_CONST, C_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
     put(out, N_CONST, C_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
-    if (wrap) base = base % wrap;
+    if (given.wrap) base = base % given.wrap;
 #endif
     put(out, N_CONST, C_BASE, AS_FLOAT(base));
     put(out, N_CONST, C_KAPPA, w_float(kappa));
@@ -93,7 +95,7 @@ __kernel void tile_constants(__global const float *restrict pulse, __global cons
 #pragma unroll
     for (int i = 0; i < 3; i++) {
         wv steep = w_sub(w_make((fv)0, (fv)0), w_mul(kappa, u[i]));
-        fv high = (w_float(steep) + magic) - magic;
+        fv high = (w_float(steep) + given.magic) - given.magic;
         put(out, N_CONST, C_STEEP + i, high);
         put(out, N_CONST, C_STEEP_LOW + i, w_float(w_sub(steep, w_make(high, (fv)0))));
     }
@@ -170,15 +172,22 @@ static inline wv ratio_of(wv a, wv b, int fine) {
 }
 #endif
 
+typedef struct {
+    int n, n_tiles, first, skip, wrap, fine;
+    float radius;
+} line_constants_numbers;
+
 // Constants that the lines of a tile share, for VW pulses per work-item: as tile_constants, with one radius, m, for all tiles.
 //   axes    (2, 6)    a column's and a row's step, m, hi and lo parts
 //   wrap    M > 0: profiles repeat every M samples; 0: they do not
 //   fine    samples of a line per pixel: 1, 2, 4 or 8
-__kernel void line_constants(__global const float *restrict pulse, __global const float *restrict tile,
-                             float radius, int n, int n_tiles, int first, int skip, int wrap, int fine,
-                             __global const float *restrict axes, __global float *restrict out) {
-    size_t g = get_global_id(0), k = first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x = load_point(tile, k, n_tiles);
+__kernel void line_constants(line_constants_numbers given, __global const float *restrict pulse,
+                             __global const float *restrict tile, __global const float *restrict axes,
+                             __global float *restrict out) {
+    int n = given.n, skip = given.skip, fine = given.fine;
+    float radius = given.radius;
+    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * n;
+    point x = load_point(tile, k, given.n_tiles);
     out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;
 
     point d;
@@ -210,7 +219,7 @@ __kernel void line_constants(__global const float *restrict pulse, __global cons
 #else
     put(out, N_LINE, L_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
     put(out, N_LINE, L_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
-    if (wrap) base = base % wrap;
+    if (given.wrap) base = base % given.wrap;
 #endif
     put(out, N_LINE, L_BASE, AS_FLOAT(base));
     put(out, N_LINE, L_KAPPA, w_float(kappa));

@@ -37,6 +37,10 @@ static inline dv beam_state(__global const double *restrict pulse, size_t n, siz
 }
 #endif
 
+typedef struct {
+    int n, n_tiles, first, skip, wrap;
+} tile_constants_numbers;
+
 // Constants that the points of a tile share, for VW pulses per work-item. global size (n/VW, tiles of this call).
 //   pulse   (N_PULSE, n)            see geometry_float64.clh; kappa, sigma and limit as pairs
 //   tile    (3, n_tiles)            reference points, m
@@ -45,11 +49,11 @@ static inline dv beam_state(__global const double *restrict pulse, size_t n, siz
 //   skip    SKIP_WINDOW, SKIP_BEAM: leave tiles out, instead of looking at each of their points
 //   wrap    M > 0: profiles repeat every M samples; 0: they do not
 //   out     (tiles of this call, n, N_CONST)
-__kernel void tile_constants(__global const double *restrict pulse, __global const double *restrict tile,
-                             __global const double *restrict radius, int n, int n_tiles, int first, int skip,
-                             int wrap, __global double *restrict out) {
-    size_t p = get_global_id(0), k = first + get_global_id(1);
-    int spread = 0;
+__kernel void tile_constants(tile_constants_numbers given, __global const double *restrict pulse,
+                             __global const double *restrict tile, __global const double *restrict radius,
+                             __global double *restrict out) {
+    size_t p = get_global_id(0), k = given.first + get_global_id(1);
+    int n = given.n, n_tiles = given.n_tiles, skip = given.skip, wrap = given.wrap, spread = 0;
     point x = {(dv)tile[k], (dv)tile[n_tiles + k], (dv)tile[2 * (size_t)n_tiles + k]}, u, v;
     pair R0, S0;
     pair delta = half_path(pulse, n, p, spread, x, &R0, &u, &S0, &v);

@@ -6,6 +6,7 @@ from typing import Any
 
 from ..base import float_pairs
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from .plan import Plan
 
 
@@ -23,7 +24,7 @@ class TileConstants:
         self.nbytes = 4 * plan.components(bistatic, beam)
         mode = 3 if plan.range_mode == 3 else plan.range_mode == 1 and not bistatic
         macros = {"BISTATIC": bistatic, "BEAM": beam, "LOCAL": local, "RANGE": mode}
-        self.magic = [float_pairs.magic(plan.steps[0])] if plan.range_mode == 3 else []
+        self.magic = float_pairs.magic(plan.steps[0]) if plan.range_mode == 3 else 0.0
         self.kernel = device.kernel("tile_constants.cl", "tile_constants", **{k: int(v) for k, v in macros.items()})
 
     def compute(
@@ -39,7 +40,10 @@ class TileConstants:
         constants = self.device.empty(self.nbytes * n * (end - first))
         self.device.run(
             self.kernel, (n // self.device.info.vector_width, end - first), None,
-            pulse, references, radius, n, n_tiles, first, skip, self.wrap, constants,
-            *self.magic,
+            launch_numbers(
+                "tile_constants.cl", "tile_constants", n=n, n_tiles=n_tiles, first=first, skip=skip, wrap=self.wrap,
+                magic=self.magic,
+            ),
+            pulse, references, radius, constants,
         )  # fmt: skip
         return constants

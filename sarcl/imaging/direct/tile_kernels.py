@@ -98,7 +98,7 @@ class _Lines:
         self.macros = plan.macros(bistatic, wrap, bool(records["LOCAL"])) | self.geometry
         # LOCAL alone: the program of TileConstants, with the same macros
         self.records = device.kernel("tile_constants.cl", "line_constants", **self.geometry, **records, RANGE=0)
-        self.wrap_and_fine = plan.length if wrap else 0, plan.fine
+        self.wrap, self.fine = plan.length if wrap else 0, plan.fine
         assert tiling.grid.spacing is not None
         self.steps = dict(zip(("step_y", "step_x"), tiling.grid.spacing, strict=True))
         self.axes = device.upload(float_pairs.wide(steps(tiling.grid)))
@@ -115,8 +115,11 @@ class _Lines:
         out = self.device.empty(4 * floats * n * (high - low))
         self.device.run(
             self.records, (n // self.device.info.vector_width, high - low), None,
-            pulse, on.buffers[0], np.float32(self.tiling.radius), n, on.tiles.n_tiles, low, on.skip,
-            *self.wrap_and_fine, self.axes, out,
+            launch_numbers(
+                "tile_constants.cl", "line_constants", n=n, n_tiles=on.tiles.n_tiles, first=low, skip=on.skip,
+                wrap=self.wrap, fine=self.fine, radius=self.tiling.radius,
+            ),
+            pulse, on.buffers[0], self.axes, out,
         )  # fmt: skip
         return out
 

@@ -115,7 +115,11 @@ class DirectFloat64(DirectEngine):
                     count = min(step, n_tiles - at)
                     device.run(
                         self.constants, (n // self.lanes, count), None,
-                        pulse, tile, reach, n, n_tiles, at, self.task.skip_flags, wrap, constants,
+                        launch_numbers(
+                            "tile_constants_float64.cl", "tile_constants", n=n, n_tiles=n_tiles, first=at,
+                            skip=self.task.skip_flags, wrap=wrap,
+                        ),
+                        pulse, tile, reach, constants,
                     )  # fmt: skip
                     items = positions.shape[1] // self.lanes
                     device.run(
