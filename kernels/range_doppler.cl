@@ -15,13 +15,18 @@
 #include "interp.clh"
 
 #if VW == 1
+typedef struct {
+    int stride, origin, begin, first, period, n_ranges, add;
+} straighten_onto_numbers;
+
 // global size (columns, bins), on GPUs: a work-item reads one column
 //   share   (columns of the image): a factor;  begin  first column here, of the image
 //   out     (..., n_ranges, 2): bin q adds to row (first + q) modulo `period`, or where `add` is 0 overwrites it
-__kernel void straighten_onto(__global const float *restrict profiles, int stride, int origin,
+__kernel void straighten_onto(straighten_onto_numbers given, __global const float *restrict profiles,
                               __global const int *restrict cell, __global const float *restrict line,
-                              __global const float *restrict table, __global const float *restrict share, int begin,
-                              int first, int period, int n_ranges, int add, __global float *restrict out) {
+                              __global const float *restrict table, __global const float *restrict share,
+                              __global float *restrict out) {
+    int stride = given.stride, origin = given.origin, begin = given.begin;
     int i = get_global_id(0), n_segments = ((int)get_global_size(0) + SEGMENT - 1) / SEGMENT;
     size_t q = get_global_id(1), at = q * n_segments + i / SEGMENT;
     __global const float *l = line + 4 * at;
@@ -29,9 +34,9 @@ __kernel void straighten_onto(__global const float *restrict profiles, int strid
     look_up(profiles + 2 * (q * stride + origin), stride, origin, cell[at], fma(column, l[1], l[0]), table, &re, &im);
     float cycles = fma(column, l[3], l[2]);
     sincos_cycles(cycles - nearest(cycles), &s, &c);
-    size_t to = (size_t)((first + (int)q) % period) * n_ranges + begin + i;
+    size_t to = (size_t)((given.first + (int)q) % given.period) * given.n_ranges + begin + i;
     float2 made = share[begin + i] * (float2)(fma(re, c, -im * s), fma(re, s, im * c));
-    vstore2(add ? vload2(to, out) + made : made, to, out);
+    vstore2(given.add ? vload2(to, out) + made : made, to, out);
 }
 #endif
 

@@ -20,38 +20,46 @@ __kernel void rows(__global const float *restrict from, int first, __global floa
     vstore2(vload2((first + k) * length + t, from), k * length + t, out);
 }
 
+typedef struct {
+    int n_rows, stride, first, length, count;
+} columns_numbers;
+
 // global size (length, count), each rounded up to whole groups (8, 8)
 //   from  (n_rows, stride, 2);  out (count, length, 2)
-__kernel void columns(__global const float *restrict from, int n_rows, int stride, int first, int length, int count,
-                      __global float *restrict out) {
+__kernel void columns(columns_numbers given, __global const float *restrict from, __global float *restrict out) {
     __local float2 tile[ACROSS][ACROSS + 1];
     int x = get_local_id(0), y = get_local_id(1);
     int t0 = (int)get_global_id(0) - x, k0 = (int)get_global_id(1) - y;
     float2 sum = (float2)(0, 0);
-    if (k0 + x < count && t0 + y < length) {
-        for (int row = t0 + y; row < n_rows; row += length) sum += vload2((size_t)row * stride + first + k0 + x, from);
+    if (k0 + x < given.count && t0 + y < given.length) {
+        for (int row = t0 + y; row < given.n_rows; row += given.length)
+            sum += vload2((size_t)row * given.stride + given.first + k0 + x, from);
     }
     tile[y][x] = sum;
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (k0 + y < count && t0 + x < length) vstore2(tile[x][y], (size_t)(k0 + y) * length + t0 + x, out);
+    if (k0 + y < given.count && t0 + x < given.length)
+        vstore2(tile[x][y], (size_t)(k0 + y) * given.length + t0 + x, out);
 }
+
+typedef struct {
+    int length, origin, sign, n, count, stride, first;
+} lay_numbers;
 
 // global size (count, n), each rounded up to whole groups (8, 8)
 //   spectra  (count, length, 2);  weights (n): v;  out (n, stride, 2)
-__kernel void lay(__global const float *restrict spectra, int length, int origin, int sign,
-                  __global const float *restrict weights, int n, int count, __global float *restrict out, int stride,
-                  int first) {
+__kernel void lay(lay_numbers given, __global const float *restrict spectra, __global const float *restrict weights,
+                  __global float *restrict out) {
     __local float2 tile[ACROSS][ACROSS + 1];
     int x = get_local_id(0), y = get_local_id(1);
     int k0 = (int)get_global_id(0) - x, i0 = (int)get_global_id(1) - y;
     float2 value = (float2)(0, 0);
-    if (k0 + y < count && i0 + x < n) {
-        int at = (origin + sign * (i0 + x)) % length;
-        value = vload2((size_t)(k0 + y) * length + (at < 0 ? at + length : at), spectra);
+    if (k0 + y < given.count && i0 + x < given.n) {
+        int at = (given.origin + given.sign * (i0 + x)) % given.length;
+        value = vload2((size_t)(k0 + y) * given.length + (at < 0 ? at + given.length : at), spectra);
     }
     tile[y][x] = value;
     barrier(CLK_LOCAL_MEM_FENCE);
-    if (k0 + x < count && i0 + y < n) {
-        vstore2(weights[i0 + y] * tile[x][y], (size_t)(i0 + y) * stride + first + k0 + x, out);
+    if (k0 + x < given.count && i0 + y < given.n) {
+        vstore2(weights[i0 + y] * tile[x][y], (size_t)(i0 + y) * given.stride + given.first + k0 + x, out);
     }
 }

@@ -11,6 +11,7 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.fft_batches import Batches
+from ..opencl.launch_numbers import launch_numbers
 
 ACROSS = 8  # work-items of a group along each axis, as in kernels/transposition.cl
 
@@ -46,8 +47,12 @@ class Transforms:
         size = _whole(self.length), _whole(count)
         work = self._reserved()
         self.device.run(
-            self._columns, size, (ACROSS, ACROSS), array, shape[0], shape[1], first, self.length, count, work,
-            steps=-(-shape[0] // self.length),
+            self._columns, size, (ACROSS, ACROSS),
+            launch_numbers(
+                "transposition.cl", "columns", n_rows=shape[0], stride=shape[1], first=first, length=self.length,
+                count=count,
+            ),
+            array, work, steps=-(-shape[0] // self.length),
         )  # fmt: skip
         self._batches.transform()
 
@@ -62,7 +67,11 @@ class Transforms:
         factors, n = weights
         self.device.run(
             self._lay, (_whole(count), _whole(n)), (ACROSS, ACROSS),
-            self._work, self.length, origin, sign, factors, n, count, out, stride, first,
+            launch_numbers(
+                "transposition.cl", "lay", length=self.length, origin=origin, sign=sign, n=n, count=count,
+                stride=stride, first=first,
+            ),
+            self._work, factors, out,
         )  # fmt: skip
 
     def _reserved(self) -> Any:

@@ -18,6 +18,7 @@ from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
 from sarcl.imaging.range_doppler._doppler import Band
 from sarcl.numerics import windows
 from sarcl.numerics.interpolation import interpolator
+from sarcl.opencl.launch_numbers import launch_numbers
 from sarcl.reference.range_doppler import compressed, straighten
 
 SPEED = 100.0
@@ -155,11 +156,14 @@ def test_bins_are_compressed_as_the_twin_says(device, wide, windowed):
     out = gpu.zeros(8 * 4 * length)
     gpu.run(
         gpu.kernel("compression_filter.cl", "compress"), (length, 4), None,
-        gpu.upload(spectra), n, 5, 7, gpu.upload(float_pairs.wide(frequencies)), gpu.upload(factors),
-        gpu.upload(np.concatenate([float_pairs.wide(bends), kept[None]])), 6, 2,
-        *(np.float32(v) for v in float_pairs.wide(np.array([center, 2 / SPEED_OF_LIGHT * distance])).T.ravel()),
-        np.float32(band.low), np.float32(band.high), np.float32(band.taper), np.float32(first), np.float32(step),
-        len(values), gpu.upload(values.astype(np.float32)), out,
+        launch_numbers(
+            "compression_filter.cl", "compress", n_samples=n, first=5, period=7, n_bins=6, begin=2,
+            center=float_pairs.wide(np.array(center)),
+            delay=float_pairs.wide(np.array(2 / SPEED_OF_LIGHT * distance)), low=band.low, high=band.high,
+            taper=band.taper, window_first=first, window_step=step, n_window=len(values),
+        ),
+        gpu.upload(spectra), gpu.upload(float_pairs.wide(frequencies)), gpu.upload(factors),
+        gpu.upload(np.concatenate([float_pairs.wide(bends), kept[None]])), gpu.upload(values.astype(np.float32)), out,
     )  # fmt: skip
     got = gpu.download(out, np.empty((4, length), np.complex64))
     rows = (5 + np.arange(2, 6)) % 7
@@ -190,8 +194,12 @@ def test_profiles_are_read_and_added_as_the_twin_says(device, taps):
     for add in (1, 0):
         out = gpu.copied(start)
         gpu.run(
-            made, (columns, bins), None, gpu.upload(profiles), stride, origin, gpu.upload(cell), gpu.upload(line),
-            gpu.upload(kernel.table), gpu.upload(share), 20, 4, 6, n_ranges, add, out,
+            made, (columns, bins), None,
+            launch_numbers(
+                "range_doppler.cl", "straighten_onto", stride=stride, origin=origin, begin=20, first=4, period=6,
+                n_ranges=n_ranges, add=add,
+            ),
+            gpu.upload(profiles), gpu.upload(cell), gpu.upload(line), gpu.upload(kernel.table), gpu.upload(share), out,
         )  # fmt: skip
         got = gpu.download(out, np.empty_like(start))
         expected = start.astype(np.complex128)

@@ -21,6 +21,7 @@ from ...numerics.transforms import Transforms
 from ...numerics.weighted_samples import WeightedSamples, bound_of_held
 from ...opencl.device import Device
 from ...opencl.fft_batches import Batches
+from ...opencl.launch_numbers import launch_numbers
 from ...opencl.pipeline import SLOTS, Pipeline
 from ._bins import Bins
 from ._doppler import EVANESCENT
@@ -214,8 +215,10 @@ class _Migration:
         values = np.ones(1, np.float32) if window is None else window.weights.astype(np.float32)
         self._window = device.copied(values)
         first, step = (0.0, 1.0) if window is None else (window.sines[0], window.sines[1] - window.sines[0])
-        band = (plan.band.low, plan.band.high, plan.band.taper, first, step)
-        self._band = (*(np.float32(value) for value in band), len(values))
+        self._band = {
+            "low": plan.band.low, "high": plan.band.high, "taper": plan.band.taper, "window_first": first,
+            "window_step": step, "n_window": len(values),
+        }  # fmt: skip
         # the part of the amplitude that depends on the slant range alone; its phase of 1/8 cycle is in the lines
         level = np.abs(bins.level(plan.ranges))
         self._shares = [device.copied((share * level).astype(np.float32)) for share in bins.shares()]
@@ -272,16 +275,16 @@ class _Migration:
         bend = bins.bend(doppler, distance)
         kept = np.abs(bend) < EVANESCENT * bins.frequencies.min()
         bends = pipeline.upload(np.concatenate([float_pairs.wide(bend), kept[None].astype(np.float32)]))
-        constants = [
-            *float_pairs.wide(np.array(bins.center)),
-            *float_pairs.wide(np.array(2 / SPEED_OF_LIGHT * distance)),
-        ]
+        center, delay = (float_pairs.wide(np.array(v)) for v in (bins.center, 2 / SPEED_OF_LIGHT * distance))
         length = self.plan.profile_length
         for start, count, work in self._batches.of(n):
             device.run(
-                self._compress, (length, count), None, spectra, len(bins.frequencies), first, period,
-                self._frequencies, self._factors, bends, n, start, *(np.float32(c) for c in constants), *self._band,
-                self._window, work,
+                self._compress, (length, count), None,
+                launch_numbers(
+                    "compression_filter.cl", "compress", n_samples=len(bins.frequencies), first=first, period=period,
+                    n_bins=n, begin=start, center=center, delay=delay, **self._band,
+                ),
+                spectra, self._frequencies, self._factors, bends, self._window, work,
             )  # fmt: skip
             self._batches.transform()
             device.run(self._pad, (self._stride, count), None, work, length, bins.pad, start, out)
@@ -302,7 +305,11 @@ class _Migration:
         buffer, first, period = to
         for number, (profile, share) in enumerate(zip(profiles, self._shares, strict=True)):
             device.run(
-                self._straighten, (end - begin, len(doppler)), None, profile, self._stride,
-                bins.pad + self.plan.profile_length // 2, *places, bins.table, share, begin, first, period,
-                len(self.plan.ranges), int(not anew or number > 0), buffer,
+                self._straighten, (end - begin, len(doppler)), None,
+                launch_numbers(
+                    "range_doppler.cl", "straighten_onto", stride=self._stride,
+                    origin=bins.pad + self.plan.profile_length // 2, begin=begin, first=first, period=period,
+                    n_ranges=len(self.plan.ranges), add=not anew or number > 0,
+                ),
+                profile, *places, bins.table, share, buffer,
             )  # fmt: skip
