@@ -3,16 +3,22 @@
 // macros    none
 // reference: sarcl/imaging/tiling/plane.py:PlaneTiling.place
 
+typedef struct {
+    ulong pixels;
+    int across, high, wide, columns;
+} untile_numbers;
+
 // global size (columns of the image, rows of these bands)
 //   totals   (4, pixels)   of tiles `high` x `wide` one after another: re, im, and their rounding errors
 //   slot     (bands, across): position of a tile among them
 //   out      (rows, columns, 2)
-__kernel void untile(__global const float *restrict totals, ulong pixels, __global const int *restrict slot, int across,
-                     int high, int wide, int columns, __global float *restrict out) {
-    int column = get_global_id(0), row = get_global_id(1);
-    size_t tile = slot[(row / high) * across + column / wide];
+__kernel void untile(untile_numbers given, __global const float *restrict totals, __global const int *restrict slot,
+                     __global float *restrict out) {
+    int column = get_global_id(0), row = get_global_id(1), high = given.high, wide = given.wide;
+    size_t pixels = given.pixels;
+    size_t tile = slot[(row / high) * given.across + column / wide];
     size_t i = tile * high * wide + (row % high) * wide + column % wide;
-    size_t o = 2 * ((size_t)row * columns + column);
+    size_t o = 2 * ((size_t)row * given.columns + column);
     out[o] = totals[i] + totals[i + 2 * pixels];
     out[o + 1] = totals[i + pixels] + totals[i + 3 * pixels];
 }

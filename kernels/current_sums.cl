@@ -9,7 +9,7 @@
 //           chunk     (chunks + 1,) int: first cell of each
 //           antenna   (4, or 8 with a receiver of its own; n): u and 1/R of each pulse
 //           kappa     (n_frequencies,): wavenumber sent, cycles per m, and rho (n_frequencies, n): wavenumber received
-//           travel_*  d: direction of travel of the wave that made the currents
+//           travel    d: direction of travel of the wave that made the currents
 //           sums      (chunks, frequencies up to whole blocks, 2, n): cosine and sine part of s
 // macros    VW        pulses per work-item; n is a multiple of it
 //           BISTATIC  1: receiver and rho apart; 0: receiver = transmitter and rho = kappa
@@ -44,13 +44,18 @@ static inline void wave(fv cycles, fv *re, fv *im) {
     *im = -s;
 }
 
+typedef struct {
+    int cells, n_frequencies, n;
+    float travel[3];
+} current_sums_numbers;
+
 // global size (n / VW, in groups of GROUP; chunks; 1 or more: work-items among which blocks of frequencies are divided)
-__kernel void current_sums(__global const float4 *restrict cell, __global const float2 *restrict current,
-                           __global const int *restrict chunk, __global const float *restrict antenna,
-                           __global const float *restrict kappa, __global const float *restrict rho,
-                           __global float *restrict sums, int cells, int n_frequencies, int n, float travel_x,
-                           float travel_y, float travel_z) {
-    int p = get_global_id(0), here = get_global_id(1);
+__kernel void current_sums(current_sums_numbers given, __global const float4 *restrict cell,
+                           __global const float2 *restrict current, __global const int *restrict chunk,
+                           __global const float *restrict antenna, __global const float *restrict kappa,
+                           __global const float *restrict rho, __global float *restrict sums) {
+    int p = get_global_id(0), here = get_global_id(1), n = given.n, n_frequencies = given.n_frequencies;
+    float travel_x = given.travel[0], travel_y = given.travel[1], travel_z = given.travel[2];
     int blocks = (n_frequencies + BLOCK - 1) / BLOCK;
     fv ux = LOAD(p, antenna), uy = LOAD(p, antenna + n), uz = LOAD(p, antenna + 2 * n), near = LOAD(p, antenna + 3 * n);
 #if BISTATIC
@@ -104,7 +109,7 @@ __kernel void current_sums(__global const float4 *restrict cell, __global const 
 #pragma unroll
                 for (int j = 0; j < BLOCK; j++) {
                     int f = min(f0 + j, last);
-                    float2 value = at[(size_t)f * cells];
+                    float2 value = at[(size_t)f * given.cells];
 #if !LINEAR
 #if BISTATIC
                     wave(fma((fv)kappa[f], PATH(path, i), LOAD(p, rho + (size_t)f * n) * PATH(back, i)), &c, &s);

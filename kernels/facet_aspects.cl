@@ -22,17 +22,23 @@
 #include "facet.clh"
 #include "facet_planes.clh"
 
+typedef struct {
+    int n, second;
+} aspect_amplitudes_numbers;
+
 // global size (n/VW): work-item computes VW facets.
 //   facets   (planes, n)  see facet_planes.clh;  across  (4, n)  rho_k, r_k
 //   roots    (2, n)  1/sqrt(eps), re, im
 //   aspect   (9)     along; s, c; f/c, cycles/m; k/(2 sqrt(pi)); f over the patterns' frequency; R of spreading
 //   up       (6)     vertical, and the axis that replaces it for vectors along it;  patterns, second, axes (18)  see gains.clh
 //   out      (polarisations, 2, n)   re, im
-__kernel void aspect_amplitudes(__global const float *restrict facets, __global const float *restrict across,
-                                __global const float *restrict roots, int n, __global const float *restrict aspect,
-                                __global const float *restrict up, __global const float *restrict patterns, int second,
-                                __global const float *restrict axes, __global float *restrict out) {
+__kernel void aspect_amplitudes(aspect_amplitudes_numbers given, __global const float *restrict facets,
+                                __global const float *restrict across, __global const float *restrict roots,
+                                __global const float *restrict aspect, __global const float *restrict up,
+                                __global const float *restrict patterns, __global const float *restrict axes,
+                                __global float *restrict out) {
     size_t at = get_global_id(0);
+    int n = given.n;
     float3 along = vload3(0, aspect), vertical = vload3(0, up), other = vload3(1, up);
     float s = aspect[3], c = aspect[4], wave = aspect[5];
     triple rho = load_triple(across, at, n);
@@ -55,7 +61,7 @@ __kernel void aspect_amplitudes(__global const float *restrict facets, __global 
 #if WEIGHTS
     fv away = LOAD(at, across + 3 * (size_t)n) / (fv)c;
     antenna_view view = antenna_view_of(u, away, u, away, axes, aspect[8]);
-    mean = c_mul(mean, weight(view, patterns, second, aspect[7]));
+    mean = c_mul(mean, weight(view, patterns, given.second, aspect[7]));
 #endif
     fv scale = (cosine > 0 ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * (fv)aspect[6];
     complex_v sent[4] = {S.hh, S.hv, S.vh, S.vv};

@@ -97,13 +97,17 @@ static inline int meets(reach of, __global const int *cell, __global const float
 }
 #endif
 
+typedef struct {
+    int n_rows, n_samples, m0, m1, first, add;
+} spread_numbers;
+
 // global size (tiles along axis 1, tiles along axis 0 in this band), times the group (8, 8) where GROUPED: a work-item, or
 // a group, owns one tile of the grid.
 //   samples  (n_rows, n_samples, 2)
 //   first    tile row of the band;  out (rows of the band, M1, 2);  add: 1 adds to the values there, 0 overwrites them
-__kernel void spread(__global const float *restrict samples, int n_rows, int n_samples,
-                     __global const int *restrict cell, __global const float *restrict line,
-                     __global const float *restrict table, int m0, int m1, int first, int add, __global float *out) {
+__kernel void spread(spread_numbers given, __global const float *restrict samples, __global const int *restrict cell,
+                     __global const float *restrict line, __global const float *restrict table, __global float *out) {
+    int n_samples = given.n_samples, m0 = given.m0, m1 = given.m1, first = given.first;
 #if GROUPED
     __local shared_tile tile;
     __local int met[ITEMS]; // rows that may have samples in the tile
@@ -117,13 +121,13 @@ __kernel void spread(__global const float *restrict samples, int n_rows, int n_s
 #endif
     int middle = n_samples / 2;
     reach of = {base0 - TAPS / 2 - 1, base0 + TILE + TAPS / 2, base1 - TAPS / 2 - 1, base1 + TILE + TAPS / 2};
-    for (int p = 0; p < n_rows; p++) {
+    for (int p = 0; p < given.n_rows; p++) {
         __global const float *l = line + 6 * (size_t)p, *row = samples + 2 * ((size_t)p * n_samples + middle);
 #if GROUPED
         if (p % ITEMS == 0) {
             barrier(CLK_LOCAL_MEM_FENCE);
             int mine = p + item;
-            met[item] = mine < n_rows && meets(of, cell + 2 * mine, line + 6 * (size_t)mine, m0, m1, n_samples);
+            met[item] = mine < given.n_rows && meets(of, cell + 2 * mine, line + 6 * (size_t)mine, m0, m1, n_samples);
             barrier(CLK_LOCAL_MEM_FENCE);
         }
         if (!met[p % ITEMS]) continue;
@@ -185,7 +189,7 @@ __kernel void spread(__global const float *restrict samples, int n_rows, int n_s
         if (i < m0 && j < m1) {
             __global float *to = out + 2 * ((size_t)(i - TILE * first) * m1 + j);
             float2 s = sum_of_cell(&tile, k);
-            vstore2(add ? vload2(0, to) + s : s, 0, to);
+            vstore2(given.add ? vload2(0, to) + s : s, 0, to);
         }
     }
 #else
@@ -193,7 +197,7 @@ __kernel void spread(__global const float *restrict samples, int n_rows, int n_s
         __global float *to = out + 2 * ((size_t)(base0 - TILE * first + i) * m1 + base1);
         float *from = sum + 2 * ((i + TAPS - 1) * STRIDE + TAPS - 1);
         int n = 2 * min(TILE, m1 - base1);
-        for (int j = 0; j < n; j++) to[j] = add ? to[j] + from[j] : from[j];
+        for (int j = 0; j < n; j++) to[j] = given.add ? to[j] + from[j] : from[j];
     }
 #endif
 }

@@ -91,30 +91,40 @@ static inline int blocked(__global const float *leaf, __global const float *node
     return 0;
 }
 
+typedef struct {
+    float eye[3], slack;
+    int fresh;
+} face_numbers;
+
 // Facets turned away start with every sample hidden, the others with none (fresh 1) or as they are (fresh 0).
-__kernel void face(__global const float *restrict facet, __global const int *restrict index,
-                   __global const uchar *restrict side, float ex, float ey, float ez, float slack, int fresh,
-                   __global ulong *restrict hidden) {
+__kernel void face(face_numbers given, __global const float *restrict facet, __global const int *restrict index,
+                   __global const uchar *restrict side, __global ulong *restrict hidden) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 ahead = (float3)(ex, ey, ez) - (float3)(f[0], f[1], f[2]);
+    float3 ahead = vload3(0, given.eye) - (float3)(f[0], f[1], f[2]);
     float above = f[9] * ahead.x + f[10] * ahead.y + f[11] * ahead.z;
     float lift = f[9] * f[9] + f[10] * f[10] + f[11] * f[11];
     float far = ahead.x * ahead.x + ahead.y * ahead.y + ahead.z * ahead.z;
-    int away = side[index[i]] && above < 0 && above * above > slack * slack * lift * far;
-    hidden[i] = away ? ~0UL : fresh ? 0UL : hidden[i];
+    int away = side[index[i]] && above < 0 && above * above > given.slack * given.slack * lift * far;
+    hidden[i] = away ? ~0UL : given.fresh ? 0UL : hidden[i];
 }
 
-__kernel void hidden(__global const float *restrict facet, __global const int *restrict index,
-                     __global const float2 *restrict place, int samples, float ex, float ey, float ez, float ox, float oy,
-                     float oz, float shrink, __global const float *restrict leaf, __global const float *restrict node,
-                     __constant const int *restrict base, int depth, __global ulong *restrict out) {
+typedef struct {
+    float eye[3], other[3], shrink;
+    int samples, depth;
+} hidden_numbers;
+
+__kernel void hidden(hidden_numbers given, __global const float *restrict facet, __global const int *restrict index,
+                     __global const float2 *restrict place, __global const float *restrict leaf,
+                     __global const float *restrict node, __constant const int *restrict base,
+                     __global ulong *restrict out) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 eye = (float3)(ex, ey, ez), other = (float3)(ox, oy, oz);
+    float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
     ulong bits = out[i];
-    for (int s = 0; s < samples; s++)
-        if (!(bits >> s & 1) && blocked(leaf, node, base, depth, lifted(f, place[s], eye, other), eye, shrink)) bits |= 1UL << s;
+    for (int s = 0; s < given.samples; s++)
+        if (!(bits >> s & 1) && blocked(leaf, node, base, given.depth, lifted(f, place[s], eye, other), eye, given.shrink))
+            bits |= 1UL << s;
     out[i] = bits;
 }
 

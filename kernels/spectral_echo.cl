@@ -100,14 +100,18 @@ __kernel void spread(__global const float *restrict amplitude, __global const in
 #endif
 }
 
+typedef struct {
+    int n_range, n_table;
+} migrate_numbers;
+
 // global size (n_f, n_u): work-item computes y at one wavenumber along track and one frequency.
 //   out  (n_u, n_f, 2)
-__kernel void migrate(__global const float *restrict grid, int n_range, __global const int *restrict first,
+__kernel void migrate(migrate_numbers given, __global const float *restrict grid, __global const int *restrict first,
                       __global const float *restrict rest, __global const float *restrict cycles,
                       __global const int *restrict cell, __global const float *restrict cell_rest,
-                      __global const float *restrict tables, int n_table, __global const float *restrict basis,
+                      __global const float *restrict tables, __global const float *restrict basis,
                       __global const float *restrict flat, __global const float *restrict taps, __global float *out) {
-    int n = (int)get_global_id(0), n_f = (int)get_global_size(0);
+    int n_range = given.n_range, n_table = given.n_table, n = (int)get_global_id(0), n_f = (int)get_global_size(0);
     size_t at = (size_t)get_global_id(1) * n_f + n;
     __global float *to = out + 2 * at;
     to[0] = to[1] = 0;

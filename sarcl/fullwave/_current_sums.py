@@ -9,6 +9,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ..opencl.memory_budget import budget
 from ._currents import Currents
 
@@ -134,13 +135,10 @@ def _sums(
         kernel,
         size,
         (group, 1, 1) if group else None,
+        launch_numbers("current_sums.cl", "current_sums", cells=n, n_frequencies=n_frequencies, n=count, travel=travel),
         *arrays,
         *tables,
         sums,
-        n,
-        n_frequencies,
-        count,
-        *travel.astype(np.float32),
         steps=n / chunks,
     )
     got = device.download(sums, np.empty((chunks, blocks * BLOCK, 2, count), np.float32)).sum(axis=0, dtype=np.float64)

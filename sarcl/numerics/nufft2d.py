@@ -14,6 +14,7 @@ from ..base.text import size_text
 from ..base.tolerances import askable, rounded_up
 from ..opencl import fft
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ..opencl.pipeline import Pipeline
 from . import cost_model, shared_tile
 from ._grid_image import WORK, OnDevice, OnHost
@@ -235,8 +236,11 @@ class Gridder:
                     cell, line = (pipeline.upload(a[start:stop]) for a in (self.cell, self.line))
                     self.device.run(
                         self.kernel, *shared_tile.launch(self.device, (-(-m1 // self.tile), last - first)),
-                        given, stop - start, self.n_samples, cell, line, self.table, m0, m1, first, int(start > 0), out,
-                        steps=stop - start,
+                        launch_numbers(
+                            "nufft2d.cl", "spread", n_rows=stop - start, n_samples=self.n_samples, m0=m0, m1=m1,
+                            first=first, add=start > 0,
+                        ),
+                        given, cell, line, self.table, out, steps=stop - start,
                     )  # fmt: skip
                     done = 0.8 * (first + (last - first) * stop / n_rows) / n_tiles
 

@@ -7,6 +7,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ._aspect_blocks import scene_box
 from ._facet_samples import PROBES, SAMPLES, sample_points
 from ._ray_casting import DeviceFacets, Frame, Occluders
@@ -84,9 +85,10 @@ class IlluminationSolver:
         which, hidden = device.upload(index.astype(np.int32)), device.empty(8 * n)
         face = device.kernel("ray_casting.cl", "face")
         for first, viewpoint in enumerate(viewpoints):
-            eye = self.frame.eye(viewpoint)[:3]
-            arguments = (self.facets.buffer, which, self.facets.side, *eye, np.float32(slack), int(first == 0), hidden)
-            device.run(face, (n,), None, *arguments)
+            numbers = launch_numbers(
+                "ray_casting.cl", "face", eye=self.frame.eye(viewpoint)[:3], slack=slack, fresh=first == 0
+            )
+            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.side, hidden)
         for viewpoint, other, horizon in zip(viewpoints, viewpoints[::-1], horizons, strict=True):
             if horizon is not None:
                 horizon.hide(self.facets, which, n, points, other, hidden)

@@ -10,6 +10,7 @@ import numpy as np
 from ..base.boxes import box
 from ..base.morton import interleaved
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import edges, normals
 
 # Height above a facet at which rays start, relative to its longest edge: so coplanar and touching neighbours, and
@@ -102,9 +103,13 @@ class Occluders:
                viewpoint its sample points lie
         """
         kernel = self.device.kernel("ray_casting.cl", "hidden")
-        eye = self.frame.eye(viewpoint)
-        arguments = (facets.buffer, index, *points, *eye[:3], *self.frame.eye(other)[:3], eye[3])
-        self.device.run(kernel, (n,), None, *arguments, self.leaf, self.node, self.base, self.depth, hidden)
+        (*eye, shrink), (place, samples) = self.frame.eye(viewpoint), points
+        numbers = launch_numbers(
+            "ray_casting.cl", "hidden", samples=samples, eye=eye, other=self.frame.eye(other)[:3], shrink=shrink,
+            depth=self.depth,
+        )  # fmt: skip
+        buffers = facets.buffer, index, place, self.leaf, self.node, self.base, hidden
+        self.device.run(kernel, (n,), None, numbers, *buffers)
 
 
 def _curve(points: np.ndarray) -> np.ndarray:

@@ -12,6 +12,7 @@ from ...base import float_pairs
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from .tiling import Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
 
@@ -111,7 +112,11 @@ class PlaneTiling(Tiling):
         made, slots = device.empty(8 * height * columns), device.upload(where)
         device.run(
             device.kernel("assemble_image.cl", "untile"), (columns, height), None,
-            sums, np.uint64(n_tiles * self.per_tile), slots, self.across, self.high, self.wide, columns, made,
+            launch_numbers(
+                "assemble_image.cl", "untile", pixels=n_tiles * self.per_tile, across=self.across, high=self.high,
+                wide=self.wide, columns=columns,
+            ),
+            sums, slots, made,
         )  # fmt: skip
         return device.download(made, np.empty((height, columns), np.complex64))
 

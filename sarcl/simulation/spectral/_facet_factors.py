@@ -9,6 +9,7 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from ...scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._straight_track import tangent
@@ -75,8 +76,8 @@ class FacetFactors:
             made = self.device.empty(8 * self.n_made * n)
             self.device.run(
                 self.kernel, (n // self.device.info.vector_width,), None,
-                planes, across, self.device.upload(root), n, aspect, self.up, self.patterns, self.second, self.axes,
-                made,
+                launch_numbers("facet_aspects.cl", "aspect_amplitudes", n=n, second=self.second),
+                planes, across, self.device.upload(root), aspect, self.up, self.patterns, self.axes, made,
             )  # fmt: skip
             parts = self.device.download(made, np.empty((self.n_made, 2, n), np.float32))[..., : len(here)]
             for i, channel in enumerate(self.channels):

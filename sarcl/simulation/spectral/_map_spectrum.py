@@ -22,6 +22,7 @@ from ...numerics import shared_tile
 from ...numerics.interpolation import Interpolator
 from ...opencl import fft
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from ._aspect_window import DopplerGrid, wavenumber
 from ._azimuth_transfer import AzimuthTransfer
 from ._map_plan import MapPlan, RangeWavenumbers
@@ -128,8 +129,8 @@ class ReflectivityMap:
             first, rest, cycles, cell, cell_rest = (device.upload(a) for a in coordinates)
             device.run(
                 kernel, made.shape[::-1], None,
-                spectra, plan.n_range, first, rest, cycles, cell, cell_rest, held, tables.shape[-1], basis, self.flat,
-                self.table, buffer,
+                launch_numbers("spectral_echo.cl", "migrate", n_range=plan.n_range, n_table=tables.shape[-1]),
+                spectra, first, rest, cycles, cell, cell_rest, held, basis, self.flat, self.table, buffer,
             )  # fmt: skip
             out[part] += device.download(buffer, made)
 
