@@ -14,25 +14,37 @@
 #include "fdtd.clh"
 #include "fdtd_lists.clh"
 
+typedef struct {
+    int count, record, conducts, first;
+} edges_numbers;
+
 // global size (last - first), of edges, faces and incident
-__kernel void edges(__global float *restrict e, __global const int *restrict at, __global const float *restrict share,
-                    __global float *restrict old, __global float *restrict residual, int count, int record,
-                    int conducts, int first) {
-    edge(first + (int)get_global_id(0), e, at, share, old, residual, count, record, conducts);
+__kernel void edges(edges_numbers given, __global float *restrict e, __global const int *restrict at,
+                    __global const float *restrict share, __global float *restrict old, __global float *restrict residual) {
+    edge(given.first + (int)get_global_id(0), e, at, share, old, residual, given.count, given.record, given.conducts);
 }
 
-__kernel void faces(__global const float *restrict e, __global float *restrict h, __global const int *restrict at,
-                    __global const float *restrict weight, __global float *restrict old,
-                    __global float *restrict residual, int count, int record, int component, int plane, int row, float s,
-                    int first) {
-    face(first + (int)get_global_id(0), e, h, at, weight, old, residual, count, record, component, plane, row, s);
+typedef struct {
+    int count, record, component, plane, row, first;
+    float s;
+} faces_numbers;
+
+__kernel void faces(faces_numbers given, __global const float *restrict e, __global float *restrict h,
+                    __global const int *restrict at, __global const float *restrict weight, __global float *restrict old,
+                    __global float *restrict residual) {
+    face(given.first + (int)get_global_id(0), e, h, at, weight, old, residual, given.count, given.record, given.component,
+         given.plane, given.row, given.s);
 }
 
-__kernel void incident(__global float *restrict field, __global const int *restrict at, __global const int *restrict from,
-                       __global const float *restrict rest, __global const float *restrict amount,
-                       __global const float *restrict u, int u_at, int n_points, int quiet_below, int quiet_above,
-                       int first) {
-    enter(first + (int)get_global_id(0), field, at, from, rest, amount, u + u_at, n_points, quiet_below, quiet_above);
+typedef struct {
+    int u_at, n_points, quiet_below, quiet_above, first;
+} incident_numbers;
+
+__kernel void incident(incident_numbers given, __global float *restrict field, __global const int *restrict at,
+                       __global const int *restrict from, __global const float *restrict rest,
+                       __global const float *restrict amount, __global const float *restrict u) {
+    enter(given.first + (int)get_global_id(0), field, at, from, rest, amount, u + given.u_at, given.n_points,
+          given.quiet_below, given.quiet_above);
 }
 
 static inline float sum_lanes(lanes v) {
@@ -45,15 +57,20 @@ static inline float sum_lanes(lanes v) {
 #endif
 }
 
+typedef struct {
+    int count, n_samples, n_frequencies, begin, stride, each;
+} transform_numbers;
+
 // global size (work-items)
-__kernel void transform(__global const float *restrict residual, __global const float *restrict phase,
-                        __global float *restrict sums, __global float *restrict norms, int count, int n_samples,
-                        int n_frequencies, int begin, int stride, int each) {
+__kernel void transform(transform_numbers given, __global const float *restrict residual, __global const float *restrict phase,
+                        __global float *restrict sums, __global float *restrict norms) {
+    // max: else compilers widen the count where it is loaded, and each step of the loop takes additions more on sm_90
+    int count = max(given.count, 0), n_samples = given.n_samples, n_frequencies = given.n_frequencies;
     int item = (int)get_global_id(0), n_items = (int)get_global_size(0);
     for (int f = 0; f < n_frequencies; f++) {
         lanes changed = 0, norm = 0;
-        for (int n = 0; n < each; n++) {
-            int l = LANES * (begin * item + stride * n);
+        for (int n = 0; n < given.each; n++) {
+            int l = LANES * (given.begin * item + given.stride * n);
             if (l >= count) break;
             __global float *sum = sums + 2 * (long)f * count + l;
             lanes re = 0, im = 0;

@@ -52,15 +52,15 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
 }
 
 // global size (1 or vectors of a row, rows / rows_each rounded up, planes), for both kernels
-#define EACH_VECTOR                                                                                           \
-    int i = first + (int)get_global_id(2), plane_layer = layer_of(i, n_planes, thick), any = 0;               \
-    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * rows_each);                                         \
-    for (int j = (int)get_global_id(1) * rows_each; j < j_end; j++) {                                         \
-        int2 lit = reached(front - along_x * i - along_y * j, along_z, n_vectors);                            \
+#define EACH_VECTOR                                                                                             \
+    int i = given.first + (int)get_global_id(2), plane_layer = layer_of(i, n_planes, thick), any = 0;           \
+    int j_end = min(n_rows, ((int)get_global_id(1) + 1) * rows_each);                                           \
+    for (int j = (int)get_global_id(1) * rows_each; j < j_end; j++) {                                           \
+        int2 lit = reached(front - along_x * i - along_y * j, along_z, n_vectors);                              \
         int hole = resting[2 * (i * n_rows + j)] / LANES, hole_end = resting[2 * (i * n_rows + j) + 1] / LANES; \
-        any |= lit.x < lit.y;                                                                                 \
-        for (int v = (int)get_global_id(0), at = start + i * plane + j * row + LANES * v; v < lit.y;          \
-             v += (int)get_global_size(0), at += LANES * (int)get_global_size(0)) {                           \
+        any |= lit.x < lit.y;                                                                                   \
+        for (int v = (int)get_global_id(0), at = start + i * plane + j * row + LANES * v; v < lit.y;            \
+             v += (int)get_global_size(0), at += LANES * (int)get_global_size(0)) {                             \
             if (v < lit.x || (v >= hole && v < hole_end)) continue;
 
 #define END_EACH_VECTOR \
@@ -91,33 +91,44 @@ static inline int2 reached(float ahead, float along_z, int n_vectors) {
 #if LISTS
 
 // The incident wave enters the rows that were updated. No place occurs twice in a part of its list.
-#define ENTER(FIELD)                                                                                                   \
-    int group = i * (int)get_global_size(1) + (int)get_global_id(1);                                                   \
-    for (int part = 0; any && part < 2 * wave; part++) {                                                               \
-        __global const int *rows = wave_rows + part * (n_planes * (int)get_global_size(1) + 1) + group;                \
-        for (int l = rows[0]; l < rows[1]; l++)                                                                        \
-            enter(l, FIELD, wave_at, wave_from, wave_rest, wave_amount, u + u_at, n_points, quiet_below, quiet_above); \
+#define ENTER(FIELD)                                                                                    \
+    int group = i * (int)get_global_size(1) + (int)get_global_id(1);                                    \
+    for (int part = 0; any && part < 2 * given.wave; part++) {                                          \
+        __global const int *rows = wave_rows + part * (n_planes * (int)get_global_size(1) + 1) + group; \
+        for (int l = rows[0]; l < rows[1]; l++)                                                         \
+            enter(l, FIELD, wave_at, wave_from, wave_rest, wave_amount, u + given.u_at, given.n_points, \
+                  given.quiet_below, given.quiet_above);                                                \
     }
 
-#define LIST_ARGUMENTS(COEFFICIENT)                                                                                  \
-    , int wave, __global const int *restrict wave_rows, __global const int *restrict wave_at,                        \
-        __global const int *restrict wave_from, __global const float *restrict wave_rest,                            \
-        __global const float *restrict wave_amount, __global const float *restrict u, int u_at, int n_points,        \
-        int quiet_below, int quiet_above, __global const int *restrict rows, __global const int *restrict list_at,   \
-        __global const float *restrict COEFFICIENT, __global float *restrict old, __global float *restrict residual, \
-        int count, int record,                                                                                       \
-        int conducts
+#define LIST_ARGUMENTS(COEFFICIENT)                                                                                      \
+    , __global const int *restrict wave_rows, __global const int *restrict wave_at,                                      \
+        __global const int *restrict wave_from, __global const float *restrict wave_rest,                                \
+        __global const float *restrict wave_amount, __global const float *restrict u, __global const int *restrict rows, \
+        __global const int *restrict list_at, __global const float *restrict COEFFICIENT, __global float *restrict old,  \
+        __global float *restrict residual
 #else
 #define LIST_ARGUMENTS(COEFFICIENT)
 #endif
 
-#define GRID_ARGUMENTS                                                                                                \
-    __global float *restrict psi, __global const float *restrict coefficient, __global const ushort *restrict resting, \
-        int thick, int component, int start, int plane, int row, int n_planes, int n_rows, int n_vectors,             \
-        int rows_each, float s, int first, float front, float along_x, float along_y, float along_z
+#define GRID_ARGUMENTS \
+    __global float *restrict psi, __global const float *restrict coefficient, __global const ushort *restrict resting
 
-__kernel void update_e(__global float *restrict e, __global const float *restrict h, GRID_ARGUMENTS
+// Of both updates; the last line is read where LISTS.
+typedef struct {
+    int thick, component, start, plane, row, n_planes, n_rows, n_vectors, rows_each, first;
+    float s, front, along[3];
+    int wave, u_at, n_points, quiet_below, quiet_above, count, record, conducts;
+} update_numbers;
+
+// Those of the grid by their own names.
+#define GRID_NUMBERS                                                                                                 \
+    int thick = given.thick, component = given.component, start = given.start, plane = given.plane, row = given.row; \
+    int n_planes = given.n_planes, n_rows = given.n_rows, n_vectors = given.n_vectors, rows_each = given.rows_each;  \
+    float s = given.s, front = given.front, along_x = given.along[0], along_y = given.along[1], along_z = given.along[2];
+
+__kernel void update_e(update_numbers given, __global float *restrict e, __global const float *restrict h, GRID_ARGUMENTS
                            LIST_ARGUMENTS(share)) {
+    GRID_NUMBERS
     __global const float *hx = h, *hy = h + component, *hz = hy + component;
     __global float *ex = e, *ey = e + component, *ez = ey + component;
     EACH_VECTOR
@@ -133,12 +144,13 @@ __kernel void update_e(__global float *restrict e, __global const float *restric
 #if LISTS
     ENTER(e)
     for (int l = rows[group]; any && l < rows[group + 1]; l++)
-        edge(l, e, list_at, share, old, residual, count, record, conducts);
+        edge(l, e, list_at, share, old, residual, given.count, given.record, given.conducts);
 #endif
 }
 
-__kernel void update_h(__global const float *restrict e, __global float *restrict h, GRID_ARGUMENTS
+__kernel void update_h(update_numbers given, __global const float *restrict e, __global float *restrict h, GRID_ARGUMENTS
                            LIST_ARGUMENTS(weight)) {
+    GRID_NUMBERS
     __global float *hx = h, *hy = h + component, *hz = hy + component;
     __global const float *ex = e, *ey = e + component, *ez = ey + component;
     EACH_VECTOR
@@ -154,6 +166,6 @@ __kernel void update_h(__global const float *restrict e, __global float *restric
 #if LISTS
     ENTER(h)
     for (int l = rows[group]; any && l < rows[group + 1]; l++)
-        face(l, e, h, list_at, weight, old, residual, count, record, component, plane, row, s);
+        face(l, e, h, list_at, weight, old, residual, given.count, given.record, component, plane, row, s);
 #endif
 }

@@ -17,7 +17,8 @@ PARTS = 2  # of a list of the incident wave: components on an edge of its box ar
 class TargetList:
     """Places of a field with their coefficients and old values, and samples of the residuals.
 
-    places  as in Lattice, in the order of GroupOrder (n,);  count  n rounded up to whole vectors, at least one
+    places    as in Lattice, in the order of GroupOrder (n,);  count  n rounded up to whole vectors, at least one
+    conducts  edges of a conductor alone, which have no coefficients
     """
 
     def __init__(self, device: Device, lattice: Lattice, at: np.ndarray, values: np.ndarray) -> None:
@@ -25,8 +26,8 @@ class TargetList:
         sort = GroupOrder.of(lattice, at)
         self.places, self._first = at[sort.order], sort.first
         self.count = max(1, -(-len(at) // LANES)) * LANES
-        self._conducts = len(values) == 2 and not values.any()  # edges of a conductor alone: no coefficients
-        kept = 0 if self._conducts else self.count
+        self.conducts = len(values) == 2 and not values.any()
+        kept = 0 if self.conducts else self.count
         padded = np.zeros((len(values), max(kept, 1)), np.float32)
         if kept:
             padded[:, : len(at)] = values[:, sort.order]
@@ -36,10 +37,14 @@ class TargetList:
         self._at, self._values = device.copied(in_buffer), device.copied(padded)
         self._old, self.residual = device.zeros(4 * max(kept, 1)), device.zeros(4 * self.count * SAMPLES)
 
-    def arguments(self, sample: int | None) -> tuple[Any, ...]:
-        """Arguments of kernels: arrays, count, where sample number `sample` of the residuals is stored, conductor."""
-        record = -1 if sample is None else sample * self.count
-        return self._at, self._values, self._old, self.residual, self.count, record, int(self._conducts)
+    @property
+    def arrays(self) -> tuple[Any, ...]:
+        """The buffers that kernels read: places, coefficients, old values, residuals."""
+        return self._at, self._values, self._old, self.residual
+
+    def numbers(self, sample: int | None) -> dict[str, int]:
+        """Numbers of kernels: count, and where sample number `sample` of the residuals is stored."""
+        return {"count": self.count, "record": -1 if sample is None else sample * self.count}
 
     @property
     def rows(self) -> Any:
@@ -52,7 +57,7 @@ class TargetList:
 
     def start(self, field: np.ndarray) -> None:
         """Take old values from a field (3, *shape)."""
-        if not self._conducts:
+        if not self.conducts:
             old = np.zeros(self.count, np.float32)
             old[: len(self.places)] = field.flat[self.places]
             self.device.write(self._old, old)
@@ -91,9 +96,9 @@ class IncidentList:
         return [_span(first, self._groups, planes) for first in self._first]
 
 
-def heard(loud: list[int]) -> tuple[int, int]:
+def heard(loud: list[int]) -> dict[str, int]:
     """Limits of `from` (kernels/fdtd_lists.clh) beyond which entries read no point from loud[0] to loud[1]."""
-    return 8 * (loud[0] - BEFORE - AFTER), 8 * loud[1] + 7
+    return {"quiet_below": 8 * (loud[0] - BEFORE - AFTER), "quiet_above": 8 * loud[1] + 7}
 
 
 def _span(first: np.ndarray, groups: int, planes: tuple[int, int]) -> tuple[int, int]:

@@ -12,6 +12,7 @@ from typing import Any
 import numpy as np
 
 from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
 from ._absorber import layers
 from ._incident import COMPONENTS, SILENT, WaveTable, entrances
 from ._lists import SAMPLES, IncidentList, TargetList, heard
@@ -83,7 +84,7 @@ class Fields:
         self._dark = wave is not None  # fields are zero beyond the front of the wave
         travel = np.array([0, 0, 1.0]) if wave is None else wave.wave.travel
         along_z = travel[2] if abs(travel[2]) > LEAST_Z else LEAST_Z
-        self._travel = tuple(np.float32(d) for d in (*travel[:2], along_z))
+        self._travel = *travel[:2], along_z
         self._wave_first, self._loud, self._front = -WAVE_STEPS, [SILENT], np.full(WAVE_STEPS, -np.inf)
         self._wave_values = device.zeros(4)
 
@@ -117,38 +118,48 @@ class Fields:
         now = step - self._wave_first
         loud = self._loud[now] if wave else SILENT
         points = wave.n_points if wave else 0
-        enters = self._wave_values, now * COMPONENTS * points if wave else 0, points, *heard(loud)
+        enters = {"u_at": now * COMPONENTS * points if wave else 0, "n_points": points, **heard(loud)}
         sample = step // self._every % SAMPLES if (step + 1) % self._every == 0 else None
         vectors = grid.shape[2] // self.lanes
         columns, each, groups = (1, ROWS, grid.groups) if self._rows_are_items else (vectors, 1, grid.shape[1])
         lists: tuple[Any, ...] = ()
         if self._rows_are_items:
-            lists = (
-                int(loud != SILENT), entrance.rows, *entrance.arrays, *enters, part.rows, *part.arguments(sample)
-            )  # fmt: skip
+            lists = entrance.rows, *entrance.arrays, self._wave_values, part.rows, *part.arrays
         self.device.run(
-            self._update[magnetic], (columns, groups, planes[1] - planes[0]), None, self.e, self.h,
-            *self._layers[magnetic], self._resting, self._thickness, grid.component, grid.start, grid.plane, grid.row,
-            *grid.shape[:2], vectors, each, np.float32(COURANT), planes[0],
-            np.float32(self._front[now] if self._dark else np.inf), *self._travel, *lists,
+            self._update[magnetic], (columns, groups, planes[1] - planes[0]), None,
+            launch_numbers(
+                "fdtd_vacuum.cl", "update", thick=self._thickness, component=grid.component, start=grid.start,
+                plane=grid.plane, row=grid.row, n_planes=grid.shape[0], n_rows=grid.shape[1], n_vectors=vectors,
+                rows_each=each, first=planes[0], s=COURANT, front=self._front[now] if self._dark else np.inf,
+                along=self._travel, wave=loud != SILENT, conducts=part.conducts, **enters, **part.numbers(sample),
+            ),
+            self.e, self.h, *self._layers[magnetic], self._resting, *lists,
         )  # fmt: skip
         if not self._rows_are_items:
             for first, last in entrance.spans(planes) if loud != SILENT else ():
                 if first < last:
-                    self.device.run(self._enter, (last - first,), None, field, *entrance.arrays, *enters, first)
+                    self.device.run(
+                        self._enter, (last - first,), None,
+                        launch_numbers("fdtd_lists.cl", "incident", first=first, **enters),
+                        field, *entrance.arrays, self._wave_values,
+                    )  # fmt: skip
             self._correct(part, sample, part.span(planes), magnetic)
 
     def _correct(self, part: TargetList, sample: int | None, span: tuple[int, int], magnetic: bool) -> None:
         """Correct entries of the list of a target, each by a work-item."""
         if span[0] < span[1]:
-            grid, size, arrays = self.lattice, (span[1] - span[0],), part.arguments(sample)
+            grid, size = self.lattice, (span[1] - span[0],)
             if magnetic:
-                self.device.run(
-                    self._faces, size, None, self.e, self.h, *arrays[:-1], grid.component, grid.plane, grid.row,
-                    np.float32(COURANT), span[0],
+                numbers = launch_numbers(
+                    "fdtd_lists.cl", "faces", component=grid.component, plane=grid.plane, row=grid.row, s=COURANT,
+                    first=span[0], **part.numbers(sample),
                 )  # fmt: skip
+                self.device.run(self._faces, size, None, numbers, self.e, self.h, *part.arrays)
             else:
-                self.device.run(self._edges, size, None, self.e, *arrays, span[0])
+                numbers = launch_numbers(
+                    "fdtd_lists.cl", "edges", conducts=part.conducts, first=span[0], **part.numbers(sample)
+                )
+                self.device.run(self._edges, size, None, numbers, self.e, *part.arrays)
 
     def transform(self, part: TargetList, phase: Any, sums: Any, n_samples: int, n_frequencies: int) -> np.ndarray:
         """Add the samples of the residuals to their sums over time (kernels/fdtd_lists.cl).
@@ -163,8 +174,12 @@ class Fields:
             begin, stride, each = 1, items, -(-vectors // items)
         norms = self.device.empty(8 * n_frequencies * items)
         self.device.run(
-            self._transform, (items,), None, part.residual, phase, sums, norms, part.count, n_samples, n_frequencies,
-            begin, stride, each,
+            self._transform, (items,), None,
+            launch_numbers(
+                "fdtd_lists.cl", "transform", count=part.count, n_samples=n_samples, n_frequencies=n_frequencies,
+                begin=begin, stride=stride, each=each,
+            ),
+            part.residual, phase, sums, norms,
         )  # fmt: skip
         out = self.device.download(norms, np.empty((2, n_frequencies, items), np.float32))
         return np.asarray(out.sum(axis=2, dtype=np.float64))

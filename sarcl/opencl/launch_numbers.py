@@ -21,13 +21,12 @@ def launch_numbers(file: str, kernel: str, **values: ArrayLike) -> np.ndarray:
     TypeError: values are missing, or the struct has no such members; OverflowError: an integer that is too large.
     """
     layout = _layout(file, f"{kernel}_numbers")
-    if values.keys() != set(layout.names or ()):
-        missing, unknown = set(layout.names or ()) - values.keys(), values.keys() - set(layout.names or ())
+    names = layout.names or ()
+    given = tuple(values[name] for name in names if name in values)
+    if len(given) != len(names) or len(values) != len(names):
+        missing, unknown = set(names) - values.keys(), values.keys() - set(names)
         raise TypeError(f"{kernel}_numbers of {file}: missing {sorted(missing)}, unknown {sorted(unknown)}")
-    made = np.zeros(1, layout)
-    for name, value in values.items():
-        made[name] = value
-    return made
+    return np.array([given], layout)
 
 
 @functools.cache

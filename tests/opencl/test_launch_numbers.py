@@ -1,12 +1,14 @@
 """Structs by value: every number arrives where its name says, on every device; other names are refused."""
 
 import re
+from pathlib import Path
 
 import numpy as np
 import pytest
 from helpers.kernel_probe import placed
 
 from sarcl.opencl import launch_numbers as module
+from sarcl.opencl._programs import source
 from sarcl.opencl.launch_numbers import launch_numbers
 
 PROBE = """
@@ -30,6 +32,9 @@ __kernel void probe(probe_numbers given, __global float *out) {
 }
 """
 VALUES = {"last": -3, "a": 1, "b": 2**31 - 1, "eye": [0.5, -1.5, 2.0], "far": 5 * 2**32 + 7, "ratio": 0.25}
+KERNELS = sorted(path.name for path in (Path(__file__).parents[2] / "kernels").glob("*.cl"))
+KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\((.*?)\)\s*\{", re.S)
+STRUCT = re.compile(r"typedef struct \{[^}]*\} (\w+_numbers);")
 
 
 @pytest.fixture
@@ -56,3 +61,32 @@ def test_other_names_and_numbers_that_do_not_fit_are_refused(probe):
         launch_numbers("probe.cl", "probe", **{**VALUES, "b": 2**31})
     with pytest.raises(TypeError, match=re.escape("kernels/probe.cl has no `typedef struct { ... } other_numbers;`")):
         launch_numbers("probe.cl", "other")
+
+
+def test_every_struct_has_the_same_size_and_places_on_the_device(device, monkeypatch):
+    """Sizes and the places of the members of every kernel's numbers: a device's compiler lays structs out by itself."""
+    layouts, text, body = [], "", ""
+    for file in KERNELS:
+        for struct in STRUCT.finditer(source(file)):
+            layout, name = module._layout(file, struct[1]), f"{file[:-3]}_{struct[1]}"
+            text += struct[0].replace(f" {struct[1]};", f" {name};") + "\n"
+            body += f"    {{ {name} s; *out++ = sizeof(s);"
+            body += "".join(f" *out++ = (char *)&s.{member} - (char *)&s;" for member in layout.names) + " }\n"
+            layouts.append(layout)
+    assert len(layouts) > 20
+    wanted = [n for layout in layouts for n in (layout.itemsize, *(layout.fields[name][1] for name in layout.names))]
+    placed(monkeypatch, "places.cl", f"{text}__kernel void places(__global int *out) {{\n{body}}}\n")
+    out = device.empty(4 * len(wanted))
+    device.run(device._build("places.cl", {})["places"], (1,), (1,), out)
+    assert device.download(out, np.empty(len(wanted), np.int32)).tolist() == wanted
+
+
+@pytest.mark.parametrize("file", KERNELS)
+def test_a_kernel_takes_few_numbers_by_their_place(file):
+    """More come in a struct, by name: two numbers that change places are no error of a compiler."""
+    text = re.sub(r"//.*|^#.*$", "", source(file), flags=re.M)
+    for name, arguments in re.findall(
+        r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\((.*?)\)\s*\{", text, re.S
+    ):
+        numbers = [a for a in arguments.split(",") if re.fullmatch(r"\s*(int|uint|ulong|float|double)\s+\w+\s*", a)]
+        assert len(numbers) <= 4, f"{name} of kernels/{file} takes {numbers}"
