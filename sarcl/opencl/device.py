@@ -20,8 +20,8 @@ from ._programs import build, kernels_of, names_in, quiet, source
 from .device_list import DeviceInfo
 from .failures import buffer_bytes, explained
 
-# A launch of a struct and 16 buffers takes 33 us of processor time, and 23 us once pyopencl is told the struct's type (17
-# single numbers took 84 us untold). Telling it takes 0.4 ms, which kernels of few launches do not save.
+# A launch of a struct and 16 buffers takes 33 us of processor time, and 23 us once pyopencl is told the struct's type;
+# one of 17 single numbers took 84 us untold. Telling it takes 0.4 ms, which kernels of few launches do not save.
 MANY_LAUNCHES = 20
 GROUP = 16  # work-items per group on a CPU (1 where the size does not divide by it), for kernels of any group size
 
