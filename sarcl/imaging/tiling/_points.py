@@ -5,14 +5,42 @@ from __future__ import annotations
 import itertools
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from typing import Any
+from weakref import WeakKeyDictionary
 
 import numpy as np
 
+from ...base.morton import morton_order
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles, tile_points
 from ...opencl.device import Device
 from .tiling import Orders, Part, Roots, Run, Section, Tiling
 from .tree import Tree
+
+KEPT = 2**25  # points of a grid whose order is kept, in 4 bytes each
+
+
+class _Curve:
+    """What the tilings of one grid share.
+
+    orders  {band: order of its cells that are not empty, int32, along a space-filling curve}
+    radii   {side: the largest radius of a tile, m}
+    """
+
+    def __init__(self) -> None:
+        self.orders: dict[int, np.ndarray] = {}
+        self.radii: dict[int, float] = {}
+
+    def order(self, band: int, points: np.ndarray) -> np.ndarray:
+        """The order of the points (n, 3) of a band."""
+        found = self.orders.get(band)
+        if found is None:
+            found = morton_order(points).astype(np.int32)
+            if sum(map(len, [*self.orders.values()])) + len(found) <= KEPT:
+                self.orders[band] = found
+        return found
+
+
+_curves: WeakKeyDictionary[ImageGrid, _Curve] = WeakKeyDictionary()
 
 
 class PointTiling(Tiling):
@@ -27,7 +55,10 @@ class PointTiling(Tiling):
         self.empty = None if grid.empty is None else grid.empty.ravel()
         self.n_bands = -(-grid.size // self.LISTED_BAND)
         self._full = [self._cells(b) for b in range(self.n_bands)]
-        self.radius = max(float(self.band(b)[0].radius.max()) for b in range(self.n_bands))
+        self._curve = _curves.setdefault(grid, _Curve())
+        if side not in self._curve.radii:
+            self._curve.radii[side] = max(float(self.band(b)[0].radius.max()) for b in range(self.n_bands))
+        self.radius = self._curve.radii[side]
 
     def extent(self, first: int, last: int) -> slice:
         return slice(first * self.LISTED_BAND, min(last * self.LISTED_BAND, self.grid.size))
@@ -54,10 +85,11 @@ class PointTiling(Tiling):
     def band(self, index: int) -> tuple[Tiles, np.ndarray | None]:
         points, empty = self._points(index), self._empty_in(index)
         if empty is None:
-            return tile_points(points, self.center, self.per_tile)
+            return tile_points(points, self.center, self.per_tile, self._curve.order(index, points))
         # a band without a point keeps a tile, of one cell whose pixel is set to 0
         cells = np.flatnonzero(~empty) if self._full[index] else np.zeros(1, np.int64)
-        tiles, order = tile_points(points[cells], self.center, self.per_tile)
+        points = points[cells]
+        tiles, order = tile_points(points, self.center, self.per_tile, self._curve.order(index, points))
         return tiles, cells[order]
 
     def tile_sizes(self, first: int, last: int) -> np.ndarray:

@@ -96,14 +96,15 @@ class PlaneTiling(Tiling):
         self, device: Device, sums: Any, run: Run, tiles: tuple[int, int], orders: Orders, flat: Any
     ) -> None:
         if tiles == (0, (run[1] - run[0]) * self.across):
-            flat[self.extent(*run)] = self._download(device, sums, run, None)
+            self._write(device, sums, run, None, flat)
         else:
             super().place_sums(device, sums, run, tiles, orders, flat)
 
-    def _download(self, device: Device, sums: Any, run: Run, slot: np.ndarray | None) -> np.ndarray:
-        """Rows, complex64, of a run of bands, from compensated sums (4, pixels) on the device.
+    def _write(self, device: Device, sums: Any, run: Run, slot: np.ndarray | None, flat: Any, left: int = 0) -> None:
+        """Write the rows of a run of bands to the flat image, from compensated sums (4, pixels) on the device.
 
         slot  (tiles,) int: number of each of the sums' tiles among the bands', row by row; None: in that order
+        left  first of the columns
         """
         rows, columns, n_tiles = self.extent(*run), self.grid.shape[1], (run[1] - run[0]) * self.across
         height = rows.stop - rows.start
@@ -118,7 +119,11 @@ class PlaneTiling(Tiling):
             ),
             sums, slots, made,
         )  # fmt: skip
-        return device.download(made, np.empty((height, columns), np.complex64))
+        if isinstance(flat, np.ndarray) and flat.dtype == np.complex64 and flat.flags.c_contiguous:
+            if flat.shape[1] == columns:
+                device.download(made, flat[rows])
+                return
+        flat[rows, left : left + columns] = device.download(made, np.empty((height, columns), np.complex64))
 
     def outline(self) -> np.ndarray:
         return outline(self.grid)
@@ -200,8 +205,7 @@ class PlaneTiling(Tiling):
 
     def place_section(self, device: Device, sums: Any, section: Section, flat: Any) -> None:
         part = section.part
-        made = self._columns(part)._download(device, sums, part[:2], section.tree.slot)
-        flat[self.extent(*part[:2]), part.low * self.wide : part.low * self.wide + made.shape[1]] = made
+        self._columns(part)._write(device, sums, part[:2], section.tree.slot, flat, part.low * self.wide)
 
     def n_roots(self, first: int, last: int, factor: int) -> int:
         return self._lines(first, last, factor) * -(-self.across // factor)
