@@ -25,6 +25,8 @@ from ..base.constants import SPEED_OF_LIGHT
 
 Cosines = Sequence[ArrayLike] | np.ndarray  # (ky, kz), each (...)
 
+LONGEST = 1e12  # s, of retarded times
+
 # 2 pi in parts of 33 bits, of which up to 2^20 multiples are exact, and the rest
 _TWO_PI = (6.2831853069365025, 2.4308402025215864e-10, 8.089064995183803e-21)
 
@@ -51,6 +53,7 @@ def dirichlet(x: ArrayLike, n: int) -> np.ndarray:
 
 def geometric(x: ArrayLike, n: int) -> np.ndarray:
     """sum over 0 <= i < n of exp(j i x) = exp(j (n - 1) x/2) dirichlet(x, n)."""
+    n = validation.count("n", n)
     rest, _ = reduced(x)
     return np.asarray(np.exp(0.5j * (n - 1) * rest) * dirichlet(rest, n))
 
@@ -81,7 +84,7 @@ def diverse_factor(
     if not isinstance(cosines, (list, tuple, np.ndarray)) or len(cosines) != 2:
         raise ValueError(f"cosines is {cosines!r:.60}; give (ky, kz)")
     ky, kz = (validation.values("cosines", k) for k in cosines)
-    t = validation.values("retarded", retarded)
+    t = _seconds(retarded)
     lengths = zip_longest(*(each.shape[::-1] for each in (ky, kz, t)), fillvalue=1)
     if any(len(set(along) - {1}) > 1 for along in lengths):
         raise ValueError(f"cosines have shapes {ky.shape} and {kz.shape} and retarded has {t.shape}; give equal ones")
@@ -102,8 +105,28 @@ def _pair(name: str, value: object) -> None:
 
 def power_pattern(factor: ArrayLike, peak: float | None = None) -> np.ndarray:
     """|factor|^2 over `peak`^2; peak: the number of elements, or None: the largest |factor| given."""
-    power = np.abs(np.asarray(factor)) ** 2
-    return np.asarray(power / (power.max() if peak is None else validation.number("peak", peak, above=0) ** 2))
+    level = np.abs(validation.values("factor", factor, np.complex128))
+    validation.finite("factor", level)
+    largest = float(level.max(initial=0)) if peak is None else validation.number("peak", peak, above=0)
+    if largest == 0:
+        raise ValueError("factor is 0 everywhere, so that it has no peak; give peak=, the number of elements")
+    with np.errstate(over="ignore"):
+        return np.asarray((level / largest) ** 2)
+
+
+def _finite(name: str, value: ArrayLike) -> np.ndarray:
+    """Numbers (...); ValueError for what are none, NaN and Inf."""
+    out = validation.values(name, value)
+    validation.finite(name, out)
+    return out
+
+
+def _seconds(retarded: ArrayLike) -> np.ndarray:
+    """Retarded times, s (...); ValueError for those whose products with frequencies overflow."""
+    out = _finite("retarded", retarded)
+    if out.size and np.abs(out).max() > LONGEST:
+        raise ValueError(f"retarded reaches {np.abs(out).max():g} s, wanted at most {LONGEST:g} s; give seconds")
+    return out
 
 
 def quadratic_phase(
@@ -138,9 +161,13 @@ def beam_angles(
     df = validation.array("frequency_step", frequency_step, np.float64, (2,))
     if not d.all():
         raise ValueError(f"spacing is {d.tolist()}; elements at one position form no beam")
-    t = np.asarray(retarded, np.float64)
-    ky, kz = (wave / d[i] * (lobe[i] - df[i] * t) for i in range(2))
-    with np.errstate(invalid="ignore"):
+    t = validation.values("retarded", retarded)
+    _pair("lobe", lobe)
+    orders = [validation.number(f"lobe[{i}]", lobe[i]) for i in range(2)]
+    for i, order in enumerate(orders):
+        validation.count(f"lobe[{i}]", abs(order), 0)
+    with np.errstate(invalid="ignore", over="ignore"):  # no beam: NaN
+        ky, kz = (wave / d[i] * (orders[i] - df[i] * t) for i in range(2))
         elevation = np.arcsin(np.where(np.abs(kz) <= 1, kz, np.nan))
         azimuth = np.arcsin(np.where(ky**2 + kz**2 <= 1, ky / np.cos(elevation), np.nan))
     return azimuth, elevation
@@ -182,8 +209,9 @@ def peak_delay(
     n elements: f = f0 + (n - 1) df, the peak of the exact field: the part i (n - 1) of its phase i^2 dk d k is linear.
     """
     f = validation.number("f0", f0, above=0) + (validation.count("n", n) - 1) * _step(frequency_step)
-    d = validation.number("spacing", spacing)
-    return np.asarray(-d * np.cos(elevation) * np.sin(azimuth) * f / (SPEED_OF_LIGHT * frequency_step))
+    d, step = validation.number("spacing", spacing), _step(frequency_step)
+    up, aside = _finite("elevation", elevation), _finite("azimuth", azimuth)
+    return np.asarray(-d * np.cos(up) * np.sin(aside) * f / (SPEED_OF_LIGHT * step))
 
 
 def waveform(
@@ -197,10 +225,11 @@ def waveform(
     pulsed: bool = False,
 ) -> np.ndarray:
     """exp(j 2 pi f0 t') times the factor of n elements in a row, (4.9); pulsed: 0 where |t'| > period/2, (4.16)."""
-    t = np.asarray(retarded, np.float64)
+    t = _seconds(retarded)
+    aside = np.sin(_finite("azimuth", azimuth))
     steps = (validation.number("frequency_step", frequency_step), 0.0)
     factor = diverse_factor(
-        f0, shape=(n, 1), spacing=(spacing, 0.0), frequency_step=steps, cosines=(np.sin(azimuth), 0.0), retarded=t
+        f0, shape=(n, 1), spacing=(spacing, 0.0), frequency_step=steps, cosines=(aside, 0.0), retarded=t
     )
     cycles = f0 * t
     out = np.exp(2j * np.pi * (cycles - np.rint(cycles))) * factor

@@ -2,6 +2,7 @@
 
 For other folders:
 
+    arguments     checks of arguments that are no numbers: names of files, words, functions, indices
     boxes         bounding boxes of points and their corners
     constants     the speed of light
     counter_rng   random numbers computed from a seed and a counter: independent of order and blocks
@@ -25,6 +26,7 @@ For other folders:
 """
 
 __all__ = [
+    "arguments",
     "boxes",
     "constants",
     "counter_rng",

@@ -9,6 +9,7 @@ import numpy as np
 from .host_memory import installed
 from .text import size_text
 
+NUMBERS = SupportsComplex | SupportsFloat | SupportsIndex  # None is none of these; classes of numbers look like them
 LARGEST_TOLERANCE = 0.3  # relative error; noise of a tenth of the signal's power
 LEAST_TOLERANCE = 1e-11  # relative error; a range of 1 km at 10 GHz, rounded to float64, has a phase error of 2e-11 rad
 
@@ -85,6 +86,10 @@ def sealed(made: np.ndarray) -> np.ndarray:
     return made
 
 
+class _NoNumbers(TypeError):
+    """Why a value is refused, in words of sarcl."""
+
+
 def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
     """A copy of `value` as an array of `dtype` in C order; ValueError where that would change its numbers."""
     wanted = np.dtype(dtype)
@@ -93,27 +98,28 @@ def converted(name: str, value: Any, dtype: Any) -> np.ndarray:
     try:
         given = np.asarray(value)
         if given.dtype.kind not in "biufcO":
-            raise TypeError(f"type {given.dtype}")
+            raise _NoNumbers(f"type {given.dtype}")
         if given.dtype.kind == "O":
-            none = [
-                v for v in given.flat if v is None or not isinstance(v, SupportsComplex | SupportsFloat | SupportsIndex)
-            ]
+            none = [v for v in given.flat if isinstance(v, type) or not isinstance(v, NUMBERS)]
             if none:
-                raise TypeError(f"{'None' if none[0] is None else 'a ' + type(none[0]).__name__} is no number")
+                raise _NoNumbers(f"{'None' if none[0] is None else 'a ' + type(none[0]).__name__} is no number")
         if given.dtype.kind == "c" and wanted.kind != "c":
-            raise TypeError(f"type {given.dtype}: take the real part or the modulus")
+            raise _NoNumbers(f"type {given.dtype}: take the real part or the modulus")
         if np.ma.is_masked(value):
-            raise TypeError(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
+            raise _NoNumbers(f"{np.ma.count_masked(value)} values are masked: fill or remove them")
         if wanted.kind in "iu" and given.dtype.kind == "f" and not (given == np.rint(given)).all():
-            raise TypeError("not all are whole numbers")
+            raise _NoNumbers("not all are whole numbers")
         with np.errstate(all="ignore"):
             made = np.array(given, dtype=wanted, order="C")
         if wanted.kind in "iu" and not (made == given).all():  # the largest numbers come back as negative ones
-            raise TypeError("not all are small enough")
+            raise _NoNumbers("not all are small enough")
         return made
     except (TypeError, ValueError, OverflowError) as exc:
         shown = " ".join(repr(value).split())
-        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({exc})") from None
+        small = isinstance(exc, OverflowError)
+        why = "not all are small enough" if small else "not all are numbers"
+        why = str(exc) if isinstance(exc, _NoNumbers) else why
+        raise ValueError(f"{name} must be numbers that fit {wanted}, got {shown:.80} ({why})") from None
 
 
 def unmasked(name: str, value: Any, first_row: int = 0, remedy: str = "fill them, with 0 where nothing came") -> Any:
@@ -181,18 +187,18 @@ def tolerance(value: Any) -> float:
     return out
 
 
-def count(name: str, value: Any, least: int = 1) -> int:
-    """Return `value` as an int of at least `least`; a float with a fraction is refused."""
+def count(name: str, value: Any, least: int | None = 1) -> int:
+    """Return `value` as an int of at least `least`, None for any; a float with a fraction is refused."""
     try:
         if np.iscomplexobj(value) or np.ma.is_masked(value):
             raise TypeError
         out = int(value)
         whole = out == value
     except (TypeError, ValueError, OverflowError):
-        raise ValueError(f"{name} must be a whole number, got {value!r}") from None
+        raise ValueError(f"{name} must be a whole number, got {value!r:.80}") from None
     if not whole or isinstance(value, (bool, np.bool_)):
-        raise ValueError(f"{name} must be a whole number, got {value!r}")
-    if out < least:
+        raise ValueError(f"{name} must be a whole number, got {value!r:.80}")
+    if least is not None and out < least:
         raise ValueError(f"{name} is {out}; it must be at least {least}")
     return out
 

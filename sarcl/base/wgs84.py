@@ -17,7 +17,8 @@ ANTENNAS = 6.3e6, 5e7  # m: antennas at such distances from the origin are in Ea
 
 def is_earth_fixed(antenna: NDArray[np.float64]) -> bool:
     """Whether the position of an antenna, m (3,), is Earth-fixed: told by its distance from the origin."""
-    return ANTENNAS[0] < float(np.linalg.norm(antenna)) < ANTENNAS[1]
+    position = validation.array("antenna", antenna, np.float64, (3,))
+    return ANTENNAS[0] < float(np.hypot(np.hypot(*position[:2]), position[2])) < ANTENNAS[1]
 
 
 def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArray[np.float64]:
@@ -27,13 +28,12 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
     """
     longitude, latitude = _radians(longitude, latitude)
     height = validation.values("height", height)
-    s, c = np.sin(latitude), np.cos(latitude)
+    with np.errstate(invalid="ignore"):  # infinite angles have no position: NaN, as of NaN
+        s, c, sine, cosine = np.sin(latitude), np.cos(latitude), np.sin(longitude), np.cos(longitude)
     normal = SEMI_MAJOR / np.sqrt(1 - ECCENTRICITY_SQUARED * s**2)  # radius of curvature in the prime vertical
     across = (normal + height) * c
     return np.stack(
-        np.broadcast_arrays(
-            across * np.cos(longitude), across * np.sin(longitude), (normal * (1 - ECCENTRICITY_SQUARED) + height) * s
-        ),
+        np.broadcast_arrays(across * cosine, across * sine, (normal * (1 - ECCENTRICITY_SQUARED) + height) * s),
         axis=-1,
     )
 
@@ -41,8 +41,9 @@ def ecef(longitude: ArrayLike, latitude: ArrayLike, height: ArrayLike) -> NDArra
 def up(longitude: ArrayLike, latitude: ArrayLike) -> NDArray[np.float64]:
     """Unit normal of the ellipsoid, outwards (..., 3), at degrees."""
     longitude, latitude = _radians(longitude, latitude)
-    c = np.cos(latitude)
-    return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
+    with np.errstate(invalid="ignore"):  # infinite angles have no normal: NaN, as of NaN
+        c = np.cos(latitude)
+        return np.stack(np.broadcast_arrays(c * np.cos(longitude), c * np.sin(longitude), np.sin(latitude)), axis=-1)
 
 
 def local_axes(longitude: float, latitude: float) -> NDArray[np.float64]:
@@ -58,7 +59,10 @@ def local_axes(longitude: float, latitude: float) -> NDArray[np.float64]:
 
 def vertical_at(position: np.ndarray) -> np.ndarray | None:
     """Unit normal of the ellipsoid (3,) at an Earth-centred position, m (3,); None farther than 32 km from it."""
+    position = validation.array("position", position, np.float64, (3,))
     axes = SEMI_MAJOR * np.array([1, 1, 1 - FLATTENING])
+    if np.abs(position).max() > 2 * SEMI_MAJOR:
+        return None
     if abs(np.linalg.norm(position / axes) - 1) > 0.005:
         return None
     normal = position / axes**2

@@ -19,6 +19,7 @@ from ._grid_index import Axes, Curvilinear
 if TYPE_CHECKING:
     from ..base.types import PathLike
 
+FARTHEST = 1e6  # degrees: more is no place
 HIGHEST = 20e3  # m: the Earth's surface reaches from -10 935 to 8849
 Geoid = str | Path | ArrayLike | Callable[[np.ndarray, np.ndarray], ArrayLike] | None
 
@@ -55,6 +56,7 @@ class ElevationModel:
         if np.nanmax(np.abs(height)) > HIGHEST:
             raise ValueError(f"height reaches {np.nanmax(np.abs(height)):.6g} m, which no land has; give metres")
         for name, axis in (("longitude", 1), ("latitude", 0)):
+            validation.ndim(name, getattr(self, name))
             given = np.asarray(getattr(self, name))
             shape = (height.shape[axis],) if given.ndim == 1 else height.shape
             values = validation.array(name, given, np.float64, shape)
@@ -109,7 +111,7 @@ class ElevationModel:
         except ValueError:
             raise ValueError(f"longitude has shape {lon.shape} and latitude {lat.shape}; give equal ones") from None
         shape, (index, height) = lon.shape, self._index
-        known = np.isfinite(lon) & np.isfinite(lat)
+        known = (np.abs(lon) < FARTHEST) & (np.abs(lat) < FARTHEST)
         at = index.at(*(np.where(known, v, w[0, 0]).ravel() for v, w in ((lon, self.longitude), (lat, self.latitude))))
         at = np.where(np.abs(at - np.rint(at)) < 1e-9, np.rint(at), at)  # a point needs no height of its neighbours
         size = np.array(height.shape)[:, None] - 1
@@ -134,18 +136,21 @@ class ElevationModel:
         center as in `Scene.from_dem`. MemoryError for too many.
         """
         validation.choice("frame", frame, ("local", "ecef"))
+        steps_m = validation.array("spacing", spacing, np.float64, (2,))
+        if not (steps_m > 0).all():
+            raise ValueError(f"spacing is {steps_m.tolist()} m; give two distances above 0, (north, east)")
         tile = elevation.Tile(self.longitude, self.latitude, self.height)
         origin, axes = elevation.local_frame(tile, center)
         known = (wgs84.ecef(self.longitude, self.latitude, np.nan_to_num(self.height)) - origin) @ axes.T
         low, high = (f(known.reshape(-1, 3), axis=0) for f in (np.min, np.max))
-        steps = [int(np.floor((high[a] - low[a]) / d * (1 + 1e-9))) + 1 for a, d in ((1, spacing[0]), (0, spacing[1]))]
+        steps = [int(np.floor((high[a] - low[a]) / d * (1 + 1e-9))) + 1 for a, d in ((1, steps_m[0]), (0, steps_m[1]))]
         if math.prod(steps) > elevation.MOST_POINTS:
             raise MemoryError(
                 f"a grid of {steps[0]} x {steps[1]} points is more than {elevation.MOST_POINTS:,}; give a larger "
                 "spacing, or bounds=(west, south, east, north) of the part that the radar sees"
             )
-        y = (low[1] + high[1]) / 2 + (np.arange(steps[0]) - (steps[0] - 1) / 2) * spacing[0]
-        x = (low[0] + high[0]) / 2 + (np.arange(steps[1]) - (steps[1] - 1) / 2) * spacing[1]
+        y = (low[1] + high[1]) / 2 + (np.arange(steps[0]) - (steps[0] - 1) / 2) * steps_m[0]
+        x = (low[0] + high[0]) / 2 + (np.arange(steps[1]) - (steps[1] - 1) / 2) * steps_m[1]
         out = np.empty((*steps, 3))
         for row, north in enumerate(y):
             local = np.stack([x, np.full_like(x, north), np.full_like(x, known[..., 2].mean())], axis=-1)

@@ -10,6 +10,8 @@ from numpy.typing import NDArray
 from ..base import validation, wgs84
 from .rotation import GM, J2, RATE, to_earth_fixed
 
+FARTHEST = 1e11  # m: what is farther from the Earth is in no orbit about it
+
 
 @dataclass(frozen=True, eq=False)
 class KeplerElements:
@@ -38,6 +40,8 @@ class KeplerElements:
         """Elements that are a user's arguments. ValueError for those that are no ellipse above the Earth's surface."""
         a = validation.number("semi_major_axis", semi_major_axis, above=0)
         e = validation.number("eccentricity", eccentricity, least=0)
+        if a > FARTHEST:
+            raise ValueError(f"semi_major_axis is {a:g} m, farther than the Sun; give m, from the Earth's centre")
         if e >= 1:
             raise ValueError(f"eccentricity is {e:g}; an ellipse has less than 1")
         if a * (1 - e) < wgs84.SEMI_MAJOR * (1 - wgs84.FLATTENING):

@@ -22,8 +22,10 @@ from ._random_motion import deviation, frequencies, random_process
 
 WRAPPED = 0.01  # largest fraction of a row's energy that a shift may wrap around: side lobes hold less
 FRAMES = ("scene", "track")
+OVERFLOW = np.errstate(over="ignore", invalid="ignore")  # positions that are not finite are refused by their name
 
 
+@OVERFLOW
 def perturbed(
     track: Trajectory,
     *,
@@ -58,6 +60,7 @@ def perturbed(
     return turned(out, random_process(track.known_times, angles, drawn, seed, 1)[0]) if angles.any() else out
 
 
+@OVERFLOW
 def sinusoidal(
     track: Trajectory,
     *,
@@ -110,6 +113,7 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
     return replace(raw, **changes)
 
 
+@OVERFLOW
 def relative(
     track: Trajectory,
     *,

@@ -11,6 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
+from ..base import arguments
 from ..base.errors import ToleranceMissed, warn
 from ..base.report import Report
 from ..base.stage_timer import Clock
@@ -146,6 +147,7 @@ def backproject(
     )
     if check is not None:
         flag("check", check)
+    arguments.progress(progress)
     tolerance = options.tolerance
     piece = _piece(tile, resume, out)
     raw, task = options.task(raw, grid)

@@ -7,6 +7,7 @@ from typing import Any
 import h5py
 import numpy as np
 
+from ..base import arguments
 from ._checksums import AT_ONCE, Checksums, crc_of
 
 
@@ -30,6 +31,8 @@ class CheckedRows(h5py.Dataset):
         )
 
     def __getitem__(self, args: Any, new_dtype: Any = None) -> Any:
+        if new_dtype is None:
+            arguments.checked_index("index", f"samples in {self.file.filename!r}", args, self.shape)
         first = args[0] if isinstance(args, tuple) and args else args
         low, high = self._touched(first)
         step = self._sums.step
@@ -68,6 +71,11 @@ class CheckedRows(h5py.Dataset):
     def _read(self, args: Any, new_dtype: Any = None) -> Any:
         try:
             return super().__getitem__(args, new_dtype)
+        except (TypeError, ValueError, IndexError):  # what NumPy reads of an array, but h5py not of a file
+            raise IndexError(
+                f"index {args!r:.60} cannot be read from {self.file.filename!r}, which gives whole numbers, slices of "
+                "positive steps, masks and increasing lists: take all into memory first, numpy.asarray(...)"
+            ) from None
         except (OSError, RuntimeError) as exc:
             raise OSError(f"{self.file.filename!r} cannot be read ({exc}); copy it again") from exc
 

@@ -52,7 +52,7 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
     """
     head = HEADER.match(data)
     if head is None:
-        raise ValueError(f"{what} has no header of a PLY file, from 'ply' to 'end_header': {_mesh_checks.TAKE}")
+        raise ValueError(f"{what} cannot be read as .ply (no header from 'ply' to 'end_header'): {_mesh_checks.TAKE}")
     order, elements = _header(head[1].decode("latin-1"), what)
     body = _Text(data[head.end() :], what) if not order else _Binary(data[head.end() :], order)
     at = 0
@@ -212,7 +212,8 @@ def _count(element: _Element, row: int, p: _Property, body: _Text | _Binary, at:
 
 def _short(element: _Element, rows: int, what: str) -> ValueError:
     noun = PLURAL.get(element.name, f"rows of {element.name!r:.40}")
-    return ValueError(f"{what} declares {element.rows} {noun} and holds {rows}: {_mesh_checks.TAKE}")
+    found = f"it declares {element.rows} {noun} and holds {rows}"
+    return ValueError(f"{what} cannot be read as .ply ({found}): {_mesh_checks.TAKE}")
 
 
 def _vertices(element: _Element, body: _Text | _Binary, what: str) -> np.ndarray:

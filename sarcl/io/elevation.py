@@ -13,7 +13,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base import errors, validation, wgs84
+from ..base import arguments, errors, validation, wgs84
 from . import _other_files, input_paths
 
 log = logging.getLogger(__name__)
@@ -37,7 +37,7 @@ def load(
     path: Any, *, bounds: Any = None, heights: Any = None, geoid: Any = None, nodata: Any = None, external: Any = False
 ) -> Tile:  # fmt: skip
     """Points of an elevation model within bounds; arguments and errors as in Scene.from_dem."""
-    path = Path(path)
+    path = arguments.path("path", path)
     name = f"DEM {path.name!r}"
     external = validation.flag("external", external)
     with _opened(path, name, external) as file:

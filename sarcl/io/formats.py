@@ -18,6 +18,7 @@ from importlib import import_module
 from pathlib import Path
 from typing import Any, Literal
 
+from ..base import arguments
 from . import input_paths
 
 Kind = Literal["phase history", "image"]
@@ -115,7 +116,7 @@ def named(path: Any, among: list[Format]) -> Format | None:
 
 def writer_functions(path: Any, kind: Written) -> Any:
     """Functions of the format in which `path` is written, by its suffix; ValueError where no format is written so."""
-    among = writing(kind)
+    among, path = writing(kind), arguments.path("path", path)
     form = named(path, among)
     if form is None:
         ending, wanted = Path(path).suffix, suggested(among, "'")

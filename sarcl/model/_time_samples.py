@@ -36,6 +36,7 @@ from .waveform import Waveform
 BLOCK = 2**20  # samples per block of rows
 SOME_ROWS = 16  # rows in which the sign of the beat is checked
 BAND_STEPS = 2**16  # frequencies at which the spectrum of a chirp is taken
+LONGEST_DELAY = 1e9  # s
 KINDS = ("compressed", "dechirped", "chirped")
 LIGHT = Fraction(SPEED_OF_LIGHT)
 
@@ -68,6 +69,8 @@ def spectra_of(
     if not (carrier > 0).all():
         raise ValueError(f"carrier[{int(np.argmin(carrier))}] is {carrier.min():g} Hz; it must be positive")
     start = _each("start", start, n_rows)
+    if np.abs(start).max() > LONGEST_DELAY:
+        raise ValueError(f"start reaches {np.abs(start).max():g} s, longer than any echo takes; give seconds")
     if kind == "dechirped":
         if sweep_rate is None or not (sweep_rate := validation.number("sweep_rate", sweep_rate)):
             raise ValueError("dechirped samples need sweep_rate=, Hz/s, not 0: negative where the frequency falls")
@@ -104,7 +107,9 @@ def spectra_of(
         factor: complex = 1 / (rate * float(np.sqrt(waveform.peak_energy_density)))
         if waveform.sweep_rate is not None:  # that of exp(j pi K t^2) has a phase of pi/4 beside P
             factor *= np.exp(-0.25j * np.pi * np.sign(waveform.sweep_rate)) / _in_band(waveform)
-        pad = int(np.ceil(waveform.duration * rate))
+        wanted = waveform.duration * rate
+        validation.room(f"a pulse of {wanted:.3g} samples", 32 * wanted, "check rate, Hz, and waveform.duration, s")
+        pad = int(np.ceil(wanted))
         return of_pulses(samples, rate, start, carrier, waveform.bandwidth, factor, pad), waveform
     kept = rate if waveform is None else waveform.bandwidth
     if bandwidth is not None:
@@ -139,6 +144,7 @@ def _check_meant(
 ) -> None:
     """Raise ValueError for arguments of another kind."""
     validation.choice("pulse_time", pulse_time, ("start", "middle"))
+    validation.ndim("reference_range", reference_range)
     moved = np.any(np.asarray(reference_range) != 0)
     for name, given, only in (
         ("bandwidth", bandwidth is not None, "compressed"),
@@ -159,6 +165,7 @@ def _check_rate(rate: float, bandwidth: float, name: str) -> None:
 def _records(samples: Any, kind: str) -> Any:
     """Samples as an array, or as given where they are read row by row; ValueError for another shape or type."""
     if isinstance(samples, (list, tuple)):
+        validation.ndim("samples", samples)
         samples = np.asarray(samples)
     if len(np.shape(samples)) != 2 or 0 in samples.shape:
         raise ValueError(f"samples has shape {np.shape(samples)}, wanted (n_rows, n_times), neither zero")

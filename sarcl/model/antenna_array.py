@@ -80,6 +80,7 @@ class AntennaArray:
         return cls(positions=np.zeros((1, 3)), offsets=np.zeros((1, 1)))
 
     @classmethod
+    @np.errstate(over="ignore", invalid="ignore")  # what overflows is refused by its name
     def linear(
         cls,
         n: int,
@@ -99,6 +100,7 @@ class AntennaArray:
         return cls(positions=place, offsets=[i * step], weights=weights)
 
     @classmethod
+    @np.errstate(over="ignore", invalid="ignore")  # what overflows is refused by its name
     def planar(
         cls,
         shape: Sequence[int] | np.ndarray,
@@ -113,6 +115,7 @@ class AntennaArray:
         shape (N, P), spacing (dy, dz) m, frequency_step (dfy, dfz) Hz.
         """
         validation.ndim("shape", shape)
+        validation.ndim("axes", axes)
         if np.shape(shape) != (2,) or np.shape(cast(Any, axes)) != (2, 3):
             raise ValueError(f"shape is {shape!r:.40} and axes {axes!r:.60}; give (N, P), and two directions (2, 3)")
         rows, columns = (_size(f"shape[{i}]", shape[i]) for i in range(2))
@@ -139,7 +142,9 @@ class AntennaArray:
                 f"no Costas array of {n} elements is known here; the nearest sizes are {below} and {above}"
             )
         step = validation.number("frequency_step", frequency_step)
-        return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(order * step)
+        with np.errstate(over="ignore"):
+            offsets = order * step
+        return cls.linear(n, spacing=spacing, axis=axis, weights=weights).with_offsets(offsets)
 
     def with_offsets(self, offsets: ArrayLike, *, plan: ArrayLike | None = None) -> AntennaArray:
         """The same elements with other carriers: Hz (n,), or (n_plans, n) with the `plan` of the pulses."""
@@ -155,7 +160,7 @@ class AntennaArray:
         """
         count = validation.count("count", count)
         if self.n % count:
-            raise ValueError(f"{self.n} elements do not make {count} equal groups; give a divisor of {self.n}")
+            raise ValueError(f"count is {count}; {self.n} elements do not make {count} equal groups: give a divisor")
         if (steer is None) != (frequency is None):
             raise ValueError("steer and frequency go together: steering phases refer to one frequency; give both")
         first = np.arange(self.n) // (self.n // count) * (self.n // count)
@@ -177,6 +182,7 @@ class AntennaArray:
         """
         validation.instance("other", other, AntennaArray)
         n_pulses = validation.count("n_pulses", n_pulses)
+        validation.room(f"a plan of {n_pulses:.3g} pulses", 32.0 * n_pulses, "give fewer n_pulses")
         if (at := validation.count("at", at, least=0)) > n_pulses:
             raise ValueError(f"at is {at}; it must lie within the {n_pulses} pulses")
         for name in ("positions", "weights"):

@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation
+from ..base import arguments, validation
 from ..base.report import Report
 from ..io import formats, hdf5
 from .image_grid import ImageGrid, pair
@@ -136,6 +136,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
 
     def __getitem__(self, index: slice | int | np.ndarray | tuple[slice | int | EllipsisType, ...]) -> Any:
         """Pixels: an Image on their part of the grid where every axis has a slice (or none), else their values."""
+        arguments.checked_index("index", "an image", index, tuple(self.grid.shape))
         slices = index if isinstance(index, tuple) else (index,)
         if len(slices) <= len(self.grid.shape) and all(isinstance(one, slice) for one in slices):
             gain = self.gain[slices] if isinstance(self.gain, np.ndarray) else self.gain
@@ -254,7 +255,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         On any exception `path` is as it was.
         """
         among = formats.writing("picture", "image")
-        form = formats.named(path, among)
+        form = formats.named(arguments.path("path", path), among)
         if form is None:
             ending, wanted = Path(path).suffix.lower(), formats.suggested(among, "'")
             raise ValueError(f"image path {str(path)!r} ends in {ending!r}; choose {wanted}")
@@ -273,6 +274,7 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
     ) -> PIL.Image.Image:
         from ..figures.decibels import picture
 
+        title = arguments.text("title", title)
         if len(self.grid.shape) != 2:
             raise ValueError(f"a picture needs two axes; this image has shape {tuple(self.grid.shape)}")
         origin, names = (0.0, 0.0), ("y", "x")

@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation
+from ..base import arguments, validation
 from ..base.boxes import box
 from . import _listed_surface
 
@@ -48,15 +48,28 @@ class ImageGrid:
     def __post_init__(self) -> None:
         if (self.listed is None) == (self.spacing is None):
             raise ValueError("a grid is a plane or a list of points; make it with ImageGrid.plane or ImageGrid.points")
+        if not isinstance(self.shape, (tuple, list, np.ndarray)):
+            raise TypeError(f"shape is {self.shape!r:.60}; give a number of pixels for each axis: see ImageGrid.plane")
+        object.__setattr__(self, "shape", tuple(validation.count(f"shape[{i}]", n) for i, n in enumerate(self.shape)))
         for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges"):
             value = getattr(self, name)
-            if value is not None and value.flags.writeable:
+            if value is not None and (not isinstance(value, np.ndarray) or value.flags.writeable):
+                axes: tuple[int | str, ...] = ("n",) if name in ("times", "ranges") else (3,)
                 made = (
-                    _cells(np.array(value, np.float64))
+                    _cells(validation.converted(name, value, np.float64))
                     if name == "listed"
-                    else validation.array(name, value, np.float64, value.shape)
+                    else validation.array(name, value, np.float64, axes)
                 )
                 object.__setattr__(self, name, made)
+        if self.spacing is not None:
+            steps = pair("spacing", self.spacing)
+            made_steps = [validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(steps)]
+            object.__setattr__(self, "spacing", (made_steps[0], made_steps[1]))
+            if len(self.shape) != 2 or self.center is None or self.x_axis is None or self.y_axis is None:
+                raise ValueError(
+                    f"a plane has a shape of two axes, center, x_axis and y_axis, got shape {self.shape}; make it with "
+                    "ImageGrid.plane"
+                )
 
     @classmethod
     def plane(
@@ -113,6 +126,7 @@ class ImageGrid:
         if len(shape) < 2 or shape[-1] != 3 or 0 in shape:
             raise ValueError(f"positions has shape {shape}, wanted (..., 3) with an axis before the last, none zero")
         if valid is not None:
+            validation.ndim("valid", valid)
             mask = np.asarray(valid)
             if mask.dtype != bool or mask.shape != shape[:-1]:
                 raise ValueError(f"valid is {mask.dtype} of shape {mask.shape}, wanted bool of shape {shape[:-1]}")
@@ -147,7 +161,12 @@ class ImageGrid:
         steps = tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(pair("spacing", spacing)))
         if not isinstance(dem, ElevationModel):
             dem = ElevationModel.read(
-                dem, bounds=bounds, heights=heights, geoid=geoid, nodata=nodata, external=external
+                arguments.path("dem", dem),
+                bounds=bounds,
+                heights=heights,
+                geoid=geoid,
+                nodata=nodata,
+                external=external,
             )
         elif any(option is not None for option in (bounds, heights, geoid, nodata)):
             raise ValueError("bounds, heights, geoid and nodata are for files; an ElevationModel has been read already")
@@ -205,6 +224,9 @@ class ImageGrid:
     def columns(self, start: int, stop: int) -> ImageGrid:
         """Columns start ... stop - 1 of a plane, with the same positions to the bit."""
         self._need_plane("columns")
+        start, stop = validation.count("start", start, None), validation.count("stop", stop, None)
+        if not 0 <= start < stop <= self.shape[1]:
+            raise IndexError(f"columns {start} to {stop} were requested, of {self.shape[1]}; start must be below stop")
         part = replace(self, shape=(self.shape[0], stop - start))
         part.__dict__["_middle"] = self._middle - start
         return part
@@ -216,6 +238,9 @@ class ImageGrid:
         """
         taken = []
         for axis, (n, one) in enumerate(zip(self.shape, (*slices, *[slice(None)] * len(self.shape)), strict=False)):
+            if not isinstance(one, slice):
+                raise IndexError(f"slices[{axis}] is {one!r:.60}; give a slice for each axis, such as numpy.s_[2:5]")
+            arguments.checked_index(f"slices[{axis}]", "a grid", one, (n,))
             found = range(*one.indices(n))
             if found.step < 0:
                 raise IndexError(f"axis {axis} of a grid is sliced with a step of {found.step}; steps are positive")
@@ -270,7 +295,7 @@ class ImageGrid:
 
     def sample(self, most: int, seed: int) -> tuple[tuple[np.ndarray, ...], np.ndarray]:
         """Up to `most` random pixels that are not empty: indices into an image, and positions, m (n, 3)."""
-        random = np.random.default_rng(seed)
+        most, random = validation.count("most", most), np.random.default_rng(validation.count("seed", seed, 0))
         if self.size > MOST_NUMBERED:  # the same pixel twice is unlikely
             index = tuple(random.integers(0, n, most) for n in self.shape)
             return index, self.positions_of(index)
@@ -284,7 +309,14 @@ class ImageGrid:
 
     def positions_of(self, index: tuple[np.ndarray, ...]) -> NDArray[np.float64]:
         """Positions, m (..., 3), of the pixels at whole indices into an image."""
-        return self.at(*index) if self.listed is None else self.listed[index]
+        if not isinstance(index, tuple):
+            raise TypeError(
+                f"index is a {type(index).__name__}; give a tuple of whole numbers, one array for each axis"
+            )
+        if self.listed is None:
+            return self.at(*index)
+        arguments.checked_index("index", "a grid", index, self.shape)
+        return self.listed[index]
 
     def normal_at(self, row: int, column: int) -> NDArray[np.float64]:
         """Unit normal (3,) at a pixel of a plane, or of a grid that `zero_doppler` made."""
@@ -337,7 +369,8 @@ class ImageGrid:
         assert self.y_axis is not None and self.x_axis is not None
         i = (validation.values("row", row) - self.shape[0] // 2) * self.spacing[0]
         j = (validation.values("column", column) - self._middle) * self.spacing[1]
-        return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
+        with np.errstate(invalid="ignore"):  # infinite indices have no position: NaN, as of NaN
+            return self.center + i[..., None] * self.y_axis + j[..., None] * self.x_axis
 
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
         """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on a plane or a `zero_doppler` grid."""
@@ -347,9 +380,13 @@ class ImageGrid:
         assert (
             self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None
         )
-        d = validation.values("position", position) - self.center
-        row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
-        return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
+        given = validation.values("position", position)
+        if given.ndim == 0 or given.shape[-1] != 3:
+            raise ValueError(f"position has shape {given.shape}, wanted (..., 3)")
+        d = given - self.center
+        with np.errstate(over="ignore", invalid="ignore"):  # positions that are infinite have no index: NaN
+            row = d @ self.y_axis / self.spacing[0] + self.shape[0] // 2
+            return np.stack([row, d @ self.x_axis / self.spacing[1] + self._middle], axis=-1)
 
     def _need_plane(self, what: str) -> None:
         if not self.is_plane:

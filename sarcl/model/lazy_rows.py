@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base import arguments
 from ..base.validation import sealed
 
 
@@ -44,6 +45,8 @@ class RowsOnDemand(ABC):
     def __getitem__(self, index: Any) -> np.ndarray:
         """What NumPy gives for this index of all rows; slices of rows alone, and single rows, read no others."""
         rows, *others = index if isinstance(index, tuple) else (index,)
+        if others or isinstance(rows, slice):
+            arguments.checked_index("index", "samples", index, self.shape)
         if isinstance(rows, slice):
             taken = range(*rows.indices(self.shape[0]))
             if len(taken) == 0:
@@ -55,8 +58,12 @@ class RowsOnDemand(ABC):
         if isinstance(rows, (int, np.integer)) and not isinstance(rows, (bool, np.bool_)):
             at = int(rows) + (self.shape[0] if rows < 0 else 0)
             if not 0 <= at < self.shape[0]:
-                raise IndexError(f"row {rows} was requested, but there are {self.shape[0]}")
+                raise IndexError(
+                    f"row {rows} was requested, but there are {self.shape[0]}; give one from {-self.shape[0]} to "
+                    f"{self.shape[0] - 1}"
+                )
             return np.asarray(self.rows(slice(at, at + 1))[(0, *others)])
+        arguments.checked_index("index", "samples", index, self.shape)
         return np.asarray(self.rows(slice(0, self.shape[0]))[index])
 
     def __array__(self, dtype: Any = None, copy: bool | None = None) -> np.ndarray:

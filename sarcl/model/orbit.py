@@ -5,13 +5,12 @@ from __future__ import annotations
 import datetime
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation
+from ..base import arguments, validation
 from ..earth import rotation, viewing, zero_doppler
 from ..earth.elevation import ElevationModel
 from ..earth.kepler import KeplerElements
@@ -111,7 +110,7 @@ class Orbit:
         Sentinel-1 orbit files (EOF: POEORB, RESORB), Sentinel-1 annotations (their state vectors) and orbits in the XML
         of ISCE3 are known. FileNotFoundError, and ValueError for other files and for states that `states` refuses.
         """
-        path = Path(path)
+        path = arguments.path("path", path)
         epoch, times, positions, velocities = orbit_files.load(path)
         try:
             return cls.states(times, positions, velocities, epoch)
@@ -175,7 +174,10 @@ class Orbit:
         if (n_pulses is None) == (duration is None):
             raise ValueError("the length of the track is n_pulses or duration (s); give one of them")
         if duration is not None:
-            n_pulses = max(1, round(validation.number("duration", duration, above=0) * prf))
+            wanted = validation.number("duration", duration, above=0) * prf
+            what = f"a track of duration {duration:g} s with {wanted:.3g} pulses"
+            validation.room(what, BYTES_PER_PULSE * wanted, "give a shorter duration or a lower prf")
+            n_pulses = max(1, round(wanted))
         n_pulses = validation.count("n_pulses", n_pulses)
         validation.room(f"a track of {n_pulses:.3g} pulses", BYTES_PER_PULSE * float(n_pulses), "give fewer pulses")
         if (start is None) == (center is None):
@@ -291,7 +293,9 @@ class Orbit:
         widths = validation.array("width", width, np.float64, (2,))
         if not ((widths > 0) & (widths < np.pi)).all():
             raise ValueError(f"width is ({widths[0]:g}, {widths[1]:g}) rad; wanted two angles from 0 to pi")
-        body = ellipse(float(widths[0]), float(widths[1]), validation.count("n", n, 3))
+        n = validation.count("n", n, 3)
+        validation.room(f"an edge of {float(n):.3g} positions", 500.0 * n, "give a smaller n")
+        body = ellipse(float(widths[0]), float(widths[1]), n)
         return zero_doppler.ray_ends(np.broadcast_to(p, (n, 3)), body @ axes.T, validation.number("height", height))
 
     def _time(self, name: str, value: Any) -> float:

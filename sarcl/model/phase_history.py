@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Any, Literal, TypedDict, Unpack
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import constants, validation
+from ..base import arguments, constants, validation
 from ..io import formats, hdf5
 from .lazy_rows import in_memory, pick
 
@@ -139,6 +139,12 @@ class PhaseHistory:
         if not (self.frequency > 0).all():
             bad = int(np.argmin(self.frequency))
             raise ValueError(f"frequency[{bad}] is {self.frequency[bad]:g} Hz; it must be positive")
+        with np.errstate(over="ignore"):
+            last = self.frequency + (samples.shape[1] - 1) * self.frequency_step
+        if not np.isfinite(last).all():
+            raise ValueError(
+                f"frequency_step is {self.frequency_step.max():g} Hz, at which the last frequency is infinite; give Hz"
+            )
         self._set("tx", self._rows("tx", self.tx, np.float64, (3,)))
         if self.rx is None or self.rx is self._rx_of_tx:
             self._set("rx", self.tx)
@@ -301,8 +307,11 @@ class PhaseHistory:
 
     def read(self, start: int, stop: int) -> np.ndarray:
         """Samples of rows start ... stop - 1 in memory; a NaN or Inf raises ValueError with its index."""
+        start, stop = validation.count("start", start, None), validation.count("stop", stop, None)
         if not 0 <= start <= stop <= self.n_rows:
-            raise IndexError(f"rows {start} to {stop} were requested, but there are {self.n_rows}")
+            raise IndexError(
+                f"rows {start} to {stop} were requested, but there are {self.n_rows}; give 0 <= start <= stop <= n_rows"
+            )
         block = np.asarray(validation.unmasked("samples", self.samples[start:stop], first_row=start))
         if block.shape != (stop - start, self.n_samples):
             raise ValueError(
@@ -314,9 +323,7 @@ class PhaseHistory:
 
     def __getitem__(self, rows: slice | Sequence[int] | np.ndarray) -> PhaseHistory:
         """The selected rows (slice, index array or mask); a lazy source stays lazy."""
-        index = np.atleast_1d(np.arange(self.n_rows)[rows])
-        if index.ndim != 1:
-            raise IndexError(f"rows are selected along one axis, the index has {index.ndim}")
+        index = arguments.chosen("rows", rows, self.n_rows, "rows")
         if index.size == 0:
             raise ValueError(f"no row is left of {self.n_rows}; choose at least one")
         names = ("frequency", "frequency_step", "tx", "rx", "reference_range", *PER_ROW)
@@ -339,7 +346,8 @@ class PhaseHistory:
                 continue
             if there is None:
                 raise ValueError(f"these data name no {name}; it is the same for every row")
-            if not (keep & (there == wanted)).any():
+            known = isinstance(wanted, str) if name == "polarization" else isinstance(wanted, (int, np.integer))
+            if not known or not (keep & (there == wanted)).any():
                 raise ValueError(f"{name} {wanted!r} is not in {where}; there are {sorted(set(there[keep].tolist()))}")
             keep &= there == wanted
             where = f"the rows of {name} {wanted!r}"
@@ -352,6 +360,8 @@ class PhaseHistory:
         n_samples//2. One delay axis where every row has the same frequency step.
         """
         n = self.n_samples * validation.count("oversample", oversample)
+        what = f"a signal of {n if n < 2**60 else 2.0**60:.3g} samples or more in {self.n_rows} rows"
+        validation.room(what, 48.0 * min(n, 2**60) * self.n_rows, "give a smaller oversample, or select rows")
         lag = np.arange(n) - n // 2
         step = self.frequency_step if np.ptp(self.frequency_step) else self.frequency_step[:1]
         delay = lag / (n * step[:, None])

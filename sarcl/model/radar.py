@@ -64,15 +64,25 @@ class Radar:
         Its square is P G_t G_r lambda^2/((4 pi)^3 R_t^2 R_r^2 L). Ranges m; gains are amplitudes, sqrt(G), and may be
         complex (`Antenna.gain`). Source: Skolnik, Radar Handbook, 3rd ed., ch. 1, for two antennas.
         """
-        return self.factor(frequency) * spreading(tx_range, rx_range) * np.asarray(tx_gain) * np.asarray(rx_gain)
+        given = (("tx_gain", tx_gain), ("rx_gain", rx_gain))
+        gains = [validation.values(name, gain, np.complex128) for name, gain in given]
+        out = self.factor(frequency) * spreading(tx_range, rx_range) * gains[0] * gains[1]
+        return out if np.iscomplexobj(tx_gain) or np.iscomplexobj(rx_gain) else out.real
 
 
 def spreading(tx_range: ArrayLike, rx_range: ArrayLike) -> NDArray[np.float64]:
     """1/(R_t R_r), 1/m^2. ValueError where a range is 0 or less: an antenna stands on a scatterer."""
-    out = validation.values("tx_range", tx_range) * validation.values("rx_range", rx_range)
-    if not (out > 0).all():
-        raise ValueError("an antenna stands on a scatterer (range 0), where the radar equation is not defined; move it")
-    return 1 / out
+    ranges = []
+    for name, given in (("tx_range", tx_range), ("rx_range", rx_range)):
+        made = validation.values(name, given)
+        if not (made > 0).all():
+            least = made[~(made > 0)].ravel()[0]
+            raise ValueError(
+                f"{name} is {least:g} m: an antenna stands on a scatterer, where the radar equation is not defined; "
+                "move it, or give ranges above 0"
+            )
+        ranges.append(made)
+    return 1 / (ranges[0] * ranges[1])
 
 
 def noise_variance(raw: PhaseHistory, temperature: float, waveform: Waveform | None = None) -> NDArray[np.float64]:

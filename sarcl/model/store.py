@@ -8,11 +8,11 @@ from __future__ import annotations
 
 import os
 from collections.abc import Mapping, Sequence
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
 
+from ..base import arguments, validation
 from ..io import formats, sarcl_hdf5
 from .antenna_array import AntennaArray
 from .concatenation import concatenate
@@ -64,6 +64,7 @@ def read(
     different from the others, a pipe, or one that leads into other files. Rows are compared with the file's checksums
     when they are read: OSError names rows that are damaged.
     """
+    autofocus, external = validation.flag("autofocus", autofocus), validation.flag("external", external)
     if isinstance(path, (list, tuple)):
         if not path:
             raise ValueError("read was given an empty list of files; give at least one (does the pattern match any?)")
@@ -74,7 +75,7 @@ def read(
         return parts[0] if len(parts) == 1 else concatenate(parts)  # type: ignore[arg-type]
     if not isinstance(path, (str, os.PathLike)):
         raise TypeError(f"path is a {type(path).__name__}; give a file name or a list of file names")
-    made: PhaseHistory | Image = formats.load(Path(path), _make, autofocus, external)
+    made: PhaseHistory | Image = formats.load(arguments.path("path", path), _make, autofocus, external)
     return made
 
 

@@ -8,7 +8,7 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation
+from ..base import arguments, validation
 
 BYTES_PER_PULSE = 80  # time, position and velocity, and what they are made of
 
@@ -94,6 +94,7 @@ class Trajectory:
 
     def picked(self, pulses: slice | np.ndarray) -> Trajectory:
         """The track at the pulses of a slice, or at increasing pulse numbers."""
+        arguments.checked_index("pulses", "a track", pulses, (len(self.positions),))
         whole = {name: getattr(self, name) for name in self.__dataclass_fields__}
         some: dict[str, Any] = {n: value[pulses] for n, value in whole.items() if isinstance(value, np.ndarray)}
         return replace(self, **some)
@@ -112,6 +113,7 @@ class Trajectory:
         return cls(times, start + times[:, None] * velocity, np.tile(velocity, (n, 1)))
 
     @classmethod
+    @np.errstate(all="ignore")  # what overflows is refused by its name
     def circle(
         cls,
         *,

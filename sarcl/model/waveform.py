@@ -108,6 +108,7 @@ class Waveform:
         f = validation.values("frequency", frequency) - self.center
         if self.sweep_rate is not None:
             inside = np.abs(f) <= self.bandwidth / 2 * (1 + 1e-12)
+            f = np.clip(f, -self.bandwidth, self.bandwidth)  # squares of frequencies far outside would overflow
             made = np.exp(-1j * np.pi * f**2 * (self.duration / self.bandwidth)) * inside
             return np.conj(made) if self.kind == "down-chirp" else made
         if self.kind == "tone":

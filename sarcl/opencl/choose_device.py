@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import numbers
 import os
 from typing import Any
 
@@ -25,6 +26,11 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
     """
     if isinstance(choice, Device):
         return choice
+    if isinstance(choice, bool) or not isinstance(choice, (str, numbers.Integral, type(None))):
+        shown = " ".join(repr(choice).split())
+        raise TypeError(
+            f"device is {shown:.60}; give an index, 'cpu', 'gpu', a part of the name of one of sarcl.devices(), or None"
+        )
     source = "device"
     if choice is None:
         choice, source = os.environ.get("SARCL_DEVICE") or None, "SARCL_DEVICE"
@@ -46,7 +52,7 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
 
 def _matches(info: DeviceInfo, choice: Any) -> bool:
     text = str(choice).strip().lower()
-    if text.isdigit():
+    if text.isdigit() or not isinstance(choice, str):
         return info.index == int(text)
     return text == info.kind or text in f"{info.platform} {info.name}".lower()
 

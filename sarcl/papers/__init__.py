@@ -38,7 +38,9 @@ PAPERS = {
 
 def find(name: str) -> Paper:
     """The paper of this name. ValueError names those there are."""
-    if name not in PAPERS:
+    if not isinstance(name, str) or name not in PAPERS:
+        if not isinstance(name, str):
+            raise TypeError(f"name is a {type(name).__name__}; give one of {', '.join(PAPERS)}")
         raise ValueError(text.unknown(name, list(PAPERS), "paper"))
     paper: Paper = import_module(f".{name}", __name__).PAPER
     return paper

@@ -10,6 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
+from ..base import arguments
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.errors import warn
 from ..base.validation import count, instance, sealed
@@ -111,6 +112,7 @@ def autofocus(
     """
     instance("raw", raw, PhaseHistory)
     instance("grid", grid, ImageGrid)
+    arguments.progress(progress)
     if not isinstance(range_errors, (bool, np.bool_)):
         raise TypeError(f"range_errors is {range_errors!r}; wanted True or False")
     if not raw.compressed:

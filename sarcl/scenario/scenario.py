@@ -9,6 +9,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
+from ..base import arguments
 from ..base.text import unknown
 from ..io import input_paths, toml
 from . import _schema, _simulating
@@ -152,7 +153,7 @@ class Scenario:
         """Write the scenario to a file. Names of mesh files stay relative to the folder of the file."""
         from ..io import output_paths
 
-        with output_paths.atomic(path) as part:
+        with output_paths.atomic(arguments.path("path", path)) as part:
             part.write_text(self.dumps(), encoding="utf-8")
 
     def build_waveform(self) -> Waveform:
@@ -276,7 +277,7 @@ def load(path: PathLike) -> Scenario:
 
     ValueError names file and line where the text is not TOML or not a scenario; FileNotFoundError.
     """
-    path = Path(path)
+    path = arguments.path("path", path)
     try:
         text = input_paths.contents(path, "scenario file").decode("utf-8")
     except UnicodeDecodeError as exc:
@@ -289,6 +290,8 @@ def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scena
     from ..io.toml import locate
 
     try:
+        if not isinstance(text, str):
+            raise TypeError(f"text is a {type(text).__name__}; give the text of a scenario; scenario.load reads a file")
         tables = tomllib.loads(text)
     except tomllib.TOMLDecodeError as exc:
         raise ValueError(_syntax(name, text, str(exc))) from None

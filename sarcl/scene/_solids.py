@@ -25,7 +25,7 @@ def revolved(profile: Sequence[tuple[float, float]], edge: float | None, section
     line = np.array(profile, np.float64)
     if edge is not None:
         # rings and sections so dense that the diagonal of a cell is at most `edge`
-        side = validation.number("edge", edge, above=0) / np.sqrt(2)
+        side = min(validation.number("edge", edge, above=0), geometry.FARTHEST) / np.sqrt(2)
         if float(np.abs(line).max()) > MOST_FACETS * side:
             raise MemoryError(f"edge {edge:g} m needs more than {MOST_FACETS:,} facets; take a larger one")
         if sections is None:

@@ -90,9 +90,11 @@ class Material:
 
     def lobe(self, delta: ArrayLike) -> Any:
         """The diagram D at angles delta between normal and bisector, rad (...); 0 for smooth materials."""
-        cosine = np.maximum(np.cos(delta), 0)
-        if self.diagram == "exp":
-            return np.exp(-((np.asarray(delta) / self.width) ** 2))
+        delta = validation.values("delta", delta)
+        with np.errstate(invalid="ignore", over="ignore"):  # infinite angles have no direction: NaN, as of NaN
+            cosine = np.maximum(np.cos(delta), 0)
+            if self.diagram == "exp":
+                return np.exp(-((delta / self.width) ** 2))
         return {"isotropic": 1 + 0 * cosine, "cos": cosine, "cos2": cosine**2}.get(self.diagram, 0 * cosine)
 
     @property
@@ -105,7 +107,7 @@ class Material:
 
         Its imaginary part is negative: fields vary as exp(+j 2 pi f t). inf for a perfect conductor.
         """
-        frequency = np.asarray(frequency, np.float64)
+        frequency = validation.values("frequency", frequency)
         if not (frequency > 0).all():
             raise ValueError(f"frequency reaches {frequency.min():g} Hz; it must be greater than 0")
         out: np.ndarray
@@ -228,6 +230,8 @@ def checked_table(materials: Sequence[Material], index: np.ndarray) -> tuple[tup
 
     None in place of reflectivities that are all 1. Raises ValueError for an index outside the table.
     """
+    if not isinstance(materials, (list, tuple)):
+        raise TypeError(f"materials is a {type(materials).__name__}; give a list of sarcl.Material, or () for metal")
     table = tuple(materials) or ((METAL,) if len(index) else ())
     for m in table:
         validation.instance("materials", m, Material)

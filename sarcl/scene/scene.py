@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Any, Literal, cast
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
-from ..base import validation
+from ..base import arguments, validation
 from ..base.boxes import box
 from ..base.errors import warn
 from . import terrain
@@ -76,6 +76,8 @@ class Scene:
         ) -> None: ...
 
     def __post_init__(self) -> None:
+        for name in ("positions", "triangles"):
+            validation.ndim(f"scene {name}", getattr(self, name))
         n, k = (np.shape(a)[0] if np.ndim(a) else 1 for a in (self.positions, self.triangles))
         if n + k == 0:
             raise ValueError("scene is empty; give it at least one point or facet")
@@ -109,6 +111,7 @@ class Scene:
     def points(cls, positions: ArrayLike, amplitudes: ArrayLike = 1.0) -> Scene:
         """Point scatterers at `positions`, m (n, 3), of complex `amplitudes` (n,) or one for all."""
         positions = validation.array("positions", positions, np.float64, ("n", 3))
+        geometry.check_reach("positions", positions)
         if validation.ndim("amplitudes", amplitudes) == 0:
             amplitudes = [cast(complex, amplitudes)] * len(positions)
         amplitudes = validation.array("amplitudes", amplitudes, np.complex128, (len(positions),))
@@ -136,6 +139,7 @@ class Scene:
         Raises ValueError when there are none, a corner is not finite, or every facet has zero area.
         """
         triangles = validation.array("triangles", triangles, np.float64, ("n_facets", 3, 3))
+        geometry.check_reach("triangles", triangles)
         k = len(triangles)
         index, factor, table = resolve(material, materials, (k,))
         factor = factor * terrain.spread("reflectivity", reflectivity, (k,))
@@ -206,7 +210,9 @@ class Scene:
                     f"the unit of this mesh is {scale:g} m, as its file says: its longest side is taken as {size:.4g} "
                     f"m. Give scale={scale:g} to confirm it, or another scale, m per unit, where the file is wrong"
                 )
-        placed = loaded.triangles * scale @ rotate.T + position
+        with np.errstate(over="ignore", invalid="ignore"):
+            placed = loaded.triangles * scale @ rotate.T + position
+        geometry.check_reach(f"corners of a mesh of scale {scale:g}", placed)
         if not geometry.solid(placed).any():
             what = f"mesh file {Path(mesh).name!r}" if isinstance(mesh, (str, Path)) else "mesh"
             raise ValueError(
@@ -385,6 +391,7 @@ class Scene:
 
     def part(self, which: np.ndarray) -> Scene:
         """The scene with only those of its facets for which `which`, bool (k,), is True."""
+        which = arguments.chosen("which", which, len(self.triangles), "facets")
         parts: dict[str, Any] = {n: validation.sealed(getattr(self, n)[which]) for n in _FACET_ARRAYS}
         return replace(self, **parts)
 

@@ -67,7 +67,7 @@ def disc(
     **options: Unpack[SurfaceOptions],
 ) -> Scene:
     """A circular disc about the origin in z = 0, facing up."""
-    radius = validation.number("radius", radius, above=0)
+    radius = _length("radius", radius)
     return _revolved([(radius, 0), (0, 0)], edge, sections, two_sided=two_sided, **options)
 
 
@@ -97,7 +97,7 @@ def cylinder(
     **options: Unpack[ClosedOptions],
 ) -> Scene:
     """An upright circular cylinder with its lids."""
-    radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
+    radius, height = _length("radius", radius), _length("height", height)
     return _revolved([(0, 0), (radius, 0), (radius, height), (0, height)], edge, sections, **options)
 
 
@@ -110,7 +110,7 @@ def cone(
     **options: Unpack[ClosedOptions],
 ) -> Scene:
     """An upright circular cone with its base."""
-    radius, height = validation.number("radius", radius, above=0), validation.number("height", height, above=0)
+    radius, height = _length("radius", radius), _length("height", height)
     return _revolved([(0, 0), (radius, 0), (0, height)], edge, sections, **options)
 
 
@@ -124,8 +124,8 @@ def frustum(
     **options: Unpack[ClosedOptions],
 ) -> Scene:
     """A truncated cone of radii `bottom` and `top` with its lids; sections=4 makes it a truncated pyramid."""
-    bottom, top = validation.number("bottom", bottom, above=0), validation.number("top", top, above=0)
-    height = validation.number("height", height, above=0)
+    bottom, top = _length("bottom", bottom), _length("top", top)
+    height = _length("height", height)
     return _revolved([(0, 0), (bottom, 0), (top, height), (0, height)], edge, sections, **options)
 
 
@@ -136,7 +136,7 @@ def sphere(
 
     n follows from `edge`, or is the smallest that gives at least `facets`, default 2000.
     """
-    radius = validation.number("radius", radius, above=0)
+    radius = _length("radius", radius)
     if edge is not None and facets is not None:
         raise ValueError("sphere takes edge or facets, not both: one follows from the other")
     if edge is None:
@@ -186,11 +186,20 @@ def _placed(
     position = validation.array("position", position, np.float64, (3,))
     options = {"two_sided": False, **options}
     scene = Scene.facets(triangles @ geometry.rotation(rotation).T + position, **options)
-    return scene if edge is None else scene.split(validation.number("edge", edge, above=0))
+    if edge is None:
+        return scene
+    return scene.split(min(validation.number("edge", edge, above=0), geometry.FARTHEST))
+
+
+def _length(name: str, value: Any) -> float:
+    out = validation.number(name, value, above=0)
+    geometry.check_reach(name, np.array(out))
+    return out
 
 
 def _dimensions(name: str, size: ArrayLike, n: int) -> list[float]:
     size = validation.array(name, size, np.float64, (n,))
+    geometry.check_reach(name, size)
     return [validation.number(f"{name}[{i}]", v, above=0) for i, v in enumerate(size)]
 
 

@@ -9,6 +9,9 @@ import numpy as np
 from ..base import validation
 from ..base.vectors import dot
 
+MOST_TURN = 1e12  # rad, of a rotation: float64 resolves 1e-4 rad there
+FARTHEST = 1e70  # m, of corners: the square of an area stays finite
+
 
 def edges(triangles: np.ndarray) -> np.ndarray:
     """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
@@ -108,18 +111,29 @@ def highest(triangles: np.ndarray, x: float, y: float) -> float | None:
     return float(((opposite[good] * pz[good]).sum(axis=1) / total[good]).max())
 
 
+def check_reach(name: str, corners: np.ndarray) -> None:
+    """ValueError for coordinates, m, at which products of areas overflow: their facets would be left out."""
+    if not max(corners.max(initial=0), -corners.min(initial=0)) <= FARTHEST:
+        raise ValueError(f"{name}: lengths up to {np.abs(corners).max():g} m, whose areas overflow; give metres")
+
+
 def rotation(given: Any) -> np.ndarray:
     """Matrix (3, 3) of a rotation, given as a matrix, a rotation vector in rad, an angle about z, or None."""
     if given is None:
         return np.eye(3)
     if hasattr(given, "as_matrix"):
         given = given.as_matrix()
-    if np.ndim(given) == 0:
+    if validation.ndim("rotation", given) == 0:
         given = (0.0, 0.0, validation.number("rotation", given))
     if np.ndim(given) == 1:
+        angles = validation.array("rotation", given, np.float64, (3,)).copy()
+        if np.abs(angles).max() > MOST_TURN:
+            raise ValueError(
+                f"rotation reaches {np.abs(angles).max():g} rad, which float64 does not resolve; give less"
+            )
         from scipy.spatial.transform import Rotation
 
-        return Rotation.from_rotvec(validation.array("rotation", given, np.float64, (3,)).copy()).as_matrix()
+        return Rotation.from_rotvec(angles).as_matrix()
     matrix = validation.array("rotation", given, np.float64, (3, 3))
     # float32 matrices are orthonormal to 1e-7 only
     if not np.allclose(matrix @ matrix.T, np.eye(3), rtol=0, atol=1e-6) or np.linalg.det(matrix) < 0:

@@ -9,12 +9,12 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
-from ..base import host_memory, wgs84
+from ..base import arguments, host_memory, wgs84
 from ..base.errors import ToleranceMissed
 from ..base.report import Report
 from ..base.types import PathLike
 from ..base.validation import array as numbers
-from ..base.validation import choice, count, direction, flag, instance
+from ..base.validation import choice, count, direction, flag, instance, number
 from ..base.validation import tolerance as allowed_error
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
@@ -241,6 +241,9 @@ def echo_request(
     seed = count("seed", seed, 0)
     if not isinstance(shadows, (bool, np.bool_)):
         choice("shadows", shadows, ("embree",))
+    arguments.progress(progress)
+    if max_edge is not None and not isinstance(max_edge, str):
+        max_edge = number("max_edge", max_edge, above=0)
     opened = open_device(device)
     return EchoRequest(
         opened, allowed_error(tolerance), budget(opened, max_bytes),

@@ -10,9 +10,10 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ..base import arguments
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
-from ..base.validation import array, choice, number, sealed
+from ..base.validation import array, choice, flags, ndim, number, sealed
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
@@ -91,8 +92,9 @@ class Illumination:
 
     def share(self, block: int) -> np.ndarray:
         """Illuminated shares in a block, uint8 (k,): 255 is a whole facet. Stored, or computed anew (max_bytes)."""
-        if not -len(self) <= block < len(self):
-            raise IndexError(f"block is {block}; there are {len(self)}")
+        arguments.checked_index("block", "the blocks", block, (len(self),))
+        if not isinstance(block, (int, np.integer)):
+            raise IndexError(f"block is {block!r:.60}; give a whole number from {-len(self)} to {len(self) - 1}")
         block %= len(self)
         if block >= len(self._changes):
             return self._look(block)
@@ -177,14 +179,18 @@ def lit(
     """
     tx = array("tx", tx, np.float64, ("n_pulses", 3))
     ends = [tx] if rx is None else [tx, array("rx", rx, np.float64, (len(tx), 3))]
+    if not isinstance(triangles, np.ndarray) or triangles.dtype != np.float64 or triangles.shape[1:] != (3, 3):
+        triangles = array("triangles", triangles, np.float64, ("k", 3, 3))
     k = len(triangles)
+    arguments.progress(progress, "progress(block, blocks)")
+    if max_bytes is not None:
+        max_bytes = number("max_bytes", max_bytes, least=0)
     tolerance = number("tolerance", tolerance, least=SAMPLES[-1][1])
     choice("engine", engine, ("opencl", "embree"))
     grid = None if heights is None else heights_of(heights)
-    masks = {"on_heights": on_heights, "two_sided": two_sided, "wanted": wanted}
-    for name, mask in masks.items():
-        if mask is not None and np.shape(mask) not in ((), (k,)):
-            raise ValueError(f"{name} has shape {np.shape(mask)}; wanted one for each of {k} facets, ({k},)")
+    on_heights = None if on_heights is None else _mask("on_heights", on_heights, k)
+    wanted = None if wanted is None else _mask("wanted", wanted, k)
+    two_sided = _mask("two_sided", two_sided, k)
     if grid is not None:
         for name, end in zip(("tx", "rx"), ends, strict=False):
             check_above(name, grid, end)
@@ -245,3 +251,12 @@ def lit(
         sealed(blocks), sealed(viewpoints), sealed(~ever), sealed(always), sealed(np.array(dark, np.int64)),
         (0, len(tx)), sealed(usual), changes, lambda block: look(chosen[block]),
     )  # fmt: skip
+
+
+def _mask(name: str, given: np.ndarray | bool, k: int) -> np.ndarray:
+    """A bool for each of k facets (k,), read-only, from one or one for all."""
+    if ndim(name, given) and np.shape(given) != (k,):
+        raise ValueError(f"{name} has shape {np.shape(given)}; wanted one for each of {k} facets, ({k},)")
+    if getattr(given, "dtype", None) != np.bool_:
+        flags(name, given)
+    return np.broadcast_to(np.asarray(given, np.bool_), (k,))

@@ -112,7 +112,7 @@ def test_indices_that_do_not_fit_are_refused(tmp_path, how, faces, words):
         (lambda t: t.replace(b"list uchar int", b"list uchar integer"), "is no line of the header"),
         (lambda t: t.replace(b"property float x", b"property float u"), "vertices of u, y, z, wanted x, y and z"),
         (lambda t: text_of(name="a", more="property list uchar int b\n", end=" 0"), "without a list vertex_index"),
-        (lambda t: t.replace(b"end_header", b"end"), "no header of a PLY file"),
+        (lambda t: t.replace(b"end_header", b"end"), "no header from 'ply' to 'end_header'"),
         (lambda t: t.replace(b"format ascii 1.0\n", b""), "no line 'format'"),
         (lambda t: t.replace(b"element face", b"element tristrips"), "has strips of triangles"),
     ],

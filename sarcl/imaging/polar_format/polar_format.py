@@ -9,6 +9,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...base import arguments
 from ...base.errors import SarclWarning, ToleranceMissed
 from ...base.report import Report
 from ...base.stage_timer import Clock
@@ -71,6 +72,7 @@ def polar_format(
     """
     if check is not None:
         flag("check", check)
+    arguments.progress(progress)
     clock = Clock()
     made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance

@@ -18,6 +18,7 @@ from ...earth.elevation import ElevationModel
 from ._track import REMEDY, Track
 
 UP = np.array([0.0, 0.0, 1.0])
+HIGHEST = 1e8  # m, of heights above the ellipsoid, or above the plane z = 0
 NODES = 10, 24  # times and ranges at which smooth Earth-fixed positions are solved; in between, Chebyshev polynomials
 
 
@@ -36,7 +37,10 @@ class Ground:
         if not track.is_earth_fixed and (np.hypot(*velocity.T[:2]) < 1e-6 * np.abs(velocity[:, 2])).any():
             raise ValueError(f"the track is vertical: no side of it is left or right; {REMEDY}")
         if not isinstance(heights, ElevationModel):
-            return cls(track, number("heights", heights), sign)
+            level = number("heights", heights)
+            if abs(level) > HIGHEST:
+                raise ValueError(f"heights is {level:g} m, which no ground has; give z in m, or an ElevationModel")
+            return cls(track, level, sign)
         if not track.is_earth_fixed:
             raise ValueError(
                 "heights is an elevation model, by longitude and latitude, but the track is in local coordinates, "

@@ -102,8 +102,8 @@ class Track:
     def side(self, raw: PhaseHistory, asked: str | None) -> float:
         """1 right of the track, -1 left: as asked, or where the origin is if it lies in every row's range window."""
         if asked is not None:
-            if asked not in ("left", "right"):
-                raise ValueError(f"side is {asked!r}; choose 'left' or 'right' of the track, seen from above")
+            if not isinstance(asked, str) or asked not in ("left", "right"):
+                raise ValueError(f"side is {asked!r:.60}; choose 'left' or 'right' of the track, seen from above")
             return 1.0 if asked == "right" else -1.0
         off = (np.linalg.norm(raw.tx, axis=1) + np.linalg.norm(raw.rx, axis=1)) / 2 - raw.reference_range
         position, velocity = self.states(np.array([(self.start + self.stop) / 2]))

@@ -9,10 +9,12 @@ from typing import Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
+from ...base import arguments
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceMissed
 from ...base.report import Report
 from ...base.stage_timer import Clock
+from ...base.validation import flag
 from ...earth.elevation import ElevationModel
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
@@ -98,6 +100,9 @@ def range_doppler(
     Source: Cumming and Wong, "Digital Processing of Synthetic Aperture Radar Data", 2005, chapter 6;
     docs/theory/range_doppler.md.
     """
+    if check is not None:
+        flag("check", check)
+    arguments.progress(progress)
     clock = Clock()
     task = make_task(
         raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, doppler_rate,
