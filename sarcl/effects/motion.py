@@ -22,10 +22,8 @@ from ._random_motion import deviation, frequencies, random_process
 
 WRAPPED = 0.01  # largest fraction of a row's energy that a shift may wrap around: side lobes hold less
 FRAMES = ("scene", "track")
-OVERFLOW = np.errstate(over="ignore", invalid="ignore")  # positions that are not finite are refused by their name
 
 
-@OVERFLOW
 def perturbed(
     track: Trajectory,
     *,
@@ -53,14 +51,14 @@ def perturbed(
     """
     validation.instance("track", track, Trajectory)
     seed = validation.count("seed", seed, 0)
-    drawn = frequencies(correlation_time, spectrum, seed)
-    offset, rate = random_process(track.known_times, deviation("rms", rms), drawn, seed, 0)
-    out = _moved(track, offset, rate, frame)
-    angles = deviation("attitude_rms", attitude_rms)
-    return turned(out, random_process(track.known_times, angles, drawn, seed, 1)[0]) if angles.any() else out
+    with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
+        drawn = frequencies(correlation_time, spectrum, seed)
+        offset, rate = random_process(track.known_times, deviation("rms", rms), drawn, seed, 0)
+        out = _moved(track, offset, rate, frame)
+        angles = deviation("attitude_rms", attitude_rms)
+        return turned(out, random_process(track.known_times, angles, drawn, seed, 1)[0]) if angles.any() else out
 
 
-@OVERFLOW
 def sinusoidal(
     track: Trajectory,
     *,
@@ -79,8 +77,9 @@ def sinusoidal(
     if validation.ndim("phase", phase) == 0:
         phase = np.full(3, validation.number("phase", phase))
     phase = validation.array("phase", phase, np.float64, (3,))
-    angle = rate * track.known_times[:, None] + phase
-    return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
+    with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
+        angle = rate * track.known_times[:, None] + phase
+        return _moved(track, size * np.sin(angle), size * rate * np.cos(angle), frame)
 
 
 def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory | None = None) -> PhaseHistory:
@@ -113,7 +112,6 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
     return replace(raw, **changes)
 
 
-@OVERFLOW
 def relative(
     track: Trajectory,
     *,
@@ -145,14 +143,15 @@ def relative(
     )
     t = (track.known_times - validation.number("epoch", epoch))[:, None]
     back = np.swapaxes(Rotation.from_rotvec(w * t).as_matrix(), 1, 2)
-    positions = c + np.einsum("nij,nj->ni", back, track.positions - c - v * t - a * t**2 / 2)
-    changes: dict[str, Any] = {"positions": positions}
-    if track.velocities is not None:
-        seen = np.einsum("nij,nj->ni", back, track.velocities - v - a * t)
-        changes["velocities"] = seen - np.cross(w, positions - c)
-        if track.accelerations is not None:
-            inertia = 2 * np.cross(w, changes["velocities"]) + np.cross(w, np.cross(w, positions - c))
-            changes["accelerations"] = np.einsum("nij,nj->ni", back, track.accelerations - a) - inertia
+    with np.errstate(over="ignore", invalid="ignore"):  # positions that are not finite are refused by their name
+        positions = c + np.einsum("nij,nj->ni", back, track.positions - c - v * t - a * t**2 / 2)
+        changes: dict[str, Any] = {"positions": positions}
+        if track.velocities is not None:
+            seen = np.einsum("nij,nj->ni", back, track.velocities - v - a * t)
+            changes["velocities"] = seen - np.cross(w, positions - c)
+            if track.accelerations is not None:
+                inertia = 2 * np.cross(w, changes["velocities"]) + np.cross(w, np.cross(w, positions - c))
+                changes["accelerations"] = np.einsum("nij,nj->ni", back, track.accelerations - a) - inertia
     if track.attitude is not None:
         changes["attitude"] = back @ track.attitude
     return replace(track, **changes)

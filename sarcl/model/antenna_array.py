@@ -80,7 +80,6 @@ class AntennaArray:
         return cls(positions=np.zeros((1, 3)), offsets=np.zeros((1, 1)))
 
     @classmethod
-    @np.errstate(over="ignore", invalid="ignore")  # what overflows is refused by its name
     def linear(
         cls,
         n: int,
@@ -96,11 +95,11 @@ class AntennaArray:
         """
         i = np.arange(_size("n", n))
         step = validation.number("frequency_step", frequency_step)
-        place = i[:, None] * (validation.number("spacing", spacing) * validation.direction("axis", axis))
-        return cls(positions=place, offsets=[i * step], weights=weights)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by its name
+            place = i[:, None] * (validation.number("spacing", spacing) * validation.direction("axis", axis))
+            return cls(positions=place, offsets=[i * step], weights=weights)
 
     @classmethod
-    @np.errstate(over="ignore", invalid="ignore")  # what overflows is refused by its name
     def planar(
         cls,
         shape: Sequence[int] | np.ndarray,
@@ -124,8 +123,9 @@ class AntennaArray:
         steps = validation.array("frequency_step", frequency_step, np.float64, (2,))
         n, p = (i.ravel() for i in np.indices((rows, columns)))
         y, z = (validation.direction(f"axes[{i}]", axes[i]) for i in range(2))
-        place = n[:, None] * (dy * y) + p[:, None] * (dz * z)
-        return cls(positions=place, offsets=[n * steps[0] + p * steps[1]], weights=weights)
+        with np.errstate(over="ignore", invalid="ignore"):  # what overflows is refused by its name
+            place = n[:, None] * (dy * y) + p[:, None] * (dz * z)
+            return cls(positions=place, offsets=[n * steps[0] + p * steps[1]], weights=weights)
 
     @classmethod
     def costas(

@@ -113,7 +113,6 @@ class Trajectory:
         return cls(times, start + times[:, None] * velocity, np.tile(velocity, (n, 1)))
 
     @classmethod
-    @np.errstate(all="ignore")  # what overflows is refused by its name
     def circle(
         cls,
         *,
@@ -141,19 +140,20 @@ class Trajectory:
         center = validation.array("center", center, np.float64, (3,))
         if n > 1 and arc == 0:
             raise ValueError("arc is 0; the positions of several pulses must differ")
-        if speed is not None:
-            if prf is not None:
-                raise ValueError(f"prf {prf!r} and speed {speed!r} both give the times; give one of them")
-            if n == 1:
-                raise ValueError("speed gives the times of several pulses, and n_pulses is 1; give prf instead")
-            prf = validation.number("speed", speed, above=0) * (n - 1) / (radius * abs(arc))
-        elif prf is not None:
-            prf = validation.number("prf", prf, above=0)
-        angle = start + arc * (np.arange(n) / max(n - 1, 1))
-        zero = np.zeros(n)
-        ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), zero + height], axis=-1)
-        if prf is None:
-            return cls(None, center + ring)
-        rate = arc / max(n - 1, 1) * prf
-        tangent = np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
-        return cls(np.arange(n) / prf, center + ring, radius * rate * tangent)
+        with np.errstate(all="ignore"):  # what overflows is refused by its name
+            if speed is not None:
+                if prf is not None:
+                    raise ValueError(f"prf {prf!r} and speed {speed!r} both give the times; give one of them")
+                if n == 1:
+                    raise ValueError("speed gives the times of several pulses, and n_pulses is 1; give prf instead")
+                prf = validation.number("speed", speed, above=0) * (n - 1) / (radius * abs(arc))
+            elif prf is not None:
+                prf = validation.number("prf", prf, above=0)
+            angle = start + arc * (np.arange(n) / max(n - 1, 1))
+            zero = np.zeros(n)
+            ring = np.stack([radius * np.cos(angle), radius * np.sin(angle), zero + height], axis=-1)
+            if prf is None:
+                return cls(None, center + ring)
+            rate = arc / max(n - 1, 1) * prf
+            tangent = np.stack([-np.sin(angle), np.cos(angle), zero], axis=-1)
+            return cls(np.arange(n) / prf, center + ring, radius * rate * tangent)
