@@ -27,11 +27,18 @@ static inline int any_bits(int8 m, int8 value) {
 
 #define BITS ((int8)(1, 2, 4, 8, 16, 32, 64, 128))
 
+// The k-th eight numbers of a node or a leaf, as two loads of four: vload8 promises the alignment of one number alone, and
+// GPUs would load each by itself.
+static inline float8 eight(int k, __global const float *p) {
+    __global const float4 *four = (__global const float4 *)p + 2 * k;
+    return (float8)(four[0], four[1]);
+}
+
 // children of a node whose boxes, a little enlarged on the host, the ray touches
 static inline int touched(__global const float *node, float3 p, float3 inverse) {
-    float8 ax = (vload8(0, node) - p.x) * inverse.x, bx = (vload8(3, node) - p.x) * inverse.x;
-    float8 ay = (vload8(1, node) - p.y) * inverse.y, by = (vload8(4, node) - p.y) * inverse.y;
-    float8 az = (vload8(2, node) - p.z) * inverse.z, bz = (vload8(5, node) - p.z) * inverse.z;
+    float8 ax = (eight(0, node) - p.x) * inverse.x, bx = (eight(3, node) - p.x) * inverse.x;
+    float8 ay = (eight(1, node) - p.y) * inverse.y, by = (eight(4, node) - p.y) * inverse.y;
+    float8 az = (eight(2, node) - p.z) * inverse.z, bz = (eight(5, node) - p.z) * inverse.z;
     float8 in = fmax(fmax(fmin(ax, bx), fmin(ay, by)), fmin(az, bz));
     float8 out = fmin(fmin(fmax(ax, bx), fmax(ay, by)), fmax(az, bz));
     return any_bits((in <= out) & (out >= 0.0f), BITS);
@@ -43,10 +50,10 @@ static inline int crossed(__global const float *leaf, float3 p, float3 d, int z,
     float px = x == 0 ? p.x : x == 1 ? p.y : p.z, py = y == 0 ? p.x : y == 1 ? p.y : p.z;
     float pz = z == 0 ? p.x : z == 1 ? p.y : p.z, dx = x == 0 ? d.x : x == 1 ? d.y : d.z;
     float dy = y == 0 ? d.x : y == 1 ? d.y : d.z, dz = z == 0 ? d.x : z == 1 ? d.y : d.z;
-    float8 az = vload8(z, leaf) - pz, bz = vload8(3 + z, leaf) - pz, cz = vload8(6 + z, leaf) - pz;
-    float8 ax = (vload8(x, leaf) - px) * dz - az * dx, ay = (vload8(y, leaf) - py) * dz - az * dy;
-    float8 bx = (vload8(3 + x, leaf) - px) * dz - bz * dx, by = (vload8(3 + y, leaf) - py) * dz - bz * dy;
-    float8 cx = (vload8(6 + x, leaf) - px) * dz - cz * dx, cy = (vload8(6 + y, leaf) - py) * dz - cz * dy;
+    float8 az = eight(z, leaf) - pz, bz = eight(3 + z, leaf) - pz, cz = eight(6 + z, leaf) - pz;
+    float8 ax = (eight(x, leaf) - px) * dz - az * dx, ay = (eight(y, leaf) - py) * dz - az * dy;
+    float8 bx = (eight(3 + x, leaf) - px) * dz - bz * dx, by = (eight(3 + y, leaf) - py) * dz - bz * dy;
+    float8 cx = (eight(6 + x, leaf) - px) * dz - cz * dx, cy = (eight(6 + y, leaf) - py) * dz - cz * dy;
     float8 u = cx * by - cy * bx, v = ax * cy - ay * cx, w = bx * ay - by * ax;
     int8 inside = ((u >= 0) & (v >= 0) & (w >= 0)) | ((u <= 0) & (v <= 0) & (w <= 0));
     float8 det = (u + v + w) * dz, t = u * az + v * bz + w * cz;

@@ -59,3 +59,11 @@ def test_samples_of_pixels_follow_their_spacing_in_slant_range():
 def test_work_items_that_share_lines_read_samples_without_conflicts():
     """Per line of an item: 16 samples of 8 bytes, two pairs of weights, and where the line begins."""
     assert shared_lines(64, 256, fine=4, line_taps=4, slope_taps=0) == (16 * 2 + 2 + 1) / 4
+
+
+@pytest.mark.parametrize("nodes", [1, 5, 500])
+def test_a_node_of_a_tree_takes_a_quarter_of_the_wavefronts_as_loads_of_sixteen_bytes(nodes):
+    """Nodes of kernels/ray_casting.cl have 48 numbers; the rays of 20 warps look at any of them."""
+    at = 192 * np.random.default_rng(0).integers(0, nodes, (20, 32))
+    single, four = (global_wavefronts(at + np.arange(0, 192, width)[:, None, None], width).sum() for width in (4, 16))
+    assert single == 4 * four
