@@ -66,12 +66,30 @@ class Part:
     def commit(self) -> None:
         """Make this file `target`, with the permissions that `target` had."""
         if self._lock is not None:
+            self.restore()
             if self.target.exists():
                 shutil.copymode(self.target, self.path)
             if os.name == "nt":  # where files that are open cannot be moved
                 self._unlock()
             os.replace(self.path, self.target)
             self._unlock()
+
+    def restore(self) -> None:
+        """Write anew what this file, still open here, holds, where its folder or its name was deleted meanwhile."""
+        if self._lock is None or _is(self._lock, self.path):
+            return
+        self.target.parent.mkdir(parents=True, exist_ok=True)
+        log.warning("%s was deleted while %s was written in it; it is made again", self.target.parent, self.target.name)
+        made = Part(self.target)
+        try:
+            with open(os.dup(self._lock), "rb") as held, open(made.path, "wb") as file:
+                held.seek(0)
+                shutil.copyfileobj(held, file)
+        except BaseException:
+            made.remove()
+            raise
+        os.close(self._lock)
+        self.path, self._lock = made.path, made._lock
 
     def remove(self) -> None:
         """Remove this file."""

@@ -89,6 +89,7 @@ class Unfinished:
             self.file.flush()
             found = _checksums.layout(self.file, self.file.id.get_filesize(), *(self._rows or ("", None)))
             self.file.close()
+            self._part.restore()
             os.truncate(self._part.path, found.size)  # releases the bytes that were reserved and not used
             _checksums.append(self._part.path, found)
         self._part.commit()

@@ -17,6 +17,11 @@ def check(path: Path, what: str = "", folder: str = "give the name of a file in 
     try:
         mode = os.stat(path).st_mode
     except (FileNotFoundError, NotADirectoryError):
+        if not path.is_absolute() and _is_deleted_here():
+            raise FileNotFoundError(
+                f"{shown} cannot be found: the current folder has been deleted; change to another (os.chdir), or give "
+                "a path that begins with /"
+            ) from None
         raise FileNotFoundError(f"{shown} does not exist; check the name and the folder") from None
     except OSError as exc:
         raise PermissionError(f"{shown} cannot be read: {exc.strerror}; check the name and its permissions") from None
@@ -27,6 +32,15 @@ def check(path: Path, what: str = "", folder: str = "give the name of a file in 
     if not stat.S_ISREG(mode):
         kind = "a pipe" if stat.S_ISFIFO(mode) else "a socket" if stat.S_ISSOCK(mode) else "a device"
         raise ValueError(f"{shown} is {kind}, wanted a regular file, which is read in any order: copy it to one first")
+
+
+def _is_deleted_here() -> bool:
+    """Whether the current folder has been deleted."""
+    try:
+        os.getcwd()
+    except FileNotFoundError:
+        return True
+    return False
 
 
 def contents(path: Path, what: str = "") -> bytes:

@@ -27,7 +27,7 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
     IsADirectoryError when `path` is a folder, PermissionError when nothing can be created there or `path` is
     write-protected or a device, OSError when the disk is too full. Nothing that exists is touched.
     """
-    target = Path(os.path.realpath(os.fspath(path)))
+    target = place(path)
     folder, shown = target.parent, str(path)
     if not os.path.lexists(folder):
         raise FileNotFoundError(
@@ -62,10 +62,21 @@ def check_writable(path: Any, n_bytes: int = 0) -> Path:
     return target
 
 
+def place(path: Any) -> Path:
+    """The file that `path` names, links followed; FileNotFoundError where the current folder has been deleted."""
+    try:
+        return Path(os.path.realpath(os.fspath(path)))
+    except FileNotFoundError:
+        raise FileNotFoundError(
+            f"cannot write {str(path)!r}: the current folder has been deleted; change to another (os.chdir), or give a "
+            "path that begins with /"
+        ) from None
+
+
 def no_room(path: Any, cause: OSError | None, n_bytes: float = 0, what: str = "it", more: str = "") -> OSError:
     """The error of a full disk: the file, why, what it needs and what is free, and a remedy; more  said after that."""
     why = f"{cause.strerror}; " if cause is not None and cause.strerror else ""
-    folder = os.path.dirname(os.path.realpath(os.fspath(path)))
+    folder = next(each for each in place(path).parents if each.exists())  # it may have been deleted meanwhile
     free = size_text(shutil.disk_usage(folder).free)
     needs = f"needs {size_text(n_bytes)}, its disk has {free} free" if n_bytes else f"is on a disk with {free} free"
     remedy = "make room there or choose another disk"
@@ -84,7 +95,7 @@ def check_room(needs: Mapping[Any, float]) -> None:
     """
     wanted: dict[int, float] = {}
     for path, n_bytes in needs.items():
-        folder = os.path.dirname(os.path.realpath(os.fspath(path)))
+        folder = place(path).parent
         disk = os.stat(folder).st_dev
         what = "it" if disk not in wanted else "it, with the outputs before it,"
         wanted[disk] = wanted.get(disk, 0.0) + n_bytes

@@ -13,8 +13,11 @@ from importlib.resources import files
 from pathlib import Path
 from typing import Any
 
+from ..base.text import size_text
+
 POCL = "Portable Computing Language"  # name of PoCL's platform
 _building = threading.RLock()  # the filters of warnings belong to all threads
+LEAST_FILE = 2**20  # bytes, of a file that PoCL writes for a kernel: the largest have 0.6 MB
 STALE = 5.0  # s; an older lock on the cache of binaries belongs to a process that was killed
 
 
@@ -56,9 +59,24 @@ def build(context: Any, text: str, options: list[str]) -> Any:
     import pyopencl
 
     if context.devices[0].platform.name == POCL:
+        _check_file_limit()
         with suppress(pyopencl.Error):
             return pyopencl.Program(context, source("builtins.clh") + "\n" + text).build([*options, "-D_OPENCL_H_"])
     return pyopencl.Program(context, text).build(options)
+
+
+def _check_file_limit() -> None:
+    """OSError where files may be so small that PoCL's compiler, which writes what it builds, would end the process."""
+    try:
+        from resource import RLIM_INFINITY, RLIMIT_FSIZE, getrlimit
+    except ImportError:  # Windows has no such limits
+        return
+    most = getrlimit(RLIMIT_FSIZE)[0]
+    if most != RLIM_INFINITY and most < LEAST_FILE:
+        raise OSError(
+            f"kernels cannot be built: files may have {size_text(most)} at most here (ulimit -f), and PoCL writes what "
+            f"it builds to files of up to {size_text(LEAST_FILE)}; raise the limit"
+        )
 
 
 def kernels_of(program: Any) -> dict[str, Any]:

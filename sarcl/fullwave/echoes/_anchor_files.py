@@ -19,6 +19,7 @@ import numpy as np
 from ...base.errors import warn
 from ...base.fingerprint import as_bytes, checker
 from ...base.text import size_text
+from ...io import output_paths
 from ..runs import RunEnd
 
 log = logging.getLogger(__name__)
@@ -35,7 +36,7 @@ class AnchorFiles:
     """
 
     def __init__(self, out: Any, mark: str) -> None:
-        self.folder = Path(os.path.realpath(os.fspath(out)) + ".anchors")
+        self.folder = Path(f"{output_paths.place(out)}.anchors")
         self.mark = mark
         if others := [p for p in self.folder.glob("*.anchor") if not p.name.startswith(mark)]:
             log.warning(

@@ -22,6 +22,7 @@ from typing import Any
 import numpy as np
 
 from ...base.fingerprint import as_bytes, checker
+from ...io import output_paths
 from ..engine import Skipped
 from ..tiling.tiling import Run, Tiling
 from ._fingerprint import difference, mark
@@ -35,7 +36,7 @@ DIGEST = 32  # bytes
 
 def folder_of(path: Any) -> Path:
     """The folder for the tile files of image `path`."""
-    return Path(os.path.realpath(os.fspath(path)) + ".parts")
+    return Path(f"{output_paths.place(path)}.parts")
 
 
 class TileStore:
@@ -85,6 +86,7 @@ class TileStore:
         check = checker()
         temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
         try:
+            self.folder.mkdir(parents=True, exist_ok=True)  # it may have been deleted meanwhile
             with open(temporary, "wb") as file:
                 start: tuple[Any, ...] = (MAGIC, struct.pack("<Q", len(text)), text)
                 for part in chain(start, (as_bytes(p.astype(self.dtype, copy=False)) for p in parts)):
