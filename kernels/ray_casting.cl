@@ -27,12 +27,11 @@ static inline int any_bits(int8 m, int8 value) {
 
 #define BITS ((int8)(1, 2, 4, 8, 16, 32, 64, 128))
 
-// The k-th eight numbers of a node or a leaf, as two loads of four: vload8 promises the alignment of one number alone, and
-// GPUs would load each by itself.
-static inline float8 eight(int k, __global const float *p) {
-    __global const float4 *four = (__global const float4 *)p + 2 * k;
-    return (float8)(four[0], four[1]);
-}
+// Eight numbers of a node or a leaf, which are whole multiples of 16 bytes: vload8 promises the alignment of one number
+// alone, and GPUs would load each by itself.
+typedef float8 __attribute__((aligned(16))) aligned_float8;
+
+static inline float8 eight(int k, __global const float *p) { return ((__global const aligned_float8 *)p)[k]; }
 
 // children of a node whose boxes, a little enlarged on the host, the ray touches
 static inline int touched(__global const float *node, float3 p, float3 inverse) {
