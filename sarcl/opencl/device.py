@@ -222,6 +222,8 @@ class Device:
         given = [np.int32(a) if isinstance(a, int) else a for a in args]
         with explained(self.info, f"kernel {kernel.function_name}", given), self._lock:
             count = self._counts[kernel] = self._counts.get(kernel, 0) + 1
+            if count == 1 and kernel.num_args != len(given):  # some drivers end the process
+                raise TypeError(f"{kernel.function_name} takes {kernel.num_args} arguments, not {len(given)}")
             if count == MANY_LAUNCHES:
                 kernel.set_scalar_arg_dtypes([_type_of(a) for a in given])
             self._arrays.enqueued += 1

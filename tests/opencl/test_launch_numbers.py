@@ -90,3 +90,13 @@ def test_a_kernel_takes_few_numbers_by_their_place(file):
     ):
         numbers = [a for a in arguments.split(",") if re.fullmatch(r"\s*(int|uint|ulong|float|double)\s+\w+\s*", a)]
         assert len(numbers) <= 4, f"{name} of kernels/{file} takes {numbers}"
+
+
+def test_a_launch_of_too_few_or_many_arguments_is_refused(device):
+    """PoCL ends the process where it is given an argument that the kernel does not have."""
+    device._counts.clear()  # a kernel's first launch is checked
+    kernel, buffer = device.kernel("assemble_image.cl", "untile"), device.zeros(64)
+    for given in ([buffer], [np.int32(1)] * 9):
+        with pytest.raises(TypeError, match=f"untile takes 4 arguments, not {len(given)}"):
+            device.run(kernel, (16, 1), None, *given)
+        device._counts.clear()

@@ -12,6 +12,7 @@ import numpy as np
 from ...model.image_grid import ImageGrid
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
+from ...opencl.launch_numbers import launch_numbers
 from .tree import Tree
 
 Run = tuple[int, int]  # bands first ... last - 1
@@ -215,7 +216,8 @@ def download_sums(device: Device, sums: Any, n: int, kind: type[np.floating] = n
     if kind == np.float32:  # added up there: half of the bytes are downloaded
         made, first = device.empty(8 * n), device.upload(np.zeros(1, np.int32))
         untile = device.kernel("assemble_image.cl", "untile")
-        device.run(untile, (n, 1), None, sums, np.uint64(n), first, 1, 1, n, n, made)
+        numbers = launch_numbers("assemble_image.cl", "untile", pixels=n, across=1, high=1, wide=n, columns=n)
+        device.run(untile, (n, 1), None, numbers, sums, first, made)
         return device.download(made, np.empty(n, np.complex64))
     real, imaginary, real_rest, imaginary_rest = device.download(sums, np.empty((4, n), kind))
     return np.asarray((real + real_rest) + 1j * (imaginary + imaginary_rest))
