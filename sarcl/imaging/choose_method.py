@@ -113,10 +113,6 @@ class _Float32:
                 f"samples up, or ask for a tolerance below {LEAST_TOLERANCE:.0e}, which is met in complex128"
             )
         self.task, self.tolerance, self.energy = task, tolerance, profile_energy.estimate(task)
-        self.near = max(1.0, self.energy.near_pixels if self.energy.near_pixels > 1.25 else 1.0)
-        self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, task.raw.n_samples) * max(
-            self.energy.whole_profile - self.near, 0.0
-        )
         self.gains = 0.0
         if task.antenna is not None:
             self.gains = antenna_beam.rounding(task, tiling_of(task.grid, 32).radius)  # of the largest tiles
@@ -124,8 +120,26 @@ class _Float32:
         if task.grid.is_plane:  # listed points are taken as they are
             farthest = float(np.abs(task.grid.bounds).max())
             self.coordinates = error_bounds.coordinate_rounding(farthest, task.highest)
-        left = np.sqrt(max(tolerance**2 - self.coordinates**2, 0.0))
-        self.inner = float(left - self.rounding - self.gains) / self.near
+        self._aim(self.energy.darkness())
+
+    def _aim(self, near: float) -> None:
+        """Leave a plan what it may take of the tolerance where its errors are `near` times those of its kernels."""
+        self.near = near
+        self.rounding = error_bounds.sum_rounding(tile_kernels.CHUNK, self.task.raw.n_samples) * max(
+            self.energy.whole_profile - near, 0.0
+        )
+        left = np.sqrt(max(self.tolerance**2 - self.coordinates**2, 0.0))
+        self.inner = float(left - self.rounding - self.gains) / near
+
+    def _planned(self, make: Callable[[float], tuple[ImagePlan, Tiling]]) -> tuple[ImagePlan, Tiling]:
+        """The plan that `make` finds for the tolerance that is left. How the errors of few rows add up depends on the
+        length of its profiles: where they add up to more, there is less left."""
+        while True:
+            made = make(self.inner)
+            near = self.energy.darkness(made[0].length)
+            if near <= self.near:
+                return made
+            self._aim(near)
 
     def direct(self, on: DeviceClass) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
@@ -137,7 +151,7 @@ class _Float32:
                 how=f"in complex64: beam is narrower than float32 resolves in tiles of {radius:.3g} m so near a track",
             )  # fmt: skip
         try:
-            made = direct_method.make_plan(self.task, self.inner, on)
+            made = self._planned(lambda left: direct_method.make_plan(self.task, left, on))
         except ToleranceUnreachable as refused:
             raise refused.restated(self.tolerance, self._best()) from None
         return self._offer("direct", made, direct_method.Direct)
@@ -146,16 +160,17 @@ class _Float32:
         """With sub-apertures. ToleranceUnreachable gives the reason, but no best tolerance, which takes a search."""
         self._must_round_less("with sub-apertures", None)
         try:
-            made = factorized_plan.make_plan(self.task, self.inner, on)
+            made = self._planned(lambda left: factorized_plan.make_plan(self.task, left, on))
         except ToleranceUnreachable as refused:
             raise refused.restated(self.tolerance, None) from None
         return self._offer("factorized", made, Factorized)
 
     def _best(self) -> float | None:
         """The smallest tolerance that `direct` meets: rounding takes half of it at most, and the plan the rest."""
+        n_samples = self.task.raw.n_samples
         least = max(
             LEAST_TOLERANCE,
-            numerics_plan.least(self.task.raw.n_samples, tile_kernels.CHUNK) * self.near + self.rounding,
+            numerics_plan.least(n_samples, tile_kernels.CHUNK) * self.energy.largest(n_samples) + self.rounding,
         )
         least = np.hypot(least + self.gains, self.coordinates)
         least = max(least, *(error / ROUNDING for error in (self.rounding, self.coordinates, self.gains)))

@@ -54,6 +54,11 @@ class ImagePlan(Protocol):
         """Cost of the image, relative to that of other plans of the method."""
         ...
 
+    @property
+    def length(self) -> int:
+        """Samples of a range profile."""
+        ...
+
     def describe(self, method: str) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""
         ...

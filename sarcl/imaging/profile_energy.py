@@ -9,40 +9,65 @@ from dataclasses import dataclass
 from weakref import WeakKeyDictionary
 
 import numpy as np
+from numpy.lib.stride_tricks import sliding_window_view
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
-from ..numerics import range_profiles
+from ..numerics import interpolator_choice, range_profiles
 from ..numerics.interpolation import deconvolved
 from ..numerics.pulse_geometry import half_path
 from ..opencl import fft
+from ._rows_in_phase import RowsInPhase
 from .focusing_task import FocusingTask
 
 ROWS, PIXELS, MOST = 16, 256, 2**18  # rows and pixels in the estimate; samples at most
+FEW = 64  # rows of which all are read, as their errors may add up in phase
 ALL = 2**28  # samples up to which every row is read
 IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
 TAPS, FINER, TERMS = 12, 4.0, 6  # of an interpolator with an error of 1e-11
+CHANCE, CHANCE_OF_FEW = 1.25, 1.12  # what noise in many pixels makes of `near`, which is 1
+BESIDE = TAPS + 2  # samples beside a pixel: those that an interpolation reads, and one more on each side
 
 
 _norms: WeakKeyDictionary[FocusingTask, np.ndarray] = WeakKeyDictionary()  # several plans are made for a task
 _known: WeakKeyDictionary[FocusingTask, ProfileEnergy] = WeakKeyDictionary()
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ProfileEnergy:
     """Root mean square of range profiles, relative to that at the pixels themselves.
 
-    near_pixels    over the samples around each pixel's range: errors of interpolation are proportional to it
+    near_pixels    over the samples around each pixel's range: errors of interpolation are proportional to it where they
+                   add up as at random
     whole_profile  over all samples: rounding errors of the transforms are proportional to it
+    rows           of few rows, of which all were read: what their errors of interpolation are in phase
     """
 
     near_pixels: float
     whole_profile: float
+    rows: RowsInPhase | None = None
+
+    def near(self, length: int = 0) -> float:
+        """By how much errors of interpolation are larger, relative to the pixels, than those of the kernel.
+
+        length  samples of the range profiles; 0: as if they did not matter
+        """
+        return self.near_pixels if self.rows is None else max(self.near_pixels, self.rows.ratio(length))
+
+    def darkness(self, length: int = 0) -> float:
+        """`near` where it is larger than chance makes it: than 1.25, of few rows than 1.12; else 1."""
+        near = self.near(length)
+        return near if near > (CHANCE if self.rows is None else CHANCE_OF_FEW) else 1.0
+
+    def largest(self, n_samples: int) -> float:
+        """The largest `darkness` of any plan for rows of so many samples."""
+        return max(self.darkness(n) for n in (0, *interpolator_choice.lengths(n_samples)))
 
 
 def estimate(task: FocusingTask) -> ProfileEnergy:
     """Estimate from 256 pixels in 16 rows spread over the data and in the 16 strongest rows, to 1e-11 of an amplitude.
 
+    Up to 64 rows are all read, unless they have more than 2^18 samples.
     ProfileEnergy(1, 1) where none of these pixels lies in the range window and beam of any row.
     """
     if task not in _known:
@@ -54,7 +79,8 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     """See `estimate`."""
     raw, grid = task.raw, task.grid
     bright = row_norms(task)
-    count = min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
+    few = raw.n_rows <= min(FEW, MOST // raw.n_samples)
+    count = raw.n_rows if few else min(ROWS, raw.n_rows, max(1, MOST // raw.n_samples))
     usual = spread_over(raw.n_rows, count)
     best = np.setdiff1d(np.argsort(bright)[-count:], usual)
     _, x = grid.sample(PIXELS, seed=1)
@@ -67,21 +93,27 @@ def _estimate(task: FocusingTask) -> ProfileEnergy:
     length = fft.good_length(max(4 * n, 48))
     shaped = 1 / deconvolved(TAPS, FINER, TERMS, np.float64).transform(k / length)
     pixel_power = near = pixels_inside = 0.0
+    together = RowsInPhase.of(raw.n_rows, len(x), BESIDE) if few else None
     for row, samples in read.items():
         delays, inside = _delays(task, x, row)
-        share = None
-        if task.antenna is not None:
-            share = np.abs(task.antenna.weights(x[inside], row, task.antenna.frequency)) ** 2
-        values, close = _powers(samples / scale, shaped, length, delays[inside], share)
-        pixel_power, near = pixel_power + stands_for[row] * values, near + stands_for[row] * close
+        gains = None if task.antenna is None else task.antenna.weights(x[inside], row, task.antenna.frequency)
+        values, about, beside = _values(samples / scale, shaped, length, delays[inside])
+        here, close = np.abs(values) ** 2, (np.abs(about) ** 2).mean(axis=1)
+        if gains is not None:
+            here, close = here * np.abs(gains) ** 2, close * np.abs(gains) ** 2
+        pixel_power += stands_for[row] * float(here.sum())
+        near += stands_for[row] * float(close.sum())
         pixels_inside += stands_for[row] * int(inside.sum()) / raw.n_rows
+        if together is not None:
+            cycles = delays * (raw.frequency[row] / raw.frequency_step[row] + n // 2)
+            together.add(row, inside, delays, cycles, values, beside, 1.0 if gains is None else gains.conj())
     peak = 1.0 if task.antenna is None else task.antenna.peak
     whole = pixels_inside * float(((bright / scale) ** 2).sum()) * peak**2
     if whole == 0 or near == 0:
         return ProfileEnergy(1.0, 1.0)
     floor = 1e-20 * whole  # where every pixel is at an exact null of every row
     return ProfileEnergy(
-        float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(whole / max(pixel_power, floor)))
+        float(np.sqrt(near / max(pixel_power, floor))), float(np.sqrt(whole / max(pixel_power, floor))), together
     )
 
 
@@ -136,24 +168,22 @@ def _delays(task: FocusingTask, x: np.ndarray, row: int) -> tuple[np.ndarray, np
     return delays, seen
 
 
-def _powers(
-    samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray, share: np.ndarray | None
-) -> tuple[float, float]:
-    """Power of a profile at delays (m,), in fractions of the window, summed; and the mean power of the samples around
-    each delay, summed.
+def _values(
+    samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Values of a profile at delays (m,), in fractions of the window; its samples about each, and its values as far
+    from each as samples lie apart: (m, BESIDE) each.
 
     shaped  (n_samples,): what makes up for the kernel's transform
-    share   (m,): weight of the power at each delay, or None
     """
     made = deconvolved(TAPS, FINER, TERMS, np.float64)
     weights = np.stack([shaped, np.ones(len(samples))])
     profile, plain = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
-    power = np.abs(plain) ** 2
     place = delays * length - (made.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
     taps = (first[:, None] + np.arange(made.taps)) % length
-    values = (made.weights(place - first) * profile[taps]).sum(axis=1)
-    # the samples that an interpolation reads, and one more on each side
-    around = (first[:, None] + np.arange(-1, made.taps + 1)) % length
-    here, near = np.abs(values) ** 2, power[around].mean(axis=1)
-    return (float(here.sum()), float(near.sum())) if share is None else (float(here @ share), float(near @ share))
+    shares = made.weights(place - first)
+    values = (shares * profile[taps]).sum(axis=1)
+    read = profile[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + made.taps - 1)) % length]
+    beside = sliding_window_view(read, made.taps, axis=1) @ shares[:, :, None]
+    return values, plain[(first[:, None] + np.arange(-1, BESIDE - 1)) % length], beside[..., 0]

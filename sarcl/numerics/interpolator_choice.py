@@ -27,6 +27,14 @@ def profile_length(oversample: float, n_samples: int, taps: int) -> int:
 
 
 @functools.lru_cache(maxsize=256)
+def lengths(n_samples: int) -> tuple[int, ...]:
+    """Lengths of the profiles of rows of n_samples that a plan may take, in float32 or float64."""
+    taps = (*interpolation.TERMS, *FLOAT64_TAPS)
+    found = {profile_length(s, n_samples, t) for s in OVERSAMPLE for t in taps}
+    return tuple(sorted(n for n in found if n <= max(LONGEST, 2 * n_samples * max(interpolation.TERMS))))
+
+
+@functools.lru_cache(maxsize=256)
 def _candidates(n_samples: int, carrier: float) -> tuple[tuple[int, float, int], ...]:
     """Taps, oversampling and profile length of every interpolator for rows of n_samples."""
     out = []

@@ -106,8 +106,7 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
     distance = task.antennas.distance(grid.bounds)
     extent = float(np.linalg.norm(np.diff(grid.bounds, axis=0)))
     cells = np.clip(2 * float(raw.bandwidth.min()) * extent / SPEED_OF_LIGHT, 1, grid.size)
-    # ratio of the energy in the profiles to that at the pixels: in these data, or at the nulls to be expected
-    dark = max(energy.near_pixels, error_bounds.darkness(float(cells)))
+    expected = error_bounds.darkness(float(cells))
     ranges = [
         (
             error_bounds.range_error_float64(tiling.radius, distance, frequency, order),
@@ -124,6 +123,8 @@ def _plans(task: FocusingTask, tilings: dict[int, Tiling], energy: ProfileEnergy
             if length > max(interpolator_choice.LONGEST, 2 * raw.n_samples):
                 continue
             interpolator = interpolation.interpolator_float64(taps, float(oversample))
+            # ratio of the energy in the profiles to that at the pixels: in these data, or at the nulls to be expected
+            dark = max(energy.near(length), expected)
             fixed = dark * interpolator.error
             rounding = error_bounds.sum_rounding(CHUNK, length, interpolator.edge_gain, error_bounds.FLOAT64)
             fixed += max(energy.whole_profile, dark) * rounding

@@ -1,0 +1,138 @@
+"""Errors of interpolation that add up over few rows, against what the planner takes them to be."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.imaging import profile_energy
+from sarcl.imaging._rows_in_phase import RowsInPhase
+from sarcl.imaging.focusing_task import make_task
+from sarcl.numerics import interpolation, interpolator_choice
+from sarcl.opencl import fft
+
+KERNELS = (4, 2.0), (4, 4.0), (6, 3.0), (2, 16.0), (8, 1.5)
+DATA = "noise", "some samples", "one sample alike in all rows", "a point", "the edge of the band alone"
+
+
+def drawn(seed):
+    """A few rows on a line, at one place or scattered, and a few pixels: raw, grid."""
+    random = np.random.default_rng(seed)
+
+    def log(low, high):
+        return float(np.exp(random.uniform(np.log(low), np.log(high))))
+
+    n_rows, n, pixels, bandwidth = int(log(2, 41)), int(log(1, 40)), int(log(1, 6)), 1e10 * log(1e-3, 1.5)
+    t, step = np.linspace(-0.5, 0.5, n_rows)[:, None], log(1e-4, 30)
+    kind, data = int(random.integers(4)), DATA[int(random.integers(5))]
+    ways = 0 * t, t * (0, 1, 0), random.normal(size=(n_rows, 3)), t * (1, 0.3, 0)
+    tx = np.array([[-700.0, 0, 700]]) + step * ways[kind]
+    samples = random.normal(size=(n_rows, n)) + 1j * random.normal(size=(n_rows, n))
+    if data == "some samples":
+        samples *= random.random(n) < 0.2
+        samples[0, 0] += 1
+    elif data == "one sample alike in all rows":
+        samples[:, 0] = 2 * samples[0, 0]
+    elif data == "a point":
+        samples = np.broadcast_to(np.exp(2j * np.pi * random.random() * np.arange(n)), samples.shape)
+    elif data == "the edge of the band alone":
+        samples = (np.arange(n) == 0) * np.exp(2j * np.pi * random.random((n_rows, 1)))
+    raw = sarcl.PhaseHistory(
+        samples, frequency=1e10 - bandwidth / 2, frequency_step=bandwidth / n, tx=tx,
+        reference_range=np.linalg.norm(tx, axis=1),
+    )  # fmt: skip
+    cell = SPEED_OF_LIGHT / 2 / bandwidth
+    return raw, sarcl.ImageGrid.points(random.normal(size=(pixels, 3)) * cell * random.choice([0.01, 1, 5]))
+
+
+def waves(task):
+    """Waves of all samples at the delays of all pixels (n_rows, n, n_samples), delays and turns of the carrier."""
+    raw, k = task.raw, np.arange(task.raw.n_samples) - task.raw.n_samples // 2
+    moved = np.linalg.norm(raw.tx[:, None] - task.grid.positions, axis=-1) - raw.reference_range[:, None]
+    delays = 2 / SPEED_OF_LIGHT * raw.frequency_step[:, None] * moved
+    carrier = raw.frequency + raw.n_samples // 2 * raw.frequency_step
+    turns = np.exp(4j * np.pi / SPEED_OF_LIGHT * carrier[:, None] * moved)
+    return np.exp(2j * np.pi * delays[..., None] * k), delays, turns
+
+
+def errors(task):
+    """Errors of images whose profiles are interpolated in float64, relative to those of the kernels: length, error."""
+    raw, k, found = task.raw, np.arange(task.raw.n_samples) - task.raw.n_samples // 2, []
+    exact, delays, turns = waves(task)
+    rows = (exact * raw.samples[:, None]).sum(axis=-1) * turns
+    scale = max(np.linalg.norm(rows.sum(axis=0)), np.linalg.norm(rows))
+    for taps, oversample in KERNELS:
+        kernel = interpolation.interpolator(taps, oversample)
+        length = interpolator_choice.profile_length(oversample, raw.n_samples, taps)
+        place = delays * length - (taps - 1) / 2
+        first = np.rint(place)
+        read = np.exp(2j * np.pi * (first[..., None] + np.arange(taps))[..., None] * k / length)
+        made = (kernel.weights(place - first)[..., None] * read / kernel.transform(k / length)).sum(axis=-2)
+        wrong = ((made - exact) * raw.samples[:, None]).sum(axis=-1) * turns
+        found.append((length, np.linalg.norm(wrong.sum(axis=0)) / scale / kernel.error))
+    return found
+
+
+def exceeded(seeds):
+    """By how much the largest of the errors exceeds what is planned for: the ratios that are above 1."""
+    found = []
+    for seed in seeds:
+        raw, grid = drawn(seed)
+        task = make_task(raw, grid, None, None, True, True)
+        energy = profile_energy.estimate(task)
+        found.append(max(error / energy.darkness(length) for length, error in errors(task)))
+    return [ratio for ratio in found if ratio > 1]
+
+
+@pytest.mark.parametrize("seeds", [range(150), pytest.param(range(1000, 2500), marks=pytest.mark.slow)], ids=str)
+def test_errors_of_few_rows_are_those_planned_for(seeds):
+    """The largest of five kernels in data made to be hard: 1 in 700 exceeds the estimate, by less than a fifth."""
+    above = exceeded(seeds)
+    assert len(above) <= 1 + len(seeds) / 500 and max(above, default=0) < 1.2
+
+
+def test_errors_that_add_up_in_power_alone_would_be_exceeded(monkeypatch):
+    monkeypatch.setattr(RowsInPhase, "ratio", lambda self, length: 0.0)
+    assert len(exceeded(range(150))) >= 3
+
+
+@pytest.mark.parametrize("seed", range(12))
+def test_the_sums_are_those_of_the_waves(seed):
+    raw, grid = drawn(seed)
+    weights = np.linspace(1, 2, raw.n_rows)
+    task = make_task(raw, grid, None, weights, True, True)
+    energy = profile_energy.estimate(task)
+    exact, delays, turns = waves(task)
+    turns = turns * weights[:, None]
+    spectra = exact * raw.samples[:, None] * turns[..., None]  # (n_rows, n, n_samples)
+    rows = spectra.sum(axis=-1)
+    scale = max(np.linalg.norm(rows.sum(axis=0)), np.linalg.norm(rows))
+    n = raw.n_samples
+    k, fine = np.arange(n) - n // 2, fft.good_length(max(4 * n, 48))
+    for length in (0, 24, 37):
+        most = 0.0
+        for image in {0, length, -length}:
+            turned = (spectra * np.exp(2j * np.pi * image * delays)[..., None]).sum(axis=0)
+            most = max(most, *(np.linalg.norm(turned @ np.exp(2j * np.pi * k * i / fine)) for i in range(-7, 7)))
+        assert energy.rows.ratio(length) == pytest.approx(most / scale, rel=1e-6)
+        assert energy.near(length) == max(energy.near_pixels, energy.rows.ratio(length))
+
+
+def test_a_plan_has_the_errors_of_the_length_of_its_profiles():
+    """Profiles of 480 samples, a rate of 9.6 GHz, hold an image of the carrier of 10 GHz at 0.4 GHz, at which rows of
+    a point add up metres away from it too, where its image is dark."""
+    y = np.linspace(-150, 150, 31)
+    tx = np.stack([np.full(31, -5e3), y, np.zeros(31)], axis=1)
+    raw = sarcl.PhaseHistory(
+        np.ones((31, 15), np.complex64), frequency=10e9 - 140e6, frequency_step=20e6, tx=tx,
+        reference_range=np.linalg.norm(tx, axis=1),
+    )  # fmt: skip
+    grid = sarcl.ImageGrid.plane(shape=(20, 20), spacing=0.1, center=(0, 3, 0))
+    energy = profile_energy.estimate(make_task(raw, grid, None, None, False, True))
+    assert energy.darkness(480) > 1.5 * energy.darkness(90)
+    assert energy.largest(15) == max(energy.darkness(length) for length in (0, *interpolator_choice.lengths(15)))
+    for tolerance in (3e-2, 1e-2, 1e-3):
+        report = sarcl.backproject(raw, grid, tolerance=tolerance, check=True).report
+        assert report.measured_error <= report.predicted_error <= tolerance
