@@ -55,6 +55,7 @@ LEAF_PIXELS = 0.1  # per contribution to a leaf tile computed pixel by pixel, on
 REFERENCED = 8.0  # per sample: weights and reference range
 COMPRESSION_FILTER = 20.0  # per sample of a Doppler bin: secondary range compression
 STRAIGHTENED = 8.0  # per Doppler bin and column, on top of its taps
+SUMMED = 0.3  # per Doppler bin, row and column, where rows are transformed along the track by sums (2026-11-23)
 
 # Choice of a method (2026-11-21).
 MERGING_PAYS = 0.8  # share of the direct method's cost below which sub-apertures are taken
@@ -86,10 +87,16 @@ CHANNEL_SCATTERER = 0.003  # per scatterer in that pulse
 CHANNEL_INTERPOLATED = 0.05  # per sample of an interpolated channel
 INTERPOLATION_PAYS = 0.7  # share of the cost of separate channels below which interpolation is taken
 
+# Echoes of points and facets, in us, beside which the plan of a spectral echo is short (2026-11-23).
+ECHO_PULSE = 50.0  # per pulse and polarisation
+ECHO_SAMPLE = 0.03  # per sample
+ECHO_POINT, ECHO_FACET = 0.02, 0.16  # per scatterer
+
 # Spectral echoes, in us (2026-11-22).
 SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 0.05  # per scatterer and function of aspect: amplitudes, weights of antennas
 SPECTRAL_PLANES = 0.4  # per facet: numbers for the kernel of the amplitudes
 SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map
+SPECTRAL_PLANNED = 0.12  # per sample of a response that is transformed while planning (2026-11-23)
 SPECTRAL_SAMPLE = 0.35  # per wavenumber along the track and frequency: transforms, and the samples read from them
 
 

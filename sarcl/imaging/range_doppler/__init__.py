@@ -6,6 +6,7 @@ For other folders:
 
 For this folder alone:
 
+    _along_track      FFTs or sums along the track on the host: rows to Doppler bins, and these to rows of the image
     _aperture_window  a window over the beam, as weights of Doppler bins
     _bins             Doppler bins: secondary range compression, migration, azimuth compression
     _doppler          Doppler band that an image needs, Doppler centroid

@@ -12,7 +12,6 @@ some slant ranges (secondary range compression).
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import pairwise
 
 import numpy as np
 
@@ -20,15 +19,15 @@ from ...base import host_memory
 from ...base.stage_timer import Clock
 from ...model.phase_history import PhaseHistory
 from ...numerics import range_profiles
-from ...opencl import fft
 from ...opencl.device import Device
+from ._along_track import ImageRows, Spectra
 from ._bins import Bins
 from ._focus_on_device import focus_on_device
 from ._host_rows import ARRAYS, Budget, referenced
 from ._plan import FocusPlan
 from ._track import Track
 
-PIECE = 64  # rows that are transposed at a time, for the cache
+PIECE = 64  # rows that are made at a time, for the cache
 
 
 def focus(
@@ -39,58 +38,34 @@ def focus(
 
     MemoryError where neither memory nor temporary files hold the rows, their spectra or the compressed bins.
     """
-    if not device.is_cpu:
-        made = focus_on_device(device, plan, raw, track, weights, budget, clock, on_progress)
-        if made is not None:
-            return made
-    spectra = _azimuth_spectra(plan, raw, weights, budget, clock)
+    if not device.is_cpu and not plan.far_fewer(raw.n_rows):
+        image = focus_on_device(device, plan, raw, track, weights, budget, clock, on_progress)
+        if image is not None:
+            return image
+    rows = _rows(plan, raw, weights, budget)
+    clock.lap("samples")
+    spectra = Spectra(plan, rows, budget)
+    del rows
+    clock.lap("fft")
     on_progress(0.3)
     bins = Bins(device, plan, raw, track)
-    n_times, n_ranges = len(plan.times), len(plan.ranges)
-    period = plan.length * plan.finer
-    folded = host_memory.zeros((period, n_ranges), budget.host / ARRAYS, "Doppler bins of the columns")
+    compressed = ImageRows(plan, budget)
     at_once = bins.at_once(budget.device)
     for start in range(0, len(plan.bins), at_once):
         numbers = plan.bins[start : start + at_once]
-        chosen = spectra[numbers % plan.length]
-        for columns, made in bins.compressed(chosen, numbers):
-            for a, b in _pieces(numbers, period):
-                folded[numbers[a] % period : numbers[a] % period + b - a, columns] += made[a:b]
+        for columns, made in bins.compressed(spectra.at(numbers), numbers):
+            compressed.add(numbers, columns, made)
         clock.lap("migration")
         on_progress(0.3 + 0.5 * (start + len(numbers)) / len(plan.bins))
     del spectra
-    image = np.empty((n_times, n_ranges), np.complex64)
-    level = bins.level(plan.ranges).astype(np.complex64)
-    width = _columns(folded, budget)
-    for start in range(0, n_ranges, width):
-        columns = slice(start, start + width)
-        made = fft.rows(None, np.ascontiguousarray(folded[:, columns].T), inverse=True)
-        image[:, columns] = made[:, :n_times].T * level[columns]
+    image = compressed.rows(bins.level(plan.ranges))
     clock.lap("fft")
     on_progress(1.0)
     return image
 
 
-def _columns(held: np.ndarray, budget: Budget) -> int:
-    """Columns that are transformed at a time: few for the cache, more where each pass reads a file again."""
-    return max(PIECE, int(budget.host / (32 * len(held)))) if isinstance(held, np.memmap) else PIECE
-
-
-def _pieces(numbers: np.ndarray, period: int) -> list[tuple[int, int]]:
-    """Runs of consecutive Doppler bins that do not cross a multiple of the period."""
-    breaks = np.flatnonzero(numbers % period == 0)
-    edges = np.unique(np.concatenate([[0], breaks, [len(numbers)]]))
-    return [(int(a), int(b)) for a, b in pairwise(edges)]
-
-
-def _azimuth_spectra(
-    plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], budget: Budget,
-    clock: Clock,
-) -> np.ndarray:  # fmt: skip
-    """FFT of the rows along the track, all with the reference range plan.center: complex64 (length, n_samples).
-
-    A track longer than the FFT is folded: the plan's length keeps what is folded out of the pixels' Doppler band.
-    """
+def _rows(plan: FocusPlan, raw: PhaseHistory, weights: tuple[np.ndarray, np.ndarray], budget: Budget) -> np.ndarray:
+    """The rows, weighted, all with the reference range plan.center: complex64 (n_rows, n_samples)."""
     rows = host_memory.zeros((raw.n_rows, raw.n_samples), budget.host / ARRAYS, "rows of samples")
     largest = 0.0
     for start in range(0, raw.n_rows, PIECE):
@@ -98,15 +73,4 @@ def _azimuth_spectra(
         rows[start : start + PIECE] = made
         largest = max(largest, here)
     range_profiles.check_digits(largest)
-    clock.lap("samples")
-    out = host_memory.zeros((plan.length, raw.n_samples), budget.host / ARRAYS, "spectra along the track")
-    width = _columns(out, budget)
-    for start in range(0, raw.n_samples, width):
-        columns = slice(start, start + width)
-        part = np.zeros((len(rows[0, columns]), plan.length), np.complex64)
-        for first in range(0, raw.n_rows, plan.length):
-            piece = rows[first : first + plan.length, columns].T
-            part[:, : piece.shape[1]] += piece
-        out[:, columns] = fft.rows(None, part).T
-    clock.lap("fft")
-    return out
+    return rows

@@ -28,6 +28,7 @@ INTERPOLATION, COMPRESSION = 0.4, 0.5  # shares of the tolerance that the other 
 # fourth power, relative to those at its ends: 1/sqrt(5), 1/sqrt(17), and some room for the phase's cubic part.
 QUADRATIC, FOURTH = 0.5, 0.3
 LEAST_PHASE = 0.05  # share of the tolerance below which the phases of the compression are float32
+SUMS_PAY = 30.0  # times faster, on CPUs, from which on GPUs leave transforms along the track to the host
 CUBIC = 1 / 24  # largest error of a cubic through four nodes, in the first interval: of exp(j k psi), k the node
 
 
@@ -70,12 +71,32 @@ class FocusPlan:
         """Cost in contributions of sarcl/numerics/cost_model.py: FFTs, filters, reading along the migration."""
         bins, columns, several = len(self.bins), len(self.ranges), len(self.blocks) > 1
         filters = len(self.blocks) + 1 if several else 1
-        out = n_rows * n_samples * cost_model.REFERENCED + n_samples * cost_model.profile(self.length)
+        out = n_rows * n_samples * cost_model.REFERENCED + n_samples * self._along(n_rows, self.length)
         out += bins * filters * (n_samples * cost_model.COMPRESSION_FILTER + cost_model.profile(self.profile_length))
         out += (
             bins * columns * (4 if several else 1) * (cost_model.STRAIGHTENED + cost_model.TAPS[self.interpolator.taps])
         )
-        return out + columns * cost_model.profile(self.length * self.finer)
+        return out + columns * self._along(len(self.times), self.length * self.finer)
+
+    def sums_pay(self, n: int, length: int) -> bool:
+        """Whether n rows are transformed along the track by sums over the Doppler bins, instead of FFTs of a length."""
+        return self._along(n, length) < cost_model.profile(length)
+
+    def held(self, n_rows: int, n_samples: int) -> int:
+        """Complex numbers of the arrays of all rows, and of all Doppler bins."""
+        n_times, period = len(self.times), self.length * self.finer
+        spectra = n_rows if self.sums_pay(n_rows, self.length) else self.length
+        folded = 2 * n_times if self.sums_pay(n_times, period) else period
+        return spectra * n_samples + folded * len(self.ranges)
+
+    def far_fewer(self, n_rows: int) -> bool:
+        """Whether GPUs' FFTs of such lengths, too, would take longer than sums for so many rows of samples."""
+        transforms = ((n_rows, self.length), (len(self.times), self.length * self.finer))
+        return all(SUMS_PAY * self._along(n, length) < cost_model.profile(length) for n, length in transforms)
+
+    def _along(self, n: int, length: int) -> float:
+        """Cost of a column of n rows, transformed along the track by an FFT or by sums."""
+        return min(cost_model.profile(length), cost_model.SUMMED * len(self.bins) * n)
 
     def describe(self) -> dict[str, Any]:
         """The plan in words and numbers, for a report."""

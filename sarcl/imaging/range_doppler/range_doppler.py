@@ -181,7 +181,7 @@ def plan_range_doppler(
     plan = task.plan
     pixels = len(plan.times) * len(plan.ranges)
     details: dict[str, object] = {"pixels": f"{len(plan.times)} x {len(plan.ranges)}", **task.describe()}
-    held = plan.length * raw.n_samples + plan.length * plan.finer * len(plan.ranges) + pixels  # complex64
+    held = plan.held(raw.n_rows, raw.n_samples) + pixels  # complex64
     seconds = plan.cost(raw.n_rows, raw.n_samples) / speed(task.device)
     return Forecast("range-Doppler", details, seconds, 8.0 * held + 24.0 * pixels, plan.predicted_error, None)
 
