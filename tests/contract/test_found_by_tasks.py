@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from dataclasses import replace
 
 import numpy as np
@@ -13,6 +14,8 @@ from sarcl.imaging import choose_method
 from sarcl.imaging.range_doppler._aperture_window import ApertureWindow
 from sarcl.numerics import windows
 from sarcl.reference.polar_format import polar_format as plane_waves
+from sarcl.simulation.spectral import _azimuth_transfer
+from sarcl.simulation.spectral._planning_time import PlanningTime
 
 GRID = sarcl.ImageGrid.plane(shape=(5, 4), spacing=0.4)
 
@@ -300,3 +303,56 @@ def test_time_records_below_zero_hertz_are_refused_in_the_words_of_their_argumen
     samples, tx = np.ones((2, 16), complex), np.array([[-700, 0, 700], [-700, 1, 700.0]])
     with pytest.raises(ValueError, match=says):
         sarcl.PhaseHistory.from_time(samples, rate=rate, start=1e-6, carrier=[1e8, 5e7], tx=tx, **options)
+
+
+@pytest.mark.parametrize("tolerance", [3e-2, 1e-3, 1e-4])
+def test_errors_that_add_up_in_phase_over_few_rows_are_planned_for(tolerance, device):
+    """All rows from one place have the same two samples, which cancel at the pixel, beside noise of their own: errors
+    of interpolation are those of one row, times their number. The estimate took them for as random as the noise."""
+    n, n_samples = 40, 8
+    tx = np.repeat([[-700.0, 20.0, 700.0]], n, axis=0)
+    raw = noise_on(tx, n_samples=n_samples, bandwidth=1e9)
+    raw = replace(raw, samples=np.where(np.arange(n_samples) % 4, 0.2 * raw.samples, 0))
+    cell = 299792458 / 2e9
+    for away in np.linspace(0, 1.5, 7):  # in resolution cells, towards the antenna: pixels at places between samples
+        place = away * cell * tx[0] / np.linalg.norm(tx[0])
+        waves = np.exp(2j * np.pi * away * np.array([-4, 0]) / n_samples)  # of the samples 0 and 4 at the pixel
+        common = np.zeros(n_samples, complex)
+        common[[0, 4]] = waves.conj() * (1, -1)
+        grid = sarcl.ImageGrid.points(np.repeat(place[None], 3, axis=0))
+        raw_here = replace(raw, samples=raw.samples + common)
+        image = sarcl.backproject(raw_here, grid, tolerance=tolerance, method="direct", check=False, device=device)
+        assert image_error(image, raw_here) <= image.report.predicted_error <= tolerance, away
+
+
+def few_pulses_far_away():
+    """7 pulses 0.1 mm apart and 1000 km from three points: half a kilometre of track is a Fresnel zone at 0.6 GHz."""
+    track = sarcl.Trajectory.line(start=(-7e5, 0, 7e5), velocity=(0, 1, 0), prf=1e4, n_pulses=7)
+    points = sarcl.Scene.points([[0, 0, 0], [30, 20, 0], [-40, 10, 0.0]])
+    return points, sarcl.Waveform.chirp(center=6e8, bandwidth=1e7, duration=1e-5), track
+
+
+def test_a_plan_of_spectral_echo_that_takes_longer_than_echo_is_refused(monkeypatch):
+    """It compared responses over millions of pulse intervals, for minutes, of which the track has seven."""
+    for name in ("response_error", "transfer_tables"):
+        monkeypatch.setattr(_azimuth_transfer, name, lambda *given: pytest.fail("responses were transformed"))
+    says = r"seen over \d{6,} pulse intervals, of which the track has 7; .* echo takes about .* in all: use echo"
+    forecast = sarcl.plan_echo(*few_pulses_far_away())
+    assert forecast.spectral_seconds is None and re.search(says, forecast.spectral_refusal)
+    for variant in ("exact", "saras"):
+        with pytest.raises(ValueError, match=says):
+            sarcl.spectral_echo(*few_pulses_far_away(), variant=variant)
+
+
+def test_the_time_of_a_plan_is_that_of_all_its_steps():
+    limit = PlanningTime(7, 0.0)
+    limit.spend(3e7, 5000)  # 3.6 s
+    with pytest.raises(ValueError, match=r"more than 7\.2 s, and echo takes about 0 s"):
+        limit.spend(3e7, 5000)
+    many = PlanningTime.of_echo(100_000, 10_000, 1000, 2, False)  # 280 us for each pulse and polarisation: 56 s
+    many.spend(4.6e8, 110_000)
+    with pytest.raises(ValueError, match="more than 57 s, and echo takes about 56 s"):
+        many.spend(1.5e7, 110_000)
+    facets = PlanningTime.of_echo(100_000, 10_000, 1000, 1, True)
+    with pytest.raises(ValueError, match="echo takes about 3 min"):
+        facets.spend(2e9, 110_000)

@@ -17,6 +17,7 @@ For this folder alone:
     _map_part               one map of a part of a scene, with its transfer functions
     _map_plan               grid of the map, and the range wavenumbers at which its spectrum is read
     _map_spectrum           the map's spectrum at the range wavenumbers of every frequency
+    _planning_time          how long a plan may take
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
     _scratch                complex arrays in memory or in temporary files
     _spectral_part          points or facets: plan, and spectra along the track

@@ -21,12 +21,14 @@ from ...base.errors import NotApplicable, ToleranceUnreachable
 from ...numerics.polynomials import chebyshev, lagrange
 from ...opencl import fft
 from ._aspect_window import Aspects, DopplerGrid, KnownPhase, ResponsePhase, wavenumber
+from ._planning_time import PlanningTime
 from ._straight_track import StraightTrack, tangent
 
 # Ranges and frequencies of the tables, and width of their margins in Fresnel zones, that are tried one after the other.
 TRIED = ((1, 1, 4), (1, 2, 4), (2, 2, 4), (2, 3, 4), (3, 3, 4), (3, 4, 16), (4, 4, 64), (6, 8, 64))
 CELLS = 8  # of a table per Fresnel zone, for a margin of 4
 TESTED = 4  # scatterers whose responses are compared with the formula
+COMPARED = 9  # ranges and frequencies, three of each, at which they are compared
 SAFETY = 1.5  # the error is measured at a few ranges and frequencies
 MOST_CELLS = 2**22  # of a table, and lags of a transform: beyond, echo is the better choice
 
@@ -83,8 +85,7 @@ class AzimuthTransfer:
 
 def doppler_grid(transfer: AzimuthTransfer, track: StraightTrack, reach: tuple[float, float]) -> DopplerGrid:
     """The wavenumbers of a transfer function; reach  lowest and highest end of any scatterer's response, m (2,)."""
-    length = max(reach[1], track.length - min(reach[0], 0.0)) + 2 * track.spacing
-    n_lags = fft.good_length(int(np.ceil(length / track.spacing)))
+    n_lags = lags_of(track, reach)
     period = n_lags * track.spacing
     k = wavenumber(np.array(transfer.aspects.band))
     ends = np.outer(1 / transfer.phase.ratio(np.ones(2), k), transfer.limits) * period / (2 * np.pi)
@@ -92,15 +93,23 @@ def doppler_grid(transfer: AzimuthTransfer, track: StraightTrack, reach: tuple[f
     return DopplerGrid(period, n_lags, first, max(1, int(np.floor(ends.max())) - first + 1))
 
 
+def lags_of(track: StraightTrack, reach: tuple[float, float]) -> int:
+    """Pulse intervals of a period that holds the track and any scatterer's response; reach as of `doppler_grid`."""
+    length = max(reach[1], track.length - min(reach[0], 0.0)) + 2 * track.spacing
+    return fft.good_length(int(np.ceil(length / track.spacing)))
+
+
+def compared_samples(n_factors: int, n_functions: int, n_lags: int) -> float:
+    """Samples that are transformed where responses are compared with the formula: see `response_error`."""
+    return float(COMPARED) * (n_factors + n_functions) * n_lags
+
+
 def transfer_tables(
     aspects: Aspects, functions: Functions, n_ranges: int, n_frequencies: int, margin: float
 ) -> AzimuthTransfer:
     """Tables at Chebyshev nodes of ranges and frequencies. `margin`: Fresnel zones by which they exceed the window."""
-    zone = aspects.fresnel
-    step = zone / (CELLS * max(1.0, margin / 4))
     low, high = aspects.support
-    start = -high - margin * zone
-    n = fft.good_length(int(np.ceil((high - low + 2 * margin * zone) / step)) + 4)
+    start, step, n = _cells(aspects, margin)
     inverse = np.sort(
         chebyshev(0.5 / aspects.nearest + 0.5 / aspects.farthest, 1 / aspects.nearest - 1 / aspects.farthest, n_ranges)
     )
@@ -111,8 +120,7 @@ def transfer_tables(
         for m, f in enumerate(frequencies.tolist()):
             k = float(wavenumber(f))
             lag_step = np.pi / (k * n * step)
-            first, last = (int(np.floor(r * float(tangent(end)) / lag_step)) for end in (low, high))
-            count = -(-(last - first + 2) // n) * n
+            first, count = _lags(aspects, r, lag_step, n)
             if max(count, n) > MOST_CELLS:
                 raise NotApplicable(
                     f"scatterers are seen over {r * (high - low):.3g} m of track, which would need transforms of "
@@ -143,6 +151,28 @@ def transfer_tables(
     return AzimuthTransfer(aspects, KnownPhase(middle), ranges, frequencies, start, step, tables)
 
 
+def table_samples(aspects: Aspects, n_functions: int, n_ranges: int, n_frequencies: int, margin: float) -> float:
+    """Samples that are transformed for tables: see `transfer_tables`."""
+    _, step, n = _cells(aspects, margin)
+    k = float(wavenumber(aspects.band[1]))
+    lags = _lags(aspects, aspects.farthest, np.pi / (k * n * step), n)[1]
+    return float(n_ranges * n_frequencies * n_functions) * max(lags, n)
+
+
+def _cells(aspects: Aspects, margin: float) -> tuple[float, float, int]:
+    """First value of u/2k in a table, the step to the next one, and their number."""
+    zone, (low, high) = aspects.fresnel, aspects.support
+    step = zone / (CELLS * max(1.0, margin / 4))
+    n = fft.good_length(int(np.ceil((high - low + 2 * margin * zone) / step)) + 4)
+    return -high - margin * zone, step, n
+
+
+def _lags(aspects: Aspects, slant_range: float, step: float, n: int) -> tuple[int, int]:
+    """The first lag at which a slant range, m, is seen, in steps, m, and how many there are: a multiple of n."""
+    first, last = (int(np.floor(slant_range * float(tangent(end)) / step)) for end in aspects.support)
+    return first, -(-(last - first + 2) // n) * n
+
+
 @dataclass(frozen=True, eq=False)
 class Brightest:
     """The scatterers that the pulses see brightest: factors (n, J), places along the track and slant ranges, m (n,)."""
@@ -154,15 +184,18 @@ class Brightest:
 
 def plan_transfer(
     aspects: Aspects, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float],
-    tolerance: float, asked: float, brightest: Brightest | None = None,
+    tolerance: float, asked: float, time: PlanningTime, brightest: Brightest | None = None,
 ) -> AzimuthTransfer:  # fmt: skip
     """The smallest tables whose responses differ from the formula by at most `tolerance`.
 
-    factors    of some scatterers (n, J);  asked  the whole tolerance, for the message
+    factors    of some scatterers (n, J);  asked  the whole tolerance, for the message;  time  that the plan may take
     brightest  where a beam weighs aspects: their samples are compared too, at the pulses that there are
     """
-    best = np.inf
+    best, n_lags = np.inf, lags_of(track, reach)
+    some, n_functions = factors[:TESTED].shape
     for tried in TRIED:
+        time.spend(compared_samples(some, n_functions, n_lags), n_lags)
+        time.spend(table_samples(aspects, n_functions, *tried), n_lags)
         made = transfer_tables(aspects, functions, *tried)
         error = response_error(made, functions, factors[:TESTED], track, reach)
         if brightest is not None:

@@ -27,11 +27,13 @@ from ._aspect_window import Aspects, DopplerGrid, wavenumber
 from ._azimuth_transfer import SAFETY, AzimuthTransfer, Functions
 from ._map_part import MapPart
 from ._map_plan import RangeWavenumbers, plan_map, scatterers_per_cell
+from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._straight_track import StraightTrack, tangent
 
 # Nodes over s_k, 1/R_k and frequency, and cells of the table per pulse of D, that are tried one after the other.
 TRIED = ((2, 1, 1, 8), (2, 2, 2, 8), (3, 2, 2, 8), (3, 3, 3, 16), (4, 4, 4, 16), (6, 6, 6, 32), (8, 8, 8, 32))
+COMPARED = 27  # responses that are compared, at most: three frequencies, nine places
 COMPRESSED = 0.1  # share of the tolerance: tables of several nodes are replaced by fewer sums of them
 
 
@@ -180,14 +182,18 @@ def edge_wavenumbers(
 
 def plan_edge(
     aspects: Aspects, functions: Functions, factors: np.ndarray, places: EdgePlaces, middle_range: float,
-    track: StraightTrack, tolerance: float, asked: float,
+    track: StraightTrack, tolerance: float, asked: float, time: PlanningTime,
 ) -> tuple[AzimuthTransfer, EdgeNodes]:  # fmt: skip
     """The smallest tables whose responses differ from D by at most `tolerance`.
 
-    factors  of some scatterers (n, J);  asked  the whole tolerance, for the message
+    factors  of some scatterers (n, J);  asked  the whole tolerance, for the message;  time  that the plan may take
     """
     best = np.inf
     for tried in TRIED:
+        *nodes_over, cells = tried
+        n_lags = track.n_pulses + places.length
+        tables = float(np.prod(nodes_over)) * factors.shape[1] * 2 * cells * places.length
+        time.spend(tables + COMPARED * len(factors) * n_lags, n_lags)
         transfer, nodes = edge_tables(aspects, functions, places, track.spacing, middle_range, tried, tolerance)
         error = SAFETY * edge_error(transfer, nodes, functions, factors, places, track)
         best = min(best, error)
@@ -239,7 +245,7 @@ def places_of_edges(amplitudes: ScattererAmplitudes, aspects: Aspects, track: St
 
 def edge_map(
     aspects: Aspects, functions: Functions, factors: np.ndarray, places: EdgePlaces, track: StraightTrack,
-    some: np.ndarray, tolerance: float, of_grid: float, is_random: bool, tile: int, asked: float,
+    some: np.ndarray, tolerance: float, of_grid: float, is_random: bool, tile: int, asked: float, time: PlanningTime,
 ) -> MapPart:  # fmt: skip
     """The map of an edge.
 
@@ -247,7 +253,7 @@ def edge_map(
     """
     ranges = float(places.distance.min()), float(places.distance.max() * (1 + 1e-4))
     middle = (ranges[0] + ranges[1]) / 2
-    transfer, nodes = plan_edge(aspects, functions, factors, places, middle, track, tolerance, asked)
+    transfer, nodes = plan_edge(aspects, functions, factors, places, middle, track, tolerance, asked, time)
     grid, numbers = edge_wavenumbers(transfer, nodes, places.length, track)
     azimuth = places.pulse * track.spacing
     per_cell = 0.0 if is_random else scatterers_per_cell(azimuth, places.distance, grid, numbers)

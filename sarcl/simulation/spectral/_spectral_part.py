@@ -17,12 +17,21 @@ from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_fu
 from ._aspect_window import aspects
 from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspects
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
-from ._azimuth_transfer import TESTED, Brightest, doppler_grid, plan_transfer, response_error
+from ._azimuth_transfer import (
+    TESTED,
+    Brightest,
+    compared_samples,
+    doppler_grid,
+    lags_of,
+    plan_transfer,
+    response_error,
+)
 from ._edge_map import edge_map, places_of_edges
 from ._facet_factors import FacetFactors
 from ._map_part import MapPart
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
 from ._map_spectrum import ReflectivityMap
+from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._scratch import Scratch
 from ._stationary_phase import stationary_tables
@@ -118,13 +127,13 @@ class PartOnDevice:
 
 def plan_part(
     amplitudes: ScattererAmplitudes, track: StraightTrack, band: tuple[float, float], has_beam: bool,
-    is_random: bool, variant: str, tolerance: float, asked: float, device: Device,
+    is_random: bool, variant: str, tolerance: float, asked: float, device: Device, time: PlanningTime,
 ) -> SpectralPart:  # fmt: skip
     """The plan for points or facets whose error is at most `tolerance`.
 
     variant    "exact" or "saras";  band  Hz, its limits
     has_beam   antennas limit the aspects at which scatterers are seen;  is_random  scatterers have random phases
-    asked      the whole tolerance, for messages
+    asked      the whole tolerance, for messages;  time  that the plan may take
     """
     low, high, outside, main = aspects_seen(amplitudes, track, band, has_beam, OUTSIDE * tolerance)
     check_doppler(track, band[1], main, has_beam)
@@ -168,13 +177,15 @@ def plan_part(
     brightest = _brightest(amplitudes, track, drawn, factors, band) if has_beam else None
     factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
     if variant == "saras":
+        n_lags = lags_of(track, reach)
+        time.spend(compared_samples(1, len(expansion), n_lags), n_lags)
         transfer = stationary_tables(seen_aspects, expansion.functions)
         error = RESPONSE_SAFETY * response_error(transfer, expansion.functions, factors[:1], track, reach)
         _check_saras(expansion.error, error, outside, (1 - GRID) * tolerance, asked)
         transfer = replace(transfer, error=error)
     else:
         transfer = plan_transfer(
-            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, brightest
+            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, time, brightest
         )  # fmt: skip
     grid = doppler_grid(transfer, track, reach)
     numbers = range_wavenumbers(transfer, grid)
@@ -188,7 +199,7 @@ def plan_part(
         maps.append(
             edge_map(
                 seen_aspects, expansion.functions, factors[:TESTED], places, track, some, of_transfer, of_grid,
-                is_random, tile, asked,
+                is_random, tile, asked, time,
             )
         )  # fmt: skip
     return SpectralPart(amplitudes, some, expansion, tuple(maps), (low, high), outside)

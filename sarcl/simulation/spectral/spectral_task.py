@@ -22,6 +22,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
 from .. import echo_sampling
 from ..scene_echoes import EchoRequest, SceneEchoes, parts_of, prepare_scene
+from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
 from ._straight_track import StraightTrack, straight_track
@@ -77,6 +78,10 @@ class SpectralTask:
             made = plan_part(
                 amplitudes, self.line, band, prepared.weights.pair is not None, random, variant,
                 share / gain - fixed - straight, request.tolerance, request.device,
+                PlanningTime.of_echo(
+                    self.line.n_pulses, len(amplitudes.azimuth), len(self.frequencies), len(request.polarizations),
+                    part is prepared.facets,
+                ),
             )  # fmt: skip
             parts.append(made)
             errors.append(gain * (made.predicted_error + fixed + straight))

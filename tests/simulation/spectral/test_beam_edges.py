@@ -17,6 +17,7 @@ from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._beam_edges import beam_edges, continued_weights
 from sarcl.simulation.spectral._map_plan import plan_map, tile_of
 from sarcl.simulation.spectral._map_spectrum import ReflectivityMap
+from sarcl.simulation.spectral._planning_time import PlanningTime
 from sarcl.simulation.spectral._straight_track import straight_track
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=2e-6)
@@ -99,7 +100,7 @@ def test_the_map_of_an_edge_is_the_sum_over_scatterers_and_pulses(side, device):
     tangents = side * -0.004 + random.uniform(-1e-5, 0, n) * side
     inner = seen.low if side > 0 else seen.high
     places = edge.edge_places(tangents, azimuth, slant_range, side, inner, line)
-    transfer, nodes = edge.plan_edge(seen, functions, np.eye(2), places, 1e4, line, 1e-4, 1e-3)
+    transfer, nodes = edge.plan_edge(seen, functions, np.eye(2), places, 1e4, line, 1e-4, 1e-3, PlanningTime(200, 0.0))
     grid, numbers = edge.edge_wavenumbers(transfer, nodes, places.length, line)
     assert transfer.error <= 1e-4 and grid.n_lags >= line.n_pulses + places.length
     plan = plan_map(1e-4, numbers, grid, (9890.0, 10110.0), 1.0, tile_of(device), 1e-3)
