@@ -8,10 +8,7 @@
 //
 // source    backproject_lines.cl, also for pulses that are added pixel by pixel. The sums are kept without the rest_ij of a
 //           group of pulses, that of its middle pulse: where groups change, and after CHUNK pulses, sums are turned by the
-//           difference of the phases. T is stored by periods of the items' pixels, so that neighbouring items read
-//           neighbouring numbers of local memory, and the places of all samples that an item reads are constants.
-//           T(m) holds the bend of the group's lines too (line_group.clh:bend_of), at m beta/FINE + bend (m/FINE)^2 with the
-//           carrier of m beta/FINE: of the positions, rest_ij is then what the bend leaves.
+//           difference of the phases
 // symbols   T, W, n_i, rest_ij, beta   as in backproject_lines.cl
 // macros    FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM, SIDE, FINE, LINE_TAPS, LINE_TERMS, GROUP as in
 //           backproject_lines.cl;  SHARED 1, see line_geometry.clh
@@ -32,121 +29,12 @@
 #include "line_group.clh"
 #include "line_schedule.clh"
 
-#define PIXELS 4                                // neighbouring pixels of a line that belong to a work-item
-#define ACROSS (SIDE / PIXELS)                  // work-items that share a line
-#define AT_ONCE (ITEMS / ACROSS)                // lines that the work-group adds to at a time
-#define LINES (SIDE / AT_ONCE)                  // lines that a work-item adds to, every AT_ONCE-th
-#define PERIOD (FINE * PIXELS)                  // samples of T from a work-item's first pixel to its neighbour's
-#define READ ((PIXELS - 1) * FINE + LINE_TAPS)  // samples of T over which a work-item's pixels of a line reach
-// Sample m of T is stored at row m % PERIOD, column m / PERIOD, and again PERIOD rows and one column before: so the samples
-// that an item reads lie in one column, whichever comes first.
-#define ROWS (PERIOD + READ - 1)
-#define COLUMNS (MOST / PERIOD + 1)
+#define PIXELS 4                  // neighbouring pixels of a line that belong to a work-item
+#define ACROSS (SIDE / PIXELS)    // work-items that share a line
+#define AT_ONCE (ITEMS / ACROSS)  // lines that the work-group adds to at a time
+#define LINES (SIDE / AT_ONCE)    // lines that a work-item adds to, every AT_ONCE-th
 
-DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
-#if SLOPE_TAPS
-DEFINE_SLOPES(line_slopes, SLOPE_TAPS, SLOPE_TERMS)
-#define OUTER ((LINE_TAPS - SLOPE_TAPS) / 2)  // taps on either side that have no slopes
-#endif
-
-typedef struct {
-    float of[LINE_TAPS * LINE_TERMS];
-} line_table;
-typedef struct {
-#if SLOPE_TAPS
-    float of[SLOPE_TAPS * SLOPE_TERMS];
-#else
-    float of[LINE_TAPS * LINE_TERMS];  // not read
-#endif
-} slope_table;
-
-// What the items of a work-group make of a pulse together.
-typedef struct {
-    float4 W[SIDE * LINE_TAPS / 2];
-#if SLOPE_TAPS
-    float4 V[SIDE * SLOPE_TAPS / 2];
-#endif
-    float2 T[ROWS * COLUMNS];
-    int at[SIDE];
-} pulse_lines;
-
-// Weights W_b of line r, and their slopes V_b; where the line's first sample of T is stored.
-INLINED void weigh_line(group pulses, __global const float *restrict entry, int r, TABLE weights, TABLE slopes,
-                        __local pulse_lines *made) {
-    float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP), ratios = FOUR(entry, E_FINE_LOW);
-    float4 phases = FOUR(entry, E_ACROSS_LOW), u = FOUR(entry, E_U_X), v = FOUR(entry, E_V_X);
-    float fine = steps.w, fine_low = ratios.x, samples_of_T = phases.w;
-    line_geometry line;
-    line.u = (direction){u.x, u.y, 0, u.z, u.w};
-    line.v = (direction){v.x, v.y, 0, v.z, v.w};
-    float i = r - SIDE / 2, centre = curvature_at(line, i, 0, q_of_line(pulses, i)), weight[LINE_TAPS];
-    // i times the ratio of steps, in two parts: the first product is exact
-    float product = i * ratios.y, whole = nearest(product), rest = fma(i, ratios.z, product - whole);
-    float shift = in_position_of(pulses, line, i, centre);
-    float place = place_of(pulses, i, ratios.y * (1.0f / FINE), samples_of_T * (1.0f / FINE), shift);
-    float t = fma(shift - pulses.bend * place * place, samples_of_T, rest) - 0.5f * (LINE_TAPS - 1), first = nearest(t), z = t - first;
-    line_weights(z, weights, weight);
-#if SLOPE_TAPS
-    float slope[SLOPE_TAPS];
-    line_slopes(z, slopes, slope);
-#endif
-    first += whole;
-    float cycles = cycles_of(i, ratios.w, phases.x) + phases.y;
-    cycles = fma(centre, phases.z, cycles);
-    cycles -= nearest(cycles);
-    cycles -= cycles_of(first, fine, fine_low);
-    cycles -= nearest(cycles);
-    // from tap to tap the phase falls by that of a FINE-th of a pixel: turned from the middle outwards, where weights are small
-    float cosine[LINE_TAPS], sine[LINE_TAPS], step_sine, step_cosine, of_tap = cycles - (LINE_TAPS / 2) * fine;
-    of_tap = of_tap - (LINE_TAPS / 2) * fine_low;
-    sincos_cycles(of_tap - nearest(of_tap), &sine[LINE_TAPS / 2], &cosine[LINE_TAPS / 2]);
-    sincos_cycles(fine + fine_low, &step_sine, &step_cosine);
-#pragma unroll
-    for (int b = LINE_TAPS / 2 + 1; b < LINE_TAPS; b++) {
-        cosine[b] = fma(cosine[b - 1], step_cosine, sine[b - 1] * step_sine);
-        sine[b] = fma(sine[b - 1], step_cosine, -cosine[b - 1] * step_sine);
-    }
-#pragma unroll
-    for (int b = LINE_TAPS / 2 - 1; b >= 0; b--) {
-        cosine[b] = fma(cosine[b + 1], step_cosine, -sine[b + 1] * step_sine);
-        sine[b] = fma(sine[b + 1], step_cosine, cosine[b + 1] * step_sine);
-    }
-    __local float2 *W = (__local float2 *)made->W + r * LINE_TAPS;
-#pragma unroll
-    for (int b = 0; b < LINE_TAPS; b++) {
-        W[b] = (float2)(weight[b] * cosine[b], weight[b] * sine[b]);
-#if SLOPE_TAPS
-        if (b >= OUTER && b < OUTER + SLOPE_TAPS) {
-            float per_metre = slope[b - OUTER] * samples_of_T;
-            ((__local float2 *)made->V)[r * SLOPE_TAPS + b - OUTER] = (float2)(per_metre * cosine[b], per_metre * sine[b]);
-        }
-#endif
-    }
-    // no rounding, however unlikely, may lead outside of T
-    int from = as_int(numbers.y), count = as_int(numbers.z);
-    int m = clamp((int)first - from - FINE * (SIDE / 2), 0, count - FINE * (SIDE - 1) - LINE_TAPS);
-    made->at[r] = m % PERIOD * COLUMNS + m / PERIOD;
-}
-
-// Sample number k of T: the profile of a pulse at a place of a line, carrier included. row: its profile.
-INLINED void take_sample(group pulses, __global const float *restrict entry, int k, __global const float *restrict row, int stride,
-                         int origin, TABLE table, __local float2 *T) {
-    float4 numbers = FOUR(entry, E_PULSE), steps = FOUR(entry, E_STEP);
-    float m = k + as_int(numbers.y), re, im, sine, cosine;
-    // m times the step, in two parts: the first product is exact
-    float product = m * steps.x, whole = nearest(product);
-    // the bend in samples of the profile: entry[E_SAMPLES] is that of T per metre
-    float bend = pulses.bend * entry[E_SAMPLES] * (1.0f / (FINE * FINE)) * (steps.x + steps.y);
-    float t = fma(m, fma(m, bend, steps.y), product - whole) + steps.z;
-    look_up(row, stride, origin, as_int(numbers.w) + nearest_int(product), t, table, &re, &im);
-    sincos_cycles(cycles_of(m, steps.w, entry[E_FINE_LOW]), &sine, &cosine);
-    float2 sample = (float2)(fma(re, cosine, -im * sine), fma(re, sine, im * cosine));
-    uint row_of = (uint)k % PERIOD, column = (uint)k / PERIOD;
-    T += row_of * COLUMNS + column;
-#pragma unroll
-    for (int copy = 0; copy * PERIOD < ROWS; copy++)
-        if (row_of + copy * PERIOD < ROWS && column >= copy) T[copy * (PERIOD * COLUMNS - 1)] = sample;
-}
+#include "pulse_lines.clh"
 
 // The sums of a work-item, without the rest_ij of the pulses so far.
 typedef struct {
