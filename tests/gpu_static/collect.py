@@ -24,6 +24,7 @@ from sarcl.opencl import choose_device, fft
 from sarcl.opencl._programs import names_in, source
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import DeviceInfo
+from sarcl.opencl.launch_numbers import _layout
 
 KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\(")
 PAPER = DeviceInfo(
@@ -70,13 +71,22 @@ class Use:
     groups: dict[str, set[int]] = field(default_factory=dict)
 
 
+def numbers_of(file: str, text: str, kernel: str) -> np.dtype | None:
+    """The type of the struct that a kernel takes its numbers in; None for a kernel that takes each by its place."""
+    found = re.search(rf"void\s+{kernel}\s*\(\s*(\w+_numbers) given\b", text)
+    return found and _layout(file, found[1])
+
+
 def kernels_in(text: str) -> list[str]:
     """Names of the kernels in source text."""
     return KERNEL.findall(text)
 
 
 class PaperDevice(Device):
-    """A GPU that records programs and launches in `found`, and computes nothing."""
+    """A GPU that records programs and launches in `found`, and computes nothing.
+
+    AssertionError: a launch whose numbers are not the struct that its kernel takes.
+    """
 
     def __init__(self, info: DeviceInfo, found: dict[Variant, Use]) -> None:
         self.info, self.found, self.task, self.until = info, found, "", ""
@@ -95,7 +105,10 @@ class PaperDevice(Device):
         variant = Variant(file, tuple(sorted((k, int(v)) for k, v in macros.items() if k in known)))
         use = self.found.setdefault(variant, Use())
         use.tasks.append(self.task)
-        return {name: SimpleNamespace(function_name=name, use=use) for name in kernels_in(text)}
+        return {
+            name: SimpleNamespace(function_name=name, use=use, numbers=numbers_of(file, text, name))
+            for name in kernels_in(text)
+        }
 
     def upload(self, array: np.ndarray) -> Any:
         return self.empty(array.nbytes)
@@ -132,6 +145,8 @@ class PaperDevice(Device):
     def run(
         self, kernel: Any, size: tuple[int, ...], group: tuple[int, ...] | None, *args: Any, **options: Any
     ) -> None:
+        given = args[0].dtype if isinstance(args[0], np.ndarray) and args[0].dtype.names else None
+        assert given == kernel.numbers, f"{kernel.function_name} takes {kernel.numbers} first, not {given}"
         items = 0 if group is None else int(np.prod(group))
         kernel.use.groups.setdefault(kernel.function_name, set()).add(items)
         if self.until and kernel.function_name.startswith(self.until):
