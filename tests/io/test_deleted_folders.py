@@ -11,6 +11,7 @@ import pytest
 from helpers.cases import noise_on, straight
 
 import sarcl
+from sarcl.io import output_paths
 from sarcl.opencl import _programs
 
 RAW = noise_on(straight(16), n_samples=32)
@@ -70,6 +71,17 @@ def test_what_is_computed_is_written_though_its_folder_is_deleted_meanwhile(verb
         got, want = (np.asarray(getattr(one, "samples", getattr(one, "data", None))) for one in (each, wanted))
         np.testing.assert_array_equal(got, want)
     assert [path.name for path in folder.iterdir()] == ["a.h5"]
+
+
+@pytest.mark.skipif(os.name == "nt", reason="Windows keeps folders that are in use")
+@pytest.mark.parametrize("what", ["folder", "name"])
+def test_a_file_that_is_deleted_before_it_is_committed_is_written_anew(tmp_path, what):
+    folder = tmp_path / "out"
+    folder.mkdir()
+    with output_paths.atomic(folder / "a.txt") as part:
+        part.write_text("kept")
+        shutil.rmtree(folder) if what == "folder" else part.unlink()
+    assert (folder / "a.txt").read_text() == "kept" and [path.name for path in folder.iterdir()] == ["a.txt"]
 
 
 def test_a_limit_on_files_that_would_end_pocl_is_told_before_it_builds(monkeypatch):

@@ -12,6 +12,7 @@ from typing import Any, TypedDict, cast
 import numpy as np
 
 from ...arrays.map_aperture import MapKind, map_aperture
+from ...base import arguments
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
 from ...base.rows import spread_over
@@ -68,6 +69,10 @@ def run(
     progress: Callable[[str, int, int], None] | None = None,
 ) -> list[dict[str, Any]]:
     """Measurements of each case: plain numbers, ready for JSON."""
+    if not isinstance(cases, Sequence) or not all(isinstance(case, Case) for case in cases):
+        shown = " ".join(repr(cases).split())
+        raise TypeError(f"cases is {shown:.60}; give a list of fda.Case")
+    arguments.progress(progress)
     out = []
     for i, case in enumerate(cases):
         if progress:
