@@ -7,7 +7,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
-from sarcl.imaging import profile_energy
+from sarcl.imaging import choose_method, profile_energy
 from sarcl.imaging._rows_in_phase import RowsInPhase
 from sarcl.imaging.focusing_task import make_task
 from sarcl.numerics import interpolation, interpolator_choice
@@ -120,19 +120,30 @@ def test_the_sums_are_those_of_the_waves(seed):
         assert energy.near(length) == max(energy.near_pixels, energy.rows.ratio(length))
 
 
-def test_a_plan_has_the_errors_of_the_length_of_its_profiles():
-    """Profiles of 480 samples, a rate of 9.6 GHz, hold an image of the carrier of 10 GHz at 0.4 GHz, at which rows of
-    a point add up metres away from it too, where its image is dark."""
+def test_a_plan_has_the_errors_of_the_length_of_its_profiles(device):
+    """Profiles of 30 samples, a rate of 600 MHz, hold an image of the carrier of 620 MHz at 20 MHz, at which rows of a
+    point add up tens of metres away from it too, where its image is dark."""
     y = np.linspace(-150, 150, 31)
     tx = np.stack([np.full(31, -5e3), y, np.zeros(31)], axis=1)
     raw = sarcl.PhaseHistory(
-        np.ones((31, 15), np.complex64), frequency=10e9 - 140e6, frequency_step=20e6, tx=tx,
+        np.ones((31, 15), np.complex64), frequency=620e6 - 140e6, frequency_step=20e6, tx=tx,
         reference_range=np.linalg.norm(tx, axis=1),
     )  # fmt: skip
-    grid = sarcl.ImageGrid.plane(shape=(20, 20), spacing=0.1, center=(0, 3, 0))
-    energy = profile_energy.estimate(make_task(raw, grid, None, None, False, True))
-    assert energy.darkness(480) > 1.5 * energy.darkness(90)
+    grid = sarcl.ImageGrid.plane(shape=(20, 20), spacing=1.0, center=(0, 30, 0))
+    task = make_task(raw, grid, None, None, False, True)
+    energy = profile_energy.estimate(task)
+    assert energy.darkness(30) > 3 > 1 == energy.darkness(60)
     assert energy.largest(15) == max(energy.darkness(length) for length in (0, *interpolator_choice.lengths(15)))
-    for tolerance in (3e-2, 1e-2, 1e-3):
+    lengths = set()
+    for tolerance in (3e-2, 1e-2, 4e-4, 1e-4):
+        plan = choose_method.choose(task, "direct", tolerance)
+        lengths.add(plan.plan.length)
+        assert plan.predicted_error >= energy.darkness(plan.plan.length) * plan.plan.interpolator.error
         report = sarcl.backproject(raw, grid, tolerance=tolerance, check=True).report
         assert report.measured_error <= report.predicted_error <= tolerance
+    assert 30 in lengths and len(lengths) > 1
+    poor = device.without_fp64()
+    with pytest.raises(sarcl.ToleranceUnreachable) as refused:
+        sarcl.backproject(raw, grid, tolerance=1e-6, device=poor)
+    report = sarcl.backproject(raw, grid, tolerance=refused.value.best, device=poor, check=True).report
+    assert report.measured_error <= refused.value.best
