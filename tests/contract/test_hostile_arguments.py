@@ -207,3 +207,51 @@ def test_arguments_of_every_wrong_kind_are_refused_in_words_of_sarcl(what, tmp_p
     found = {(n, kind): fault(call, arguments, n, kind) for n, kind in pairs}
     wrong = [f"{what}({name}={kind}): {said}" for (name, kind), said in found.items() if said]
     assert not wrong, "\n".join(wrong)
+
+
+def test_rows_of_a_file_by_odd_indices_are_those_of_the_array_or_refused_by_name(tmp_path):
+    RAW.save(tmp_path / "a.h5")
+    IMAGE.save(tmp_path / "b.h5")
+    raw, image = sarcl.read(tmp_path / "a.h5"), sarcl.read(tmp_path / "b.h5")
+    for rows in (slice(None, None, -2), slice(9, 2, -3), [3, 1, 1], [-1, 0], np.arange(16) % 3 == 0, slice(50, 60)):
+        if np.size(np.arange(16)[rows]):
+            np.testing.assert_array_equal(raw[rows].samples[:], RAW.samples[rows])
+    there = {"a.h5": (raw.samples, RAW.samples), "b.h5": (image, IMAGE.data)}
+    for (name, (lazy, array)), index in itertools.product(
+        there.items(),
+        (10**9, -99, 1.5, "x", b"x", 1j, object(), {}, [[1], [2, 3]], (0, 99), (0, 1, 2), slice("a"), [99]),
+    ):
+        try:
+            wanted = array[index]
+        except (IndexError, TypeError, ValueError):
+            wanted = None
+        with pytest.raises(IndexError, match=r"index .*(give|take)") if wanted is None else warnings.catch_warnings():
+            np.testing.assert_array_equal(lazy[index], wanted, err_msg=f"{name} {index}")
+    for index in (slice(None, None, -1), [3, 1], [1, 1], ([0, 1], [2, 3]), None):
+        try:
+            np.testing.assert_array_equal(raw.samples[index], RAW.samples[index])
+        except IndexError as exc:
+            assert "a.h5" in str(exc) and "take all into memory first" in str(exc)
+
+
+@pytest.mark.parametrize(
+    "choice", [1.5, float("nan"), True, b"cpu", {"cpu"}, np.arange(1), object(), [1.5], ["cpu", None, {}]]
+)
+def test_devices_that_are_no_names_are_refused(choice):
+    with pytest.raises(TypeError, match=r"device is .*; give an index, 'cpu', 'gpu', a part of the name"):
+        sarcl.backproject(RAW, GRID, device=choice)
+    with pytest.raises(TypeError, match=r"device is .*; give an index"):
+        sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), CHIRP, TRACK, device=choice)
+
+
+@pytest.mark.parametrize("progress", [5, "x", [], object(), np.zeros(3)])
+def test_progress_that_cannot_be_called_is_refused_before_any_work(progress):
+    point = sarcl.Scene.points([[0, 0, 0]])
+    for call in (
+        lambda **k: sarcl.backproject(RAW, GRID, **k), lambda **k: sarcl.polar_format(RAW, GRID, **k),
+        lambda **k: sarcl.range_doppler(RAW, **k), lambda **k: sarcl.autofocus(RAW, GRID, **k),
+        lambda **k: sarcl.echo(point, CHIRP, TRACK, **k), lambda **k: sarcl.spectral_echo(point, CHIRP, TRACK, **k),
+        lambda **k: sarcl.fullwave_echo(point, CHIRP, TRACK, **k),
+    ):  # fmt: skip
+        with pytest.raises(TypeError, match=r"progress is .*; give a function, which is called as progress"):
+            call(progress=progress)
