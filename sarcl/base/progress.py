@@ -24,6 +24,8 @@ class Bar:
     """
 
     def __init__(self, stream: TextIO | None = None) -> None:
+        if stream is not None and not hasattr(stream, "write"):
+            raise TypeError(f"stream is a {type(stream).__name__}; give an open text file, such as sys.stderr, or None")
         self._stream = stream
         self._stage: str | None = None
         self._start = 0.0

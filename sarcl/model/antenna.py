@@ -14,6 +14,7 @@ from .pointing import rotations
 from .trajectory import Trajectory
 
 Kind = Literal["isotropic", "aperture", "gaussian", "table"]
+TABLE = ("azimuth", "elevation", "values")  # fields of the kind "table"
 KINDS = ("isotropic", "aperture", "gaussian", "table")
 LEVEL = ((1.0, 0.0, 0.0), (0.0, 1.0, 0.0), (0.0, 0.0, 1.0))  # mount of an antenna along the body's axes
 MOST_DECIBELS = 300.0  # of gains: the squares of both antennas' amplitudes stay within float32
@@ -104,6 +105,14 @@ class Antenna:
             self._set("width", width)
         elif self.kind == "table":
             self._check_table()
+        for name, kind in (("size", "aperture"), ("width", "gaussian"), *((n, "table") for n in TABLE)):
+            if kind != self.kind and getattr(self, name) is not None:
+                raise ValueError(f"antenna {name} is of the kind {kind!r}, and kind is {self.kind!r}; leave it out")
+        if self.kind != "aperture" and validation.array("antenna taper", self.taper, np.float64, (2,)).tolist() != [
+            1,
+            1,
+        ]:
+            raise ValueError(f"antenna taper is of the kind 'aperture', and kind is {self.kind!r}; leave it out")
 
     def _check_table(self) -> None:
         for name, most in (("azimuth", np.pi), ("elevation", np.pi / 2)):

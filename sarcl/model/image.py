@@ -117,6 +117,10 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         if self.aperture is not None:
             rows = validation.array("image aperture", self.aperture, np.float64, ("k", 13))
             object.__setattr__(self, "aperture", rows)
+        if self.report is not None:
+            validation.instance("image report", self.report, Report)
+        for name in ("window", "polarization"):
+            arguments.text(f"image {name}", getattr(self, name))
         if self.frame is not None:
             validation.choice("image frame", self.frame, FRAMES)
 

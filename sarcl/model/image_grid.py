@@ -158,6 +158,7 @@ class ImageGrid:
         """
         from ..earth.elevation import ElevationModel
 
+        external = validation.flag("external", external)
         steps = tuple(validation.number(f"spacing[{i}]", d, above=0) for i, d in enumerate(pair("spacing", spacing)))
         if not isinstance(dem, ElevationModel):
             dem = ElevationModel.read(
@@ -320,18 +321,20 @@ class ImageGrid:
 
     def normal_at(self, row: int, column: int) -> NDArray[np.float64]:
         """Unit normal (3,) at a pixel of a plane, or of a grid that `zero_doppler` made."""
+        at = [validation.number("row", row), validation.number("column", column)]
         if self.is_plane:
             return self.normal
-        i, j = np.clip([row, column], 0.5, np.array(self.shape) - 1.5)
+        i, j = np.clip(at, 0.5, np.array(self.shape) - 1.5)
         here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
         across = np.cross(here[2] - here[3], here[0] - here[1])
         return np.asarray(across / np.linalg.norm(across))
 
     def spacing_at(self, row: int, column: int) -> tuple[float, float]:
         """Distance to the next row and column, m, at a pixel of a plane, or of a grid that `zero_doppler` made."""
+        at = [validation.number("row", row), validation.number("column", column)]
         if self.spacing is not None:
             return self.spacing
-        i, j = np.clip([row, column], 0.5, np.array(self.shape) - 1.5)
+        i, j = np.clip(at, 0.5, np.array(self.shape) - 1.5)
         here = self.at([i + 0.5, i - 0.5, i, i], [j, j, j + 0.5, j - 0.5])
         return float(np.linalg.norm(here[0] - here[1])), float(np.linalg.norm(here[2] - here[3]))
 

@@ -45,6 +45,16 @@ class Orbit:
     span: tuple[float, float]
     epoch: np.datetime64 | None = None
 
+    def __post_init__(self) -> None:
+        if not isinstance(self.path, (StateVectors, KeplerElements, TwoLineElements)):
+            raise TypeError(
+                f"path is a {type(self.path).__name__}; make an orbit by Orbit.states, Orbit.kepler, Orbit.tle or "
+                "Orbit.read"
+            )
+        object.__setattr__(self, "span", span_of(self.span))
+        if self.epoch is not None:
+            object.__setattr__(self, "epoch", date(self.epoch))
+
     @classmethod
     def states(cls, times: ArrayLike, positions: ArrayLike, velocities: ArrayLike, epoch: Date | None = None) -> Orbit:
         """The orbit through state vectors: s (n,), m (n, 3), m/s (n, 3), Earth-fixed, at least 4.
@@ -189,6 +199,7 @@ class Orbit:
             first -= (n_pulses - 1) / 2 / prf
         t = first + np.arange(n_pulses) / prf
         p, v = self._states(t)
+        validation.choice("side", side, ("right", "left"))
         track = Trajectory(t, p, v, accelerations=self.accelerations(t), stop_and_go=False)
         if attitude is None:
             if look is not None:

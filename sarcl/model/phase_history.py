@@ -10,11 +10,11 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, constants, validation
+from ..base.report import Report
 from ..io import formats, hdf5
 from .lazy_rows import in_memory, pick
 
 if TYPE_CHECKING:
-    from ..base.report import Report
     from ..base.types import LazyRows, PathLike
     from .antenna_array import AntennaArray
     from .waveform import Waveform
@@ -159,6 +159,8 @@ class PhaseHistory:
             bad = int(np.argmin(self.weight))
             raise ValueError(f"weight[{bad}] is {self.weight[bad]:g}; it cannot be negative")
         self._set("compressed", validation.flag("compressed", self.compressed))
+        if self.report is not None:
+            validation.instance("report", self.report, Report)
         if self.waveform is not None and not hasattr(self.waveform, "matched_spectrum"):
             raise TypeError(f"waveform is a {type(self.waveform).__name__}; give a sarcl.Waveform or None")
         if self.array is not None and not hasattr(self.array, "offsets_at"):

@@ -32,6 +32,7 @@ from ..scattering.facets import POLARIZATIONS
 from ..scene.scene import Scene
 from . import echo_sampling
 from .channels.array_echo import array_echo
+from .channels.channel_rows import CHANNELS, RECEIVE
 from .echo_check import measure_error, worth_checking
 from .echo_output import EchoOutput
 from .scene_echoes import EchoRequest, Progress, prepare_scene
@@ -151,6 +152,8 @@ def echo(
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
     compressed = flag("compressed", compressed)
+    choice("channels", channels, CHANNELS)
+    choice("receive", receive, RECEIVE)
     if check is not None:
         flag("check", check)
     request = echo_request(
@@ -242,7 +245,9 @@ def echo_request(
     if not isinstance(shadows, (bool, np.bool_)):
         choice("shadows", shadows, ("embree",))
     arguments.progress(progress)
-    if max_edge is not None and not isinstance(max_edge, str):
+    if isinstance(max_edge, str):
+        choice("max_edge", max_edge, ("auto",))
+    elif max_edge is not None:
         max_edge = number("max_edge", max_edge, above=0)
     opened = open_device(device)
     return EchoRequest(

@@ -154,6 +154,11 @@ CALLS = {
     "scenario.load": (scenarios.load, {"path": "a.toml"}, None),
     "scenario.loads": (scenarios.loads, {"text": SCENARIO}, None),
     "Scenario.save": (scenarios.loads(SCENARIO).save, {"path": "b.toml"}, None),
+    "Orbit": (sarcl.Orbit, {"path": ORBIT.path, "span": (-60, 720), "epoch": "2020-01-01"}, None),
+    "Image": (sarcl.Image, {"data": IMAGE.data, "grid": GRID}, "data grid gain report window polarization frame"),
+    "Antenna": (
+        sarcl.Antenna, {"kind": "gaussian", "width": (0.1, 0.1)}, "kind width size taper azimuth elevation values mount"
+    ),
     "resolve": (material.resolve, {"material": "metal", "materials": None, "shape": (3,)}, "material materials"),
 }  # fmt: skip
 # refusals that name the argument by another word, as the reader of the message knows it
@@ -242,6 +247,22 @@ def test_devices_that_are_no_names_are_refused(choice):
         sarcl.backproject(RAW, GRID, device=choice)
     with pytest.raises(TypeError, match=r"device is .*; give an index"):
         sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), CHIRP, TRACK, device=choice)
+
+
+@pytest.mark.parametrize(
+    "name, value",
+    [("channels", "x"), ("receive", None), ("max_edge", "3"), ("max_edge", np.ones(2)), ("report", "x"), ("window", 5)],
+)
+def test_words_are_checked_where_they_change_nothing_too(name, value):
+    """Without an array, facets or a window of its own."""
+    point = sarcl.Scene.points([[0, 0, 0]])
+    with pytest.raises((ValueError, TypeError), match=name):
+        if name in ("report", "window"):
+            sarcl.Image(IMAGE.data, GRID, **{name: value})
+        else:
+            sarcl.echo(point, CHIRP, TRACK, **{name: value})
+    with pytest.raises(ValueError, match="side is 'x'; choose one of 'right', 'left'"):
+        ORBIT.trajectory(prf=100.0, center=10.0, duration=0.1, side="x")
 
 
 @pytest.mark.parametrize("progress", [5, "x", [], object(), np.zeros(3)])
