@@ -82,7 +82,7 @@ CASES = {
     "window, nothing skipped": (lambda: spaceborne(n_samples=32), 1e-3, {"skip": False}),
     "short last group": (lambda: spaceborne(n_rows=67), 1e-3, {}),
 }
-QUICK = ("1e-3", "window")
+QUICK = ("1e-3", "10 km, slopes", "window")
 BY_PIXELS = ("window", "groups of 8")  # cases whose pulses no line holds, or whose windows end in every tile
 
 

@@ -30,8 +30,8 @@ class Kernel:
 
     function_name = "backproject"
 
-    def __init__(self, error):
-        self.error = error
+    def __init__(self, error, num_args):
+        self.error, self.num_args = error, num_args
 
     def __call__(self, *args, **options):
         raise self.error
@@ -44,7 +44,7 @@ def test_a_kernel_that_finds_no_memory_names_its_buffers_and_the_remedy():
     device = open_device()
     error = pyopencl.MemoryError("clEnqueueNDRangeKernel failed: MEM_OBJECT_ALLOCATION_FAILURE", -4)
     with pytest.raises(MemoryError) as caught:
-        device.run(Kernel(error), (8,), None, device.empty(3_000_000), 5, device.empty(2_000_000))
+        device.run(Kernel(error, 3), (8,), None, device.empty(3_000_000), 5, device.empty(2_000_000))
     said = str(caught.value)
     assert "kernel backproject, with buffers of 5 MB, does not fit on" in said and device.info.name in said
     assert (
@@ -85,7 +85,7 @@ def test_a_device_that_is_lost_is_named_and_another_is_suggested():
     with pytest.raises(
         DeviceFailed, match=r"kernel backproject failed on .* DEVICE_NOT_AVAILABLE; try another device="
     ):
-        device.run(Kernel(gone), (8,), None)
+        device.run(Kernel(gone, 0), (8,), None)
 
 
 def test_a_program_without_kernels_is_said_to_come_from_a_damaged_cache():
