@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import bz2
 import io
+import posixpath
 import zipfile
 import zlib
 from collections.abc import Collection
@@ -38,13 +39,20 @@ def contents(path: Path, what: str) -> dict[str, bytes]:
     check_size(data, what)
     try:
         with zipfile.ZipFile(io.BytesIO(data)) as archive:
-            return {member.filename: archive.read(member) for member in archive.infolist() if not member.is_dir()}
+            members = [member for member in archive.infolist() if not member.is_dir()]
+            made = {member.filename: archive.read(member) for member in members}
     except (zipfile.BadZipFile, zlib.error, EOFError, RuntimeError, OSError) as exc:  # RuntimeError: a password
         raise ValueError(f"{what} cannot be unpacked ({exc}): {_mesh_checks.TAKE}") from None
+    if len(made) < len(members):
+        raise ValueError(f"{what} holds {len(members)} files of {len(made)} names: {_mesh_checks.TAKE}")
+    return made
 
 
 def meshes(path: Path, files: dict[str, bytes], kinds: Collection[str], what: str) -> list[str]:
-    """Names of the meshes among the files of an archive; a .zae holds one .dae. kinds  endings that are read."""
+    """Names of the meshes among the files of an archive; a .zae holds one .dae. kinds  endings that are read.
+
+    ValueError where there are none, and for an archive in an archive, whose meshes would be left out.
+    """
     kinds = {"dae"} if path.suffix.lower() == ".zae" else set(kinds) - {"zae"}
     found = [name for name in files if Path(name).suffix.lower().lstrip(".") in kinds and not _of_macos(name)]
     if not found or (len(found) > 1 and path.suffix.lower() == ".zae"):
@@ -53,7 +61,15 @@ def meshes(path: Path, files: dict[str, bytes], kinds: Collection[str], what: st
         raise ValueError(
             f"{what} holds {len(found) or 'no'} meshes ({there}), wanted {wanted}: unpack it, and give the mesh itself"
         )
+    inner = next((name for name in files if Path(name).suffix.lower() in KINDS and not _of_macos(name)), None)
+    if inner is not None:
+        raise ValueError(f"{what} holds another archive, {inner!r:.100}: unpack it, and give the meshes themselves")
     return found
+
+
+def beside(files: dict[str, bytes], name: str) -> dict[str, bytes]:
+    """The files of an archive by their paths from the folder of one of them, `name`: as that one names them."""
+    return {posixpath.relpath(f"/{other}", posixpath.dirname(f"/{name}")): data for other, data in files.items()}
 
 
 def _of_macos(name: str) -> bool:

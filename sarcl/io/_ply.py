@@ -6,6 +6,7 @@ trimesh takes the length of the first list for that of all, and lets numbers of 
 from __future__ import annotations
 
 import re
+from collections import Counter
 from dataclasses import dataclass, field
 from typing import Any
 
@@ -18,10 +19,11 @@ TYPES = {
     "double": "f8", "int8": "i1", "uint8": "u1", "int16": "i2", "uint16": "u2", "int32": "i4", "uint32": "u4",
     "int64": "i8", "uint64": "u8", "float16": "f2", "float32": "f4", "float64": "f8",
 }  # fmt: skip
-HEADER = re.compile(rb"ply[ \t]*\r?\n(.*?)end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
+HEADER = re.compile(rb"ply[ \t]*\r?\n((?:.*?\n)??)[ \t]*end_header[ \t]*(?:\r?\n|$)", re.DOTALL)
 ORDER = {"ascii": "", "binary_little_endian": "<", "binary_big_endian": ">"}  # of bytes; text has none
 FACES = ("vertex_index", "vertex_indices")
-PIECE = 2**18  # numbers taken from a binary file at a time, so that the list of their bytes stays small
+PIECE = 2**18  # numbers read at a time, so that what is made on the way to them stays small
+LONGEST = 400  # characters of a number as text: the largest of float64 has 309 digits before its point
 PLURAL = {"face": "faces", "vertex": "vertices"}
 
 
@@ -75,7 +77,7 @@ def read(data: bytes, what: str) -> tuple[np.ndarray, np.ndarray]:
 def _header(text: str, what: str) -> tuple[str, list[_Element]]:
     """(order of bytes, "" for text; the elements)."""
     order, elements = None, list[_Element]()
-    for line in text.splitlines():
+    for line in text.split("\n"):  # str.splitlines also splits within characters of comments, as "Å" in UTF-8
         words = line.split()
         if not words or words[0] in ("comment", "obj_info"):
             continue
@@ -97,7 +99,17 @@ def _header(text: str, what: str) -> tuple[str, list[_Element]]:
             ) from None
     if order is None:
         raise ValueError(f"{what} has no line 'format' in its header: {_mesh_checks.TAKE}")
+    _check_names([element.name for element in elements], "elements", what)
+    for element in elements:
+        _check_names([p.name for p in element.properties], f"properties of {element.name!r:.40}", what)
     return order, elements
+
+
+def _check_names(names: list[str], kind: str, what: str) -> None:
+    """ValueError for a name that is given twice: which of the two is meant cannot be told."""
+    twice = next((name for name, n in Counter(names).items() if n > 1), None)
+    if twice is not None:
+        raise ValueError(f"{what} declares two {kind} with the name {twice!r:.40}, wanted one: {_mesh_checks.TAKE}")
 
 
 def _type(name: str) -> np.dtype:
@@ -111,11 +123,18 @@ class _Text:
 
     def __init__(self, body: bytes, what: str) -> None:
         words = body.split()
+        self.size = len(words)
+        wrong = next((word for word in words if len(word) > LONGEST), None)
+        if wrong is None and b"_" in body:  # NumPy takes 1_0 for 10
+            wrong = next(word for word in words if b"_" in word)
+        if wrong is not None:
+            raise ValueError(f"{what} has a word that is no number: {str(wrong)[1:]:.60}: {_mesh_checks.TAKE}")
+        self.numbers = np.empty(self.size)
         try:
-            self.numbers = np.array(words, "S").astype(np.float64) if words else np.zeros(0)
+            for at in range(0, self.size, PIECE):
+                self.numbers[at : at + PIECE] = np.array(words[at : at + PIECE], "S").astype(np.float64)
         except ValueError as exc:
             raise ValueError(f"{what} has words that are no numbers ({exc}): {_mesh_checks.TAKE}") from None
-        self.size = len(self.numbers)
 
     def width(self, type_: np.dtype) -> int:
         return 1

@@ -93,17 +93,18 @@ def _read(path: Path, what: str, external: bool) -> Any:
     if kind.lstrip(".") not in known:
         raise ValueError(f"{what}: unknown format {path.suffix!r}; known are {', '.join(known)}")
     if kind not in _mesh_archive.KINDS:
-        others = _other_files.Resolver(path, external)
-        made = _scene(input_paths.contents(path, "mesh file"), kind, path, what, others)
-        _check_refused(others, what)
+        around = _other_files.Resolver(path, external)
+        made = _scene(input_paths.contents(path, "mesh file"), kind, path, what, around)
+        _check_refused(around, what)
         return made
     files = _mesh_archive.contents(path, what)
     names = _mesh_archive.meshes(path, files, trimesh.exchange.load.mesh_formats(), what)
-    beside: Any = trimesh.resolvers.ZipResolver({name: io.BytesIO(data) for name, data in files.items()})
-    scenes = [
-        _scene(files[name], Path(name).suffix.lower(), None, f"{what}, its file {name!r:.100}", beside)
-        for name in names
-    ]
+    scenes = []
+    for name in names:
+        held = {other: io.BytesIO(data) for other, data in _mesh_archive.beside(files, name).items()}
+        others: Any = trimesh.resolvers.ZipResolver(held)
+        kind, of_it = Path(name).suffix.lower(), f"{what}, its file {name!r:.100}"
+        scenes.append(_scene(files[name], kind, None, of_it, others))
     return trimesh.scene.scene.append_scenes(scenes) if len(scenes) > 1 else scenes[0]
 
 

@@ -159,3 +159,28 @@ def test_a_glb_that_names_a_file_of_its_archive_finds_it(tmp_path):
     files = trimesh.Scene(BOX).export(file_type="gltf")
     path = archive(tmp_path / "a.zip", **{name.replace(".", "__"): data for name, data in files.items()})
     assert len(sarcl.Scene.from_mesh(path).triangles) == 12
+
+
+def test_an_archive_in_an_archive_and_names_given_twice_are_refused(tmp_path):
+    """trimesh leaves out what they hold."""
+    stl = BOX.export(file_type="stl")
+    for inner in ("more.zip", "more.ZAE", "more.stl.bz2"):
+        path = archive(tmp_path / "a.zip", **{"a__stl": stl, inner.replace(".", "__"): b""})
+        with pytest.raises(ValueError, match=rf"'a\.zip' holds another archive, '{inner}': unpack it"):
+            sarcl.Scene.from_mesh(path)
+    with zipfile.ZipFile(tmp_path / "b.zip", "w") as made, pytest.warns(UserWarning, match="Duplicate name"):
+        made.writestr("a.stl", stl)
+        made.writestr("a.stl", stl)
+    with pytest.raises(ValueError, match=r"'b\.zip' holds 2 files of 1 names"):
+        sarcl.Scene.from_mesh(tmp_path / "b.zip")
+
+
+def test_meshes_in_folders_of_an_archive_read_the_files_beside_them(tmp_path):
+    """Two glTF files whose buffers have one name and one length."""
+    sizes = {"": 1.0, "large/": 2.0, "deep/er/": 3.0}
+    with zipfile.ZipFile(tmp_path / "a.zip", "w") as made:
+        for folder, size in sizes.items():
+            for name, data in trimesh.Scene(trimesh.creation.box([size] * 3)).export(file_type="gltf").items():
+                made.writestr(folder + name, data)
+    made = sarcl.Scene.from_mesh(tmp_path / "a.zip", repair=False)
+    assert area(made) == pytest.approx(6 * sum(size**2 for size in sizes.values()))

@@ -54,6 +54,24 @@ def test_triangles_and_squares_in_one_file_are_read_alike_from_text_and_binary(t
             np.testing.assert_array_equal(sarcl.Scene.from_mesh(path).triangles, text.triangles)
 
 
+def test_comments_may_hold_any_characters(tmp_path):
+    """The second byte of "Å" in UTF-8 alone is a new line in Latin-1."""
+    want = sarcl.Scene.from_mesh(written(tmp_path / "plain.ply", text_of())).triangles
+    for comment in ("von Åke", "a\x0cb\x1cc", "before the end_header", "end_header"):
+        for data in (text_of(), binary_of("binary_big_endian")):
+            for line in (f"comment {comment}\n", f"obj_info {comment}\n"):
+                path = written(tmp_path / "a.ply", data.replace(b"comment made by a test\n", line.encode()))
+                np.testing.assert_array_equal(sarcl.Scene.from_mesh(path).triangles, want)
+
+
+def test_a_long_word_takes_no_memory_for_the_others(tmp_path):
+    """An array of all words as wide as the longest would take 0.1 TB."""
+    points = np.random.default_rng(0).normal(size=(5000, 3)).round(3).tolist()
+    path = written(tmp_path / "a.ply", text_of([*points[:-1], (1, 2, "3." + "0" * 300)], [(0, 1, 2)] * 20000))
+    assert len(mesh.load(path, repair=False).triangles) == 20000
+    refused(tmp_path / "b.ply", text_of([*points[:-1], (1, 2, "0" * 10**6)], [(0, 1, 2)] * 20000), "a word that is no number")
+
+
 def test_lists_whose_lengths_change_without_changing_the_size_of_the_file_are_not_misread(tmp_path):
     """4 + 3 + 5 corners take the bytes of three squares."""
     points = [(np.cos(a), np.sin(a), 0) for a in 2 * np.pi * np.arange(5) / 5]
@@ -115,6 +133,16 @@ def test_indices_that_do_not_fit_are_refused(tmp_path, how, faces, words):
         (lambda t: t.replace(b"end_header", b"end"), "no header from 'ply' to 'end_header'"),
         (lambda t: t.replace(b"format ascii 1.0\n", b""), "no line 'format'"),
         (lambda t: t.replace(b"element face", b"element tristrips"), "has strips of triangles"),
+        (
+            lambda t: t.replace(b"end_header", b"element face 1\nproperty uchar a\nend_header") + b" 7",
+            "declares two elements with the name 'face'",
+        ),
+        (
+            lambda t: t.replace(b"property float z", b"property float z\nproperty float x"),
+            "declares two properties of 'vertex' with the name 'x'",
+        ),
+        (lambda t: t.replace(b"\n4 0 1 3 2", b"\n4 0 1 3 0_2"), "a word that is no number: '0_2'"),
+        (lambda t: t.replace(b"\n4 0 1 3 2", b"\n4 0 1 3 " + b"0" * 500 + b"2"), "a word that is no number: '000"),
     ],
 )
 def test_what_a_text_file_does_not_hold_is_refused(tmp_path, change, words):
