@@ -138,9 +138,10 @@ def _outermost(triangles: np.ndarray, body: np.ndarray, bodies: np.ndarray, volu
     begin, end = np.searchsorted(body[order], [bodies, bodies + 1])
     parts = [triangles[order[a:b]] for a, b in zip(begin, end, strict=True)]
     low, high = (np.array([f(p.reshape(-1, 3), axis=0) for p in parts]).reshape(-1, 3) for f in (np.min, np.max))
-    out = bodies.copy()
+    low_x, high_x, out = low[:, 0].copy(), high[:, 0].copy(), bodies.copy()
     for i, part in enumerate(parts):
-        around = np.flatnonzero((low < low[i]).all(axis=1) & (high > high[i]).all(axis=1))
+        around = np.flatnonzero((low_x < low_x[i]) & (high_x > high_x[i]))  # few of many bodies, and soon found
+        around = around[(low[around] < low[i]).all(axis=1) & (high[around] > high[i]).all(axis=1)]
         places = part[:: -(-len(part) // SEEN_FROM)].mean(axis=1)
         for j in around[np.argsort(-volume[around], kind="stable")]:
             if _turns_about(parts[j], places) > 0.75:  # 1 inside, 0 outside
