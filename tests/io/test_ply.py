@@ -69,7 +69,8 @@ def test_a_long_word_takes_no_memory_for_the_others(tmp_path):
     points = np.random.default_rng(0).normal(size=(5000, 3)).round(3).tolist()
     path = written(tmp_path / "a.ply", text_of([*points[:-1], (1, 2, "3." + "0" * 300)], [(0, 1, 2)] * 20000))
     assert len(mesh.load(path, repair=False).triangles) == 20000
-    refused(tmp_path / "b.ply", text_of([*points[:-1], (1, 2, "0" * 10**6)], [(0, 1, 2)] * 20000), "a word that is no number")
+    data = text_of([*points[:-1], (1, 2, "0" * 10**6)], [(0, 1, 2)] * 20000)
+    refused(tmp_path / "b.ply", data, "a word that is no number")
 
 
 def test_lists_whose_lengths_change_without_changing_the_size_of_the_file_are_not_misread(tmp_path):
