@@ -143,7 +143,7 @@ class _Float32:
 
     def direct(self, on: DeviceClass) -> MethodChoice:
         """Every pair of row and pixel. ToleranceUnreachable names the best tolerance in complex64."""
-        self._must_round_less("in complex64", self._best())
+        self._must_round_less("in complex64", self._best)
         radius = tiling_of(self.task.grid, 8).radius  # of the smallest tiles
         if not self.task.resolves_beam(radius):
             raise ToleranceUnreachable(
@@ -158,7 +158,7 @@ class _Float32:
 
     def factorized(self, on: DeviceClass) -> MethodChoice:
         """With sub-apertures. ToleranceUnreachable gives the reason, but no best tolerance, which takes a search."""
-        self._must_round_less("with sub-apertures", None)
+        self._must_round_less("with sub-apertures", lambda: None)
         try:
             made = self._planned(lambda left: factorized_plan.make_plan(self.task, left, on))
         except ToleranceUnreachable as refused:
@@ -176,21 +176,22 @@ class _Float32:
         least = max(least, *(error / ROUNDING for error in (self.rounding, self.coordinates, self.gains)))
         return askable(rounded_up(float(least) * (1 + 1e-9)))
 
-    def _must_round_less(self, how: str, best: float | None) -> None:
+    def _must_round_less(self, how: str, best: Callable[[], float | None]) -> None:
+        """ToleranceUnreachable where rounding alone takes too much. best()  what can be met: found where it is not."""
         if self.gains > ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
-                self.tolerance, best, "float32 gains of the antenna", "aim it at the grid, or give the beam an angle",
+                self.tolerance, best(), "float32 gains of the antenna", "aim it at the grid, or give the beam an angle",
                 how=f"{how}: gains of the antenna have an error of {self.gains:.1g}",
             )  # fmt: skip
         if self.coordinates > ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
-                self.tolerance, best, "float64 coordinates of a plane's pixels", "put the origin near the scene",
+                self.tolerance, best(), "float64 coordinates of a plane's pixels", "put the origin near the scene",
                 how=f"{how}: coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
             )  # fmt: skip
         if self.rounding > ROUNDING * self.tolerance:
             ratio = 20 * np.log10(self.energy.whole_profile)
             dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
-            raise ToleranceUnreachable(self.tolerance, best, "rounding of float32 sums", how=f"{how}: {dark}")
+            raise ToleranceUnreachable(self.tolerance, best(), "rounding of float32 sums", how=f"{how}: {dark}")
 
     def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
         error = float(np.hypot(self.near * made[0].predicted_error + self.rounding + self.gains, self.coordinates))

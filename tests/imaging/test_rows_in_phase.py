@@ -147,3 +147,14 @@ def test_a_plan_has_the_errors_of_the_length_of_its_profiles(device):
         sarcl.backproject(raw, grid, tolerance=1e-6, device=poor)
     report = sarcl.backproject(raw, grid, tolerance=refused.value.best, device=poor, check=True).report
     assert report.measured_error <= refused.value.best
+
+
+def test_what_can_be_met_at_best_is_not_sought_where_a_tolerance_is_met(monkeypatch):
+    """The errors of few rows at all lengths of profiles take longer than the rest of a plan."""
+    raw, grid = drawn(3)
+    task = make_task(raw, grid, None, None, True, True)
+    asked = []
+    monkeypatch.setattr(profile_energy.ProfileEnergy, "largest", lambda self, n: asked.append(n) or 1.0)
+    choose_method.choose(task, "direct", 1e-2)
+    assert not asked
+    assert choose_method._Float32(task, 1e-2)._best() < 1e-2 and asked
