@@ -51,6 +51,13 @@ class ImageGrid:
         if not isinstance(self.shape, (tuple, list, np.ndarray)):
             raise TypeError(f"shape is {self.shape!r:.60}; give a number of pixels for each axis: see ImageGrid.plane")
         object.__setattr__(self, "shape", tuple(validation.count(f"shape[{i}]", n) for i, n in enumerate(self.shape)))
+        if self.listed is not None:
+            validation.ndim("listed", self.listed)
+            if np.shape(self.listed) != (*self.shape, 3):
+                raise ValueError(
+                    f"listed has shape {np.shape(self.listed)}, wanted {(*self.shape, 3)}, as the grid has shape "
+                    f"{self.shape}; make it with ImageGrid.points"
+                )
         for name in ("center", "x_axis", "y_axis", "listed", "times", "ranges"):
             value = getattr(self, name)
             if value is not None and (not isinstance(value, np.ndarray) or value.flags.writeable):

@@ -52,7 +52,7 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
 
 def _matches(info: DeviceInfo, choice: Any) -> bool:
     text = str(choice).strip().lower()
-    if text.isdigit() or not isinstance(choice, str):
+    if text.isdecimal() or not isinstance(choice, str):
         return info.index == int(text)
     return text == info.kind or text in f"{info.platform} {info.name}".lower()
 

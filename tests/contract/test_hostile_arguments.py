@@ -249,6 +249,11 @@ def test_devices_that_are_no_names_are_refused(choice):
         sarcl.echo(sarcl.Scene.points([[0, 0, 0]]), CHIRP, TRACK, device=choice)
 
 
+def test_a_device_whose_name_is_a_digit_but_no_number_is_not_found():
+    with pytest.raises(sarcl.NoDeviceError, match="device '²' matches no working OpenCL device"):
+        sarcl.backproject(RAW, GRID, device="²")
+
+
 @pytest.mark.parametrize(
     "name, value",
     [("channels", "x"), ("receive", None), ("max_edge", "3"), ("max_edge", np.ones(2)), ("report", "x"), ("window", 5)],

@@ -160,6 +160,15 @@ BAD = {
     "ragged positions": (lambda: points([[0, 0, 0], [1, 2]]), "positions is .* whose rows differ in length"),
     "positions not finite": (lambda: points([[[0, 0, 0], [0, 0, np.nan]]]), r"positions\[0, 1, 2\] is nan"),
     "neither": (lambda: sarcl.ImageGrid((4, 4)), "ImageGrid.plane or ImageGrid.points"),
+    "positions of another shape": (
+        lambda: sarcl.ImageGrid((2,), listed=np.zeros((3, 3))),
+        r"listed has shape \(3, 3\), wanted \(2, 3\)",
+    ),
+    "positions of no shape": (
+        lambda: sarcl.ImageGrid((1,), listed=np.zeros((0, 3))),
+        r"listed has shape \(0, 3\), wanted \(1, 3\)",
+    ),
+    "ragged list": (lambda: sarcl.ImageGrid((2,), listed=[[0, 0, 0], [1, 2]]), "listed is .* whose rows differ"),
     "normal of points": (lambda: points(np.zeros((1, 3))).normal, "normal is for planes"),
     "index in points": (lambda: points(np.zeros((1, 3))).index((0, 0, 0)), "index is for planes"),
     "at in points": (lambda: points(np.zeros((1, 3))).at(0, 0), "at is for planes"),
