@@ -9,8 +9,9 @@ error (docs/theory/accuracy.md, "Evenly spaced scatterers")
 Of a kernel whose error is at most E, the sum over the rows is about E times, and hardly more than E times the largest
 value, over small delays d beside the pixel, of
 
-    N_m(d) = sum_p c_p exp(j 2 pi m L d_p) P_p(d_p + d)
+    N_m(d) = sum_p c_p exp(j 2 pi m L d_p) Q_p(d_p + d)
 
+where Q_p is P_p with frequencies weighted as the errors of kernels are, which are largest at the edge of the band.
 Over many rows and pixels it is that of random phases, sqrt(sum_p |P_p|^2). Over few it need not be: where all rows have
 a pixel at the same place between their samples, the errors add up as the profiles beside the pixel do, even if their
 values at the pixel cancel.
@@ -31,7 +32,7 @@ class RowsInPhase:
     """What a few rows contribute to some pixels, and beside them; 0 where a row does not see a pixel.
 
     delays  d_p (n_rows, n), in fractions of the range window
-    values  c_p P_p(d_p), complex128 (n_rows, n);  beside  c_p P_p(d_p + d) at some delays d, (n_rows, n, n_beside)
+    values  c_p P_p(d_p), complex128 (n_rows, n);  beside  c_p Q_p(d_p + d) at some delays d, (n_rows, n, n_beside)
     """
 
     delays: np.ndarray
@@ -52,7 +53,7 @@ class RowsInPhase:
         """What a row contributes.
 
         inside  whether it sees each pixel (n,);  delays, cycles  d_p and the phase of c_p (n,)
-        values, beside  P_p(d_p) and P_p(d_p + d) of the pixels that it sees (m,), (m, n_beside), each times `gains`
+        values, beside  P_p(d_p) and Q_p(d_p + d) of the pixels that it sees (m,), (m, n_beside), each times `gains`
         """
         turns = np.exp(2j * np.pi * (cycles[inside] % 1)) * gains
         self.delays[row] = delays

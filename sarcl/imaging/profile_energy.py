@@ -26,6 +26,7 @@ ALL = 2**28  # samples up to which every row is read
 IN_CACHE = 2**16  # samples whose squares are made at a time, so that they stay in a cache
 TAPS, FINER, TERMS = 12, 4.0, 6  # of an interpolator with an error of 1e-11
 CHANCE, CHANCE_OF_FEW = 1.25, 1.12  # what noise in many pixels makes of `near`, which is 1
+INNER = 0.5  # share of a kernel's largest error that most kernels keep to in the inner half of the band
 BESIDE = TAPS + 2  # samples beside a pixel: those that an interpolation reads, and one more on each side
 
 
@@ -172,18 +173,27 @@ def _values(
     samples: np.ndarray, shaped: np.ndarray, length: int, delays: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
     """Values of a profile at delays (m,), in fractions of the window; its samples about each, and its values as far
-    from each as samples lie apart: (m, BESIDE) each.
+    from each as samples lie apart, frequencies weighted by `_edge_weights`: (m, BESIDE) each.
 
     shaped  (n_samples,): what makes up for the kernel's transform
     """
     made = deconvolved(TAPS, FINER, TERMS, np.float64)
-    weights = np.stack([shaped, np.ones(len(samples))])
-    profile, plain = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
+    weights = np.stack([shaped, np.ones(len(samples)), shaped * _edge_weights(len(samples))])
+    profile, plain, weighted = range_profiles.from_samples(None, samples[None], weights, length, dtype=np.complex128)
     place = delays * length - (made.taps - 1) / 2
     first = np.rint(place).astype(np.int64)
     taps = (first[:, None] + np.arange(made.taps)) % length
     shares = made.weights(place - first)
     values = (shares * profile[taps]).sum(axis=1)
-    read = profile[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + made.taps - 1)) % length]
+    read = weighted[(first[:, None] + np.arange(-BESIDE // 2, BESIDE // 2 + made.taps - 1)) % length]
     beside = sliding_window_view(read, made.taps, axis=1) @ shares[:, :, None]
     return values, plain[(first[:, None] + np.arange(-1, BESIDE - 1)) % length], beside[..., 0]
+
+
+def _edge_weights(n: int) -> np.ndarray:
+    """Weights (n,) of the samples of a row by the errors of interpolation kernels at their frequencies.
+
+    Most kernels have their largest error at the edge of the band, and less than half of it in the inner half.
+    """
+    k = np.abs(np.arange(n) - n // 2)
+    return np.maximum(k / max(n // 2, 1), INNER) if n > 1 else np.ones(1)
