@@ -159,3 +159,14 @@ def test_what_can_be_met_at_best_is_not_sought_where_a_tolerance_is_met(monkeypa
     choose_method.choose(task, "direct", 1e-2)
     assert not asked
     assert choose_method._Float32(task, 1e-2)._best() < 1e-2 and asked
+
+
+def test_a_plan_is_made_again_where_profiles_of_its_length_have_larger_errors(monkeypatch):
+    task = make_task(*drawn(3), None, None, True, True)
+    first = choose_method.choose(task, "direct", 1e-2).plan
+    monkeypatch.setattr(
+        profile_energy.ProfileEnergy, "darkness", lambda self, length=0: 5.0 if length == first.length else 1.0
+    )
+    made = choose_method.choose(task, "direct", 1e-2)
+    assert made.plan.length != first.length or made.predicted_error >= 5 * made.plan.interpolator.error
+    assert made.plan.interpolator.error < first.interpolator.error
