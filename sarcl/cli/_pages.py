@@ -75,11 +75,12 @@ def papers(args: argparse.Namespace, job: Job) -> int:
         _write(numbers, json.dumps(paper.document(sections, args.quick), allow_nan=False))
         _write(output, paper.html(sections, args.quick, args.command_line))
         fine = sum(row.holds for row in section.rows)
-        tally = f": {fine} of {len(section.rows)} as printed" if section.rows else ""
+        tally = f": {fine} of {len(section.rows)} as expected" if section.rows else ""
         job.say(f"{section.title}{tally} ({section.seconds:.1f} s)")
         for row in section.rows:
             if not row.holds:
-                job.say(f"  differs: {row.item}: printed {row.published}, measured {row.measured}")
+                wanted = "printed" if row.basis == "paper" else "expected"
+                job.say(f"  differs: {row.item}: {wanted} {row.expected}, measured {row.measured}")
     job.say(f"wrote {output} and {numbers}")
     return 0
 

@@ -11,6 +11,12 @@ import numpy as np
 
 from ..figures.html import Block, heading, listed, page, table, terms, words
 
+Basis = Literal["paper", "geometry", "theory"]
+BASES: dict[Basis, str] = {
+    "paper": "printed in the paper",
+    "geometry": "follows from the dimensions that this page chose",
+    "theory": "a law, a closed form, or the tolerance that was asked for",
+}
 Cause = Literal["", "error in print", "interpretation"]
 CAUSES: tuple[tuple[Cause, str], ...] = (
     ("error in print", "Errors in print: a sign, a subscript or a number of the paper contradicts the paper itself or "
@@ -23,26 +29,34 @@ CAUSES: tuple[tuple[Cause, str], ...] = (
 
 @dataclass(frozen=True)
 class Row:
-    """One published value or statement, and the value measured here.
+    """One expected value or statement, and the value measured here.
 
     item, source  what it is; its figure, table or equation
-    published     as printed
+    expected      the expected value or statement in words
     measured      the measured value in words;  value: as a number or several, for JSON
-    holds         whether the measured value agrees with the published one
+    holds         whether the measured value agrees with the expected one
     why           where it does not: the reason; else a remark
     rule          what counts as agreement, for the page alone
     cause         where it does not agree: a misprint, or another reading of the paper; "" where neither is known
+    basis         where the expected value comes from: a key of BASES. Only those of the paper count as published
     """
 
     item: str
     source: str
-    published: str
+    expected: str
     measured: str
     holds: bool
     why: str = ""
     value: Any = None
     rule: str = ""
     cause: Cause = ""
+    basis: Basis = "paper"
+
+    def document(self) -> dict[str, Any]:
+        """The row in JSON. The expected value is called `published` where the paper prints it."""
+        out = asdict(self)
+        del out["rule"]
+        return {"published" if name == "expected" and self.basis == "paper" else name: out[name] for name in out}
 
 
 @dataclass
@@ -57,21 +71,22 @@ class Section:
     seconds: float = 0.0
 
     def number(
-        self, item: str, source: str, published: float, measured: float, within: float, unit: str = "",
-        form: str = ".3f", why: str = "", cause: Cause = "",
+        self, item: str, source: str, expected: float, measured: float, within: float, unit: str = "",
+        form: str = ".3f", why: str = "", cause: Cause = "", *, basis: Basis = "paper",
     ) -> None:  # fmt: skip
-        """A row that holds where `measured` lies within `within` of the number printed."""
-        here, printed = (f"{v:{form}} {unit}".strip() for v in (measured, published))
-        holds, rule = bool(abs(measured - published) <= within), f"within {within:.3g} {unit}".strip()
-        self.rows.append(Row(item, source, printed, here, holds, why, plain(measured), rule, "" if holds else cause))
+        """A row that holds where `measured` lies within `within` of the expected number."""
+        wanted, value = (f"{v:{form}} {unit}".strip() for v in (expected, measured))
+        holds, rule = bool(abs(measured - expected) <= within), f"within {within:.3g} {unit}".strip()
+        cause = "" if holds else cause
+        self.rows.append(Row(item, source, wanted, value, holds, why, plain(measured), rule, cause, basis))
 
     def states(
-        self, item: str, source: str, published: str, measured: str, holds: Any, why: str = "", value: Any = None,
-        *, rule: str, cause: Cause = "",
+        self, item: str, source: str, expected: str, measured: str, holds: Any, why: str = "", value: Any = None,
+        *, rule: str, cause: Cause = "", basis: Basis = "paper",
     ) -> None:  # fmt: skip
         """A row for a statement in words. `holds`: whether the measured value agrees, by the criterion `rule`."""
         cause = "" if holds else cause
-        self.rows.append(Row(item, source, published, measured, bool(holds), why, plain(value), rule, cause))
+        self.rows.append(Row(item, source, expected, measured, bool(holds), why, plain(value), rule, cause, basis))
 
     def say(self, text: str) -> None:
         """A paragraph."""
@@ -88,8 +103,7 @@ class Section:
     def document(self) -> dict[str, Any]:
         """The section in JSON."""
         out = {name: getattr(self, name) for name in ("key", "title", "seconds", "numbers")}
-        rows = [asdict(row) for row in self.rows]
-        return out | {"rows": [{name: row[name] for name in row if name != "rule"} for row in rows]}
+        return out | {"rows": [row.document() for row in self.rows]}
 
 
 @dataclass(frozen=True)
@@ -134,12 +148,13 @@ class Paper:
         }
 
     def html(self, sections: Sequence[Section], quick: bool, command: str = "") -> str:
-        """The page of the finished sections: conclusion, terms, sections with figures, then the table of all rows.
+        """The page of the finished sections: conclusion, terms, sections with figures, then the tables of all rows.
 
         command  the line that made the page, printed on it
         """
         rows = [row for section in sections for row in section.rows]
-        different = [row for row in rows if not row.holds]
+        published = [row for row in rows if row.basis == "paper"]
+        others = [row for row in rows if row.basis != "paper"]
         blocks = [words(self.about)]
         missing = len(self.sections) - len(sections)
         if missing:
@@ -149,49 +164,76 @@ class Paper:
         first = [row for item in self.main for row in rows if row.item == item]
         if first:
             blocks += [heading("Main results"), listed([f"{_verdict(row)}: {_in_words(row)}" for row in first])]
-        blocks += [
-            heading("Conclusion"),
-            words(
-                f"{len(rows) - len(different)} of {len(rows)} published values and statements agree with what was "
-                f"measured in this run. {len(different)} differ{':' if different else '.'}"
-            ),
-        ]
-        for cause, meaning in CAUSES:
-            of_cause = [row for row in different if row.cause == cause]
-            if of_cause:
-                blocks += [words(f"{meaning} ({len(of_cause)})."), listed([_in_words(row) for row in of_cause])]
+        blocks += _conclusion(published, others)
         if self.terms:
             blocks += [heading("Terms"), terms(self.terms)]
         for section in sections:
             blocks += [heading(section.title), *section.parts]
-        blocks += [
-            heading("Published and measured"),
-            table(
-                ["item", "published", "measured", "accepted if", "verdict"],
-                [_cells(row) for row in rows],
-                "All published values and statements. The third column was measured in this run; the fourth is the "
-                "criterion behind the verdict: ok, or differs with its cause.",
-                text=True,
-                marked=[i for i, row in enumerate(rows) if not row.holds],
-            ),
-            words(f"Measured in {sum(s.seconds for s in sections):.0f} s.", True),
-        ]
+        caption = "All published values and statements."
+        blocks += [heading("Published and measured"), _table("published", published, caption)]
+        if others:
+            meanings = "; ".join(f"{basis}: {BASES[basis]}" for basis in BASES if basis != "paper")
+            caption = f"Values that the paper does not print. {meanings[0].upper()}{meanings[1:]}."
+            blocks += [heading("Expected and measured"), _table("expected", others, caption)]
+        blocks.append(words(f"Measured in {sum(s.seconds for s in sections):.0f} s.", True))
         return page(self.title, blocks, command)
+
+
+def _conclusion(published: list[Row], others: list[Row]) -> list[Block]:
+    """How many rows agree: those of the paper, and those whose values it does not print."""
+    different = [row for row in published if not row.holds]
+    blocks = [
+        heading("Conclusion"),
+        words(
+            f"{len(published) - len(different)} of {len(published)} published values and statements agree with what "
+            f"was measured in this run. {len(different)} differ{':' if different else '.'}"
+        ),
+    ]
+    for cause, meaning in CAUSES:
+        of_cause = [row for row in different if row.cause == cause]
+        if of_cause:
+            blocks += [words(f"{meaning} ({len(of_cause)})."), listed([_in_words(row) for row in of_cause])]
+    if others:
+        wrong = [row for row in others if not row.holds]
+        blocks.append(words(
+            f"{len(others) - len(wrong)} of {len(others)} further values, which the paper does not print, agree with "
+            f"geometry or theory{':' if wrong else '.'}"
+        ))  # fmt: skip
+        blocks += [listed([_in_words(row) for row in wrong])] if wrong else []
+    return blocks
+
+
+def _table(head: str, rows: list[Row], caption: str) -> Block:
+    """Rows with their criteria and verdicts; head of the second column: `published` or `expected`."""
+    return table(
+        ["item", head, "measured", "accepted if", "verdict"],
+        [_cells(row) for row in rows],
+        f"{caption} The third column was measured in this run; the fourth is the criterion behind the verdict: ok, or "
+        "differs with its cause.",
+        text=True,
+        marked=[i for i, row in enumerate(rows) if not row.holds],
+    )
 
 
 def _verdict(row: Row) -> str:
     return "ok" if row.holds else f"differs ({row.cause})" if row.cause else "differs"
 
 
+def _source(row: Row) -> str:
+    """Figure, table or equation, and the basis of values that the paper does not print."""
+    return row.source if row.basis == "paper" else ", ".join(filter(None, (row.basis, row.source)))
+
+
 def _in_words(row: Row) -> str:
     """A row as a paragraph."""
-    text = f"{row.item} ({row.source}). Published: {row.published}. Measured: {row.measured}."
+    head = "Published" if row.basis == "paper" else "Expected"
+    text = f"{row.item} ({_source(row)}). {head}: {row.expected}. Measured: {row.measured}."
     return f"{text} {row.why[:1].upper()}{row.why[1:]}.".replace("..", ".") if row.why else text
 
 
 def _cells(row: Row) -> list[str]:
     verdict = _verdict(row) + (f": {row.why}" if row.why else "")
-    return [row.item, f"{row.published} ({row.source})", row.measured, row.rule, verdict]
+    return [row.item, f"{row.expected} ({_source(row)})", row.measured, row.rule, verdict]
 
 
 def plain(value: Any) -> Any:

@@ -189,7 +189,7 @@ def test_figures_equal_the_known_ones_and_only_the_known_differ(short):
 def test_figures_from_images_equal_the_known_ones_and_only_the_known_differ(quick):
     assert_known(quick[1], KNOWN, OF_IMAGES)
     assert_different(quick[1], ERR | ERR_OF_IMAGES)
-    assert "47 of 60 published values and statements agree" in Page(quick[0]).words
+    assert "46 of 59 published values and statements agree" in Page(quick[0]).words
     assert "A quick run" in Page(quick[0]).words and quick[1]["finished"] and quick[1]["quick"]
 
 
@@ -253,10 +253,29 @@ def test_rows_are_judged_by_their_numbers():
     section.states("c", "figure 1", "focused", "not", np.False_, value=np.float32(3), rule="below 1")
     assert [row.holds for row in section.rows] == [True, False, False]
     assert [row.rule for row in section.rows] == ["within 0.002 m", "within 0.002 m", "below 1"]
-    assert section.rows[0].published == "0.167 m" and section.rows[0].measured == "0.168 m"
+    assert section.rows[0].expected == "0.167 m" and section.rows[0].measured == "0.168 m"
     text = json.dumps(section.document(), allow_nan=False)
     assert '"why": "too wide"' in text and '"value": 3' in text
     assert plain({"x": [np.inf, np.nan, np.int64(2), np.float64(1 / 3)]}) == {"x": [None, None, 2, 0.333333]}
+
+
+def test_values_that_the_paper_does_not_print_are_marked_and_not_counted_as_published():
+    section = Section("key", "title")
+    section.number("width", "table 1", 0.167, 0.168, 0.002, "m")
+    section.number("shadow", "figure 3", 28.4, 27.9, 1.0, "m", ".1f", basis="geometry")
+    section.states("sphere", "Mie", "exact", "differs by 9 %", False, rule="below 5 %", basis="theory")
+    page = Page(replace(PAPER, sections=(lambda lab: section,), main=()).html([section], quick=False))
+    assert "1 of 1 published values and statements agree" in page.words
+    assert "1 of 2 further values, which the paper does not print, agree with geometry or theory:" in page.words
+    head, *rows = page.rows
+    assert head[:2] == ["item", "expected"] and [row[1] for row in rows] == [
+        "28.4 m (geometry, figure 3)", "exact (theory, Mie)",
+    ]  # fmt: skip
+    written = section.document()["rows"]
+    assert [("published" in row, row["basis"]) for row in written] == [
+        (True, "paper"), (False, "geometry"), (False, "theory"),
+    ]  # fmt: skip
+    assert written[1]["expected"] == "28.4 m" and "rule" not in written[1]
 
 
 def test_what_is_measured_is_kept_when_a_later_section_fails(tmp_path, monkeypatch, capsys):

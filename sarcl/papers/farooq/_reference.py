@@ -24,8 +24,6 @@ def section(lab: Lab) -> Section:
     chirp = Waveform.chirp(center=F0, bandwidth=BAND, duration=1e-6)
     # 16 lobes of the spectrum: the triangle is right to 2 % of its peak.
     tone = Waveform.tone(center=F0, duration=1 / BAND, bandwidth=16 * BAND)
-    angle = 2 * np.degrees(np.arctan(LENGTH / 2 / DISTANCE))
-    out.number("angle of the aperture", "table 2.1", 5.2, angle, 0.06, "deg", ".2f")
     curves: dict[str, dict[str, tuple[np.ndarray, np.ndarray]]] = {"range": {}, "cross-range": {}}
     figures = []
     for name, waveform in (("LFM", chirp), ("tone", tone)):

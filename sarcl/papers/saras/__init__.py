@@ -41,8 +41,6 @@ TERMS = (
      "nothing back."),
     ("p", "Probability of a deviation at least as large as the measured one, if the pixels had the stated distribution "
      "(test of Kolmogorov and Smirnov). Below 0.01 the distribution is rejected here."),
-    ("geometry", "A value that the paper's figure implies but does not print: it follows from the dimensions chosen "
-     "here."),
     ("raw signal", "Samples as received, before compression in range and in azimuth."),
     ("lambda, R0, X", "Wavelength, slant range of the scene's centre, and width of the beam on the ground, m."),
 )  # fmt: skip

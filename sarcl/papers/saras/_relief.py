@@ -19,7 +19,7 @@ RADAR = FarRadar(look=np.radians(50), bandwidth=100e6, turn=0.014, n_pulses=64)
 FINE = FarRadar(look=np.radians(50), bandwidth=150e6, turn=0.02, n_pulses=100)
 COTANGENT, TANGENT = 1 / np.tan(RADAR.look), np.tan(RADAR.look)
 LOOKS = {True: 6, False: 24}
-GEOMETRY = "figure 13, geometry"
+FIGURE = "figure 13"
 BOX = (14.0, 36.0, 14.0)  # m along x, y, z: depth, width, height
 POLARIZATIONS = ("HH", "VV", "HV")
 
@@ -41,7 +41,7 @@ def parallelepiped(lab: Lab) -> Section:
     lit = power[(x > ends[1] + inside[1]) & (x < 42)].mean()
     level = float(10 * np.log10(power[dark].mean() / lit))
     out.states(
-        "power in the shadow", "figure 13", "free of speckle", f"{level:.0f} dB of the ground beside it", level < -60,
+        "power in the shadow", FIGURE, "free of speckle", f"{level:.0f} dB of the ground beside it", level < -60,
         "side lobes of the ground around it: the image has a Taylor window of -90 dB", level,
         rule="below -60 dB",
     )  # fmt: skip
@@ -66,17 +66,19 @@ def _edges(
         first, last = crossings(profile, at, lit / 2)
         within = 0.5 * FINE.null[1] * scale
         for name, wanted, found in (("begins", ends[0], first), ("ends", ends[1], last)):
-            out.number(f"shadow {name}, {plane} range", GEOMETRY, wanted * scale, found, within, "m", ".2f")
+            out.number(
+                f"shadow {name}, {plane} range", FIGURE, wanted * scale, found, within, "m", ".2f", basis="geometry"
+            )
         out.number(
-            f"length of the dark run, {plane} range", GEOMETRY, (ends[1] - ends[0]) * scale, last - first,
-            0.7 * FINE.null[1] * scale, "m", ".2f",
+            f"length of the dark run, {plane} range", FIGURE, (ends[1] - ends[0]) * scale, last - first,
+            0.7 * FINE.null[1] * scale, "m", ".2f", basis="geometry",
         )  # fmt: skip
         if plane == "ground":
             over = profile[(at > front + 2) & (at < -depth - 2)].mean()
             before = profile[(at > front - 15) & (at < front - 2)].mean()
             near = at < front + 3
             start = crossings(profile[near], at[near], (before + over) / 2)[1]
-            out.number("layover begins", GEOMETRY, front, start, FINE.null[1], "m", ".2f")
+            out.number("layover begins", FIGURE, front, start, FINE.null[1], "m", ".2f", basis="geometry")
             out.draw(html.plot(
                 [("mean over azimuth", at, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
                 "Profile across the parallelepiped, mean over azimuth: layover, then shadow, which the side lobes of a "
@@ -124,7 +126,7 @@ def cone(lab: Lab) -> Section:
     h, v = fresnel(cosine, np.array(ROUGH.permittivity(RADAR.center)))
     out.number(
         "VV over HH on flat ground", "equations A.7, A.13, A.15", float(20 * np.log10(abs(v / h))), flat_apart, 1.0,
-        "dB", ".1f",
+        "dB", ".1f", basis="theory",
     )  # fmt: skip
     out.say(
         "HH and VV agree where the cone faces the radar. The flat ground is much darker in VV, as Fresnel's "
@@ -157,7 +159,9 @@ def composite(lab: Lab) -> Section:
     end = -7 + 20 * TANGENT  # the shadow of the rear edge of the parallelepiped, 20 m high
     lit = profile[(x > end + 4) & (x < 44)].mean()
     found = crossings(profile, x, lit / 2)[1]
-    out.number("end of the parallelepiped's shadow", "figure 17, geometry", end, found, RADAR.null[1], "m", ".2f")
+    out.number(
+        "end of the parallelepiped's shadow", "figure 17", end, found, RADAR.null[1], "m", ".2f", basis="geometry"
+    )
     return out
 
 

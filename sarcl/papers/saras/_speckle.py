@@ -67,6 +67,7 @@ def _distributions(out: Section, pixels: np.ndarray) -> None:
     out.number(
         "standard deviation of the intensity over its mean", "figure 6: of Rayleigh amplitudes", 1.0, found.contrast,
         4 * error, why="" if abs(found.contrast - 1) <= 4 * error else "more than four standard errors off",
+        basis="theory",
     )  # fmt: skip
     of_intensity = speckle(np.abs(pixels) ** 2 + 0j).rayleigh
     out.states(

@@ -37,7 +37,7 @@ def section(lab: Lab) -> Section:
     area = float(normals_and_areas(square)[1].sum())
     out.number(
         "area of a facet of 1 m x 1 m on the ground, alpha 70 deg", "section 3.2", float(1 / np.cos(TILT)), area, 1e-6,
-        "m^2",
+        "m^2", basis="geometry",
     )  # fmt: skip
     radar = l_band(4)
     options = {"reference": (0, 0, 0), "range_window": (-20.0, 20.0), "device": lab.device}

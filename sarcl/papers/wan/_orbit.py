@@ -16,11 +16,14 @@ from ...model.waveform import Waveform
 from ...scene import shapes
 from ...scene.material import Material
 from ...scene.scene import Scene
+from ...scene.triangles import centroids
 from ...simulation.echo import echo
 from ..far_radar import ground
 from ..lab import Lab
 from ..paper import Section
+from ._maps import backscatter, correlation, cut, summed
 
+AVERAGED, ALIKE = 6, 0.7  # pixels along the sides of squares; least correlation that counts as very close
 STONE = Material(eps_r=3.0, diagram="cos2")
 CHIRP = Waveform.chirp(center=5.4e9, bandwidth=40e6, duration=10e-6)
 SLANT, PRF = 1.05e6, 1700.0  # m: 45 deg of incidence; Hz
@@ -47,19 +50,20 @@ def section(lab: Lab) -> Section:
     )  # fmt: skip
     power, first = np.zeros(grid.shape), None
     for seed in range(LOOKS[lab.quick]):
+        scene = _scene(axes, origin, seed)
         raw = echo(
-            _scene(axes, origin, seed), CHIRP, track, reference=origin, range_window=(-window, window), seed=seed,
+            scene, CHIRP, track, reference=origin, range_window=(-window, window), seed=seed,
             tolerance=1e-2, check=False, device=lab.device,
         )  # fmt: skip
         options: dict[str, Any] = {"window": "hamming", "tolerance": 1e-2, "device": lab.device}
         power += np.abs(np.asarray(backproject(raw, grid, check=False, **options).data)) ** 2
         if first is None:
-            first = range_doppler(raw, side="right", check=True, **options)
+            first, drawn = range_doppler(raw, side="right", check=True, **options), scene
     assert first is not None and first.report is not None and first.report.measured_error is not None
     apart = float(first.report.measured_error)
     out.states(
-        "range-Doppler image and backprojection of the same echoes", "figure 8", "the classical algorithm is used",
-        f"differ by {apart:.1e}", apart < 1e-2, value=apart, rule="below the tolerance of 1e-2",
+        "range-Doppler image and backprojection of the same echoes", "figure 8", "the same image",
+        f"differ by {apart:.1e}", apart < 1e-2, value=apart, rule="below the tolerance of 1e-2", basis="theory",
     )  # fmt: skip
     local = (np.asarray(first.grid.positions) - origin) @ axes.T
     _shadow(out, power, grid, float(np.tan(seen.incidence)))
@@ -73,18 +77,63 @@ def section(lab: Lab) -> Section:
     half = SCALE * SIDES[0], SCALE * SIDES[1]
     out.draw(html.picture(
         _db(power), (-half[1], half[1]), (-half[0], half[0]), "ground range, m", "azimuth, m",
-        f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figures 6 and 7).", floor_db=-30.0,
+        f"Backprojected on the ground: mean of {LOOKS[lab.quick]} looks (figure 6).", floor_db=-30.0,
         percentile=99.5, equal=True,
     ))  # fmt: skip
     rows = np.abs(local[:, local.shape[1] // 2, 1]) < half[0]
     columns = np.abs(local[local.shape[0] // 2, :, 0]) < half[1]
     image = np.abs(np.asarray(first.data)[rows][:, columns]) ** 2
     along, across = local[rows, local.shape[1] // 2, 1], local[local.shape[0] // 2, columns, 0]
+    _maps_of_cells(out, lab, orbit, axes, origin, drawn, image, (along, across))
     out.draw(html.picture(
         _db(image), (across[0], across[-1]), (along[0], along[-1]), "ground range of the slant range, m", "azimuth, m",
         "Range-Doppler image, one look (figure 8).", floor_db=-30.0, percentile=99.5, equal=True,
     ))  # fmt: skip
     return out
+
+
+def _maps_of_cells(
+    out: Section, lab: Lab, orbit: Orbit, axes: np.ndarray, origin: np.ndarray, scene: Scene, image: np.ndarray,
+    ground_places: tuple[np.ndarray, np.ndarray],
+) -> None:  # fmt: skip
+    """Figure 7: power of the facets in cells of the ground and of the slant plane, and figure 8 beside the latter.
+
+    image          power of the range-Doppler image (rows, columns), whose pixels see the ground at
+    ground_places  azimuth (rows,) and ground range (columns,), m
+    """
+    scene = cut(scene, CELL)
+    middles = centroids(scene.triangles)
+    power = backscatter(scene, orbit.positions(0.0), axes[2], CHIRP.center, lab.device)
+    time, slant = orbit.locate(middles)
+    on_flat = [origin + np.outer(x, axis) for x, axis in zip(ground_places, (axes[1], axes[0]), strict=True)]
+    edges = _edges(orbit.locate(on_flat[0])[0]), _edges(orbit.locate(on_flat[1])[1])
+    slant_map = summed(power, time, slant, edges)
+    along, across = ((middles - origin) @ axes[i] for i in (1, 0))
+    ground_map = summed(power, along, across, (_edges(ground_places[0]), _edges(ground_places[1])))
+    ends = [(float(places[0]), float(places[-1])) for places in ground_places]
+    for cells, caption, name in (
+        (ground_map, "on the ground", "ground range, m"),
+        (slant_map, "in the slant plane: foreshortening and layover", "ground range of the slant range, m"),
+    ):
+        out.draw(html.picture(
+            _db(cells), ends[1], ends[0], name, "azimuth, m", f"Power of the facets in cells {caption} (figure 7).",
+            floor_db=-30.0, percentile=99.5, equal=True,
+        ))  # fmt: skip
+    alike, unlike = (correlation(image, cells, AVERAGED) for cells in (slant_map, ground_map))
+    out.states(
+        "range-Doppler image and the map of the slant plane", "figures 7 and 8", "very close",
+        f"correlation {alike:.2f} of the amplitudes of {AVERAGED} x {AVERAGED} pixels; with the ground's map "
+        f"{unlike:.2f}", alike > max(ALIKE, unlike), value=[alike, unlike],
+        rule=f"correlation above {ALIKE:g} and above that with the ground's map; speckle is averaged over "
+        f"{AVERAGED**2} pixels",
+    )  # fmt: skip
+
+
+def _edges(places: np.ndarray) -> np.ndarray:
+    """Edges of cells about places that increase or decrease (n,), increasing (n + 1,)."""
+    places = np.sort(places)
+    middles = (places[1:] + places[:-1]) / 2
+    return np.concatenate([[2 * places[0] - middles[0]], middles, [2 * places[-1] - middles[-1]]])
 
 
 def _axes(orbit: Orbit, origin: np.ndarray) -> np.ndarray:
@@ -123,7 +172,7 @@ def _shadow(out: Section, power: np.ndarray, grid: ImageGrid, tangent: float) ->
     below = profile < lit / 2
     inside = np.flatnonzero(below & (x < end + 30))
     found = float(x[inside[-1]] + grid.spacing[1] / 2)
-    out.number("end of the cylinder's shadow", "figures 7 and 8", end, found, 12.0, "m", ".0f")
+    out.number("end of the cylinder's shadow", "figures 7 and 8", end, found, 12.0, "m", ".0f", basis="geometry")
     out.draw(html.plot(
         [("mean over azimuth", x, 10 * np.log10(profile / lit))], "ground range, m", "dB over the ground",
         "Profile through the solids: layover in front, shadow behind.",

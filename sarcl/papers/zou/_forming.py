@@ -46,10 +46,10 @@ def section(lab: Lab) -> Section:
             "the middle", one, rule=f"rms over {N_AZIMUTHS} azimuths below {FINE:.0%}", cause="interpretation",
         )  # fmt: skip
         out.states(
-            f"{name}: {anchors} anchors against one run per azimuth", "tolerance of sarcl", f"{TOLERANCE:.0%}",
+            f"{name}: {anchors} anchors against one run per azimuth", "tolerance", f"at most {TOLERANCE:.0%}",
             f"differs by {own:.1%}, by up to {found.own.max():.0%} at an azimuth", own < TOLERANCE,
             f"predicted from the anchors alone: {report.predicted_error:.1%}", own,
-            rule=f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}",
+            rule=f"rms over {N_AZIMUTHS} azimuths off the anchors below {TOLERANCE:.0%}", basis="theory",
         )  # fmt: skip
         degrees = np.degrees(found.angle)
         out.draw(html.plot(

@@ -26,6 +26,7 @@ from ._radar import CHIRP, DURATION, Radar
 REDUCTION = {True: 6, False: 1}  # of targets, range and track, but not of the wavelength
 CELLS = {True: 10, False: 12}  # per wavelength at 1.75 GHz, at least
 TOLERANCE = 3e-2
+FULL_BYTES = 8e9  # memory for a run of the full size: what this device happens to have would change the forecast
 CREEPING = 1.25  # of the radius of the target: waves that creep round it arrive later
 PULSE = SPEED_OF_LIGHT * DURATION / 2  # m, of slant range
 BOTH: tuple[Polarization, ...] = ("HH", "VH")
@@ -89,11 +90,11 @@ class Lab:
         )  # fmt: skip
 
     def forecast(self, name: str) -> FullwaveForecast:
-        """Memory, seconds and runs of the echoes of a target in full size."""
+        """Memory, seconds and runs of the echoes of a target in full size, with FULL_BYTES for a run."""
         scene = _targets.find(name).scene()
         return plan_fullwave_echo(
             scene, CHIRP, Radar().track, polarization=BOTH, cells=CELLS[False], tolerance=TOLERANCE,
-            device=self.device, **self.window(scene),
+            max_bytes=FULL_BYTES, device=self.device, **self.window(scene),
         )  # fmt: skip
 
     def _optics(self, name: str) -> PhaseHistory:

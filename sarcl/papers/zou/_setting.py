@@ -5,14 +5,13 @@ from __future__ import annotations
 import numpy as np
 
 from ...analysis.point_response import PointResponse, measure
-from ...base.constants import SPEED_OF_LIGHT
 from ...figures import html
 from ...imaging.backproject import backproject
 from ...scene.scene import Scene
 from ...simulation.echo import echo
 from ..paper import Section
 from . import _targets
-from ._lab import CELLS, Lab
+from ._lab import CELLS, FULL_BYTES, Lab
 from ._radar import (
     AZIMUTH_RESOLUTION,
     BANDWIDTH,
@@ -23,7 +22,6 @@ from ._radar import (
     PULSES,
     RANGE,
     RANGE_RESOLUTION,
-    SPEED,
     WAVELENGTH,
 )
 
@@ -36,19 +34,7 @@ def section(lab: Lab) -> Section:
     """Tables 1 and 2."""
     out = Section("setting", "Radar and targets (tables 1 and 2)")
     radar = lab.radar
-    out.number("range resolution, c/2B", TABLE, RANGE_RESOLUTION, SPEED_OF_LIGHT / (2 * BANDWIDTH), 1e-3, "m")
-    out.number("azimuth resolution, v/B_D", TABLE, AZIMUTH_RESOLUTION, SPEED / DOPPLER, 1e-3, "m")
-    y = radar.track.positions[:, 1]
-    seen = np.sin(np.arctan2(y, radar.range_))
-    out.number(
-        "Doppler bandwidth of the track", TABLE, DOPPLER, float(2 * SPEED / WAVELENGTH * np.ptp(seen)), 5, "Hz", ".0f",
-        "the range is chosen so that the pulses of the paper just cross the beam",
-    )  # fmt: skip
     upper = DOPPLER * (1 + BANDWIDTH / (2 * CHIRP.center))
-    out.states(
-        "Doppler bandwidth at the band's upper end", TABLE, f"sampled at PRF {PRF:.0f} Hz", f"{upper:.0f} Hz",
-        upper < PRF, value=upper, rule="below PRF",
-    )  # fmt: skip
     _point(out, lab)
     plane = max(_curved(radar.range_, lab.scene(target.name)) for target in _targets.TARGETS)
     whole = _curved(RANGE, _targets.find("tank").scene())
@@ -62,7 +48,8 @@ def section(lab: Lab) -> Section:
     out.say(
         f"The paper prints no range. Here it is {RANGE:.0f} m, at which {PULSES} pulses, "
         f"{RANGE * 2 * np.tan(HALF_BEAM):.0f} m of track, just cross the beam of {np.degrees(HALF_BEAM):.1f} degrees "
-        f"on either side that 1000 Hz of Doppler bandwidth need.{size} Targets are in free space, with the centre of "
+        f"on either side that {DOPPLER:.0f} Hz of Doppler bandwidth need: {upper:.0f} Hz at the upper end of the band, "
+        f"below the PRF of {PRF:.0f} Hz.{size} Targets are in free space, with the centre of "
         "their box at the origin, 45 degrees below the radar. Solids stand upright; cuboid and tank are longest along "
         "the track. Distances are spherical: every cell has its own. Flat sides lie on nodes of the grid."
     )
@@ -88,8 +75,8 @@ def _point(out: Section, lab: Lab) -> None:
         )  # fmt: skip
     off = float(np.linalg.norm(found.position))
     out.states(
-        "place of a point at the origin", "geometry", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off,
-        rule="within 10 mm",
+        "place of a point at the origin", "", "origin", f"{1000 * off:.2f} mm off", off < 0.01, value=off,
+        rule="within 10 mm", basis="geometry",
     )  # fmt: skip
 
 
@@ -118,7 +105,8 @@ def _table(out: Section, lab: Lab) -> None:
     ))  # fmt: skip
     out.draw(html.table(
         ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"], full,
-        f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength, forecast for "
-        "this machine at its present speed (sarcl.plan_fullwave_echo). Figure 8 takes 18 runs more for cuboid and "
+        f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength and "
+        f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
+        "(sarcl.plan_fullwave_echo). Figure 8 takes 18 runs more for cuboid and "
         "sharp cone each.",
     ))  # fmt: skip
