@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 import os
 import sys
 import warnings
@@ -57,23 +58,63 @@ def warn(text: str, topic: str = "") -> None:
     warnings.warn(text, SarclWarning, stacklevel=level)
 
 
+# measured over predicted error up to which the predicted terms explain the error, so that it falls with the tolerance
+EXPLAINED = 2.0
+
+
 class ToleranceMissed(ValueError):
     """The check of a finished image, or of finished echoes, measured an error above the tolerance.
 
-    tolerance, measured  relative errors;  image, raw  the finished Image or PhaseHistory, the other is None
+    tolerance, measured  relative errors; measured is NaN where values of the result are not finite numbers
+    image, raw           the finished Image or PhaseHistory, the other is None
+    predicted            relative error that the error formulas predicted, None: unknown
+    instead              what to do where a smaller tolerance may not help
     """
 
     def __init__(
-        self, tolerance: float, measured: float, image: Image | None = None, raw: PhaseHistory | None = None
-    ) -> None:
+        self, tolerance: float, measured: float, image: Image | None = None, raw: PhaseHistory | None = None,
+        predicted: float | None = None, instead: str = "",
+    ) -> None:  # fmt: skip
         kept = "the image is kept: in its file, or in this error's .image"
         if raw is not None:
             kept = "the echoes are kept: in their file, or in this error's .raw"
-        super().__init__(
-            f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: these data are worse than the error "
-            f"formulas allow for; ask for {tolerance**2 / measured / 2:.1e}, and please report it ({kept})"
-        )
+        if not math.isfinite(measured):
+            cause, remedies = "values of the result are not finite numbers", [instead]
+        elif predicted is None or measured > EXPLAINED * predicted:
+            cause = "part of the error is not predicted, and may remain at a smaller tolerance"
+            remedies = [instead]
+        else:
+            cause = "these data are worse than the error formulas allow for"
+            remedies = [f"ask for {tolerance**2 / measured / 2:.1e}"]
+        advice = ", and ".join([*filter(None, remedies), "please report it"])
+        super().__init__(f"tolerance {tolerance:.1e} was missed, {measured:.1e} measured: {cause}; {advice} ({kept})")
         self.tolerance, self.measured, self.image, self.raw = tolerance, measured, image, raw
+
+
+def confirm_tolerance(*, image: Image | None = None, raw: PhaseHistory | None = None, instead: str = "") -> None:
+    """ToleranceMissed where the check of a finished image, or of finished echoes, measured more than the tolerance.
+
+    NaN and Inf are never within a tolerance: neither as errors, nor anywhere in the data of a result that was checked.
+
+    instead  what to do where a smaller tolerance may not help
+    """
+    report, data = (image.report, image.data) if image is not None else (raw.report, raw.samples)  # type: ignore[union-attr]
+    assert report is not None
+    measured, tolerance = report.measured_error, report.tolerance
+    if measured is None:
+        return
+    if measured <= tolerance and not _finite(data):
+        measured = math.nan
+    if not measured <= tolerance:
+        raise ToleranceMissed(tolerance, measured, image, raw, report.predicted_error, instead)
+
+
+def _finite(data: Any) -> bool:
+    """Whether all values of an array, or of anything with shape and row slicing, are finite; read in parts."""
+    import numpy as np
+
+    n = max(1, 2**20 // max(1, math.prod(data.shape[1:]))) if len(data) else 1
+    return all(np.isfinite(data[start : start + n]).all() for start in range(0, len(data), n))
 
 
 class ToleranceUnreachable(ValueError):

@@ -62,7 +62,7 @@ class StateVectors:
                     tried.append((float(misfit.max()), n, hermite, int(misfit.argmax()) + 1))
         least = min(t[0] for t in tried)
         error, n, hermite, worst = next(t for t in tried if t[0] <= max(1.5 * least, FINE))
-        if error > WORST:
+        if not error <= WORST:
             raise ValueError(
                 f"positions[{worst}] (at {times[worst]:g} s) is {error:.3g} m away from the curve through the other "
                 "states; correct or remove a wrong state, or give states at a closer spacing"

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base import arguments
-from ..base.errors import ToleranceMissed, warn
+from ..base.errors import confirm_tolerance, warn
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..base.types import PathLike, WritableArray
@@ -239,8 +239,7 @@ def backproject(
         )
         if checkpoint:
             checkpoint.done()
-        if measured is not None and measured > tolerance:
-            raise ToleranceMissed(tolerance, measured, image)
+        confirm_tolerance(image=image, instead="try method='direct'")
         return image
 
 

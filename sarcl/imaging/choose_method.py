@@ -178,17 +178,17 @@ class _Float32:
 
     def _must_round_less(self, how: str, best: Callable[[], float | None]) -> None:
         """ToleranceUnreachable where rounding alone takes too much. best()  what can be met: found where it is not."""
-        if self.gains > ROUNDING * self.tolerance:
+        if not self.gains <= ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
                 self.tolerance, best(), "float32 gains of the antenna", "aim it at the grid, or give the beam an angle",
                 how=f"{how}: gains of the antenna have an error of {self.gains:.1g}",
             )  # fmt: skip
-        if self.coordinates > ROUNDING * self.tolerance:
+        if not self.coordinates <= ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
                 self.tolerance, best(), "float64 coordinates of a plane's pixels", "put the origin near the scene",
                 how=f"{how}: coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
             )  # fmt: skip
-        if self.rounding > ROUNDING * self.tolerance:
+        if not self.rounding <= ROUNDING * self.tolerance:
             ratio = 20 * np.log10(self.energy.whole_profile)
             dark = f"these pixels are {ratio:.0f} dB darker than what else is in the same rows"
             raise ToleranceUnreachable(self.tolerance, best(), "rounding of float32 sums", how=f"{how}: {dark}")

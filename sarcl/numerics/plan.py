@@ -100,7 +100,7 @@ def cheapest(
             for order in (2, 3, 0) if mode != 2 else (0,):
                 fixed = error_bounds.range_error(radius, distance, frequency, bandwidth, mode, order)
                 fixed += error_bounds.sum_rounding(chunk, n_samples) + (native_error or 0.0)
-                if fixed > FIXED * tolerance:
+                if not fixed <= FIXED * tolerance:
                     continue
                 try:
                     interpolator, length, cost = interpolator_choice.choose_interpolator(

@@ -47,7 +47,7 @@ class WeightError:
 
     def check(self, tolerance: float) -> None:
         """Raise ToleranceUnreachable where rounding leaves too little of the tolerance."""
-        if self.rounding > ROUNDING * tolerance:
+        if not self.rounding <= ROUNDING * tolerance:
             raise ToleranceUnreachable(
                 tolerance, self.rounding / ROUNDING * (1 + 1e-9), "float32 gains of the antennas", "aim at the scene",
                 how="with these antennas: gains are in float32, and the echoes lie "
@@ -57,7 +57,7 @@ class WeightError:
     def of(self, n: int, tolerance: float) -> float:
         """Error of points with n nodes; ToleranceUnreachable where it leaves too little of the tolerance."""
         error = self.rounding + float(self.over_band[n])
-        if error > OVER_BAND * tolerance:
+        if not error <= OVER_BAND * tolerance:
             raise ToleranceUnreachable(
                 tolerance, error / OVER_BAND * (1 + 1e-9), "gains over the band",
                 "halve the band and add the halves' images",

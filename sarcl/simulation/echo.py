@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
 from ..base import arguments, host_memory, wgs84
-from ..base.errors import ToleranceMissed
+from ..base.errors import confirm_tolerance
 from ..base.report import Report
 from ..base.types import PathLike
 from ..base.validation import array as numbers
@@ -230,8 +230,7 @@ def echo(
                 seed=seed,
             ),
         )
-    if measured is not None and measured > request.tolerance:
-        raise ToleranceMissed(request.tolerance, measured, raw=raw)
+    confirm_tolerance(raw=raw)
     return raw
 
 

@@ -79,6 +79,14 @@ def test_the_image_is_that_of_backproject_on_every_device(device, tolerance):
     hold(noise(squint=0.3), tolerance, device=device)
 
 
+@pytest.mark.parametrize("columns", [1, 2, 3, 4, 7, 13])
+def test_swaths_of_few_columns_at_a_large_squint(columns):
+    raw = noise(n=512, n_samples=512, squint=np.deg2rad(40), bandwidth=1e9, aperture=60.0)
+    middle, half = 4e3 * np.hypot(0.7, 0.714), (columns - 0.5) * SPEED_OF_LIGHT / 4.8e9
+    image = hold(raw, 1e-2, ranges=(middle - half, middle + half))
+    assert abs(image.data.shape[1] - columns) <= 1 and np.isfinite(image.data).all()
+
+
 def test_any_reference_range_will_do():
     raw = noise()
     hold(replace(raw, reference_range=np.full(raw.n_rows, 4e3)), 1e-3)

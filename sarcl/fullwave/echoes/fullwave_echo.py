@@ -8,7 +8,7 @@ from typing import Any, Literal, TypedDict
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.errors import ToleranceMissed
+from ...base.errors import confirm_tolerance
 from ...base.types import PathLike
 from ...base.validation import flag, instance
 from ...io import formats, output_paths
@@ -113,8 +113,7 @@ def fullwave_echo(
         task, anchors, out, check=flag("check", check), model_error=flag("model_error", model_error)
     )  # fmt: skip
     raw = _written(task, made, out)
-    if made.measured_error is not None and made.measured_error > request.tolerance:
-        raise ToleranceMissed(request.tolerance, made.measured_error, raw=raw)
+    confirm_tolerance(raw=raw, instead="give more anchors")
     return raw
 
 

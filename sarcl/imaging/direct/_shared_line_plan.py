@@ -89,7 +89,7 @@ def choose(
         fixed += (3 + turns) * on.native_error if native else 0.0
         fixed += error_bounds.two_part_position_rounding(radius, distance, bandwidth)
         fixed += 2 * error_bounds.curvature_rounding(radius, distance, highest)
-        if fixed > MOST_FIXED * tolerance:
+        if not fixed <= MOST_FIXED * tolerance:
             continue
         fixed += curvature.phase_error + error_bounds.sum_rounding(CHUNK, n_samples)
         shift, cells = curvature.shift(bandwidth), curvature.bent_cells(bandwidth)
@@ -100,7 +100,7 @@ def choose(
             slopes = interpolation.line_interpolator(slope_taps, fine / cells) if slope_taps else None
             shifted = shift**2 / 2 + shift * interpolation.slope_error(slopes) if slopes else shift
             error = fixed + line.error + shifted
-            if error > MOST_CHOSEN * tolerance:
+            if not error <= MOST_CHOSEN * tolerance:
                 continue
             samples = fine * 1.4 * side + taps + 4  # of T
             found = profile_interpolator(tolerance - error, n_samples, grid.size * samples / side**2)

@@ -314,7 +314,7 @@ def choose(
         fixed += error_bounds.phase_rounding(0.0, highest, True) * 2
         fixed += error_bounds.position_rounding(radius, bandwidth, False)
         fixed += error_bounds.curvature_rounding(radius, distance, highest)
-        if fixed > MOST_FIXED * tolerance:
+        if not fixed <= MOST_FIXED * tolerance:
             continue
         fixed += curvature.phase_error + error_bounds.sum_rounding(group, n_samples)
         position_phase, cells = curvature.shift(bandwidth), curvature.cells(bandwidth)
@@ -326,7 +326,7 @@ def choose(
             # the error of the weights' slopes is a few times that of the weights
             shifted = position_phase**2 / 2 + 8 * position_phase * line.error if slope else position_phase
             error = fixed + line.error + shifted
-            if error > MOST_CHOSEN * tolerance:
+            if not error <= MOST_CHOSEN * tolerance:
                 continue
             vectors = fine * (1.3 * side + 8)
             per_tile = cost_model.LINE_SAMPLE * vectors + cost_model.LINE_WEIGHTS * side + cost_model.LINE_PULSE
@@ -341,7 +341,7 @@ def choose(
                 per_pair += (cost - cost_model.TAPS[2]) * reads / grid.size
             else:
                 made, length = source
-                if made.error > tolerance - error:
+                if not made.error <= tolerance - error:
                     continue
             if best is None or per_pair < best.cost:
                 best = LinePlan(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base import arguments
-from ...base.errors import SarclWarning, ToleranceMissed
+from ...base.errors import SarclWarning, confirm_tolerance
 from ...base.report import Report
 from ...base.stage_timer import Clock
 from ...base.validation import flag, instance
@@ -112,8 +112,7 @@ def polar_format(
             device=opened.info.name,
         ),
     )
-    if measured is not None and measured > tolerance:
-        raise ToleranceMissed(tolerance, measured, image)
+    confirm_tolerance(image=image, instead="use backproject")
     return image
 
 

@@ -17,6 +17,8 @@ from ._doppler import EVANESCENT
 from ._plan import SEGMENT, FocusPlan, band_frequencies
 from ._track import Track
 
+CUBIC_NODES = 4  # nodes of a cubic polynomial
+
 
 class Bins:
     """Doppler bins on a device: secondary range compression, migration and azimuth compression."""
@@ -74,21 +76,23 @@ class Bins:
 
     @property
     def nodes(self) -> list[float]:
-        """Slant ranges, m, for which filters are made: the middle, or with several blocks their ends."""
+        """Slant ranges, m, for which filters are made: the middle of one block, every column where all blocks are
+        single columns, else the ends of the blocks."""
         ranges, blocks = self.plan.ranges, self.plan.blocks
         if len(blocks) == 1:
             return [float(ranges[len(ranges) // 2])]
+        if len(blocks) == len(ranges):
+            return [float(r) for r in ranges]
         return [float(ranges[first]) for first, _ in blocks] + [float(ranges[-1])]
 
     def near(self, block: int) -> range:
-        """Numbers of the nodes whose profiles are read for a block: four about it, or the only one."""
-        if len(self.nodes) == 1:
-            return range(1)
-        start = min(max(block - 1, 0), len(self.nodes) - 4)
-        return range(start, start + 4)
+        """Numbers of the nodes whose profiles are read for a block: four about it, or all where there are fewer."""
+        n = len(self.nodes)
+        start = min(max(block - 1, 0), max(n - CUBIC_NODES, 0))
+        return range(start, min(start + CUBIC_NODES, n))
 
     def shares(self) -> np.ndarray:
-        """Weights of the profiles of the nodes `near` a column's block, float32 (1 or 4, columns)."""
+        """Weights of the profiles of the nodes `near` a column's block, float32 (1 to 4, columns)."""
         nodes, ranges = np.array(self.nodes), self.plan.ranges
         out = np.ones((len(self.near(0)), len(ranges)), np.float32)
         if len(nodes) > 1:

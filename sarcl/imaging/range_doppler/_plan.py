@@ -42,7 +42,7 @@ class FocusPlan:
     length          rows of the azimuth FFT;  bins  numbers of the Doppler bins, in steps of 1/(length step) Hz
     blocks          first and last column + 1 of range blocks. A single block has one secondary range compression,
                     that of its middle; with several (three at least) it is interpolated by cubics through four of
-                    their ends
+                    their ends; with a block for each column, every column has its own
     interpolator, profile_length   of range profiles;  center  their delay 0, m
     phases          float32, or float64 where the phases of the secondary range compression need it
     errors          predicted relative errors by cause
@@ -135,7 +135,7 @@ def make_plan(
     band, fixed = extent.band, model_error + ROUNDING
     errors = {"hyperbolic ranges": model_error, "rounding": ROUNDING, "ends of the Doppler band": band.error}
     spare = tolerance - fixed - band.error
-    if spare <= 0.2 * tolerance:
+    if not spare > 0.2 * tolerance:
         best = rounded_up(2 * fixed)
         limit = "rounding of complex64" if model_error < ROUNDING else "the track's ranges, which are no hyperbolas"
         raise ToleranceUnreachable(tolerance, askable(best), limit, "use backproject, which takes any track")
@@ -191,16 +191,15 @@ def _blocks(
     one = QUADRATIC * max(_lacking(frequencies, center, fit, band, ranges[[n // 2, i]]) for i in (0, -1))
     if one <= allowed:
         return ((0, n),), one
-    error = np.inf
     for count in sorted({int(3 * 2 ** (i / 3)) for i in range(20)}):
-        if count > n:
-            break
-        edges = np.linspace(0, n, count + 1).astype(int)
-        blocks = tuple((int(a), int(b)) for a, b in pairwise(edges))
-        psi = max(_lacking(frequencies, center, fit, band, ranges[[a, min(b, n - 1)]]) for a, b in blocks)
+        if count >= n:  # blocks of cubics have two columns or more: with one, two of their ends would be the same
+            return tuple((i, i + 1) for i in range(n)), 0.0
+        edges = np.linspace(0, n - 1, count + 1).astype(int)
+        psi = max(_lacking(frequencies, center, fit, band, ranges[list(ends)]) for ends in pairwise(edges))
         error = FOURTH * CUBIC * psi**4
         if error <= allowed:
-            return blocks, error
+            edges[-1] = n
+            return tuple((int(a), int(b)) for a, b in pairwise(edges)), error
     raise ToleranceUnreachable(
         tolerance, None,
         "secondary range compression of so wide a swath at this squint",

@@ -11,7 +11,7 @@ from numpy.typing import ArrayLike
 
 from ...base import arguments
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import ToleranceMissed
+from ...base.errors import confirm_tolerance
 from ...base.report import Report
 from ...base.stage_timer import Clock
 from ...base.validation import flag
@@ -145,8 +145,7 @@ def range_doppler(
             device=task.device.info.name,
         ),
     )
-    if measured is not None and measured > task.tolerance:
-        raise ToleranceMissed(task.tolerance, measured, image)
+    confirm_tolerance(image=image, instead="use backproject")
     return image
 
 

@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.channels import LEAST_CUT, channels_of, cut_of, sampling, warn_of
-from ...base.errors import ToleranceMissed, ToleranceUnreachable, warned_once
+from ...base.errors import ToleranceUnreachable, confirm_tolerance, warned_once
 from ...base.report import Report
 from ...base.validation import choice
 from ...model.antenna_array import AntennaArray
@@ -93,8 +93,7 @@ def array_echo(
                 seconds=request.clock.seconds, device=request.device.info.name, seed=request.seed,
             ),
         )  # fmt: skip
-    if measured is not None and measured > request.tolerance:
-        raise ToleranceMissed(request.tolerance, measured, raw=raw)
+    confirm_tolerance(raw=raw)
     return raw
 
 

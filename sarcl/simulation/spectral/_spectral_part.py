@@ -221,7 +221,7 @@ def _brightest(
 def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allowed: float, asked: float) -> None:
     """ToleranceUnreachable where SARAS's approximations exceed their share of the tolerance."""
     error = of_amplitudes + of_transfer + outside
-    if error > allowed:
+    if not error <= allowed:
         best = rounded_up(1.05 * asked * error / allowed)
         raise ToleranceUnreachable(
             asked, askable(best), "SARAS's transfer function", "take variant='exact', or echo",

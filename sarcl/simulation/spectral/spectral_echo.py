@@ -9,7 +9,7 @@ from typing import Any, Literal
 import numpy as np
 from numpy.typing import ArrayLike
 
-from ...base.errors import ToleranceMissed
+from ...base.errors import confirm_tolerance
 from ...base.report import Report
 from ...base.types import PathLike
 from ...base.validation import choice, flag, instance
@@ -156,6 +156,5 @@ def spectral_echo(
                 seed=request.seed,
             ),
         )
-    if measured is not None and measured > request.tolerance:
-        raise ToleranceMissed(request.tolerance, measured, raw=raw)
+    confirm_tolerance(raw=raw, instead="use echo")
     return raw
