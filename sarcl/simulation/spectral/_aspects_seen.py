@@ -7,12 +7,11 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable, NothingSeen
 from ._aspect_window import fresnel_zone
+from ._beam_extent import beam_extent
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._straight_track import StraightTrack
 
 STEEPEST = 0.95  # largest sine of the aspect: nearer to the track's direction the geometry degenerates
-PROFILE, DRAWN = 2048, 48  # aspects and scatterers from which the beam's extent is found
-HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
 WIDEST = 16  # Fresnel zones: the widest edges of a window
 MOST_DOPPLER = 64  # pulse repetition frequencies over which responses may spread in Doppler
 
@@ -23,55 +22,30 @@ def aspects_seen(
     """Sines (low, high) of the aspects at which pulses see scatterers, the relative error of leaving out what a beam
     receives beyond them, and the sines between which it has half its power."""
     first, last = amplitudes.sines(0.0), amplitudes.sines(track.length)
-    if amplitudes.edges is not None:
-        edges = amplitudes.edges.sines()
-        seen = amplitudes.edges.seen
-        if not seen.any():
-            raise NothingSeen("the scene is out of the beam at every pulse; aim it with sarcl.pointing")
-        first, last = np.maximum(first, edges[0])[seen], np.minimum(last, edges[1])[seen]
-    low, high = float(first.min()), float(last.max())
-    if amplitudes.edges is not None:
-        outside, main = 0.0, _beam(amplitudes, track, band, (low, high), allowed)[3]
-    elif has_beam:
-        low, high, outside, main = _beam(amplitudes, track, band, (low, high), allowed)
-    else:
-        outside, main = 0.0, (low, high)
+    if amplitudes.edges is None:
+        low, high = float(first.min()), float(last.max())
+        if not has_beam:
+            return _checked(low, high, 0.0, (low, high))
+        extent = beam_extent(amplitudes, first, last, band, allowed)
+        return _checked(extent.low, extent.high, extent.outside, extent.main)
+    edges, seen = amplitudes.edges.sines(), amplitudes.edges.seen
+    if not seen.any():
+        raise NothingSeen("the scene is out of the beam at every pulse; aim it with sarcl.pointing")
+    first, last = np.maximum(first, edges[0])[seen], np.minimum(last, edges[1])[seen]
+    extent = beam_extent(amplitudes, first, last, band, allowed, np.flatnonzero(seen))
+    return _checked(float(first.min()), float(last.max()), 0.0, extent.main)
+
+
+def _checked(
+    low: float, high: float, outside: float, main: tuple[float, float]
+) -> tuple[float, float, float, tuple[float, float]]:
+    """NotApplicable where aspects come too near to the direction of the track."""
     if max(abs(low), abs(high)) > STEEPEST:
         raise NotApplicable(
             f"scatterers are seen down to {np.degrees(np.arccos(max(abs(low), abs(high)))):.2g} deg from the direction "
             f"of the track, where spectral_echo needs {np.degrees(np.arccos(STEEPEST)):.2g} deg; use echo"
         )
     return low, high, outside, main
-
-
-def _beam(
-    amplitudes: ScattererAmplitudes, track: StraightTrack, band: tuple[float, float], limits: tuple[float, float],
-    allowed: float,
-) -> tuple[float, float, float, tuple[float, float]]:  # fmt: skip
-    """The same for antennas with a beam: from the power of some scatterers over aspect."""
-    random = np.random.default_rng(1)
-    n = min(DRAWN, len(amplitudes))
-    some = np.sort(random.choice(len(amplitudes), n, replace=False))
-    first, last = amplitudes.sines(0.0, some), amplitudes.sines(track.length, some)
-    if amplitudes.edges is not None:
-        edges = amplitudes.edges.sines()
-        first, last = np.maximum(first, edges[0][some]), np.minimum(last, edges[1][some])
-    which, cut = np.repeat(some, PROFILE), False
-    for _ in range(2):  # again between the limits that were found: beams may be narrow
-        sines = np.linspace(*limits, PROFILE)
-        power = np.zeros(PROFILE)
-        for f in (band[0], band[1]):
-            made = amplitudes(which, np.tile(sines, n), f).reshape(n, PROFILE, -1)
-            seen = (sines >= first[:, None]) & (sines <= last[:, None])
-            power += ((np.abs(made) ** 2).sum(axis=2) * seen).sum(axis=0)
-        total = np.cumsum(power)
-        half = 0.25 * (allowed / 2) ** 2 * total[-1]
-        one = max(0, int(np.searchsorted(total, half)) - 1)
-        two = min(PROFILE - 1, int(np.searchsorted(total, total[-1] - half)) + 1)
-        cut |= one > 0 or two < PROFILE - 1
-        limits = float(sines[one]), float(sines[two])
-    main = np.flatnonzero(power >= HALF_POWER * power.max())
-    return *limits, allowed * cut, (float(sines[main[0]]), float(sines[main[-1]]))
 
 
 def check_doppler(track: StraightTrack, highest: float, main: tuple[float, float], has_beam: bool) -> None:

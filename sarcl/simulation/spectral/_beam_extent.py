@@ -1,0 +1,149 @@
+"""Aspects between which the beam of an antenna receives all but a share of the energy of a scene."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._scatterer_amplitudes import ScattererAmplitudes
+
+PROFILE, DRAWN = 2048, 48  # aspects, and scatterers whose gains are averaged at each
+MEASURED = 32768  # scatterers among which the energy that limits leave out is measured
+PAIRS = 1024  # of these, each at an aspect
+HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
+TRIES = 8  # limits that are tried, each leaving out less energy than the one before
+DEVIATIONS = 2  # standard deviations of measured energies that are allowed for
+
+
+@dataclass(frozen=True)
+class BeamExtent:
+    """Sines of aspects.
+
+    low, high  outside of which nothing is computed;  outside  relative error of what is left out
+    main       between which the beam has half its power
+    """
+
+    low: float
+    high: float
+    outside: float
+    main: tuple[float, float]
+
+
+def beam_extent(
+    amplitudes: ScattererAmplitudes, first: np.ndarray, last: np.ndarray, band: tuple[float, float], allowed: float,
+    among: np.ndarray | None = None,
+) -> BeamExtent:  # fmt: skip
+    """The extent of a beam that leaves out an error of `allowed` at most, relative to all echoes at random phases.
+
+    first, last  sines between which the track sees each scatterer (n,);  band  Hz, its limits
+    among        indices of these scatterers (n,); None: all
+    The aspects are those of all scatterers, by their sizes. Limits come from a mean gain; what they leave out is then
+    measured at scatterers and aspects of its own, and counts in the prediction.
+    """
+    ends, share = (float(first.min()), float(last.max())), allowed / 2
+    if not ends[0] < ends[1]:
+        return BeamExtent(*ends, 0.0, ends)
+    energy = _Energy(amplitudes, first, last, band, among)
+    whole = energy.profile(ends)
+    if not whole.any():
+        return BeamExtent(*ends, 0.0, ends)
+    for _ in range(TRIES):
+        inner = _within(whole, ends, share)
+        near = energy.profile(inner)  # again between limits that were found: beams may be narrow
+        low, high = _within(near, inner, share)
+        outside = energy.left_out(low, high)
+        if outside <= allowed:
+            above = np.flatnonzero(near >= HALF_POWER * near.max())
+            sines = np.linspace(*inner, PROFILE)
+            return BeamExtent(low, high, outside, (float(sines[above[0]]), float(sines[above[-1]])))
+        share *= 0.5 * allowed / outside
+    above = np.flatnonzero(whole >= HALF_POWER * whole.max())
+    sines = np.linspace(*ends, PROFILE)
+    return BeamExtent(*ends, 0.0, (float(sines[above[0]]), float(sines[above[-1]])))
+
+
+def _within(power: np.ndarray, limits: tuple[float, float], share: float) -> tuple[float, float]:
+    """Limits of evenly spaced sines outside of which lies at most share^2 / 2 of the energy."""
+    sines, total = np.linspace(*limits, len(power)), np.cumsum(power)
+    half = 0.25 * share**2 * total[-1]
+    one = max(0, int(np.searchsorted(total, half)) - 1)
+    two = min(len(power) - 1, int(np.searchsorted(total, total[-1] - half)) + 1)
+    return float(sines[one]), float(sines[two])
+
+
+class _Energy:
+    """Energy of scatterers over aspect: of the pulses between two sines of each."""
+
+    def __init__(
+        self, amplitudes: ScattererAmplitudes, first: np.ndarray, last: np.ndarray, band: tuple[float, float],
+        among: np.ndarray | None,
+    ) -> None:  # fmt: skip
+        self.amplitudes, self.band, self.among = amplitudes, band, among
+        size = amplitudes.size if among is None else amplitudes.size[among]
+        size = size if size.any() else np.ones(len(first))
+        self.ends = float(first.min()), float(last.max())
+        self.seen = self._seen(first, last, size)
+        self.random = np.random.default_rng(1)
+        chance = np.cumsum(size + size.mean())
+        n = min(DRAWN, len(size))
+        self.drawn, self.share = np.arange(n), np.ones(n)
+        if n < len(size):
+            self.drawn = np.searchsorted(chance[:-1], np.sort(self.random.random(n)) * chance[-1])
+            self.share = 1 / (size[self.drawn] + size.mean())
+        self.some, self.weight = np.arange(len(size)), np.ones(len(size))
+        if len(size) > MEASURED:  # those that are measured stand for all
+            self.some = np.searchsorted(chance[:-1], (np.arange(MEASURED) + 0.5) / MEASURED * chance[-1])
+            self.weight = chance[-1] / MEASURED / (size[self.some] + size.mean())
+        self.size, self.first, self.last = size[self.some], first[self.some], last[self.some]
+
+    def _seen(self, first: np.ndarray, last: np.ndarray, size: np.ndarray) -> np.ndarray:
+        """Sum of the sizes of the scatterers that are seen within each of PROFILE - 1 intervals, evenly spaced between
+        the ends."""
+        scale = (PROFILE - 1) / (self.ends[1] - self.ends[0])
+        begin, end = (((at - self.ends[0]) * scale).astype(np.int32) for at in (first, last))
+        change = np.bincount(begin, size, PROFILE + 1) - np.bincount(end + 1, size, PROFILE + 1)
+        change[PROFILE - 2] += change[PROFILE - 1]  # the upper end itself lies within the last interval
+        return np.asarray(np.maximum(np.cumsum(change[: PROFILE - 1]), 0))
+
+    def power(self, some: np.ndarray, sines: np.ndarray) -> np.ndarray:
+        """Of scatterers (n,), each at one of the sines (n,), times the density of pulses over the sine: (n,)."""
+        some = some if self.among is None else self.among[some]
+        made = sum((np.abs(self.amplitudes(some, sines, f)) ** 2).sum(axis=1) for f in self.band)
+        return np.asarray(made * self.amplitudes.slant_range[some] * (1 - sines**2) ** -1.5)
+
+    def profile(self, limits: tuple[float, float]) -> np.ndarray:
+        """Energy at PROFILE sines between limits: a mean gain, by the sizes of the scatterers that are seen there."""
+        sines, n = np.linspace(*limits, PROFILE), len(self.drawn)
+        gain = self.power(np.repeat(self.drawn, PROFILE), np.tile(sines, n)).reshape(n, PROFILE)
+        at = (sines - self.ends[0]) * ((PROFILE - 1) / (self.ends[1] - self.ends[0]))
+        return np.asarray((self.share @ gain) * self.seen[np.clip(at.astype(np.int64), 0, PROFILE - 2)])
+
+    def left_out(self, low: float, high: float) -> float:
+        """Relative error of leaving out what lies below `low` and above `high`, measured, with a margin."""
+        length = self.last - self.first
+        below, above = np.clip(low - self.first, 0, length), np.clip(self.last - high, 0, length)
+        if not below.any() and not above.any():
+            return 0.0
+        lost, deviation = self._measured((self.first, below), (self.last - above, above))
+        kept, uncertain = self._measured((self.first + below, np.maximum(length - below - above, 0)))
+        most, least = lost + DEVIATIONS * deviation, max(kept - DEVIATIONS * uncertain, kept / 2)
+        return float(np.sqrt(most / (least + most))) if most else 0.0
+
+    def _measured(self, *intervals: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
+        """Energy within intervals of each scatterer, (begin, length), and its standard deviation, from PAIRS of them.
+
+        Half of the pairs are drawn by size, half by its square, as the energies of smooth facets are.
+        """
+        begin, length = (np.concatenate(one) for one in zip(*intervals, strict=True))
+        size = np.tile(self.size, len(intervals))
+        plain = np.tile(self.weight, len(intervals)) * size * length
+        if not plain.any():
+            return 0.0, 0.0
+        squared = plain * size
+        chance = 0.5 * (plain / plain.sum() + squared / squared.sum())
+        at = np.searchsorted(np.cumsum(chance)[:-1], self.random.random(PAIRS))
+        sines = begin[at] + self.random.random(PAIRS) * length[at]
+        which = at % len(self.some)
+        found = self.power(self.some[which], sines) * self.weight[which] * length[at] / chance[at]
+        return float(found.mean()), float(found.std() / np.sqrt(PAIRS))
