@@ -87,6 +87,24 @@ def test_swaths_of_few_columns_at_a_large_squint(columns):
     assert abs(image.data.shape[1] - columns) <= 1 and np.isfinite(image.data).all()
 
 
+@pytest.mark.parametrize("tolerance", [0.3, 3e-2, 3e-3])
+@pytest.mark.parametrize("squint", [0.25, 0.45])
+def test_images_beside_points_hold_the_prediction(squint, tolerance):
+    """Few columns that see the side lobes of points alone, from short tracks: errors add up in phase, echoes do not."""
+    raw = points(
+        [(0.0, 0.3, 0.0), (1.0, -0.4, 0.0)], n_samples=300, bandwidth=480e6, n=300, aperture=2.5, squint=squint
+    )
+    middle = 4e3 * np.hypot(0.7, 0.714) + 11.0
+    hold(raw, tolerance, ranges=(middle, middle + 1.5))
+
+
+@pytest.mark.parametrize("n", [100, 400])
+@pytest.mark.parametrize("tolerance", [0.3, 3e-2])
+def test_noise_in_few_fresnel_zones_holds_coarse_predictions(n, tolerance):
+    for seed in range(2):
+        hold(noise(n=n, n_samples=120, aperture=1.0, squint=0.25, seed=seed), tolerance)
+
+
 def test_any_reference_range_will_do():
     raw = noise()
     hold(replace(raw, reference_range=np.full(raw.n_rows, 4e3)), 1e-3)

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -32,7 +33,8 @@ class Extent:
     """Rows and columns of an image.
 
     times, ranges  zero-Doppler times, s, step/finer apart, and slant ranges, m
-    band           sines of the squint angles at which rows contribute
+    band           sines of the squint angles at which rows contribute;  band_for  that for another error of its ends
+    zone           width of a Fresnel zone at the first range, as a sine
     pixel_band     difference of these sines for one pixel
     """
 
@@ -44,6 +46,8 @@ class Extent:
     row_times: np.ndarray
     speed: float
     has_beam: bool
+    zone: float
+    band_for: Callable[[float], Band]
 
     @property
     def middle_time(self) -> float:
@@ -119,12 +123,16 @@ def choose_extent(
         )
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
     zone = sight.zone(float(r[0]))
-    if over_beam is not None and used != (corners.min(), corners.max()):
-        taper_of_beam = ApertureWindow.over(*sight.sines, windows.table(over_beam), zone, allowed)
-        band = Band.windowed(taper_of_beam, (float(corners.min()), float(corners.max())), pixel_band, zone, allowed)
-    else:
-        band = Band.tapered(*used, pixel_band, zone, allowed, beam is not None)
-    return Extent(u, r, finer, band, pixel_band, track.times, speed, beam is not None)
+
+    def band_for(allowed: float) -> Band:
+        if over_beam is None or used == (corners.min(), corners.max()):
+            return Band.tapered(*used, pixel_band, zone, allowed, beam is not None)
+        over = ApertureWindow.over(*sight.sines, windows.table(over_beam), zone, allowed)
+        return Band.windowed(over, (float(corners.min()), float(corners.max())), pixel_band, zone, allowed)
+
+    return Extent(
+        u, r, finer, band_for(allowed), pixel_band, track.times, speed, beam is not None, zone, band_for
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, eq=False)

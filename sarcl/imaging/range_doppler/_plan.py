@@ -125,19 +125,22 @@ def curved(frequencies: np.ndarray, center: float, bend: np.ndarray) -> np.ndarr
 
 
 def make_plan(
-    raw: PhaseHistory, track: Track, extent: Extent, fit: Hyperbolas, model_error: float, tolerance: float
+    raw: PhaseHistory, track: Track, extent: Extent, fit: Hyperbolas, model_error: float, tolerance: float,
+    near: float = 1.0, whole: float = 1.0,
 ) -> FocusPlan:  # fmt: skip
     """The plan for a tolerance; ToleranceUnreachable names the best there is.
 
     model_error  root mean square phase error of the hyperbolas, rad
+    near, whole  energy about the pixels, and of the samples, relative to that at the pixels
     """
     times, ranges = extent.times, extent.ranges
-    band, fixed = extent.band, model_error + ROUNDING
-    errors = {"hyperbolic ranges": model_error, "rounding": ROUNDING, "ends of the Doppler band": band.error}
+    rounding = ROUNDING * whole
+    band, fixed = extent.band, model_error + rounding
+    errors = {"hyperbolic ranges": model_error, "rounding": rounding, "ends of the Doppler band": band.error}
     spare = tolerance - fixed - band.error
     if not spare > 0.2 * tolerance:
         best = rounded_up(2 * fixed)
-        limit = "rounding of complex64" if model_error < ROUNDING else "the track's ranges, which are no hyperbolas"
+        limit = "rounding of complex64" if model_error < rounding else "the track's ranges, which are no hyperbolas"
         raise ToleranceUnreachable(tolerance, askable(best), limit, "use backproject, which takes any track")
     frequencies = band_frequencies(raw)
     center = float(frequencies[raw.n_samples // 2])
@@ -152,12 +155,14 @@ def make_plan(
     phases, error = _phases(frequencies, center, fit, band, ranges, LEAST_PHASE * tolerance)
     errors["rounding"] += error
     spare -= error
-    interpolator, profile_length, _ = choose_interpolator(INTERPOLATION * spare, raw.n_samples, float(len(ranges)))
-    errors["interpolation in range"] = interpolator.error
+    interpolator, profile_length, _ = choose_interpolator(
+        INTERPOLATION * spare / near, raw.n_samples, float(len(ranges))
+    )
+    errors["interpolation in range"] = interpolator.error * near
     speeds = fit.at(ranges)[0]
     slow, fast = float(speeds.min()), float(speeds.max())
-    blocks, error = _blocks(frequencies, center, fit, band, ranges, COMPRESSION * spare, tolerance)
-    errors["secondary range compression"] = error
+    blocks, error = _blocks(frequencies, center, fit, band, ranges, COMPRESSION * spare / near, tolerance)
+    errors["secondary range compression"] = error * near
     low, high = band.ends
     reach = [delay(low, ranges[-1 if low < 0 else 0], slow if low < 0 else fast),
              delay(high, ranges[-1 if high > 0 else 0], slow if high > 0 else fast)]  # fmt: skip

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -27,9 +27,11 @@ from ._looks import TwoLooks
 from ._map_drift import converged
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
+from ._uneven_energy import UnevenEnergy, uneven_energy
 from ._velocity import Hyperbolas, effective_speed, factor_of_rate, hyperbolas, phase_error, rate_of
 
 TRIED, TRIED_ON_TERRAIN = (3, 9), (9, 65)  # times and ranges at which hyperbolas are compared: mountains are narrow
+TRIED_BANDS = 6  # each with wider ends
 EDGES = 0.25  # share of the tolerance for the ends of the Doppler band
 
 
@@ -151,11 +153,30 @@ def make_task(
     elif not (isinstance(doppler_rate, str) and doppler_rate == "geometry"):
         wanted, middle = _number("doppler_rate", doppler_rate, "Hz/s"), float(extent.ranges.mean())
         fit = fit.scaled(factor_of_rate(wanted, fit, middle, centroid * speed, wavelength))
-    plan = make_plan(raw, track, extent, fit, model_error, tolerance)
+    energy = uneven_energy(raw, track, extent, fit, sample_weight, row_weight, wavelength)
+    extent = _with_wide_ends(extent, energy, EDGES * tolerance)
+    plan = make_plan(raw, track, extent, fit, model_error, tolerance, energy.near, energy.whole)
     return RangeDopplerTask(
         tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, (expected, centroid),
         known, wavelength, worst,
     )  # fmt: skip
+
+
+def _with_wide_ends(extent: Extent, energy: UnevenEnergy, allowed: float) -> Extent:
+    """The extent with a Doppler band whose ends have an error of at most `allowed` in these data.
+
+    Not with a beam: there the tapers are weights of rows, which the data must not change.
+    """
+    if extent.has_beam:
+        return extent
+    asked = allowed
+    for _ in range(TRIED_BANDS):
+        band = extent.band_for(asked)
+        error = max(band.error, energy.error(band, extent.zone, extent.pixel_band))
+        if error <= 1.001 * allowed:
+            break
+        asked *= 0.8 * allowed / error
+    return replace(extent, band=replace(band, error=error))
 
 
 def _beam(value: Any) -> float:

@@ -169,7 +169,7 @@ def plan_range_doppler(
 ) -> Forecast:
     """What `range_doppler` would do with these arguments: a Forecast. Raises as it does.
 
-    Samples are read only for a centroid or rate from the data.
+    Some rows are read, as for the plan itself; all of them only for a centroid or rate from the data.
 
     options   `check` and `progress`, which do not matter here
     """
