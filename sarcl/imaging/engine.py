@@ -10,7 +10,7 @@ from typing import Any, Protocol
 import numpy as np
 
 from ..base.stage_timer import Clock
-from ..numerics import device_profiles, range_profiles
+from ..numerics import cost_model, device_profiles, range_profiles
 from ..numerics.device_profiles import DeviceProfiles
 from ..numerics.interpolation import Interpolator
 from ..opencl.device import Device
@@ -92,6 +92,11 @@ class Engine(ABC):
         """Estimated bytes on the device that `fill` takes for the first block when it is given nbytes."""
 
     @abstractmethod
+    def repeated(self, nbytes: float) -> float:
+        """Cost, in contributions of numerics/cost_model, of what `fill` makes more than once because nbytes on the
+        device divide the image: range profiles, and what precedes the division."""
+
+    @abstractmethod
     def fill(
         self, first: int, last: int, flat: Any, budget: float, clock: Clock, on_progress: Callable[[float], None]
     ) -> Skipped:
@@ -115,6 +120,12 @@ class DirectEngine(Engine):
     def blocks(self, nbytes: float) -> list[Run]:
         """See Engine. A band that is alone may be larger than what fits: `fill` makes it in parts."""
         return self.tiling.blocks(self.tiles_at_once(nbytes) * self.tiling.per_tile)
+
+    def repeated(self, nbytes: float) -> float:
+        """See Engine: the range profiles of all rows, for each block and each part of a band."""
+        most, tiling = self.tiles_at_once(nbytes) * self.tiling.per_tile, self.tiling
+        passes = sum(max(1, -(-tiling.pixels(*run) // most)) for run in self.blocks(nbytes))
+        return float((passes - 1) * self.profiles.cost)
 
     def working(self, nbytes: float) -> float:
         """See Engine: sums and values of the pixels, and the range profiles of 256 rows."""
@@ -144,6 +155,11 @@ class RowProfiles:
         self._maker: DeviceProfiles | None = None
         if device_profiles.possible(device, length, dtype):
             self._maker = DeviceProfiles(device, self.sample_weight, length, self.pad, dtype)
+
+    @property
+    def cost(self) -> float:
+        """Cost of the profiles of all rows, in contributions."""
+        return self.task.raw.n_rows * cost_model.profile(self.length)
 
     @property
     def on_device(self) -> bool:

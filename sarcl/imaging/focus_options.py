@@ -75,11 +75,22 @@ class FocusOptions:
         )
 
     def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
-        """The method for these devices together; tolerance: another one than asked for."""
+        """The method for these devices together; tolerance: another one than asked for.
+
+        "auto" takes the direct method where a device has too little memory for sub-apertures.
+        """
         on, float64 = DeviceClass.of(d.info for d in devices), all(d.info.fp64 for d in devices)
         if on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
             on = on._replace(native_error=max(native_functions.sincos_error(d) for d in devices))
-        return choose(task, self.method, self.tolerance if tolerance is None else tolerance, on, float64)
+        tolerance = self.tolerance if tolerance is None else tolerance
+        chosen = choose(task, self.method, tolerance, on, float64)
+        if self.method == "auto" and chosen.method == "factorized":
+            try:
+                for device in devices:
+                    chosen.on(device, task).blocks(self.budget(device))
+            except MemoryError:
+                return choose(task, "direct", tolerance, on, float64)
+        return chosen
 
     def budget(self, device: Device) -> float:
         """Bytes that blocks may take on a device."""

@@ -39,7 +39,9 @@ class Forecast:
 
     method           "direct" or "factorized"; "polar format" or "range-Doppler"
     plan             details of the plan, as in a report
-    seconds          estimated run time at the present speed of the devices
+    seconds          estimated run time at the present speed of the devices: planning, the work, and what is made again
+                     for every block that max_bytes allows
+    planning         of these, seconds that planning has just taken
     bytes            estimated memory: all pixels, and the blocks on every device
     predicted_error  bound of the relative error
     cheaper          (predicted error, seconds) of the next cheaper plan, or None where there is none
@@ -51,6 +53,7 @@ class Forecast:
     bytes: float
     predicted_error: float
     cheaper: tuple[float, float] | None
+    planning: float = 0.0
 
     def __str__(self) -> str:
         text = f"{self.method}: about {duration(self.seconds)}, {size_text(self.bytes)}"
@@ -85,12 +88,16 @@ def plan(
     options = FocusOptions(
         tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
     )
-    raw, task = options.task(raw, grid)
     devices = open_devices(device)
+    raw, task = options.task(raw, grid)
+    start = time.perf_counter()
     chosen = options.choose(task, devices)
-    working = sum(_bytes(task, chosen, d, options.budget(d)) for d in devices)
+    planning = time.perf_counter() - start
+    working, repeated = np.sum([_in_blocks(task, chosen, d, options.budget(d)) for d in devices], axis=0)
+    rate = _rate(devices)
     # seconds per pixel, for all rows that see it, at cost 1
-    seconds = float(task.raw.n_rows * profile_energy.share(task) / _rate(devices))
+    seconds = float(task.raw.n_rows * profile_energy.share(task) / rate)
+    besides = planning + float(repeated) / len(devices) / rate
     details = chosen.plan.describe(chosen.method)
     unseen = unseen_pixels(task)
     if unseen:
@@ -100,10 +107,11 @@ def plan(
     return Forecast(
         chosen.method,
         details,
-        seconds * _work(task, chosen),
+        besides + seconds * _work(task, chosen),
         float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
         chosen.predicted_error,
-        _cheaper(task, options, devices, chosen, seconds),
+        _cheaper(task, options, devices, chosen, seconds, besides),
+        planning,
     )
 
 
@@ -129,9 +137,13 @@ def _rate(devices: list[Device]) -> float:
 
 
 def _cheaper(
-    task: FocusingTask, options: FocusOptions, devices: list[Device], chosen: MethodChoice, seconds: float
-) -> tuple[float, float] | None:
-    """Predicted error and seconds of the most accurate plan that costs noticeably less."""
+    task: FocusingTask, options: FocusOptions, devices: list[Device], chosen: MethodChoice, seconds: float,
+    besides: float,
+) -> tuple[float, float] | None:  # fmt: skip
+    """Predicted error and seconds of the most accurate plan that costs noticeably less.
+
+    seconds  per unit of work;  besides  seconds that do not depend on the plan's work
+    """
     for factor in (2, 3, 10, 30):
         if options.tolerance * factor < 1:
             try:
@@ -139,15 +151,16 @@ def _cheaper(
             except ToleranceUnreachable:  # sub-apertures may be possible at the tighter tolerance alone
                 continue
             if _work(task, other) < 0.95 * _work(task, chosen):
-                return other.predicted_error, seconds * _work(task, other)
+                return other.predicted_error, besides + seconds * _work(task, other)
     return None
 
 
-def _bytes(task: FocusingTask, chosen: MethodChoice, device: Device, budget: float) -> float:
-    """Bytes on a device at a time, within its budget."""
+def _in_blocks(task: FocusingTask, chosen: MethodChoice, device: Device, budget: float) -> tuple[float, float]:
+    """Bytes on a device at a time, within its budget, and the cost of what is made again for every block."""
     tiling = copy.copy(chosen.tiling)
     tiling.n_bands = min(tiling.n_bands, MOST_BANDS)
-    return float(chosen.engine(device, task, chosen.plan, tiling).working(budget))
+    engine = chosen.engine(device, task, chosen.plan, tiling)
+    return float(engine.working(budget)), engine.repeated(budget) * chosen.tiling.n_bands / tiling.n_bands
 
 
 @functools.lru_cache(maxsize=16)

@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 
+from ..base.rows import spread_over
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
@@ -14,6 +15,7 @@ from ..scattering.scatterers import Points
 from ._exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
 
+CANDIDATES = 256  # pulses among which those that are checked are drawn
 MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
@@ -45,20 +47,37 @@ def measure_error(
     """Relative error of 256 random samples (16 random pulses, 16 frequencies each) against the exact sum; of as many as
     take two or three seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
 
-    Relative to the larger of their norm and the norm they would have if scatterers added with random phases. Facets as
-    they were cut, each by its centroid's plane wave at every frequency.
+    Half of the pulses are drawn by the energy of their samples, so that those are among them whose narrow beam sees the
+    scene; each counts for as many pulses as it stands for. Relative to the larger of their norm and the norm they would
+    have if scatterers added with random phases. Facets as they were cut, each by its centroid's plane wave at every
+    frequency.
     """
     random = np.random.default_rng(0)
     wrong = right = random_phases = 0.0
     draws = draws_of(scene)
-    for p in random.integers(0, len(samples), draws).tolist():
+    pulses, stands_for = _drawn(samples, draws, random)
+    for p, share in zip(pulses.tolist(), stands_for.tolist(), strict=True):
         n = random.integers(0, len(frequencies), draws)
         wanted, power = exact(scene, antennas, p, frequencies[n], scene.weights)
         wanted *= spectrum[n]
-        wrong += float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
-        right += float((np.abs(wanted) ** 2).sum())
-        random_phases += float((power * np.abs(spectrum[n]) ** 2).sum())
+        wrong += share * float((np.abs(samples[p][:, n] - wanted) ** 2).sum())
+        right += share * float((np.abs(wanted) ** 2).sum())
+        random_phases += share * float((power * np.abs(spectrum[n]) ** 2).sum())
     return float(np.sqrt(wrong / max(right, random_phases))) if wrong else 0.0
+
+
+def _drawn(samples: Any, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Random pulses (draws,), and the pulses that each stands for, up to a factor."""
+    some = spread_over(len(samples), CANDIDATES)
+    energy = np.array([np.linalg.norm(samples[p].astype(np.complex128, copy=False)) ** 2 for p in some.tolist()])
+    chance = np.full(len(some), 1 / len(some))
+    if 0 < energy.sum() < np.inf:
+        chance = 0.5 * (chance + energy / energy.sum())
+    picked = random.choice(len(some), draws, p=chance / chance.sum())
+    within = some[picked]
+    if len(some) < len(samples):  # a pulse beside it
+        within = np.minimum(within + random.integers(0, len(samples) // len(some), draws), len(samples) - 1)
+    return within, 1 / chance[picked]
 
 
 def exact(

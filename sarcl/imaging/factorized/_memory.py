@@ -69,6 +69,11 @@ class MemoryPlan:
         rows = min(self.rows(nbytes), self.n_rows)
         return self.n_bytes(roots, pixels) + self.profiles.nbytes(rows) + 2 * min(AT_ONCE, nbytes / 8)
 
+    def passes(self, nbytes: float) -> tuple[int, int]:
+        """How many parts all blocks have, and how many roots these parts have together."""
+        parts = [part for run in self.blocks(nbytes) for part in self.parts(*run, nbytes)]
+        return len(parts), sum(self.tiling.part_size(part, self.plan.factors[0])[0] for part in parts)
+
     def rows(self, nbytes: float) -> int:
         """Rows per block of the first level."""
         return max(16, min(ROWS, self.profiles.rows_in(nbytes / 16) // 16 * 16))

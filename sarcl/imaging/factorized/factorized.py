@@ -27,7 +27,7 @@ from ..tiling.tiling import Roots, Tiling
 from ..tiling.tree import Tree
 from ._memory import MemoryPlan
 from ._tile_coverage import TileCoverage, coverage_of, same_coverage, without
-from .plan import GUARD, FactorPlan, Level
+from .plan import GUARD, FactorPlan, Level, moving_cost
 
 MERGE = "merge_subapertures.cl"
 SPAN = 32  # vectors of a profile per work-item on CPUs; 1 on GPUs, where neighbouring work-items then read one line
@@ -109,6 +109,14 @@ class Factorized(Engine):
     def blocks(self, nbytes: float) -> list[tuple[int, int]]:
         """Runs of bands to be made with nbytes on the device; see `MemoryPlan.blocks`."""
         return self.memory.blocks(nbytes)
+
+    def repeated(self, nbytes: float) -> float:
+        """See engine.Engine: the range profiles of all rows for each part, and merging into the roots that are cut."""
+        root = self.plan.levels[0]
+        moved = moving_cost(2 * root.reach, self.plan.first.taps, root.decimation.filter.shape[1])
+        passes, roots = self.memory.passes(nbytes)
+        whole = self.tiling.n_roots(0, self.tiling.n_bands, self.plan.factors[0])
+        return (passes - 1) * self.profiles.cost + max(roots - whole, 0) * self.task.raw.n_rows * moved
 
     def working(self, nbytes: float) -> float:
         """See engine.Engine."""

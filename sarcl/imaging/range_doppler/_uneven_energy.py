@@ -64,8 +64,8 @@ class UnevenEnergy:
 
 
 def row_errors(band: Band, zone: float) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
-    """Weights of rows that weights of Doppler bins make: sines of squint angles (n,), moduli of the errors of the weights
-    (n,), and the weights that are wanted, complex (n,).
+    """Weights of rows that weights of Doppler bins make: sines of squint angles (n,), moduli of the errors of these
+    weights (n,), and the weights that are wanted, complex (n,).
 
     Weights of bins are convolved with a chirp, a factor exp(j pi n^2) at n cycles per Fresnel zone.
     """
@@ -112,4 +112,7 @@ def uneven_energy(
         return UnevenEnergy(1.0, 1.0, sines, power, about, each)
     ratios = [float(np.sqrt((weight * e).sum() / max(here, floor))) for e in (about, energy[:, None])]
     near, whole = (ratio if ratio > CHANCE else 1.0 for ratio in ratios)
+    if extent.pixel_band < FEW_ZONES * extent.zone:  # profiles hardly migrate: their errors, too, add up in phase
+        together = np.sqrt(weight * about).sum(axis=0) * each
+        near = max(near, float(np.sqrt((together**2).sum() / (each * max(here, floor)))))
     return UnevenEnergy(near, whole, sines, power, about, each)

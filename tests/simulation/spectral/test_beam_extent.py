@@ -122,3 +122,15 @@ def test_scatterers_that_send_nothing_back_do_not_widen_the_aspects():
     faint = np.where(np.abs(scene.positions[:, 1]) > 100, 1e-9, 1.0) * scene.amplitudes
     extent, *_ = extent_of(sarcl.Scene.points(scene.positions, faint), track, SMALL, 1e-3)
     assert -0.012 < extent.low < -0.01 < 0.01 < extent.high < 0.012
+
+
+def test_pulses_that_hardly_see_the_scene_are_no_measure_of_the_error():
+    track = sarcl.Trajectory.line(start=(-800, -300, 600), velocity=(0, 100, 0), prf=400, n_pulses=2400)
+    track = pointing.stripmap(track, look=np.arctan2(8, 6), side="right")
+    raw = sarcl.spectral_echo(
+        points(30, extent=3.0), CHIRP, track, antenna=sarcl.Antenna.gaussian(width=(0.01, 0.1)), tolerance=1e-2,
+        check=True,
+    )  # fmt: skip
+    power = (np.abs(raw.samples) ** 2).sum(axis=1)
+    assert (power > 1e-3 * power.max()).mean() < 0.06
+    assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
