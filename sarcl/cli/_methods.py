@@ -41,6 +41,7 @@ TAKES = {
         "times",
         "ranges",
         "doppler",
+        "near",
         "doppler_rate",
     ),
 }
@@ -78,7 +79,7 @@ class Method:
         if name == "polar_format":
             options["sum_polarizations"] = args.sum_polarizations
         if name == "range_doppler":
-            given = ("beam", "side", "times", "ranges", "doppler", "doppler_rate")
+            given = ("beam", "side", "times", "ranges", "doppler", "near", "doppler_rate")
             options |= {k: getattr(args, k) for k in given if getattr(args, k) is not None}
         return cls(name, options)
 

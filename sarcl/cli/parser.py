@@ -185,6 +185,9 @@ def _focus(p: argparse.ArgumentParser) -> None:
         "--doppler", type=doppler, metavar="HZ|data", help="Doppler centroid (default: from the geometry)"
     )
     earth.add_argument(
+        "--near", type=float, metavar="HZ", help="of --doppler data: the centroid nearest to this (default: geometry's)"
+    )
+    earth.add_argument(
         "--doppler-rate", type=doppler, metavar="HZ/S|data", help="Doppler rate (default: from the geometry)"
     )
     large = p.add_argument_group(

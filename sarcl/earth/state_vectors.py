@@ -43,17 +43,21 @@ class StateVectors:
 
     @classmethod
     def fitted(
-        cls, times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64]
+        cls, times: NDArray[np.float64], positions: NDArray[np.float64], velocities: NDArray[np.float64] | None
     ) -> StateVectors:
         """The states with the interpolation that predicts each of them best from the others.
 
+        velocities  None: the derivatives of Lagrange polynomials through the positions
         ValueError for too few states, times that do not increase, gaps, positions inside the Earth, velocities that are
         not the derivative of the positions, states that do not fit the others, and states that do not fall as
         satellites over the rotating Earth do.
         """
         _check_times(times)
         _check_heights(positions)
-        _check_velocities(times, positions, velocities)
+        if velocities is None:
+            velocities = _slopes(times, positions, min(len(times), 8))
+        else:
+            _check_velocities(times, positions, velocities)
         tried = []
         for hermite, counts in ((True, HERMITE), (False, LAGRANGE)):
             for n in counts:
@@ -202,7 +206,8 @@ def _check_velocities(
     derived = [_slopes(times, positions, n) for n in (min(len(times), 8), min(len(times), 8) - 1)]
     doubt = np.linalg.norm(derived[0] - derived[1], axis=1)  # about the error of the derivative at this spacing
     off = np.linalg.norm(velocities - derived[0], axis=1)
-    if (off > VELOCITY_MISFIT + 10 * doubt).any():
+    wrong = off > VELOCITY_MISFIT + 10 * doubt
+    if wrong.any():
         at = int(np.argmax(off - 10 * doubt))
         inertial = np.linalg.norm(velocities[at] - derived[0][at] - spin(positions[at]))
         why = (
@@ -211,10 +216,19 @@ def _check_velocities(
             if inertial < 0.05 * off[at]
             else "check units (m, m/s, s) and the order of the states"
         )
+        if 2 * wrong.sum() <= len(wrong):
+            why = "trim these states, or derive the velocities from the positions: velocities=None"
         raise ValueError(
-            f"velocities[{at}] differs by {off[at]:.4g} m/s from the derivative of the positions; wanted Earth-fixed "
-            f"velocities: {why}"
+            f"velocities{_ranges(np.flatnonzero(wrong))} of {len(wrong)} differ by up to {off[wrong].max():.4g} m/s "
+            f"from the derivative of the positions; wanted Earth-fixed velocities: {why}"
         )
+
+
+def _ranges(rows: NDArray[np.int64]) -> str:
+    """Indices of rows in brackets, such as [0, 97:100], six at most."""
+    runs = np.split(rows, np.flatnonzero(np.diff(rows) > 1) + 1)
+    words = [str(run[0]) if len(run) == 1 else f"{run[0]}:{run[-1] + 1}" for run in runs]
+    return f"[{', '.join(words[:6])}{', ...' if len(words) > 6 else ''}]"
 
 
 def _slopes(times: NDArray[np.float64], positions: NDArray[np.float64], n: int) -> NDArray[np.float64]:

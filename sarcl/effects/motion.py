@@ -14,9 +14,9 @@ from numpy.typing import ArrayLike
 
 from ..base import constants, validation
 from ..base.vectors import unit
-from ..earth.light_time import receivers, transmitters
 from ..model.phase_history import PhaseHistory
 from ..model.pointing import turned, velocities
+from ..model.row_positions import at_arrival
 from ..model.trajectory import Trajectory
 from ._random_motion import deviation, frequencies, random_process
 
@@ -101,11 +101,7 @@ def with_positions(raw: PhaseHistory, track: Trajectory, *, receiver: Trajectory
         changes[side] = given.positions[row]
         changes[f"{side}_velocity"] = None if given.velocities is None else given.velocities[row]
     if receiver is None and not track.stop_and_go:
-        row, delay = _pulse_of_row(raw, track), raw.reference_range / constants.SPEED_OF_LIGHT
-        assert track.velocities is not None and track.accelerations is not None
-        p, v, a = track.positions[row], track.velocities[row], track.accelerations[row]
-        changes["tx"], changes["tx_velocity"] = transmitters(p, v, delay)
-        changes["rx"], changes["rx_velocity"] = receivers(p, v, a, delay, delay)
+        changes |= at_arrival(track, _pulse_of_row(raw, track), raw.reference_range)
     elif receiver is None:
         changes["rx"] = None if raw.is_monostatic else raw.rx
         changes["rx_velocity"] = changes["tx_velocity"] if raw.is_monostatic else raw.rx_velocity

@@ -4,6 +4,7 @@ A point of delay tau gives s(f) = a exp(-j 2 pi f (tau - tau_ref)), tau_ref = 2 
 
     compressed  y(t) = a g(t - tau) exp(-j 2 pi fc tau)                          g: of peak 1, the band's transform
     chirped     y(t) = a p(t - tau) exp(-j 2 pi fc tau)                          p: the pulse
+    rf          Re(y(t) exp(j 2 pi fc t)), y one of these two, t from the transmission
     dechirped   y(t) = a exp(-j 2 pi (fc + K t) (tau - tau_ref) + j pi K (tau - tau_ref)^2)   or its conjugate, or
                 its real part; K: sweep rate, t: from the instant at which the reference sweep passes fc
 
@@ -37,7 +38,7 @@ BLOCK = 2**20  # samples per block of rows
 SOME_ROWS = 16  # rows in which the sign of the beat is checked
 BAND_STEPS = 2**16  # frequencies at which the spectrum of a chirp is taken
 LONGEST_DELAY = 1e9  # s
-KINDS = ("compressed", "dechirped", "chirped")
+KINDS = ("compressed", "dechirped", "chirped", "rf")
 LIGHT = Fraction(SPEED_OF_LIGHT)
 
 
@@ -63,6 +64,11 @@ def spectra_of(
     if waveform is not None:
         validation.instance("waveform", waveform, Waveform)
     _check_meant(kind, bandwidth, pulse_time, sweep_rate, reference_range, scene_range)
+    band = None
+    if kind == "rf":
+        band = _rf_band(samples, rate, carrier, bandwidth, waveform)
+        carrier, bandwidth = sum(band) / 2, band[1] - band[0]
+        kind = "compressed" if waveform is None else "chirped"
     if carrier is None and waveform is None:
         raise ValueError("carrier is None and there is no waveform to take it from; give carrier=, Hz")
     carrier = _each("carrier", waveform.center if carrier is None else carrier, n_rows)
@@ -89,10 +95,10 @@ def spectra_of(
         return of_beats(samples, rate, start, carrier, sweep_rate, beat, reference, scene), waveform
     if beat is not None:
         raise ValueError(f"beat is {beat!r}, but {kind} samples have no beat; leave it out")
-    if np.dtype(samples.dtype).kind != "c":
+    if np.dtype(samples.dtype).kind != "c" and band is None:
         raise ValueError(
-            f"{kind} samples must be complex, got {samples.dtype}; mix real ones to baseband first "
-            "(scipy.signal.hilbert, and a factor exp(-j 2 pi f t))"
+            f'{kind} samples must be complex, got {samples.dtype}; real samples of the received signal are kind="rf", '
+            "with bandwidth=(low, high), Hz"
         )
     if waveform is not None and np.ptp(carrier) == 0 and abs(waveform.center - carrier[0]) > 1e-9 * carrier[0]:
         raise ValueError(
@@ -102,6 +108,7 @@ def spectra_of(
         if waveform is None:
             raise ValueError("chirped samples need waveform=, the pulse that was sent: Waveform.chirp or .sampled")
         _check_rate(rate, waveform.bandwidth, "waveform.bandwidth")
+        sent = None if band is None else start
         if pulse_time == "start":
             start = start - waveform.duration / 2
         factor: complex = 1 / (rate * float(np.sqrt(waveform.peak_energy_density)))
@@ -110,7 +117,7 @@ def spectra_of(
         wanted = waveform.duration * rate
         validation.room(f"a pulse of {wanted:.3g} samples", 32 * wanted, "check rate, Hz, and waveform.duration, s")
         pad = int(np.ceil(wanted))
-        return of_pulses(samples, rate, start, carrier, waveform.bandwidth, factor, pad), waveform
+        return of_pulses(samples, rate, start, carrier, waveform.bandwidth, factor, pad, sent), waveform
     kept = rate if waveform is None else waveform.bandwidth
     if bandwidth is not None:
         kept = validation.number("bandwidth", bandwidth, above=0)
@@ -119,7 +126,46 @@ def spectra_of(
     if waveform is not None:  # the peak of the compressed pulse is the integral of its spectrum
         f = waveform.center + (np.arange(4 * n) + 0.5 - 2 * n) * kept / (4 * n)
         factor *= float(waveform.matched_spectrum(f).mean())
-    return of_pulses(samples, rate, start, carrier, kept, factor), waveform
+    return of_pulses(samples, rate, start, carrier, kept, factor, sent=None if band is None else start), waveform
+
+
+def _rf_band(samples: Any, rate: float, carrier: Any, bandwidth: Any, waveform: Waveform | None) -> tuple[float, float]:
+    """The band (low, high), Hz, of real samples of the signal itself."""
+    if np.dtype(samples.dtype).kind == "c":
+        raise ValueError(
+            f'samples are {samples.dtype}, and kind "rf" is for real ones; complex ones are "compressed" or "chirped"'
+        )
+    if carrier is not None:
+        raise ValueError("carrier is the middle of bandwidth=(low, high) where kind is 'rf'; leave it out")
+    if bandwidth is None and waveform is not None:
+        bandwidth = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
+    elif bandwidth is None or np.shape(bandwidth) != (2,):
+        raise ValueError(f"bandwidth is {bandwidth!r:.60}; kind 'rf' needs bandwidth=(low, high), Hz")
+    low, high = (float(f) for f in validation.array("bandwidth", bandwidth, np.float64, (2,)))
+    if not 0 < low < high <= rate / 2 * (1 + 1e-9):
+        raise ValueError(
+            f"bandwidth is ({low:g}, {high:g}) Hz; wanted 0 < low < high, and high at most half of rate, "
+            f"{rate / 2:g} Hz"
+        )
+    if waveform is not None and abs((low + high) / 2 - waveform.center) > 1e-9 * waveform.center:
+        raise ValueError(
+            f"the middle of bandwidth is {(low + high) / 2:.9g} Hz but waveform.center {waveform.center:.9g} Hz; they "
+            "must be one frequency"
+        )
+    return low, high
+
+
+def _mixed(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarray) -> np.ndarray:
+    """The analytic signal of real rows (n_rows, n), its carrier, Hz (n_rows,), mixed to 0.
+
+    start  s (n_rows,), of sample 0 after the transmission
+    """
+    n = block.shape[1]
+    one_side = 1.0 + np.sign(np.fft.fftfreq(n))
+    if n % 2 == 0:
+        one_side[n // 2] = 1.0
+    cycles = (carrier * start)[:, None] % 1 + (carrier / rate)[:, None] * np.arange(n)
+    return np.asarray(np.fft.ifft(np.fft.fft(block.real, axis=1) * one_side, axis=1) * np.exp(-2j * np.pi * cycles))
 
 
 def _in_band(chirp: Waveform) -> complex:
@@ -147,8 +193,8 @@ def _check_meant(
     validation.ndim("reference_range", reference_range)
     moved = np.any(np.asarray(reference_range) != 0)
     for name, given, only in (
-        ("bandwidth", bandwidth is not None, "compressed"),
-        ("pulse_time", pulse_time != "start", "chirped"),
+        ("bandwidth", bandwidth is not None and kind != "rf", "compressed"),
+        ("pulse_time", pulse_time != "start" and kind != "rf", "chirped"),
         ("sweep_rate", sweep_rate is not None, "dechirped"),
         ("reference_range", bool(moved), "dechirped"),
         ("scene_range", scene_range is not None, "dechirped"),
@@ -186,13 +232,15 @@ def _each(name: str, value: Any, n_rows: int) -> np.ndarray:
 
 
 def of_pulses(
-    samples: Any, rate: float, start: np.ndarray, carrier: np.ndarray, bandwidth: float, factor: complex, pad: int = 0
-) -> Spectra:
+    samples: Any, rate: float, start: np.ndarray, carrier: np.ndarray, bandwidth: float, factor: complex, pad: int = 0,
+    sent: np.ndarray | None = None,
+) -> Spectra:  # fmt: skip
     """Spectra of records in which every echo is a pulse: compressed or chirped.
 
     start      delay of sample 0, s (n_rows,), at which the middle of a pulse counts;  carrier  Hz (n_rows,)
     bandwidth  Hz, of the frequencies to keep, about the carrier;  factor  of the spectra
     pad        samples by which the record is extended with zeros, so that pulses cut off by its ends do not wrap
+    sent       of real samples of the signal itself: s (n_rows,), of sample 0 after the transmission
 
     The reference lies at the middle of the record, and is the same for rows of one start to the last bit.
     """
@@ -206,6 +254,8 @@ def of_pulses(
     shift = np.exp(-2j * np.pi * lowest / length * np.arange(n))
 
     def spectra(block: np.ndarray, rows: slice) -> np.ndarray:
+        if sent is not None:
+            block = _mixed(block, rate, sent[rows], carrier[rows])
         made = np.fft.fft(block * shift, length, axis=1)[:, :kept]
         turns = cycles[rows, None] - step * (lowest + np.arange(kept)) * offset[rows, None]
         return np.asarray(factor * made * np.exp(2j * np.pi * turns))

@@ -191,7 +191,8 @@ class ImageGrid:
         for name, value, n in (("times", times, made.shape[0]), ("ranges", ranges, made.shape[-1])):
             axis = validation.array(name, value, np.float64, (n,))
             steps = np.diff(axis)
-            if not (steps > 0).all() or (n > 2 and np.ptp(steps) > 1e-6 * steps.mean()):
+            rounding = 4 * float(np.spacing(np.abs(axis).max())) if n > 2 else 0.0  # of absolute times
+            if not (steps > 0).all() or (n > 2 and np.ptp(steps) > 1e-6 * steps.mean() + rounding):
                 raise ValueError(f"{name} must increase in even steps; give one per row (times) or column (ranges)")
             axes.append(axis)
         return replace(made, times=axes[0], ranges=axes[1])

@@ -56,8 +56,12 @@ class Orbit:
             object.__setattr__(self, "epoch", date(self.epoch))
 
     @classmethod
-    def states(cls, times: ArrayLike, positions: ArrayLike, velocities: ArrayLike, epoch: Date | None = None) -> Orbit:
+    def states(
+        cls, times: ArrayLike, positions: ArrayLike, velocities: ArrayLike | None = None, epoch: Date | None = None
+    ) -> Orbit:
         """The orbit through state vectors: s (n,), m (n, 3), m/s (n, 3), Earth-fixed, at least 4.
+
+        velocities  None: those of the positions, by polynomials through up to 8 of them
 
         Positions in between are interpolated: by Hermite polynomials through positions and velocities, or Lagrange
         polynomials through positions, whichever predicts states that are left out best. `describe` says which, and the
@@ -67,7 +71,7 @@ class Orbit:
         """
         p = validation.array("positions", positions, np.float64, ("n_states", 3))
         t = validation.array("times", times, np.float64, (len(p),))
-        v = validation.array("velocities", velocities, np.float64, (len(p), 3))
+        v = None if velocities is None else validation.array("velocities", velocities, np.float64, (len(p), 3))
         return cls(StateVectors.fitted(t, p, v), (float(t[0]), float(t[-1])), None if epoch is None else date(epoch))
 
     @classmethod

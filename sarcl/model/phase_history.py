@@ -17,6 +17,7 @@ from .lazy_rows import in_memory, pick
 if TYPE_CHECKING:
     from ..base.types import LazyRows, PathLike
     from .antenna_array import AntennaArray
+    from .trajectory import Trajectory
     from .waveform import Waveform
 
 # optional arrays with one entry per row: name -> (dtype, trailing shape)
@@ -214,10 +215,11 @@ class PhaseHistory:
         rate: float,
         start: ArrayLike = 0.0,
         carrier: ArrayLike | None = None,
-        tx: ArrayLike,
+        tx: ArrayLike | None = None,
         rx: ArrayLike | None = None,
-        kind: Literal["compressed", "dechirped", "chirped"] = "compressed",
-        bandwidth: float | None = None,
+        track: Trajectory | None = None,
+        kind: Literal["compressed", "dechirped", "chirped", "rf"] = "compressed",
+        bandwidth: float | tuple[float, float] | None = None,
         waveform: Waveform | None = None,
         pulse_time: Literal["start", "middle"] = "start",
         sweep_rate: float | None = None,
@@ -233,12 +235,17 @@ class PhaseHistory:
                   after the instant at which the reference sweep passes `carrier`
         carrier   Hz, one or per row: the frequency that was mixed to 0; of dechirped samples that of the sweep at
                   time 0. None: waveform.center
-        tx, rx    antenna positions, m (n_rows, 3); rx None: one antenna
+        tx, rx    antenna positions, m (n_rows, 3); rx None: one antenna. Of a satellite the receiver has moved on when
+                  the echo arrives, and the Earth has turned: give track
+        track     in place of tx and rx, a Trajectory with a pulse per row: its positions and times. From
+                  `Orbit.trajectory` it gives the places of both antennas, at the delays of the reference ranges
         kind      "compressed": complex, a pulse of peak |a| at the delay of a point of amplitude a
                   "chirped": complex, a pulse of modulus |a| as it was sent; the result awaits `sarcl.compress`
                   "dechirped": the echo of a linear sweep times the sweep itself, complex or real (FMCW, stretch)
+                  "rf": real samples of the received signal itself, such as those of an impulse radar: compressed, or
+                  with `waveform` as they were sent. Their analytic signal is formed and mixed to the middle of the band
         bandwidth      Hz, of compressed samples: the frequencies that are kept, about the carrier. None: those of the
-                       waveform, or all, `rate`
+                       waveform, or all, `rate`. Of "rf" samples (low, high), Hz
         waveform       the Waveform that was sent; of chirped samples it must be given
         pulse_time     of chirped samples: `start` is counted from the "start" or the "middle" of the pulse sent
         sweep_rate     of dechirped samples: Hz/s, negative where the frequency falls
@@ -258,15 +265,28 @@ class PhaseHistory:
         docs/guide/your_own_data.md has a recipe for each kind.
         """
         from . import _time_samples
+        from .row_positions import check_orbit, rows_of_track
 
+        if (tx is None) == (track is None):
+            raise ValueError(
+                f"{'tx and track are both None' if tx is None else 'tx and track are both given'}; give exactly one: "
+                "positions, m (n_rows, 3), or a Trajectory"
+            )
         made, pulse = _time_samples.spectra_of(
             samples, kind, rate, start, carrier, bandwidth, waveform, pulse_time, sweep_rate, beat, reference_range,
             scene_range,
         )  # fmt: skip
-        return cls(
-            made.samples, made.frequency, made.step, tx, made.reference_range, rx,
-            waveform=pulse, compressed=kind != "chirped", **rows,
+        places: dict[str, Any] = {"tx": tx, "rx": rx, **rows}
+        if track is not None:
+            places = rows_of_track(track, rx, made.reference_range, rows)
+        compressed = kind != "chirped" and not (kind == "rf" and waveform is not None)
+        out = cls(
+            made.samples, made.frequency, made.step, reference_range=made.reference_range, waveform=pulse,
+            compressed=compressed, **places,
         )  # fmt: skip
+        if track is None:
+            check_orbit(out)
+        return out
 
     def __repr__(self) -> str:
         low = self.frequency.min() / 1e9

@@ -268,6 +268,65 @@ def test_the_centroid_is_estimated_from_the_data(squint):
     assert float(found["data"].split()[0]) == pytest.approx(wanted, abs=3)
 
 
+def strip_of_ground(reference):
+    random = np.random.default_rng(3)
+    y0 = 2800 * np.tan(0.2)
+    places = np.c_[random.uniform(-15, 15, (60, 2)), np.zeros(60)]
+    return points(places, n_samples=256, reference=reference, n=400, aperture=45.0, squint=0.2), y0
+
+
+@pytest.mark.filterwarnings("error::sarcl.SarclWarning")
+def test_the_centroid_of_data_is_the_right_multiple_of_the_pulse_rate_or_doubted():
+    told, _ = strip_of_ground(None)  # reference ranges follow the scene
+    silent = sarcl.PhaseHistory(  # the same samples about one range: the geometry does not know the squint
+        told.samples * np.exp(
+            -4j * np.pi / SPEED_OF_LIGHT
+            * np.outer(told.reference_range - told.reference_range.mean(),
+                       told.frequency[0] + np.arange(told.n_samples) * told.frequency_step[0])
+        ),
+        frequency=told.frequency, frequency_step=told.frequency_step, tx=told.tx,
+        reference_range=told.reference_range.mean(), time=told.time,
+    )  # fmt: skip
+
+    def centroid(raw, **options):
+        forecast = plan_range_doppler(raw, side="right", doppler="data", beam=0.004, **options)
+        return float(forecast.plan["Doppler centroid"].split()[0])
+
+    rate = (told.n_rows - 1) / float(told.time[-1] - told.time[0])
+    right = centroid(told)
+    geometry = 2 * SPEED * 9.6e9 / SPEED_OF_LIGHT * np.sin(np.arctan(0.7 * np.tan(0.2)))
+    assert abs(abs(right) - geometry) < 0.1 * rate and geometry > 0.9 * rate
+    with pytest.warns(sarcl.SarclWarning, match=r"Give near=") as warned:
+        wrong = centroid(silent)
+    assert abs(wrong) <= rate / 2
+    near = float(str(warned[0].message).split("Give near=")[1].split(",")[0])
+    assert centroid(silent, near=near) == pytest.approx(right, rel=1e-3)
+    assert centroid(silent, near=wrong + 1) == wrong  # asked for: no warning
+    with pytest.raises(ValueError, match="near is for doppler='data'"):
+        sarcl.range_doppler(told, side="right", near=100.0)
+
+
+@pytest.mark.parametrize("epoch", [1.7e9, -3e7, 2e9])
+def test_absolute_times_give_the_image_of_times_from_the_first_pulse(epoch):
+    raw = noise(squint=0.2)
+    first = raw.time[0]
+    late = replace(raw, time=raw.time + epoch)
+    images = [sarcl.range_doppler(one, tolerance=1e-3) for one in (raw, late)]
+    assert np.linalg.norm(images[1].data - images[0].data) < 1e-3 * np.linalg.norm(images[0].data)
+    np.testing.assert_allclose(images[1].grid.times - epoch, images[0].grid.times - first, atol=1e-6)
+    asked = images[1].grid.times[[10, 60]]
+    part = sarcl.range_doppler(late, tolerance=1e-3, times=asked)
+    assert abs(part.grid.times[0] - asked[0]) < 1e-6 and len(part.grid.times) in (50, 51)
+
+
+def test_times_that_float64_does_not_resolve_are_refused_by_their_name():
+    raw = noise()
+    with pytest.raises(ValueError, match=r"raw\.time reaches 1e\+14 s"):
+        sarcl.range_doppler(replace(raw, time=raw.time + 1e14))
+    with pytest.raises(ValueError, match=r"raw\.time reaches"):
+        sarcl.range_doppler(replace(raw, time=raw.time / 500 + 1e10))
+
+
 def test_profiles_are_read_as_the_twin_says(device):
     raw = noise(n=40, aperture=10.0, n_samples=50)
     random = np.random.default_rng(2)

@@ -309,9 +309,9 @@ def test_the_type_of_the_samples_is_kept_and_files_are_read_by_rows(tmp_path):
 
 
 BAD = {
-    "kind": ({"kind": "raw"}, "kind is 'raw'; choose one of 'compressed', 'dechirped', 'chirped'"),
+    "kind": ({"kind": "raw"}, "kind is 'raw'; choose one of 'compressed', 'dechirped', 'chirped', 'rf'"),
     "one row": ({"samples": np.ones(8)}, r"samples has shape \(8,\), wanted \(n_rows, n_times\)"),
-    "real": ({"samples": np.ones((3, 8))}, "compressed samples must be complex, got float64; mix real ones"),
+    "real": ({"samples": np.ones((3, 8))}, "compressed samples must be complex, got float64; real samples"),
     "no carrier": ({"carrier": None}, "no waveform to take it from; give carrier="),
     "starts": ({"start": [0.0, 1.0]}, r"start has shape \(2,\), wanted one number or one per row, \(3,\)"),
     "band": ({"bandwidth": 2e6}, "bandwidth is 2e\\+06 Hz, but samples at 1e\\+06 Hz hold no more"),

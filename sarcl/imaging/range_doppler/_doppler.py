@@ -11,6 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import warn
 from ...model.phase_history import PhaseHistory
 from ._aperture_window import ApertureWindow
 
@@ -21,6 +22,7 @@ MOST_ROWS = 2048  # rows from which a Doppler centroid is estimated
 # of them. Measured with noise: 0.1 where the tapers lie beyond the rows, 0.45 where rows are weighted by them (beams).
 FRESNEL, FRESNEL_BEAM = 0.2, 0.6
 LEAST_ZONES = 1.5  # Fresnel widths of a taper, at least
+PARTS, SURE = 8, 4  # parts of the rows by which a centroid is judged, and standard deviations
 
 
 @dataclass(frozen=True)
@@ -116,26 +118,50 @@ def centroid_of_geometry(raw: PhaseHistory, step: float, speed: float) -> float:
     return float(np.clip(-slope / speed, -STEEPEST, STEEPEST))
 
 
-def centroid_of_data(raw: PhaseHistory, step: float, speed: float, expected: float) -> float:
+def centroid_of_data(raw: PhaseHistory, step: float, speed: float, expected: float, doubt: bool = True) -> float:
     """Sine of the squint angle of the mean Doppler frequency of the echoes, the nearest to the expected one.
 
     From the phase between neighbouring rows, whose reference ranges are taken into account. The Doppler frequency is
-    known but for multiples of the pulse rate: the geometry chooses among them.
-    Source: Madsen, IEEE Trans. AES-25, 1989, pp. 134-140.
+    known but for multiples of the pulse rate: the expected one chooses among them.
+    doubt  warn where the echoes themselves tell that it is another: their Doppler frequency grows with the frequency
+    Source: Madsen, IEEE Trans. AES-25, 1989, pp. 134-140; Bamler and Runge, IEEE Trans. GE-29, 1991, pp. 415-424.
     """
     first = max(0, (raw.n_rows - MOST_ROWS) // 2)
     samples = raw.read(first, min(first + MOST_ROWS, raw.n_rows))
     moved = np.diff(raw.reference_range[first : first + len(samples)])
-    product = (samples[1:] * samples[:-1].conj()).sum(axis=0, dtype=np.complex128)
+    frequency = raw.frequency[0] + np.arange(raw.n_samples) * raw.frequency_step[0]
+    products = samples[1:] * samples[:-1].conj()
     if np.ptp(moved) > 0 or moved[0]:
-        n = np.arange(raw.n_samples)
-        frequency = raw.frequency[0] + n * raw.frequency_step[0]
-        turned = np.exp(-4j * np.pi / SPEED_OF_LIGHT * np.outer(moved, frequency))
-        product = (samples[1:] * samples[:-1].conj() * turned).sum(axis=0, dtype=np.complex128)
-    total = complex(product.sum())
+        products = products * np.exp(-4j * np.pi / SPEED_OF_LIGHT * np.outer(moved, frequency))
+    total = complex(products.sum(dtype=np.complex128))
     if total == 0:
         raise ValueError("the echoes are zero, and have no Doppler centroid: give doppler='geometry'")
     rate, wavelength = 1 / step, SPEED_OF_LIGHT / float(raw.center_frequency[0])
     found, wanted = np.angle(total) / (2 * np.pi) * rate, 2 * speed * expected / wavelength
     found += rate * np.rint((wanted - found) / rate)
+    if doubt:
+        _doubt(products, frequency, rate, float(found), float(wanted))
     return float(np.clip(wavelength * found / (2 * speed), -STEEPEST, STEEPEST))
+
+
+def _doubt(products: np.ndarray, frequency: np.ndarray, rate: float, found: float, wanted: float) -> None:
+    """Warn where Doppler frequencies that grow with the frequency tell another multiple of the pulse rate than `found`.
+
+    products  of neighbouring rows, (rows, samples), at frequencies, Hz;  wanted  Hz, centroid of the geometry
+    """
+    half = len(frequency) // 2
+    if half < 2 or len(products) < 2 * PARTS:
+        return
+    parts = np.stack([part.sum(axis=0, dtype=np.complex128) for part in np.array_split(products, PARTS)])
+    apart = float(frequency[half:].mean() - frequency[:half].mean())
+    turns = np.angle(parts[:, half:].sum(axis=1) * parts[:, :half].sum(axis=1).conj()) / (2 * np.pi)
+    told = turns * rate * float(frequency.mean()) / apart
+    deviation = float(told.std() / np.sqrt(PARTS - 1))
+    absolute = float(np.median(told))
+    nearest = found + rate * round((absolute - found) / rate)
+    if abs(nearest - found) > rate / 2 and SURE * deviation < rate / 2:
+        warn(
+            f"Doppler frequencies of the echoes change over the band as those of a centroid of {absolute:.5g} Hz do, "
+            f"where {found:.5g} Hz is used, the nearest to the {wanted:.5g} Hz of the track and reference ranges; the "
+            f"pulse rate is {rate:.5g} Hz. Give near={nearest:.5g}, or near={found:.5g} where that is right"
+        )

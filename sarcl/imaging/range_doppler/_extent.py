@@ -116,9 +116,10 @@ def choose_extent(
     corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)
     used = float(max(sight.sines[0], corners.min())), float(min(sight.sines[1], corners.max()))
     if not used[0] < used[1]:
+        seen = (track.start + track.stop) / 2 + delay(centroid, about, speed)
         raise ValueError(
-            f"no row sees the times {u[0]:.6g} to {u[-1]:.6g} s in the beam; with this Doppler centroid the rows see "
-            f"zero-Doppler times about {(track.start + track.stop) / 2 + delay(centroid, about, speed):.6g} s: "
+            f"no row sees the times {track.epoch + u[0]:.10g} to {track.epoch + u[-1]:.10g} s in the beam; with this "
+            f"Doppler centroid the rows see zero-Doppler times about {track.epoch + seen:.10g} s: "
             "give times= there, or doppler='data'"
         )
     _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))

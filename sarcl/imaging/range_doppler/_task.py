@@ -102,7 +102,7 @@ class RangeDopplerTask:
 
 def make_task(
     raw: PhaseHistory, heights: Any, side: Any, tolerance: Any, window: Any, weights: Any, times: Any, ranges: Any,
-    spacing: Any, beam: Any, doppler: Any, doppler_rate: Any, max_bytes: Any, device: Any,
+    spacing: Any, beam: Any, doppler: Any, near: Any, doppler_rate: Any, max_bytes: Any, device: Any,
 ) -> RangeDopplerTask:  # fmt: skip
     """The task of these arguments of `range_doppler`, which says what each is and what is refused."""
     instance("raw", raw, PhaseHistory)
@@ -122,8 +122,11 @@ def make_task(
     speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
     wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
     expected = centroid = centroid_of_geometry(raw, track.step, speed)
+    about = None if near is None else _number("near", near, "Hz") * wavelength / (2 * speed)
     if isinstance(doppler, str) and doppler == "data":
-        centroid = centroid_of_data(raw, track.step, speed, expected)
+        centroid = centroid_of_data(raw, track.step, speed, expected if about is None else about, near is None)
+    elif near is not None:
+        raise ValueError("near is for doppler='data', where the centroid is known but for multiples of the pulse rate")
     elif not (isinstance(doppler, str) and doppler == "geometry"):
         centroid = _number("doppler", doppler, "Hz") * wavelength / (2 * speed)
     opened = open_device(device)
@@ -134,7 +137,7 @@ def make_task(
 
     extent = choose_extent(
         raw, track, smooth, speed, centroid, None if beam is None else _beam(beam),
-        _pair("times", times), _pair("ranges", ranges), spacing, least,
+        _times(times, track.epoch), _pair("ranges", ranges), spacing, least,
         EDGES * tolerance, None if beam is None else windows.both(window)[1],
     )  # fmt: skip
     over_rows = window if extent.band.window is None else (windows.both(window)[0], None)
@@ -190,6 +193,12 @@ def _number(name: str, value: Any, unit: str) -> float:
     if isinstance(value, str):
         raise ValueError(f"{name} is {value!r}; choose 'geometry', 'data' or a number in {unit}")
     return number(name, value)
+
+
+def _times(value: Sequence[float] | None, epoch: float) -> tuple[float, float] | None:
+    """Zero-Doppler times that were asked for, s from the first row."""
+    made = _pair("times", value)
+    return made and (made[0] - epoch, made[1] - epoch)
 
 
 def _pair(name: str, value: Sequence[float] | None) -> tuple[float, float] | None:

@@ -12,6 +12,7 @@ from ...base.constants import SPEED_OF_LIGHT
 from ...model.phase_history import PhaseHistory
 
 EVEN = 1e-3  # of a pulse interval: largest deviation of pulse times from even spacing
+FINEST = 1e-3  # of the pulse interval: coarsest resolution of times
 DEGREES = 7  # highest degree of the polynomials of time through the positions
 UP = np.array([0.0, 0.0, 1.0])
 REMEDY = "use backproject, which takes any track"
@@ -21,7 +22,8 @@ REMEDY = "use backproject, which takes any track"
 class Track:
     """Positions of the phase centre, midway between transmitter and receiver, as polynomials of time.
 
-    start, step   time of the first row and between rows, s;  n_rows
+    epoch         time of the first row, s, from which all other times of the room count: they may be absolute, of 2e9 s
+    start, step   time of the first row, 0, and between rows, s;  n_rows
     coefficients  (degree + 1, 3), m: Chebyshev polynomials over the rows' span
     is_line       whether the positions are a straight, evenly sampled line to within the accuracy asked for, and
                   transmitter and receiver are one antenna
@@ -32,6 +34,7 @@ class Track:
     n_rows: int
     coefficients: np.ndarray
     is_line: bool
+    epoch: float = 0.0
 
     @classmethod
     def of(cls, raw: PhaseHistory, accuracy: float) -> Track:
@@ -43,6 +46,7 @@ class Track:
             raise ValueError(f"raw has {raw.n_rows} rows; the Doppler spectrum of range_doppler needs at least 8")
         if raw.time is None:
             raise ValueError("raw.time is None, and rows of the image are times: give dataclasses.replace(raw, time=)")
+        _check_resolution(raw.time)
         steps = np.diff(raw.time)
         if not (steps > 0).all():
             at = int(np.argmin(steps > 0)) + 1
@@ -67,8 +71,8 @@ class Track:
             if wavenumber * rest <= accuracy:
                 break
         fitted[0] += origin
-        made = cls(float(raw.time[0]), step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic)
-        if not np.linalg.norm(made.states(np.array([raw.time[raw.n_rows // 2]]))[1]) * step > 0:
+        made = cls(0.0, step, raw.n_rows, fitted, degree == 1 and raw.is_monostatic, float(raw.time[0]))
+        if not np.linalg.norm(made.states(np.array([made.stop / 2]))[1]) * step > 0:
             raise ValueError(f"the antenna rests at {middle[0]}; a synthetic aperture needs a moving one")
         return made
 
@@ -116,3 +120,15 @@ class Track:
                 "give side='left' or side='right' of the track, seen from above"
             )
         return float(np.sign(across))
+
+
+def _check_resolution(time: np.ndarray) -> None:
+    """ValueError where times are so far from 0 that float64 does not resolve the pulse interval."""
+    interval = float(abs(time[-1] - time[0])) / (len(time) - 1)
+    rounding = float(np.spacing(np.abs(time).max()))
+    if rounding > FINEST * interval > 0:
+        raise ValueError(
+            f"raw.time reaches {np.abs(time).max():.9g} s, where float64 resolves {rounding:.2g} s, "
+            f"{rounding / interval:.2g} of the pulse interval, and {FINEST:g} is needed: give times from the first "
+            "pulse on, as they were before an epoch was added, by dataclasses.replace(raw, time=)"
+        )

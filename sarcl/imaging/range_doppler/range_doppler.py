@@ -54,6 +54,7 @@ def range_doppler(
     spacing: tuple[float | None, float | None] | None = None,
     beam: float | None = None,
     doppler: Literal["geometry", "data"] | float = "geometry",
+    near: float | None = None,
     doppler_rate: Literal["geometry", "data"] | float = "geometry",
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
@@ -72,8 +73,8 @@ def range_doppler(
                pixel in the beam, as a weight of Doppler frequencies: a pixel at the end of the track has a part of it
     max_bytes  for blocks on the device, as `backproject` takes it; arrays of all pulses or Doppler bins that are larger
                than a third of it, or of half the machine's memory, are temporary files
-    times      (first, last) zero-Doppler time, s; None: those of the rows, less where a pixel's Doppler band and the
-               image's exceed the pulse rate
+    times      (first, last) zero-Doppler time, s, on the clock of raw.time, which may be absolute (2e9 s); None: those
+               of the rows, less where a pixel's Doppler band and the image's exceed the pulse rate
     ranges     (near, far) slant range, m; None: the ranges that the range window holds in every row
     spacing    (s, m) between rows and columns, or None for either: the spectrum of a pixel then fills 0.8 of the
                sampling rate at most. Rows are a whole fraction of the pulse interval apart, no farther than asked
@@ -82,6 +83,8 @@ def range_doppler(
                without a window along the track (the log and the report say how much that is), else within it
     doppler    centroid of the beam, and of the default times: "geometry", from reference ranges that change (else
                broadside); "data", from the phases of neighbouring rows; or in Hz, at the centre frequency
+    near       Hz: data determine the centroid but for multiples of the pulse rate; the one nearest to this is taken.
+               None: the one nearest to that of the geometry, with a warning where the echoes tell another one
     doppler_rate  of the azimuth compression: "geometry", from the track; "data", from the displacement of two looks
                (map drift), which needs ground with contrast; or in Hz/s at the centre frequency, in the middle of the
                ranges and at the centroid. Effective velocities at all ranges are scaled alike. `tolerance` then refers
@@ -105,11 +108,12 @@ def range_doppler(
     arguments.progress(progress)
     clock = Clock()
     task = make_task(
-        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, doppler_rate,
+        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, near, doppler_rate,
         max_bytes, device,
     )  # fmt: skip
     plan, track, weight = task.plan, task.track, (task.sample_weight, task.row_weight)
-    grid = ImageGrid.zero_doppler(plan.times, plan.ranges, task.ground.positions(plan.times, plan.ranges))
+    positions = task.ground.positions(plan.times, plan.ranges)
+    grid = ImageGrid.zero_doppler(track.epoch + plan.times, plan.ranges, positions)
     if task.extent.has_beam and plan.band.window is None and task.beyond_beam < -TOLD:
         log.warning(BEYOND, -task.beyond_beam)
     clock.lap("plan")
@@ -162,6 +166,7 @@ def plan_range_doppler(
     spacing: tuple[float | None, float | None] | None = None,
     beam: float | None = None,
     doppler: Literal["geometry", "data"] | float = "geometry",
+    near: float | None = None,
     doppler_rate: Literal["geometry", "data"] | float = "geometry",
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
@@ -174,7 +179,7 @@ def plan_range_doppler(
     options   `check` and `progress`, which do not matter here
     """
     task = make_task(
-        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, doppler_rate,
+        raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, near, doppler_rate,
         max_bytes, device,
     )  # fmt: skip
     plan = task.plan
