@@ -117,9 +117,11 @@ def _kelvin(radar: Any) -> float:
 
 
 def cell_area(raw: PhaseHistory, point: ArrayLike, normal: ArrayLike = (0.0, 0.0, 1.0)) -> float:
-    """Area, m^2, of the resolution cell at `point` on a plane: (2 pi)^2 over the area of the spatial frequencies.
+    """Area, m^2, of the resolution cell at `point` on a plane: the integral of |response|^2 over its peak.
 
-    Range cell on the ground times cross-range cell, both between peak and null of an unweighted image: c/(2 B sin) x
+    By Parseval it is (2 pi)^2 times the mean, over the samples, of 1/(the area of spatial frequencies that a sample
+    occupies), over their number. For samples that are even there it is (2 pi)^2 over the area of all of them:
+    range cell on the ground times cross-range cell, both between peak and null of an unweighted image: c/(2 B sin) x
     lambda/(2 angle), where the track is straight and short. Only rows of the first polarisation count; they must pass
     the point in one direction.
     """

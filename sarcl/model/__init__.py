@@ -14,6 +14,7 @@ For other folders:
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
     radar             Radar: the radar equation as named factors
+    row_positions     positions of both antennas in each row, from a track; of orbits at the echo's arrival
     store             read(): files as PhaseHistory or Image; output files completed and opened as such
     trajectory        Trajectory: position of the antenna at each pulse
     waveform          Waveform: spectrum of the pulse and of its matched filter
@@ -40,6 +41,7 @@ __all__ = [
     "phase_history",
     "pointing",
     "radar",
+    "row_positions",
     "store",
     "trajectory",
     "waveform",

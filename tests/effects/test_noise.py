@@ -41,6 +41,33 @@ def test_the_cell_is_range_cell_on_the_ground_times_cross_range_cell():
     assert tilted == pytest.approx(CELL * np.sin(LOOK), rel=2e-3)
 
 
+def test_the_cell_is_the_integral_of_the_response_where_pulses_are_uneven_and_the_band_is_wide():
+    y = 64 * np.sinh(np.linspace(-2, 2, 129)) / np.sinh(2)  # spacings from 1 to 3.6
+    tx = np.stack([np.full(129, -GROUND), y, np.full(129, HEIGHT)], axis=1)
+    raw = sarcl.PhaseHistory(
+        np.zeros((129, 64), np.complex64), 4.8e9, 150e6, tx, reference_range=np.linalg.norm(tx, axis=1)
+    )  # 4.8 to 14.4 GHz
+    x, along = np.arange(-0.69, 0.69, 0.006), np.arange(-40, 40, 0.25)
+    f = raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
+    look = -tx / np.linalg.norm(tx, axis=1, keepdims=True)  # plane waves at the point
+    k = 4 * np.pi / SPEED_OF_LIGHT * f[None, :, None] * look[:, None, :2]
+    k = k.reshape(-1, 2)
+    response = sum(
+        np.einsum("sx,sy->xy", np.exp(1j * np.outer(part[:, 0], x)), np.exp(1j * np.outer(part[:, 1], along)))
+        for part in np.array_split(k, 64)
+    )
+    area = (np.abs(response) ** 2).sum() * 0.006 * 0.25 / len(k) ** 2
+    assert cell_area(raw, (0, 0, 0)) == pytest.approx(area, rel=0.03)
+
+
+def test_the_nesz_holds_for_spectra_that_are_not_flat():
+    t = np.arange(-200, 201) / (4 * BAND)
+    pulse = sarcl.Waveform.sampled(np.exp(-np.pi * (BAND / 3 * t) ** 2), 4 * BAND, FC)
+    noisy = add_noise(silence(waveform=pulse), nesz=0.5, cell_area=CELL, seed=5)
+    power = (np.abs(noisy.samples[:]) ** 2).mean()  # of a pixel it is this over the number of samples
+    assert power == pytest.approx(0.5 * CELL * noisy.n_rows * noisy.n_samples, rel=0.05)
+
+
 @pytest.mark.parametrize("window, widening", [(None, 1.0), ("hamming", 1.36**2)])
 @pytest.mark.parametrize("nesz_db", [-22.0, 3.0])
 def test_an_image_of_noise_has_the_nesz_asked_for(window, widening, nesz_db):

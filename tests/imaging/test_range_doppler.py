@@ -13,7 +13,9 @@ import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.imaging.range_doppler import _focus
 from sarcl.imaging.range_doppler._bins import Bins
-from sarcl.imaging.range_doppler._plan import curved
+from sarcl.imaging.range_doppler._doppler import Band
+from sarcl.imaging.range_doppler._plan import _blocks, _lacking, curved
+from sarcl.imaging.range_doppler._velocity import Hyperbolas
 from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
 from sarcl.numerics.interpolation import interpolator
 from sarcl.numerics.range_profiles import correction, from_samples
@@ -589,3 +591,25 @@ def test_a_track_is_as_straight_as_the_tolerance_needs():
     hold(bent(1e-6), 1e-2)
     with pytest.raises(sarcl.ToleranceUnreachable, match=r"rounding of complex64"):
         sarcl.range_doppler(RAW, tolerance=1e-6)
+
+
+@pytest.mark.parametrize("psi", [0.25, 0.3, 0.4, 0.6, 1.0])
+def test_range_blocks_have_the_error_of_a_cubic(psi):
+    """Phases that grow evenly over the swath by `psi` per block, read by a cubic through the ends of four blocks."""
+    nodes, at = np.arange(4.0), np.linspace(0, 1, 201)
+    exact = np.exp(1j * psi * at)
+    cubic = sum(
+        np.exp(1j * psi * nodes[k]) * np.prod([(at - m) / (nodes[k] - m) for m in nodes if m != nodes[k]], axis=0)
+        for k in range(4)
+    )
+    worst = np.abs(cubic - exact).max()
+    ranges = np.linspace(4e3, 5e3, 3001)
+    fit = Hyperbolas(4e3, 5e3, np.array([[100.0, 0.0, 0.0]]))
+    band = Band(-0.3, 0.1, 0.02, 0.0)
+    frequencies = np.linspace(9.3e9, 9.9e9, 64)
+    whole = _lacking(frequencies, 9.6e9, fit, band, ranges[[0, -1]])
+    allowed = 0.3 * worst * 1.001
+    blocks, error = _blocks(frequencies, 9.6e9, fit, band, ranges, allowed, 1e-3)
+    assert 0.11 * worst < error <= allowed
+    # as many blocks as that phase needs, in steps of a third of an octave
+    assert whole / psi <= 1.01 * len(blocks) <= 1.45 * whole / psi

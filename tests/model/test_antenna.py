@@ -142,6 +142,10 @@ def test_steered_turned_and_quaternions_are_the_same_turns():
     aimed = pointing.stripmap(TRACK, 0.6)
     angle = np.linspace(-0.1, 0.1, len(TRACK))
     swept = pointing.steered(aimed, angle, 0.02).attitude
+    for axes in swept:  # a rotation, whose y axis stays across the vertical of the old ones
+        assert np.allclose(axes @ axes.T, np.eye(3)) and np.linalg.det(axes) == pytest.approx(1)
+    assert np.allclose(np.einsum("ni,ni->n", swept[:, :, 1], aimed.attitude[:, :, 2]), 0)
+    assert (np.einsum("ni,ni->n", swept[:, :, 1], aimed.attitude[:, :, 1]) > 0.9).all()
     # the old boresight is seen at minus the angle that the beam was turned by
     level = pointing.steered(aimed, angle).attitude
     seen = np.einsum("ni,nij->nj", aimed.attitude[:, :, 0], level)

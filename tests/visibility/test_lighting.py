@@ -440,3 +440,22 @@ def test_embree_where_it_is_not_installed_says_what_to_do(monkeypatch):
     monkeypatch.setitem(sys.modules, "embreex", None)
     with pytest.raises(ImportError, match="pip install embreex"):
         shares(ground(2), eye(0, 30), engine="embree")
+
+
+def test_facets_that_turn_towards_the_antenna_between_viewpoints_are_lit():
+    """300 plates that hide nothing of one another, seen from an arc, which is divided into few blocks."""
+    random, k = np.random.default_rng(0), 300
+    normal = unit(random.normal(size=(k, 3)))
+    along = unit(np.cross(normal, random.normal(size=(k, 3))))
+    across = np.cross(normal, along)
+    place = 40.0 * np.stack([np.arange(k) % 18, np.arange(k) // 18, np.zeros(k)], axis=1)
+    triangles = np.stack(
+        [place + 8 * along, place - 4 * along + 7 * across, place - 4 * along - 7 * across], axis=1
+    )  # fmt: skip
+    angle = np.linspace(-0.8, 0.8, 801)
+    track = 60e3 * np.stack([np.cos(angle), np.sin(angle), 0.5 + 0 * angle], axis=1)
+    made = lit(triangles, track, two_sided=False)
+    assert len(made) < 100
+    for pulse in range(0, 801, 9):
+        facing = (unit(track[pulse] - place) * normals(triangles)).sum(axis=1)
+        assert (made.fraction_at(pulse)[facing > 1e-3] > 0.99).all()

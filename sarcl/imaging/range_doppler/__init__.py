@@ -22,6 +22,7 @@ For this folder alone:
     _range_window     slant ranges that lie in the range window of every row
     _task             arguments checked; track, ground, extent and plan of one image
     _track            an evenly sampled smooth track
+    _uneven_energy    errors where energy lies unevenly over rows and ranges: ends of the Doppler band, dark columns
     _velocity         ranges from a track to points as hyperbolas: effective velocity at several slant ranges
 """
 

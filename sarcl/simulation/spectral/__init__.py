@@ -12,6 +12,7 @@ For this folder alone:
     _aspects_seen           limits of these aspects: the track's ends, beams, the pulse repetition frequency
     _azimuth_transfer       responses along the track, transformed numerically
     _beam_edges             hard edges of beams: the aspects at which each scatterer passes them
+    _beam_extent            aspects between which a beam receives all but a share of the energy
     _edge_map               what hard edges add: maps whose azimuths are numbers of pulses
     _facet_factors          amplitudes of facets at one aspect after the other, on a device
     _map_part               one map of a part of a scene, with its transfer functions
