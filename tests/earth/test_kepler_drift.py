@@ -29,9 +29,9 @@ def test_rates_are_those_of_lagrange_s_equations(a, e, i):
         h = 1e-4 * at
         return (of(at + h) - of(at - h)) / (2 * h)
 
-    by_a, by_e, by_i = (
-        slope(lambda x: averaged(x, e, i), a), slope(lambda x: averaged(a, x, i), e), slope(lambda x: averaged(a, e, x), i)
-    )  # fmt: skip
+    by_a = slope(lambda x: averaged(x, e, i), a)
+    by_e = slope(lambda x: averaged(a, x, i), e)
+    by_i = slope(lambda x: averaged(a, e, x), i)
     n, shape = np.sqrt(GM / a**3), 1 - e**2
     node = by_i / (n * a**2 * np.sqrt(shape) * np.sin(i))
     perigee = np.sqrt(shape) * by_e / (n * a**2 * e) - np.cos(i) * node
