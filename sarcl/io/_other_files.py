@@ -3,11 +3,11 @@
 from __future__ import annotations
 
 import re
+from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
-from xml.etree import ElementTree
 
-from . import _hdf5_safety, input_paths
+from . import _hdf5_safety, _virtual_rasters, input_paths
 
 # endings of pictures, which a mesh may name as textures: nothing here needs them
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".tif", ".tiff", ".bmp", ".gif", ".dds", ".webp", ".ktx", ".ktx2", ".hdr")
@@ -16,6 +16,7 @@ CATALOGUES = {
     "WMS", "WCS", "WMTS", "HTTP", "PLMOSAIC", "EEDA", "EEDAI", "STACIT", "STACTA", "ESRIC", "NGW", "OGCAPI", "GTI",
 }  # fmt: skip
 NESTED = 8  # levels of virtual rasters of virtual rasters
+MOST_SOURCES = 100_000  # rasters that a virtual raster reads, through others too; models of the Earth have 26 000
 HDF5 = b"\x89HDF\r\n\x1a\n"
 ALLOW = "which sarcl does not follow; external=True allows it for files that you trust"
 
@@ -73,14 +74,31 @@ def check_raster(path: Path, name: str) -> None:
     Virtual rasters (VRT) name their sources, HDF5 files (netCDF 4, BAG) may hold external storage and links. Other XML,
     JSON and indices of tiles (GTI) name files anywhere, or addresses of a network.
     """
+    _reads(path, name, 0, {})
+
+
+def _reads(path: Path, name: str, depth: int, known: dict[Path, int]) -> int:
+    """How many rasters GDAL reads for one, after the checks of `check_raster`.
+
+    depth  virtual rasters that led to this one
+    known  what was found before: two sources each, 60 levels deep, are more rasters than can be read
+    """
+    if path in known:
+        return known[path]
     with open(path, "rb") as file:
         head = file.read(512)
     if head.startswith(HDF5):
         _check_hdf5(path, name)
     elif re.match(rb"(\xef\xbb\xbf)?\s*<", head):
-        _check_sources(path, name, 0)
+        if depth > NESTED:
+            raise ValueError(f"{name} is a virtual raster of virtual rasters, {NESTED} deep; give one of its sources")
+        known[path] = sum(_reads(source, name, depth + 1, known) for source in _sources(path, name))
+        if known[path] > MOST_SOURCES:
+            raise ValueError(f"{name} reads more than {MOST_SOURCES:,} rasters; give those of the part that is seen")
+        return known[path]
     elif re.match(rb"(\xef\xbb\xbf)?\s*[{[]", head) or ".gti" in path.name.lower():
         raise _catalogue(name)
+    return 1
 
 
 def check_parts(path: Path, driver: str, files: list[str], name: str) -> None:
@@ -96,31 +114,19 @@ def _catalogue(name: str) -> ValueError:
     return ValueError(f"{name} is a list of rasters elsewhere, and no raster: give one of those, or external=True")
 
 
-def _check_sources(path: Path, name: str, depth: int) -> None:
-    if depth > NESTED:
-        raise ValueError(f"{name} is a virtual raster of virtual rasters, {NESTED} deep; give one of its sources")
+def _sources(path: Path, name: str) -> Iterator[Path]:
+    """Files in the folder of a virtual raster, which it is made of."""
     try:
-        tree = ElementTree.fromstring(input_paths.contents(path, "DEM file"))
-    except (ElementTree.ParseError, ValueError, LookupError) as exc:
-        raise ValueError(f"{name} is XML that cannot be read ({exc}); export it again, or give its sources") from None
-    if tree.tag != "VRTDataset":
-        raise ValueError(
-            f"{name} is XML of the kind {tree.tag!r:.60}, which names a raster elsewhere; give that raster"
-        )
-    for element in tree.iter():
-        source = (element.text or "").strip()
-        if source and re.search("source(dataset|filename|url)|filename|file$|dataset$", element.tag, re.IGNORECASE):
-            found = beside(path, source)
-            if found is None:
-                raise ValueError(f"{name} leads to another file: {source!r}, outside its folder, {ALLOW}")
-            if not found.is_file():
-                raise ValueError(f"{name} names {source!r:.100}, and there is no such file in its folder; put it there")
-            with open(found, "rb") as file:
-                head = file.read(512)
-            if head.startswith(HDF5):
-                _check_hdf5(found, name)
-            elif re.match(rb"(\xef\xbb\xbf)?\s*<", head):
-                _check_sources(found, name, depth + 1)
+        sources = _virtual_rasters.sources(path)
+    except _virtual_rasters.Refused as exc:
+        raise ValueError(f"{name} {exc}") from None
+    for source in sources:
+        found = beside(path, str(source))
+        if found is None:
+            raise ValueError(f"{name} leads to another file: '{source}', outside its folder, {ALLOW}")
+        if not found.is_file():
+            raise ValueError(f"{name} names '{source!s:.100}', and there is no such file in its folder; put it there")
+        yield found
 
 
 def _check_hdf5(path: Path, name: str) -> None:

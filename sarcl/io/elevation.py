@@ -188,12 +188,13 @@ def _window(file: Any, name: str, bounds: Any) -> tuple[np.ndarray, np.ndarray]:
 
         there = ", ".join(f"{v:.5f}" for v in transform_bounds(file.crs, WGS84, *file.bounds))
         raise ValueError(f"bounds hold no cell of {name}, which reaches over ({there}); check west, south, east, north")
-    rows, columns = (np.arange(int(a), int(b) + 1) for a, b in zip(low, high, strict=True))
-    if len(rows) * len(columns) > MOST_POINTS:
+    shape = [int(b) - int(a) + 1 for a, b in zip(low, high, strict=True)]
+    if shape[0] * shape[1] > MOST_POINTS:  # before there are lists of them
         raise MemoryError(
-            f"{name} has {len(rows)} x {len(columns)} points, more than {MOST_POINTS:,}; give bounds=(west, south, "
+            f"{name} has {shape[0]} x {shape[1]} points, more than {MOST_POINTS:,}; give bounds=(west, south, "
             "east, north) of the part that the radar sees"
         )
+    rows, columns = (np.arange(int(a), int(b) + 1) for a, b in zip(low, high, strict=True))
     return rows, columns
 
 

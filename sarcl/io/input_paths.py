@@ -43,10 +43,13 @@ def _is_deleted_here() -> bool:
     return False
 
 
-def contents(path: Path, what: str = "") -> bytes:
-    """All bytes of a file, after `check`; PermissionError names a file that cannot be read."""
+def contents(path: Path, what: str = "", most: int | None = None) -> bytes:
+    """All bytes of a file, after `check`; PermissionError names a file that cannot be read.
+
+    most  of a file with more bytes, one more than these is read
+    """
     check(path, what)
-    return _read(path, what, None)
+    return _read(path, what, None if most is None else most + 1)
 
 
 def head(path: Path, what: str = "", folder: str = "give the name of a file in it") -> bytes:

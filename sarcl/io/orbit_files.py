@@ -6,12 +6,12 @@ import re
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
-from xml.etree import ElementTree
 
 import numpy as np
 
-from . import input_paths
+from . import _xml
 
+LONGEST = 100  # characters of a number or a time: a regular expression takes the square of them to refuse one
 _SPACE = re.compile(r"\{[^}]*\}")
 
 
@@ -51,12 +51,11 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     FileNotFoundError where there is no file; ValueError where it is not XML, of an unknown layout, has no state vectors
     or fewer than it announces, or states in another frame or other units.
     """
-    text = input_paths.contents(path, "orbit file")
     name = f"orbit file {path.name!r}"
     try:
-        root = ElementTree.fromstring(text)
-    except ElementTree.ParseError as exc:
-        raise ValueError(f"{name} cannot be read as XML ({exc}): it is damaged, or no orbit file") from None
+        root = _xml.parsed(path, "orbit file")
+    except _xml.Refused as exc:
+        raise ValueError(f"{name} {exc}: it is damaged, or no orbit file; copy it again") from None
     for element in root.iter():
         element.tag = _SPACE.sub("", element.tag) if isinstance(element.tag, str) else ""
     layout = LAYOUTS.get(root.tag)
@@ -66,11 +65,14 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     states = list(root.iter(layout.state))
     if not states:
         raise ValueError(f"{name} is {layout.name} without state vectors (<{layout.state}>); give one that has them")
+    for state in states:  # at most the first state with another in it is walked twice
+        if next((inner for inner in state.iter(layout.state) if inner is not state), None) is not None:
+            raise ValueError(f"{name} has state vectors (<{layout.state}>) within one another: it is damaged")
     for said in root.iter(f"List_of_{layout.state}s"):
-        if said.get("count", "").isdigit() and int(said.get("count", "")) != len(states):
+        count = said.get("count", "")
+        if count.isdigit() and count.lstrip("0") != str(len(states)):
             raise ValueError(
-                f"{name} announces {int(said.get('count', ''))} state vectors and has {len(states)}: it was cut off; "
-                "copy it again"
+                f"{name} announces {count:.20} state vectors and has {len(states)}: it was cut off; copy it again"
             )
     frames = [f for state in states for f in state.iter(layout.frame)] or [*root.iter(layout.frame)]
     for frame in frames:
@@ -89,6 +91,8 @@ def _text(name: str, state: Any, tag: str) -> str:
     text = state.findtext(tag)
     if text is None:
         raise ValueError(f"{name} has a state vector without <{tag}>: it is damaged")
+    if len(text) > LONGEST:
+        raise ValueError(f"{name} has a <{tag}> of {len(text)} characters, wanted a number or a time: it is damaged")
     return str(text).strip()
 
 

@@ -160,6 +160,101 @@ def test_sources_that_are_no_files_of_the_folder_are_refused(inside, source):
         sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid")
 
 
+HEAD = (
+    '<VRTDataset rasterXSize="5" rasterYSize="4"{more}><SRS>{crs}</SRS>'
+    "<GeoTransform>12, 0.001, 0, 42, 0, -0.001</GeoTransform>"
+)
+BAND = '<VRTRasterBand dataType="Float32" band="1">'
+BESIDE = (
+    '<SimpleSource><SourceFilename relativeToVRT="1">a.tif</SourceFilename><SourceBand>1</SourceBand></SimpleSource>'
+)
+
+
+def raster(head="", source=BESIDE, crs="EPSG:4979", more=""):
+    return f"{HEAD.format(crs=crs, more=more)}{head}{BAND}{source}</VRTRasterBand></VRTDataset>"
+
+
+PROCESSED = (
+    '<VRTDataset subClass="VRTProcessedDataset"><Input><SourceFilename relativeToVRT="1">a.tif</SourceFilename></Input>'
+    '<ProcessingSteps><Step name="s"><Algorithm>LocalScaleOffset</Algorithm>'
+    '<Argument name="gain_dataset_filename_1">../a.tif</Argument><Argument name="gain_dataset_band_1">1</Argument>'
+    '<Argument name="offset_dataset_filename_1">../a.tif</Argument><Argument name="offset_dataset_band_1">1</Argument>'
+    "</Step></ProcessingSteps></VRTDataset>"
+)
+WARPED = (
+    "<GDALWarpOptions><SourceDataset relativeToVRT='1'>a.tif</SourceDataset><Transformer><GenImgProjTransformer>"
+    "<SrcRPCTransformer><RPCTransformer><DEMPath>../a.tif</DEMPath></RPCTransformer></SrcRPCTransformer>"
+    "</GenImgProjTransformer></Transformer></GDALWarpOptions>"
+)
+LEADS = {  # the last: what GDAL takes for a source, and XML does not
+    "an argument": (PROCESSED, "subClass> 'VRTProcessedDataset'"),
+    "a processed source": (raster(source=PROCESSED), "<VRTDataset>"),
+    "DEMPath": (raster(WARPED, more=' subClass="VRTWarpedDataset"'), "<SrcRPCTransformer>"),
+    "an attribute": (raster(source='<SimpleSource SourceFilename="../a.tif" SourceBand="1"/>'), "SourceFilename>"),
+    "a system in a file": (raster(crs="../a.wkt"), r"<SRS> '../a.wkt'"),
+    "a system on a network": (raster(crs="http://localhost/a"), "<SRS> 'http"),
+    "a grid of PROJ": (raster(crs="+proj=longlat +nadgrids=a.gsb"), r"<SRS> '\+proj"),
+    "overviews": (
+        raster('<Metadata domain="OVERVIEWS"><MDI key="OVERVIEW_FILE">../a.tif</MDI></Metadata>'),
+        "domain> 'OVERVIEWS'",
+    ),
+    "options of drivers": (raster(source="<SimpleSource><OpenOptions/></SimpleSource>"), "<OpenOptions>"),
+    "an option of warping": (raster('<GDALWarpOptions><Option name="X">../a</Option></GDALWarpOptions>'), "option 'X'"),
+    "Python": (raster(source="<PixelFunctionLanguage>Python</PixelFunctionLanguage>"), "<PixelFunctionLanguage>"),
+    "an instruction": (raster("<?x <SourceFilename>../a.tif</SourceFilename> ?>"), r"instruction \(<\?x"),
+    "text around an element": (
+        raster(source="<SimpleSource><SourceFilename>../a.tif<a/></SourceFilename></SimpleSource>"),
+        "no name in its folder",
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("how", LEADS)
+def test_what_a_virtual_raster_holds_beside_the_harmless_is_refused(inside, how):
+    pytest.importorskip("rasterio")
+    for folder in (inside, inside.parent):
+        tif(folder / "a.tif")
+    text, wanted = LEADS[how]
+    (inside / "a.vrt").write_text(text)
+    vrt(inside / "b.vrt", "a.vrt")
+    for name in ("a.vrt", "b.vrt"):
+        with pytest.raises(ValueError, match=rf"DEM '{name}' .*{wanted}"):
+            sarcl.ElevationModel.read(inside / name, heights="ellipsoid")
+
+
+def test_names_that_count_from_the_current_folder_are_looked_for_there(inside, monkeypatch):
+    for folder in (inside, inside.parent):
+        tif(folder / "a.tif")
+    vrt(inside / "a.vrt", "a.tif", relative=0)
+    monkeypatch.chdir(inside.parent)
+    with pytest.raises(ValueError, match=r"'a\.vrt' leads to another file: .*a\.tif', outside its folder"):
+        sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid")
+    monkeypatch.chdir(inside)
+    assert sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid").height.shape == (4, 5)
+
+
+@pytest.mark.parametrize("crs", [None, "EPSG:32633"])
+def test_virtual_rasters_as_gdal_writes_them_are_read(inside, crs):
+    tif(inside / "a.tif")
+    import rasterio
+    import rasterio.shutil
+    from rasterio.vrt import WarpedVRT
+
+    with rasterio.open(inside / "a.tif") as file, WarpedVRT(file, crs=crs or file.crs) as warped:
+        rasterio.shutil.copy(warped if crs else file, inside / "a.vrt", driver="VRT")
+        wanted = warped.read(1)
+    found = sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid", nodata=0).height
+    assert np.array_equal(np.nan_to_num(found), wanted)
+
+
+def test_virtual_rasters_that_read_one_another_many_times_are_refused(inside):
+    tif(inside / "0.vrt")
+    for level in range(1, 8):
+        (inside / f"{level}.vrt").write_text(raster(source=100 * BESIDE.replace("a.tif", f"{level - 1}.vrt")))
+    with pytest.raises(ValueError, match=r"'7\.vrt' reads more than 100,000 rasters; give those of the part"):
+        sarcl.ElevationModel.read(inside / "7.vrt", heights="ellipsoid")
+
+
 def test_rasters_that_name_themselves_or_an_address_are_refused(inside):
     pytest.importorskip("rasterio")
     vrt(inside / "a.vrt", "a.vrt")
