@@ -227,7 +227,9 @@ def test_names_that_count_from_the_current_folder_are_looked_for_there(inside, m
         tif(folder / "a.tif")
     vrt(inside / "a.vrt", "a.tif", relative=0)
     monkeypatch.chdir(inside.parent)
-    with pytest.raises(ValueError, match=r"'a\.vrt' leads to another file: .*a\.tif', outside its folder"):
+    with pytest.raises(
+        ValueError, match=rf"leads to another file: '{inside.parent}/a\.tif', outside"
+    ):  # before GDAL opens it
         sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid")
     monkeypatch.chdir(inside)
     assert sarcl.ElevationModel.read(inside / "a.vrt", heights="ellipsoid").height.shape == (4, 5)
