@@ -103,6 +103,11 @@ def _struct(path: Path) -> np.void:
             found = loadmat(file, variable_names=["data"])
         except NotImplementedError:
             raise ValueError(f"{path.name} is a MATLAB 7.3 file, wanted MATLAB 5; save it again with -v7") from None
+        except _mat5_checks.TooLarge as exc:
+            raise ValueError(
+                f"{path.name} has {path.stat().st_size / 1e6:.3g} MB and {exc}, so it is hardly measured data; if you "
+                "trust it, load it elsewhere, and save its struct 'data' alone, without compression (-v6)"
+            ) from None
         except Exception as exc:  # scipy's parser fails in a dozen ways on a damaged file
             raise ValueError(
                 f"{path.name} cannot be read as a MATLAB 5 file ({str(exc) or type(exc).__name__}); "

@@ -2,8 +2,10 @@
 
 from __future__ import annotations
 
+import struct
 import subprocess
 import sys
+import zlib
 
 import pytest
 
@@ -96,4 +98,54 @@ def test_a_virtual_raster_of_far_more_points_than_bytes_is_refused(tmp_path, kin
     (tmp_path / "a.vrt").write_text(RASTER.format(n=n, m=m, step=1e-9))
     taken, said = reading(tmp_path / "a.vrt")
     assert said.startswith(f"MemoryError: DEM 'a.vrt' has {m} x {n} points, more than 25,000,000; give bounds")
+    assert taken < MOST_MEMORY
+
+
+# MATLAB 5 --------------------------------------------------------------------------------------------------
+
+
+def element(kind, data):
+    return struct.pack("<II", kind, len(data)) + data + bytes(-len(data) % 8)
+
+
+def array(class_code, dims, *parts, name=b"x"):
+    """An array of a MATLAB 5 file: flags, dimensions, name, and the elements of its numbers or cells."""
+    head = element(6, struct.pack("<II", class_code, 0)) + element(5, struct.pack("<II", *dims)) + element(1, name)
+    return element(14, head + b"".join(parts))
+
+
+def matlab(*elements):
+    return b"MATLAB 5.0 MAT-file".ljust(124) + b"\x00\x01IM" + b"".join(elements)
+
+
+def packed(count, kind):
+    """A compressed array of `count` zeros, of the data type 2 (bytes) or 9 (doubles), which is never whole in memory
+    here."""
+    size = count * {2: 1, 9: 8}[kind]
+    head = array(9, (count, 1), struct.pack("<II", kind, size))
+    stream, left = zlib.compressobj(6), size + -size % 8
+    out = stream.compress(head[:4] + struct.pack("<I", len(head) - 8 + left) + head[8:])
+    while left:
+        out, left = out + stream.compress(bytes(min(left, 2**20))), left - min(left, 2**20)
+    out += stream.flush()
+    return struct.pack("<II", 15, len(out)) + out
+
+
+EMPTY = struct.pack("<II", 14, 0)
+MATLAB = {
+    "two of 320 MB": (lambda: matlab(*[packed(40_000_000, 9)] * 2), "unpacks to more than 8 times"),
+    "many of 12 MB": (lambda: matlab(*[packed(1_500_000, 9)] * 25), "unpacks to more than 8 times"),
+    "cells": (lambda: matlab(array(1, (3_000_000, 1), EMPTY * 3_000_000)), "more than 100,000 arrays"),
+    "elements": (lambda: matlab(EMPTY * 3_000_000), "more than 100,000 arrays"),
+    "numbers of a byte": (lambda: matlab(packed(15_000_000, 2)), "more than 2 numbers per byte"),
+}
+
+
+@pytest.mark.parametrize("kind", MATLAB)
+def test_a_matlab_file_that_takes_far_more_than_its_size_is_refused(tmp_path, kind):
+    path = tmp_path / "a.mat"
+    data, wanted = MATLAB[kind]
+    path.write_bytes(data())
+    taken, said = reading(path)
+    assert said.startswith("ValueError: a.mat ") and wanted in said, said
     assert taken < MOST_MEMORY
