@@ -11,6 +11,7 @@ For other folders:
     output_paths   output files: checked before the computation, written completely or not at all
     sarcl_hdf5     sarcl's own HDF5 file: a phase history or an image, read and written as plain fields
     toml           TOML: line numbers of keys, and values written back as text
+    xml/           XML files of others: bounded in size, and virtual rasters
 
 For this folder alone:
 
@@ -31,4 +32,15 @@ For this folder alone:
     _ply           PLY files: vertices and polygons, each number of the type that its header declares
 """
 
-__all__ = ["elevation", "formats", "hdf5", "input_paths", "mesh", "orbit_files", "output_paths", "sarcl_hdf5", "toml"]
+__all__ = [
+    "elevation",
+    "formats",
+    "hdf5",
+    "input_paths",
+    "mesh",
+    "orbit_files",
+    "output_paths",
+    "sarcl_hdf5",
+    "toml",
+    "xml",
+]

@@ -7,7 +7,8 @@ from collections.abc import Iterator
 from pathlib import Path
 from urllib.parse import unquote
 
-from . import _hdf5_safety, _virtual_rasters, input_paths
+from . import _hdf5_safety, input_paths
+from .xml import virtual_rasters
 
 # endings of pictures, which a mesh may name as textures: nothing here needs them
 PICTURES = (".png", ".jpg", ".jpeg", ".tga", ".tif", ".tiff", ".bmp", ".gif", ".dds", ".webp", ".ktx", ".ktx2", ".hdr")
@@ -117,8 +118,8 @@ def _catalogue(name: str) -> ValueError:
 def _sources(path: Path, name: str) -> Iterator[Path]:
     """Files in the folder of a virtual raster, which it is made of."""
     try:
-        sources = _virtual_rasters.sources(path)
-    except _virtual_rasters.Refused as exc:
+        sources = virtual_rasters.sources(path)
+    except virtual_rasters.Refused as exc:
         raise ValueError(f"{name} {exc}") from None
     for source in sources:
         found = beside(path, str(source))

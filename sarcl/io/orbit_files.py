@@ -9,7 +9,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _xml
+from .xml import parser
 
 LONGEST = 100  # characters of a number or a time: a regular expression takes the square of them to refuse one
 _SPACE = re.compile(r"\{[^}]*\}")
@@ -53,8 +53,8 @@ def load(path: Path) -> tuple[np.datetime64, np.ndarray, np.ndarray, np.ndarray]
     """
     name = f"orbit file {path.name!r}"
     try:
-        root = _xml.parsed(path, "orbit file")
-    except _xml.Refused as exc:
+        root = parser.parsed(path, "orbit file")
+    except parser.Refused as exc:
         raise ValueError(f"{name} {exc}: it is damaged, or no orbit file; copy it again") from None
     for element in root.iter():
         element.tag = _SPACE.sub("", element.tag) if isinstance(element.tag, str) else ""

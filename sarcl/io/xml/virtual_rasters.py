@@ -13,7 +13,7 @@ from collections.abc import Callable
 from pathlib import Path
 from xml.etree import ElementTree
 
-from . import _xml
+from . import parser
 
 SOURCE_NAMES = {"sourcefilename", "sourcedataset"}  # elements whose text is the name of a file
 # coordinate reference systems by a code, in WKT, as JSON or for PROJ; by other texts GDAL finds files and addresses
@@ -68,8 +68,8 @@ def sources(path: Path) -> list[Path]:
     Refused for what is no virtual raster, or holds what is not known to be harmless.
     """
     try:
-        root = _xml.parsed(path, "DEM file", instructions=False)
-    except _xml.Refused as exc:
+        root = parser.parsed(path, "DEM file", instructions=False)
+    except parser.Refused as exc:
         raise Refused(f"{exc}; export it again, or give its sources") from None
     if root.tag != "VRTDataset":
         raise Refused(f"is XML of the kind {root.tag!r:.60}, which names a raster elsewhere; give that raster")

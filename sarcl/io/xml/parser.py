@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any
 from xml.etree import ElementTree
 
-from . import input_paths
+from .. import input_paths
 
 MOST_BYTES = 64_000_000  # size of a file; orbits of a day have 5 MB, virtual rasters of 30 000 sources 20 MB
 MOST_ELEMENTS = 500_000  # about 200 bytes each in memory; orbits of a day have 100 000
