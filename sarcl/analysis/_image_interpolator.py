@@ -36,6 +36,7 @@ class ImageInterpolator:
     surface  where positions and indices belong together: the grid, or a plane that touches it
     ends     positions of transmitter and receiver that the carrier follows from, m (3,) each
     taps     pixels along each axis from which a value is interpolated, even
+    step     m, a quarter of the widest spacing that the response could have: a smaller one shows interpolation errors
     offset   cycles per pixel along rows and columns, which are left of the carrier and removed with it
 
     The error is at most 1e-4 of the nearby peak. Raises ValueError where a position lies within taps/2 pixels of the
@@ -48,6 +49,7 @@ class ImageInterpolator:
     surface: Surface
     ends: Ends
     taps: int = 2
+    step: float = 0.0
     offset: tuple[float, float] = (0.0, 0.0)
 
     @classmethod
@@ -58,7 +60,16 @@ class ImageInterpolator:
         bands, offset = _bands(plain)
         # transition of the kernel: from the band's edge to its alias, 1 - 2 band cycles per pixel
         taps = 2 * int(np.ceil(KAISER[1] / (1 - 2 * max(bands)) / 2))
-        return replace(plain, taps=taps, offset=offset)
+        widest = [
+            s * BAND / max(b, 0.5 / CHIP) for s, b in zip(plain.surface.spacing_at(row, column), bands, strict=True)
+        ]
+        return replace(plain, taps=taps, offset=offset, step=min(widest) / 4)
+
+    def touching(self, position: np.ndarray) -> tuple[ImageInterpolator, np.ndarray]:
+        """The interpolator, with the surface at a position of its own, and that position on the grid, m (3,)."""
+        row, column = self.surface.index(position)
+        moved = replace(self, surface=surface_at(self.image, row, column))
+        return moved, moved.surface.at(row, column)
 
     def __call__(self, position: np.ndarray) -> np.ndarray:
         index = self.surface.index(position)

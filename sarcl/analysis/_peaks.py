@@ -8,7 +8,7 @@ import numpy as np
 
 from ..base import validation
 from ..model.image import Image
-from ._surface import pixel_of, place_of
+from ._surface import pixel_of, place_of, surface_at
 
 
 def brightest(image: Image) -> tuple[int, int]:
@@ -26,6 +26,22 @@ def brightest(image: Image) -> tuple[int, int]:
     if at is None:
         raise ValueError("the image is zero everywhere; there is no point to measure")
     return at
+
+
+def brightest_around(image: Image, position: np.ndarray, reach: float) -> tuple[int, int]:
+    """Row and column of the brightest pixel within `reach` m of a position or, as long as one is brighter, of that."""
+    shape = np.array(image.grid.shape)
+    at = np.clip(np.rint(pixel_of(image, position)).astype(int), 0, shape - 1)
+    spacing = surface_at(image, *at).spacing_at(*at)
+    half = np.ceil(reach / np.array(spacing)).astype(int)
+    while True:
+        low, high = np.maximum(at - half, 0), np.minimum(at + half + 1, shape)
+        level = np.abs(np.asarray(image.data[low[0] : high[0], low[1] : high[1]]))
+        level = np.where(np.isfinite(level), level, 0)
+        best = np.array(np.unravel_index(level.argmax(), level.shape)) + low
+        if not level.max() > level[tuple(at - low)]:
+            return int(at[0]), int(at[1])
+        at = best
 
 
 def peak_near(image: Image, near: Any) -> tuple[int, int]:

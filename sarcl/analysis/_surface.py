@@ -6,36 +6,37 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..model import listed_surface
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 
 NEAR = 32  # pixels on each side of the pixel to which a plane is fitted
 LEAST = 1e-4  # area of a cell over the square of its longer side
-FIT = 8.0  # pixels: the plane follows pixels nearer than that most
+FIT = 2.0  # pixels: the plane follows pixels nearer than that most, which a response at half power covers
 
 
 @dataclass(frozen=True, eq=False)
 class LocalPlane:
-    """The plane through a pixel of a listed grid that its neighbours lie on, with even steps of rows and columns.
+    """The plane that touches a listed grid at fractional indices, with even steps of rows and columns.
 
-    x(i, j) = origin + (i - row) down + (j - column) across: `origin` is the pixel's own position, and the steps fit
+    x(i, j) = origin + (i - row) down + (j - column) across: `origin` lies on the surface of the grid, and the steps fit
     those of the pixels about it by least squares, which count less the farther they are. Positions m (3,).
     """
 
-    grid: ImageGrid
-    row: int
-    column: int
+    row: float
+    column: float
     origin: np.ndarray
     down: np.ndarray
     across: np.ndarray
 
     @classmethod
-    def about(cls, grid: ImageGrid, row: int, column: int) -> LocalPlane:
-        """The plane at a pixel. ValueError where cells about it are empty, or do not lie on a surface."""
+    def about(cls, grid: ImageGrid, row: float, column: float) -> LocalPlane:
+        """The plane at fractional indices. ValueError where cells about them are empty, or lie on no surface."""
         assert grid.listed is not None
-        low = np.maximum(np.array([row, column]) - NEAR, 0)
-        high = np.minimum(np.array([row, column]) + NEAR + 1, grid.shape)
-        listed = grid.listed[low[0] : high[0], low[1] : high[1]] - grid.listed[row, column]
+        pixel = np.rint([row, column]).astype(int)
+        low, high = np.maximum(pixel - NEAR, 0), np.minimum(pixel + NEAR + 1, grid.shape)
+        origin = _between(grid.listed, row, column)
+        listed = grid.listed[low[0] : high[0], low[1] : high[1]] - origin
         i = (np.arange(low[0], high[0]) - row)[:, None] + np.zeros(high[1] - low[1])
         j = np.arange(low[1], high[1]) - column + np.zeros(high[0] - low[0])[:, None]
         full = ~np.isnan(listed[..., 0])
@@ -43,10 +44,10 @@ class LocalPlane:
         steps = np.linalg.lstsq(weight * np.stack([i[full], j[full]], axis=1), weight * listed[full], rcond=None)[0]
         if not np.linalg.norm(np.cross(*steps)) > LEAST * np.linalg.norm(steps, axis=1).max() ** 2:
             raise ValueError(
-                f"rows and columns of the grid about pixel ({row}, {column}) span no plane; a point is measured on "
-                "neighbouring rows and columns of a surface: list it so, or use ImageGrid.plane"
+                f"rows and columns of the grid about pixel ({pixel[0]}, {pixel[1]}) span no plane; a point is "
+                "measured on neighbouring rows and columns of a surface: list it so, or use ImageGrid.plane"
             )
-        return cls(grid, row, column, grid.listed[row, column], *steps)
+        return cls(row, column, origin, *steps)
 
     def at(self, row: np.ndarray, column: np.ndarray) -> np.ndarray:
         """Position on the plane, m (..., 3), of fractional indices."""
@@ -58,22 +59,29 @@ class LocalPlane:
         found = (np.asarray(position) - self.origin) @ np.linalg.pinv(np.stack([self.down, self.across]))
         return np.asarray(found + np.array([self.row, self.column]))
 
-    def normal_at(self, row: int, column: int) -> np.ndarray:
+    def normal_at(self, row: float, column: float) -> np.ndarray:
         """Unit normal (3,)."""
         normal = np.cross(self.across, self.down)
         return np.asarray(normal / np.linalg.norm(normal))
 
-    def spacing_at(self, row: int, column: int) -> tuple[float, float]:
+    def spacing_at(self, row: float, column: float) -> tuple[float, float]:
         """Distance to the next row and column, m."""
         return float(np.linalg.norm(self.down)), float(np.linalg.norm(self.across))
+
+
+def _between(listed: np.ndarray, row: float, column: float) -> np.ndarray:
+    """Position, m (3,), at fractional indices; of a whole index that of the pixel, whatever is around it."""
+    if row == round(row) and column == round(column):
+        return np.asarray(listed[round(row), round(column)])
+    return listed_surface.at(listed, np.asarray(row), np.asarray(column))
 
 
 Surface = ImageGrid | LocalPlane
 
 
-def surface_at(image: Image, row: int, column: int) -> Surface:
-    """What the response at a pixel is measured on: the grid itself where it is a plane or by range_doppler, else the
-    plane that touches it there."""
+def surface_at(image: Image, row: float, column: float) -> Surface:
+    """What the response at fractional indices is measured on: the grid itself where it is a plane or by range_doppler,
+    else the plane that touches it there."""
     if has_surface(image.grid):
         return image.grid
     return LocalPlane.about(image.grid, row, column)

@@ -19,8 +19,8 @@ from numpy.typing import ArrayLike, NDArray
 from ..base import validation
 from ..model.image import Image
 from ._image_interpolator import ImageInterpolator
-from ._peaks import brightest, peak_near, place
-from ._surface import place_of, surface_at
+from ._peaks import brightest, brightest_around, peak_near, place
+from ._surface import place_of
 from ._view import ends_at
 
 if TYPE_CHECKING:
@@ -30,6 +30,10 @@ REACH = 10.0  # IRW on each side over which side lobes are measured
 LEAST_REACH = 3.0  # IRW on each side that the image must hold
 MARGIN = 18  # pixels that the interpolator may need on each side
 STEPS = 32  # points of a cut per IRW
+FARTHEST = 12  # steps, three pixels of the widest spacing: the peak is nearer to the brightest pixel
+MOST_STEPS = 40  # along both axes, of one length
+FINER = 4  # of the last steps: the response is no parabola over the first
+STRAIGHT = 0.98  # cosine of the angle to a cut within which something lies "in range" or "in cross-range"
 NAMES = "range", "cross-range"
 
 
@@ -155,27 +159,56 @@ def measure(image: Image, near: ArrayLike | None = None) -> PointResponse | tupl
     return tuple(_measured(image, *peak_near(image, one)) for one in places)
 
 
+class _Outshone(Exception):
+    """A peak at `position`, m (3,), with a stronger lobe in the cut `name` along `axis`, of which an IRW is `irw` m."""
+
+    def __init__(self, position: np.ndarray, axis: np.ndarray, name: str, cut: _Cut) -> None:
+        self.position, self.axis, self.name, self.cut = position, axis, name, cut
+
+
 def _measured(image: Image, row: int, column: int) -> PointResponse:
-    """The response of the peak at a pixel."""
+    """The response of the peak at a pixel; ValueError names the strongest peak in whose response it lies."""
+    try:
+        return _response(image, row, column)
+    except _Outshone as exc:
+        weak = exc
+    at = brightest_around(image, weak.position + weak.cut.lobe * weak.axis, REACH * weak.cut.irw)
+    try:
+        source = _response(image, *at).position
+    except (ValueError, _Outshone):  # of the border, or of a grid that is too coarse: the pixel itself
+        source = place_of(image, *at)
+    away = source - weak.position
+    distance = float(np.linalg.norm(away))
+    direction = f" in {weak.name}" if abs(away @ weak.axis) > STRAIGHT * distance else ""
+    decibels = 20 * np.log10(np.abs(image.data[at]) / np.abs(image.data[row, column]))
+    raise ValueError(
+        f"the peak at {place(weak.position)} lies in the response of something {decibels:.1f} dB stronger, "
+        f"{distance:.3g} m away{direction}; measure that with near={place(source)}"
+    )
+
+
+def _response(image: Image, row: int, column: int) -> PointResponse:
+    """The response of the peak at a pixel, whatever is around it."""
     interpolated = ImageInterpolator.about(image, row, column)
-    axes = _axes(image, row, column)
-    step = min(interpolated.surface.spacing_at(row, column)) / 4
-    position = _ascend(interpolated, interpolated.origin, axes, step)
+    peak = _ascend(interpolated, interpolated.origin, _axes(interpolated, interpolated.origin))
+    interpolated, position = interpolated.touching(interpolated.origin if peak is None else peak)
+    axes = _axes(interpolated, position)
 
     def cut(axis: np.ndarray, name: str) -> _Cut:
         def values(t: np.ndarray) -> np.ndarray:
             return interpolated(position + t[:, None] * axis)
 
-        made = _cut(values, interpolated.room(position, axis), step, name)
+        made = _cut(values, interpolated.room(position, axis), interpolated.step, name)
         if made.pslr >= 0:
-            stronger = position + made.lobe * axis
-            raise ValueError(
-                f"the peak at {place(position)} lies in the response of something {made.pslr:.1f} dB "
-                f"stronger, {abs(made.lobe):.3g} m away in {name}; measure that with near={place(stronger)}"
-            )
+            raise _Outshone(position, axis, name, made)
         return made
 
     along, across = (cut(axis, name) for axis, name in zip(axes, NAMES, strict=True))
+    if peak is None:
+        raise ValueError(
+            f"the image has no smooth maximum about {place(position)}: give near= another point, or focus with a finer "
+            "grid and a smaller tolerance"
+        )
     position.flags.writeable = False
     return PointResponse(
         position=position,
@@ -203,11 +236,10 @@ def _check(image: Image) -> None:
             raise ValueError(f"image.{name} is None, and the carrier follows from it; set it to {what}")
 
 
-def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
-    """Unit vectors of range and cross-range on the surface, at a pixel."""
-    normal = surface_at(image, row, column).normal_at(row, column)
-    point = place_of(image, row, column)
-    ends = ends_at(image, point)
+def _axes(interpolated: ImageInterpolator, point: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Unit vectors of range and cross-range on the surface, at a position on it, m (3,)."""
+    normal = interpolated.surface.normal_at(*interpolated.surface.index(point))
+    ends = ends_at(interpolated.image, point)
     gradient = -np.sum([validation.direction("antenna less point", end - point) for end in ends], axis=0)
     along = gradient - (gradient @ normal) * normal
     length = np.linalg.norm(along)
@@ -216,24 +248,34 @@ def _axes(image: Image, row: int, column: int) -> tuple[np.ndarray, np.ndarray]:
     return along / length, np.cross(normal, along / length)
 
 
-def _ascend(
-    interpolated: ImageInterpolator, start: np.ndarray, axes: tuple[np.ndarray, ...], step: float
-) -> np.ndarray:
-    """Position of the maximum near `start`, m (3,), from parabolas through log |I| along each axis in turn."""
-    x = np.array(start)
-    for _ in range(40):
-        before = x
-        for axis in axes:
-            values = np.abs(interpolated(x + step * np.array([[-1], [0], [1]]) * axis))
-            left, middle, right = np.log(np.maximum(values, 1e-300))
-            bend = left - 2 * middle + right
-            move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
-            x = x + step * float(np.clip(move, -1, 1)) * axis
-        if np.linalg.norm(x - before) < 1e-5 * step:
-            return x
-        if np.linalg.norm(interpolated.surface.index(x) - interpolated.surface.index(start)) > 3:
-            break
-    raise ValueError(f"no peak was found at {place(start)}: the image rises in every direction from it")
+def _ascend(interpolated: ImageInterpolator, start: np.ndarray, axes: tuple[np.ndarray, ...]) -> np.ndarray | None:
+    """Position of the maximum near `start`, m (3,), from parabolas through log |I| along each axis in turn; None where
+    they find none."""
+    found = None
+    for step in (interpolated.step, interpolated.step / FINER):
+        x = np.array(start if found is None else found)
+        for _ in range(MOST_STEPS):
+            before = x
+            for axis in axes:
+                x = x + _move(interpolated, x, step * axis)
+            if np.linalg.norm(x - start) > FARTHEST * interpolated.step:
+                return found
+            if np.linalg.norm(x - before) < 1e-5 * step:
+                break
+        else:
+            return found
+        found = x
+    return found
+
+
+def _move(interpolated: ImageInterpolator, x: np.ndarray, step: np.ndarray) -> np.ndarray:
+    """From x to the maximum of the parabola through log |I| at x and a step, m (3,), on either side of it; at most a
+    step."""
+    values = np.abs(interpolated(x + np.array([[-1], [0], [1]]) * step))
+    left, middle, right = np.log(np.maximum(values, 1e-300))
+    bend = left - 2 * middle + right
+    move = (left - right) / (2 * bend) if bend < 0 else np.sign(right - left)
+    return np.asarray(np.clip(move, -1, 1) * step)
 
 
 @dataclass(frozen=True)

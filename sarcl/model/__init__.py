@@ -10,6 +10,7 @@ For other folders:
     image             Image: pixels on a grid
     image_grid        ImageGrid: positions of the pixels
     lazy_rows         rows of arrays in files: selected, stacked, scaled and sliced without reading them
+    listed_surface    positions between the points of a listed grid, and indices of positions
     orbit             Orbit: where a satellite is, Earth-fixed, and what it sees
     phase_history     PhaseHistory: echoes by row and frequency, with their geometry
     pointing          attitudes of tracks: spotlight, strip map, fixed
@@ -22,7 +23,6 @@ For other folders:
 For this folder alone:
 
     _costas           Costas permutations by the constructions of Welch and Golomb
-    _listed_surface   positions between the points of a listed grid, and indices of positions
     _orbit_arguments  arguments of Orbit: positions, spans of time
     _orbit_attitude   attitudes of antennas in orbit, and directions around a beam
     _time_samples     samples in time as samples over frequency, for PhaseHistory.from_time
@@ -37,6 +37,7 @@ __all__ = [
     "image",
     "image_grid",
     "lazy_rows",
+    "listed_surface",
     "orbit",
     "phase_history",
     "pointing",

@@ -13,7 +13,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from ..base import arguments, validation
 from ..base.boxes import box
-from . import _listed_surface
+from . import listed_surface
 
 if TYPE_CHECKING:
     from ..base.types import PathLike
@@ -374,7 +374,7 @@ class ImageGrid:
     def at(self, row: ArrayLike, column: ArrayLike) -> NDArray[np.float64]:
         """Position, m (..., 3), of (fractional) pixel indices of a plane, or of a grid that `zero_doppler` made."""
         if self.times is not None and self.listed is not None:
-            return _listed_surface.at(self.listed, np.asarray(row), np.asarray(column))
+            return listed_surface.at(self.listed, np.asarray(row), np.asarray(column))
         self._need_plane("at")
         assert self.center is not None and self.spacing is not None
         assert self.y_axis is not None and self.x_axis is not None
@@ -386,7 +386,7 @@ class ImageGrid:
     def index(self, position: ArrayLike) -> NDArray[np.float64]:
         """Fractional (row, column) (..., 2) of positions, m (..., 3), projected on a plane or a `zero_doppler` grid."""
         if self.times is not None and self.listed is not None:
-            return _listed_surface.index(self.listed, np.asarray(position))
+            return listed_surface.index(self.listed, np.asarray(position))
         self._need_plane("index")
         assert (
             self.center is not None and self.spacing is not None and self.y_axis is not None and self.x_axis is not None

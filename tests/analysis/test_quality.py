@@ -124,7 +124,12 @@ def test_figures_are_those_of_brute_force_on_the_exact_image(case, window):
     grid = seen.grid(place, turned=20, oversample=2)
     image = seen.image(grid, {place: 2.0})
     got = sarcl.measure(image)
-    want = brute_force(seen.value({place: 2.0}), place, _axes(image, 40, 40), seen.cells("ground"))
+    want = brute_force(
+        seen.value({place: 2.0}),
+        place,
+        _axes(ImageInterpolator.about(image, 40, 40), np.array(place)),
+        seen.cells("ground"),
+    )
     np.testing.assert_allclose(got.irw, want["irw"], rtol=2e-4)
     # an interpolation error of 2e-5 of the peak is 0.03 dB of a lobe at -44.5 dB, 0.001 dB at -13
     loose = 0.03 if window else 0.002

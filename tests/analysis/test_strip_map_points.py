@@ -89,6 +89,50 @@ def test_points_on_a_curved_surface_are_measured_on_the_plane_that_touches_it():
     assert seen.irw == pytest.approx(flat.irw, rel=0.02)
 
 
+@pytest.mark.parametrize("at", [(0.1, 0.5), (2.5, 0.43)])
+def test_a_point_between_the_pixels_of_a_curved_surface_is_found_on_the_surface(at):
+    x, y = np.meshgrid(np.arange(-64, 64) * 0.2, np.arange(-64, 64) * 0.2)
+    waves = sarcl.ImageGrid.points(np.stack([x, y, 0.3 * np.sin(x)], axis=-1))
+    point = np.array([*at, 0.3 * np.sin(at[0])])
+    seen = sarcl.measure(spotlight(waves, point))
+    assert np.linalg.norm(seen.position - point) < 2e-4  # interpolation error, 3e-4 of a cell
+    assert abs(np.angle(seen.peak)) < 0.05  # 2 k times that; the tangent at the nearest pixel is 14 mm off, 2.8 rad
+    slope = np.array([-0.3 * np.cos(at[0]), 0, 1])
+    plane = sarcl.ImageGrid.plane(center=point, shape=(128, 128), spacing=0.2, normal=slope)
+    assert seen.irw == pytest.approx(sarcl.measure(spotlight(plane, point)).irw, rel=0.01)
+
+
+@pytest.mark.parametrize("center", [(0, 0, 0), (0.1, 0.05, 0), (0.003, 0.002, 0)])
+@pytest.mark.parametrize("shape, spacing", [(64, 0.01), (128, 0.01), (256, 0.0025)])
+def test_an_image_within_the_main_lobe_is_said_to_be_too_small(shape, spacing, center):
+    image = spotlight(sarcl.ImageGrid.plane(center=center, shape=shape, spacing=spacing), (0, 0, 0))
+    with pytest.raises(ValueError, match="in range the image holds less than 3 IRW on each side of the peak; focus a"):
+        sarcl.measure(image)
+
+
+def test_a_point_is_found_where_a_pixel_is_a_fiftieth_of_its_width():
+    grid = sarcl.ImageGrid.plane(center=(0.1, 0.05, 0), shape=512, spacing=0.01)
+    seen = sarcl.measure(spotlight(grid, (0, 0, 0)))
+    coarse = sarcl.measure(spotlight(replace(grid, spacing=(0.1, 0.1)), (0, 0, 0)))
+    assert np.linalg.norm(seen.position) < 2e-3 and seen.irw == pytest.approx(coarse.irw, rel=2e-3)
+
+
+def test_of_a_side_lobe_the_main_lobe_is_named_however_many_lobes_lie_between():
+    image = spotlight(sarcl.ImageGrid.plane(shape=256, spacing=0.15), (0, 0, 0))
+    named = 0
+    for a, b in np.mgrid[-12:13:4, -12:13:4].reshape(2, -1).T:
+        near = np.array([np.sign(a) * (abs(a) + 0.45) * 0.624, np.sign(b) * (abs(b) + 0.45) * 0.644, 0])  # of cells
+        if a and b:
+            try:
+                sarcl.measure(image, near=near)
+            except ValueError as exc:
+                if "near=" in str(exc):
+                    there = np.fromstring(str(exc).partition("near=(")[2].rstrip(")"), sep=",")
+                    assert np.linalg.norm(there) < 0.01, f"{near}: {exc}"
+                    named += 1
+    assert named > 20
+
+
 def test_cuts_are_returned_and_drawn():
     image = spotlight(PLANE, PLANE.at(48, 48))
     seen = sarcl.measure(image)
