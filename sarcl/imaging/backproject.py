@@ -23,6 +23,7 @@ from ..model.phase_history import PhaseHistory
 from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
 from ..opencl.device import Device, DeviceChoice
+from ..opencl.failures import DeviceFailed
 from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
 from .choose_method import MethodChoice, choose
@@ -330,13 +331,18 @@ def _fill(
         most = max(total / max(n_rows, 1) / MOST_FILES, workers.least_pixels)
     clock.lap("files")
     made = []
-    with closing(workers.work(todo, most, chosen.unit, output_for, clock, on_progress)) as work:
-        for first, last, flat, missed in work:
-            made.append((first, last))
-            skipped += missed
-            if checkpoint:
-                checkpoint.keep(first, last, flat, missed)
-                clock.lap("files")
+    try:
+        with closing(workers.work(todo, most, chosen.unit, output_for, clock, on_progress)) as work:
+            for first, last, flat, missed in work:
+                made.append((first, last))
+                skipped += missed
+                if checkpoint:
+                    checkpoint.keep(first, last, flat, missed)
+                    clock.lap("files")
+    except DeviceFailed:
+        if checkpoint and output is not None:  # without an output every tile is written at once
+            checkpoint.rescue(output.flat)
+        raise
     if gaps(there + made, *bands):
         raise RuntimeError(f"bands {gaps(there + made, *bands)} were left out; please report this")
     return skipped, sum(b - a for a, b in there)

@@ -286,9 +286,11 @@ def test_workers_of_a_cluster_make_the_image_of_one_device(raw, client, tmp_path
 
 def test_every_worker_opens_its_device_in_its_own_process(raw, client):
     def contexts():
-        from sarcl.opencl.choose_device import _open
+        import gc
 
-        return os.getpid(), _open.cache_info().currsize
+        from sarcl.opencl.device import Device
+
+        return os.getpid(), sum(isinstance(one, Device) for one in gc.get_objects())
 
     sarcl.backproject(raw, GRID, cluster=client)
     found = client.run(contexts)
@@ -323,6 +325,34 @@ def test_a_worker_that_is_killed_is_replaced(raw, client):
 
     image = sarcl.backproject(raw, GRID, cluster=client, progress=kill)
     assert not victims and np.array_equal(image.data, wanted.data)
+
+
+@pytest.mark.parametrize("how", ["workers", "scheduler"])
+def test_where_all_workers_are_lost_what_was_finished_stays(raw, tmp_path, how):
+    distributed = pytest.importorskip("distributed")
+    import signal
+
+    wanted, out = sarcl.backproject(raw, GRID), tmp_path / "a.h5"
+    with (
+        distributed.LocalCluster(n_workers=2, threads_per_worker=1, processes=True, dashboard_address=None) as cluster,
+        distributed.Client(cluster) as client,
+    ):
+        victims = list(client.run(os.getpid).values())
+
+        def lose(stage, done, total):
+            while done and victims and how == "workers":
+                os.kill(victims.pop(), signal.SIGKILL)
+            if done and how == "scheduler":
+                cluster.close()
+
+        with pytest.raises(
+            DeviceFailed, match=r"workers of the cluster were lost.* \d+ of \d+ blocks.*with out= it continues"
+        ):
+            sarcl.backproject(raw, GRID, cluster=client, out=out, progress=lose)
+    assert list(tmp_path.glob("a.h5.parts/bands-*.tiles"))
+    image = sarcl.backproject(raw, GRID, out=out)
+    assert "from files" in image.report.plan and np.array_equal(image.data[...], wanted.data)
+    assert [p.name for p in tmp_path.iterdir()] == ["a.h5"]
 
 
 def test_errors_of_workers_reach_the_caller(raw, client):

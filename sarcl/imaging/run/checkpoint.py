@@ -39,7 +39,7 @@ class Checkpoint:
 
     True   always, also where the run ends in an exception
     None   from PERIOD seconds on, so that a killed run loses no finished tile; a run that ends in an exception before
-           WORTH seconds removes the files that it wrote
+           WORTH seconds removes the files that it wrote, unless its devices were lost
     False  never; the files of earlier runs are deleted by `begin`
 
     The constructor reads all samples where there are tile files, or resume is True. ValueError: the files belong to
@@ -53,7 +53,7 @@ class Checkpoint:
         self.folder, self.resume = folder_of(path), resume
         self.tiles: TileStore | None = None
         self.begun = time.monotonic()
-        self.fresh = True
+        self.fresh, self._are_lost = True, False
         self._waiting: list[tuple[int, int, Skipped]] = []
         self._row_bytes = np.dtype(chosen.dtype).itemsize * math.prod(chosen.tiling.row_shape)
         if resume is not False and (resume or self.folder.exists()):
@@ -92,8 +92,18 @@ class Checkpoint:
         if self.resume is False:
             return
         self._waiting.append((first, last, skipped))
-        if self.tiles is None and time.monotonic() - self.begun < PERIOD:
+        if self.tiles is not None or time.monotonic() - self.begun >= PERIOD:
+            self._write(flat)
+
+    def rescue(self, flat: Any) -> None:
+        """The devices are lost: finished tiles, in `flat`, stay however short the run was."""
+        if self.resume is False:
             return
+        self._are_lost = True
+        if self._waiting:
+            self._write(flat)
+
+    def _write(self, flat: Any) -> None:
         try:
             tiles = self.tiles or self._open()
             for a, b, n in self._waiting:
@@ -120,7 +130,7 @@ class Checkpoint:
     def __exit__(self, kind: Any, *_: Any) -> None:
         if kind is None or self.tiles is None:
             return
-        if self.resume or not self.fresh or time.monotonic() - self.begun >= WORTH:
+        if self.resume or self._are_lost or not self.fresh or time.monotonic() - self.begun >= WORTH:
             log.warning("finished tiles are kept in %s; the same call continues from them", self.folder)
         else:
             self.tiles.clear()

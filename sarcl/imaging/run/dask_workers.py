@@ -11,6 +11,7 @@ import os
 import secrets
 import threading
 from collections.abc import Callable, Generator
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -24,6 +25,7 @@ from ...opencl import memory_budget
 from ...opencl.choose_device import open_device, split_choice
 from ...opencl.device import Device
 from ...opencl.device_list import DeviceInfo
+from ...opencl.failures import DeviceFailed
 from ..choose_method import MethodChoice
 from ..engine import Engine, Skipped
 from ..focusing_task import FocusingTask
@@ -68,6 +70,7 @@ class DaskWorkers:
         """See WorkerPool; progress is reported block by block."""
         from distributed import as_completed
 
+        lost = _losses()
         pixels = sum(self.tiling.count(*run) for run in todo)
         if self.size > 1:
             most = min(most, pixels / (BLOCKS_EACH * self.size))
@@ -75,11 +78,12 @@ class DaskWorkers:
         on_progress(0)
         if not blocks:
             return
-        worker_task = self.client.scatter(self.worker_task, broadcast=True, hash=False)
-        futures = self.client.map(_make, blocks, worker_task=worker_task, places=self.places, pure=False)
-        run_of = dict(zip((f.key for f in futures), blocks, strict=True))
-        pairs = 0
+        futures: list[Any] = []
+        pairs = done = 0
         try:
+            worker_task = self.client.scatter(self.worker_task, broadcast=True, hash=False)
+            futures = self.client.map(_make, blocks, worker_task=worker_task, places=self.places, pure=False)
+            run_of = dict(zip((f.key for f in futures), blocks, strict=True))
             for future in as_completed(futures):
                 first, last = run_of[future.key]
                 values, skipped, name = future.result()
@@ -88,11 +92,29 @@ class DaskWorkers:
                 flat = output_for(first, last)
                 flat[self.tiling.extent(first, last)] = values
                 clock.lap("backproject")
-                pairs += self.n_rows * self.tiling.count(first, last)
+                pairs, done = pairs + self.n_rows * self.tiling.count(first, last), done + 1
                 on_progress(pairs)
                 yield first, last, flat, skipped
+        except lost as exc:
+            raise DeviceFailed(
+                f"the workers of the cluster were lost, with {done} of {len(blocks)} blocks finished "
+                f"({type(exc).__name__}); look into their logs for memory that ran out, start workers, and repeat the "
+                "call: with out= it continues from the finished blocks, which are kept but with resume=False"
+            ) from exc
         finally:
-            self.client.cancel(futures)
+            with suppress(*lost):
+                self.client.cancel(futures)
+
+
+def _losses() -> tuple[type[BaseException], ...]:
+    """Exceptions of dask where workers are lost and none can repeat their blocks, or where the scheduler is lost."""
+    from concurrent.futures import CancelledError
+
+    from distributed import KilledWorker
+    from distributed.client import ClosedClientError
+    from distributed.comm import CommClosedError
+
+    return CancelledError, KilledWorker, CommClosedError, ClosedClientError
 
 
 def device_class(client: Any, device: Any) -> DeviceClass:
