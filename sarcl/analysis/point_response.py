@@ -167,16 +167,13 @@ class _Outshone(Exception):
 
 
 def _measured(image: Image, row: int, column: int) -> PointResponse:
-    """The response of the peak at a pixel; ValueError names the strongest peak in whose response it lies."""
+    """The response of the peak at a pixel; ValueError names the pixel of the strongest one in whose response it lies."""
     try:
         return _response(image, row, column)
     except _Outshone as exc:
         weak = exc
     at = brightest_around(image, weak.position + weak.cut.lobe * weak.axis, REACH * weak.cut.irw)
-    try:
-        source = _response(image, *at).position
-    except (ValueError, _Outshone):  # of the border, or of a grid that is too coarse: the pixel itself
-        source = place_of(image, *at)
+    source = place_of(image, *at)
     away = source - weak.position
     distance = float(np.linalg.norm(away))
     direction = f" in {weak.name}" if abs(away @ weak.axis) > STRAIGHT * distance else ""

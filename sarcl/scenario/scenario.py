@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-import re
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -287,17 +285,12 @@ def load(path: PathLike) -> Scenario:
 
 def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scenario:
     """A scenario from TOML text; messages name the file `name`. Raises as `load` does."""
-    from ..io.toml import locate
+    from ..io import toml
 
-    try:
-        if not isinstance(text, str):
-            raise TypeError(f"text is a {type(text).__name__}; give the text of a scenario; scenario.load reads a file")
-        tables = tomllib.loads(text)
-    except tomllib.TOMLDecodeError as exc:
-        raise ValueError(_syntax(name, text, str(exc))) from None
-    except RecursionError:
-        raise _too_deep(name) from None
-    where = Where(name, locate(text.replace("\r\n", "\n")))
+    if not isinstance(text, str):
+        raise TypeError(f"text is a {type(text).__name__}; give the text of a scenario; scenario.load reads a file")
+    tables = toml.tables(text, name)
+    where = Where(name, toml.locate(text.replace("\r\n", "\n")))
     for section, value in tables.items():
         if section not in _schema.SECTIONS:
             what = "table" if isinstance(value, (dict, list)) else "key"
@@ -305,17 +298,4 @@ def loads(text: str, *, name: str = "scenario", folder: PathLike = ".") -> Scena
     try:
         return Scenario(**tables, folder=folder, where=where)
     except RecursionError:
-        raise _too_deep(name) from None
-
-
-def _too_deep(name: str) -> ValueError:
-    return ValueError(f"{name}: arrays or tables lie hundreds deep in each other; write them flat")
-
-
-def _syntax(name: str, text: str, message: str) -> str:
-    """tomllib's message with file and line in front, the form that editors recognise."""
-    match = re.search(r" \(at (?:line (\d+), column (\d+)|end of document)\)", message)
-    line = int(match[1]) if match and match[1] else text.rstrip().count("\n") + 1
-    column = f" (column {match[2]})" if match and match[2] else " (at the end)" if match else ""
-    said = message[: match.start()] if match else message
-    return f"{name}:{line}: {said}{column}; this is not valid TOML"
+        raise toml.too_deep(name) from None

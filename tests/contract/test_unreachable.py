@@ -373,6 +373,7 @@ MAY_CATCH = {
     "io/_ply.py": "words of text that are no numbers",
     "io/mesh.py": "trimesh's readers of damaged files",
     "io/_other_files.py": "paths that are no names of files",
+    "io/toml.py": "what Python says of an integer of thousands of digits",
     "io/xml/parser.py": "XML that cannot be read",
     "io/sarcl_hdf5.py": "h5py's reader of damaged files",
     "fullwave/bodies/materials.py": "the number of the part is put before a message, which is raised again",

@@ -2,14 +2,13 @@
 
 from __future__ import annotations
 
-import tomllib
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
 from ...base import text, validation
-from ...io import input_paths
+from ...io import input_paths, toml
 from ._sweep import KEYS as SWEPT
 from ._sweep import cases
 from .case import Case
@@ -27,11 +26,9 @@ def load(path: Any) -> tuple[str, list[Case]]:
     """
     path = Path(path)
     try:
-        tables = tomllib.loads(input_paths.contents(path, "experiment").decode("utf-8"))
-    except (tomllib.TOMLDecodeError, UnicodeDecodeError) as exc:
+        tables = toml.tables(input_paths.contents(path, "experiment").decode("utf-8"), str(path))
+    except UnicodeDecodeError as exc:
         raise ValueError(f"{path}: {exc}; this is not valid TOML") from None
-    except RecursionError:
-        raise ValueError(f"{path}: arrays or tables lie hundreds deep in each other; write them flat") from None
     for name in tables:
         if name not in TABLES:
             raise ValueError(f"{path}: {text.unknown(name, TABLES, 'table')}")
