@@ -167,7 +167,7 @@ class _Outshone(Exception):
 
 
 def _measured(image: Image, row: int, column: int) -> PointResponse:
-    """The response of the peak at a pixel; ValueError names the pixel of the strongest one in whose response it lies."""
+    """The response of the peak at a pixel; ValueError names the strongest pixel in whose response it lies."""
     try:
         return _response(image, row, column)
     except _Outshone as exc:

@@ -7,13 +7,14 @@ from __future__ import annotations
 
 import argparse
 import logging
+import os
 import sys
 import warnings
 from collections.abc import Callable, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from ..io import formats
+from ..io import formats, input_paths
 from ._job import Job, Outputs
 from ._pages import bench, fda, papers
 
@@ -134,6 +135,8 @@ def focus(args: argparse.Namespace, job: Job) -> int:
     from ..scenario.scenario import load
     from ._methods import Method, check_default_grid, check_pieces, heights
 
+    for path in filter(os.path.isdir, args.raw):  # before an output is named after it
+        input_paths.check(Path(path), folder=f"give the files in it, as in {Path(path) / '*'}")
     outputs = args.output or [f"{Path(args.raw[0]).stem}.png"]
     method = Method.of(args)
     check_pieces(args, outputs)

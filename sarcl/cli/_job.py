@@ -96,7 +96,7 @@ class Job:
                 raise ValueError(f"output {path!r} is also read by this command; choose another name")
             if formats.named(path, among) is None:
                 wanted = formats.suggested(among)
-                raise ValueError(f"output {path!r} ends in {Path(path).suffix!r}; choose a name that ends in {wanted}")
+                raise ValueError(f"output {path!r} {formats.ending_of(path)}; choose a name that ends in {wanted}")
             self.expect(path, n_bytes)
         if len({Path(p).resolve() for p in paths}) < len(paths):
             raise ValueError(f"outputs {', '.join(paths)} name one file twice")

@@ -14,6 +14,7 @@ from .focusing_task import FocusingTask
 PIXELS, ROWS = 4096, 512  # pixels and rows that are tried, at most; fewer pixels than that: all of them
 FIRST = 32  # rows that every pixel is tried with; the others see only the pixels that are left
 WORTH_SAYING = 0.01  # share of the pixels from which a warning is given: corners of a square grid are cut off often
+NEAR_ZERO = 0.25  # share of the window at negative ranges: more comes of a reference near 0; records have none
 
 
 @dataclass(frozen=True)
@@ -48,15 +49,17 @@ class UnseenPixels:
         if self.share < WORTH_SAYING:
             return ""
         (near, far), (low, high) = self.ranges, self.window
+        is_near_zero = low < -NEAR_ZERO * (high - low)
+        middle = (
+            "make the data with a reference amid the ranges (records in time by PhaseHistory.from_time, dechirped ones "
+            "with scene_range=)"
+        )
         if not wraps:
-            cure = "Move the grid into the window"
-            if low < 0:
-                cure += ", or make the data with PhaseHistory.from_time, whose reference is the middle of the record"
-        elif low < 0:
+            cure = "Move the grid into the window" + (f", or {middle}" if is_near_zero else "")
+        elif is_near_zero:
             cure = (
                 "That window begins at negative ranges, because the reference lies near range 0: pass wrap=True for "
-                "data that start at range 0, or make them with PhaseHistory.from_time, whose reference is the middle "
-                "of the record"
+                f"data that start at range 0, or {middle}"
             )
         else:
             cure = "Move the grid into the window, or pass wrap=True for data that repeat beyond it"

@@ -114,13 +114,19 @@ def named(path: Any, among: list[Format]) -> Format | None:
     return next((f for f in among if ending in f.endings), None)
 
 
+def ending_of(path: Any) -> str:
+    """How the name of a path ends, for messages: that it is a folder, its suffix, or that it has none."""
+    suffix = Path(path).suffix
+    return "is a folder" if Path(path).is_dir() else f"ends in {suffix!r}" if suffix else "has no ending"
+
+
 def writer_functions(path: Any, kind: Written) -> Any:
     """Functions of the format in which `path` is written, by its suffix; ValueError where no format is written so."""
     among, path = writing(kind), arguments.path("path", path)
     form = named(path, among)
     if form is None:
-        ending, wanted = Path(path).suffix, suggested(among, "'")
-        raise ValueError(f"{kind} path {str(path)!r} ends in {ending!r}; sarcl writes a {kind} to {wanted}")
+        wanted = suggested(among, "'")
+        raise ValueError(f"{kind} path {str(path)!r} {ending_of(path)}; sarcl writes a {kind} to {wanted}")
     return form.functions
 
 

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
 import numpy as np
@@ -261,8 +260,8 @@ class Image(np.lib.mixins.NDArrayOperatorsMixin):
         among = formats.writing("picture", "image")
         form = formats.named(arguments.path("path", path), among)
         if form is None:
-            ending, wanted = Path(path).suffix.lower(), formats.suggested(among, "'")
-            raise ValueError(f"image path {str(path)!r} ends in {ending!r}; choose {wanted}")
+            wanted = formats.suggested(among, "'")
+            raise ValueError(f"image path {str(path)!r} {formats.ending_of(path)}; choose {wanted}")
         if form.is_picture:
             from ..figures.decibels import write_png
 

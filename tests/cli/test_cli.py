@@ -195,6 +195,17 @@ def test_outputs_of_unknown_kind_or_named_twice_are_refused(raw_file, capsys, no
     assert "name one file twice" in refused(capsys, "focus", raw_file, "-o", "a.png", "-o", "./a.png")
 
 
+def test_folders_and_names_without_an_ending_are_called_so(raw_file, here, capsys, no_work):
+    (here / "folder").mkdir()
+    for folder in ("folder", ".", "folder/.."):
+        said = refused(capsys, "focus", folder)
+        assert f"'{folder}' is a folder; give the files in it, as in" in said and "ends in" not in said
+    assert "'folder' is a folder; choose a name that ends in .png or" in refused(
+        capsys, "focus", raw_file, "-o", "folder"
+    )
+    assert "'image' has no ending; choose a name" in refused(capsys, "focus", raw_file, "-o", "image")
+
+
 def test_an_output_that_would_replace_an_input_or_another_output_is_refused(raw_file, here, capsys, no_work):
     before = Path(raw_file).read_bytes()
     assert "is also read by this command" in refused(capsys, "focus", raw_file, "-o", raw_file)

@@ -54,6 +54,23 @@ def test_a_grid_beside_the_window_says_move_it():
     assert "pixels outside every range window" not in image.report.plan
 
 
+def test_of_records_in_time_nobody_is_told_to_make_them_so():
+    """A record that starts at range 0 has a window from -c/(4 rate) on; dechirped ones are told of scene_range=."""
+    tx = rail().tx
+    far = sarcl.ImageGrid.plane(center=(60, 0, 0), shape=(8, 60), spacing=0.5)
+    given = {"rate": 150e6, "start": 0.0, "carrier": 9e9, "tx": tx}
+    record = sarcl.PhaseHistory.from_time(np.ones((24, 64), np.complex64), **given)
+    assert record.reference_range[0] < SPEED_OF_LIGHT / (4 * record.frequency_step[0])
+    with pytest.warns(sarcl.SarclWarning, match="Move the grid into the window, or pass wrap=True") as caught:
+        sarcl.backproject(record, far)
+    assert "from_time" not in str(caught[0].message)
+    beats = {**given, "kind": "dechirped", "sweep_rate": 2e14, "beat": "positive"}
+    with pytest.warns(
+        sarcl.SarclWarning, match=r"pass wrap=True for data that start.*dechirped ones with scene_range="
+    ):
+        sarcl.backproject(sarcl.PhaseHistory.from_time(np.ones((24, 64), np.complex64), **beats), far)
+
+
 def test_less_than_one_percent_is_counted_without_a_warning():
     raw = rail()
     grid = sarcl.ImageGrid.plane(center=(7, 0, 0), shape=(10, 32), spacing=0.5)  # the last column passes the window

@@ -243,7 +243,7 @@ BAD = {
     ),
     "floor not finite": (lambda: image().show(floor_db=np.nan), "floor_db is nan"),
     "unknown suffix": (lambda: image().save("a.bmp"), r"image path 'a.bmp' ends in '.bmp'; choose '.png' or '.h5'"),
-    "no suffix": (lambda: image().save("picture"), "image path 'picture' ends in ''; choose"),
+    "no suffix": (lambda: image().save("picture"), "image path 'picture' has no ending; choose"),
 }
 
 
