@@ -14,7 +14,7 @@ from typing import Any
 
 import numpy as np
 
-from . import _bright_points, _phase_gradient, _phase_smoothing
+from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing
 from ._aperture_view import NO_LAG, WINDOW, ApertureView, Errors
 from ._constant_echo import without_constant_echo
 from ._search import GROWTH
@@ -26,8 +26,6 @@ AGREE = 0.4  # least closeness of two phases at which they agree; that of noise 
 # rather than risked: neighbouring points of the scene, which both halves of the band show, can gain as much by chance
 GAIN = 1.05
 KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
-BRIGHT = 10  # points of the uncorrected image that must not be lost
-FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
 LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
 SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
 PASSES = 3  # of the estimate from given places
@@ -170,20 +168,19 @@ def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
 def _none_lost(view: ApertureView, errors: Errors) -> bool:
     """Whether no bright point of the image without any correction is lost in the corrected one.
 
-    Where no target is seen by all pulses, most may become sharper and others blurred.
+    Where no target is seen by all pulses, most may become sharper and others blurred. The bright points of a blurred
+    image lie beside the targets: as far as the phase moves a place by its slope, which is more metres for a far place.
     """
     zero = np.zeros(view.n)
-    powers = view.power((zero, zero)), view.power(errors)
-    (old, was), (new, now) = (_bright_points.pixels_and_levels(p, view.grid, _bright_points.CANDIDATES) for p in powers)
-    bright = _bright_points.brightest(view.raw[:: view.channels], powers[0], view.grid, 8.0, BRIGHT)
+    power = view.power(errors)
+    new, now = _bright_points.pixels_and_levels(power, view.grid, _bright_points.CANDIDATES)
     # a phase that changes by so much per pulse moves a point by so much across range, unless it soon turns back
     span = max(1, view.n // SPANS)
     slope = np.percentile(np.abs(errors[0][span:] - errors[0][:-span]), 90) / span
-    turn = slope * view.n / max(float(np.ptp(view.shift_phase[:, 0])), 1e-300)
-    for place in bright:
-        level = was[np.linalg.norm(old - place, axis=1).argmin()]
-        near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + turn
-        if level >= FAINT * was[0] and now[near].max(initial=0.0) < LOST * level:
+    for place, level in zip(*_displacement.bright_places(view, view.power((zero, zero))), strict=True):
+        per_metre = np.ptp(_displacement.shift_phase(view, place, np.ones(view.n))) / view.n
+        near = np.linalg.norm(new - place, axis=1) <= 2 * view.cell + slope / max(per_metre, 1e-300)
+        if now[near].max(initial=0.0) < LOST * level:
             log.debug("the point at %s, bright before, is lost", place)
             return False
     return True
