@@ -37,7 +37,7 @@ gpu-static:  ## compile every kernel for GPUs that are not here, and compare wit
 bench: ready  ## run time against the error achieved; peers with ARGS='--peer-python PATH'
 	@.venv/bin/sarcl bench backproject $(ARGS)
 
-autofocus-trial: ready  ## autofocus on 200 random correct scenes and 200 with errors; bench/results/trials/autofocus.json
+autofocus-trial: ready  ## autofocus on 200 random correct scenes, 200 with errors, 200 arms; bench/results/trials/autofocus.json
 	@.venv/bin/python bench/autofocus_trial.py --json bench/results/trials/autofocus.json $(ARGS)
 
 results: ready  ## docs/guide/results.md from bench/results/*.json

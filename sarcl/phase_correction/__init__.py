@@ -15,6 +15,7 @@ For this folder alone:
     _phase_gradient    phase of each pulse from its contributions
     _phase_smoothing   phase over the aperture: smoothed, unwrapped
     _search            search for the phases and ranges that maximise the sharpness of bright points
+    _smooth_search     the same for phases of few cosines
 """
 
 __all__ = ["autofocus"]

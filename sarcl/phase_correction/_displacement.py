@@ -1,21 +1,51 @@
-"""Displacements: by how much a phase moves bright places across range.
+"""Displacements: by how much a phase moves bright places across range, each by the pulses that see it.
 
 A scatterer at x that is moved by d u, u a unit vector, changes the phase of pulse p by -(2 pi f/c) d g_p.u, where g_p
 is the sum of the unit vectors from both antennas to x. A phase that is linear in g_p.u over the pulses that see x is
-therefore a displacement of x across range, and nothing in the image of x alone shows it.
+therefore a displacement of x across range, and nothing in the image of x alone shows it. What shows it is the next
+place, as far as the same pulses see both.
 """
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+
 import numpy as np
+from numpy.typing import NDArray
 
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from . import _bright_points
-from ._aperture_view import ApertureView
+from ._aperture_view import NO_LAG, ApertureView, Errors
 
 BRIGHT = 10  # brightest points of an image
 FAINT = 0.1  # of the power of the brightest: fainter points may be side lobes
+SEEN = 0.25  # of a place's largest amplitude: pulses with less at either end of the aperture do not see the place
+AVERAGED = 8  # parts of the aperture over which amplitudes are averaged: noise and neighbours cancel
+# share of the pulses that could see a place: with more, all of them do. Echoes of neighbours, a few Doppler cells
+# beside the place, hide as much of it at the ends of the aperture
+MOST = 0.75
+
+
+@dataclass(frozen=True, eq=False)
+class Displacements:
+    """What a phase moves.
+
+    places  m (k, 3), brightest first
+    along   m (k,), displacements of the places across range, positive towards where the antennas move
+    cells   m (k,), resolution of each place across range, by the pulses that see it
+    common  share of their pulses that two places have in common, at the weakest link of the strongest chain of all
+    """
+
+    places: NDArray[np.float64]
+    along: NDArray[np.float64]
+    cells: NDArray[np.float64]
+    common: float
+
+    @property
+    def apart(self) -> float:
+        """Largest displacement of two places against one another, resolution cells."""
+        return float(np.ptp(self.along / self.cells)) if len(self.along) else 0.0
 
 
 def bright_places(view: ApertureView, power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -42,3 +72,47 @@ def shift_phase(view: ApertureView, place: np.ndarray, weight: np.ndarray) -> np
     # the place lies ahead: where an antenna moves forwards, the direction to the place turns backwards
     forwards = -np.sign(weight @ (turn * (np.arange(view.n) - weight @ np.arange(view.n) / weight.sum())))
     return np.asarray(2 * np.pi * view.frequency / SPEED_OF_LIGHT * turn * (forwards or 1.0))
+
+
+def displacements(view: ApertureView, errors: Errors, power: np.ndarray) -> Displacements:
+    """Displacements of the brightest points of the corrected image, whose power is given, by the correction."""
+    places = bright_places(view, power)[0]
+    seen = _seen(view, errors, places)
+    moved, cells = np.zeros(len(places)), np.empty(len(places))
+    for k, place in enumerate(places):
+        along = shift_phase(view, place, seen[:, k])
+        centered = (along - seen[:, k] @ along / seen[:, k].sum()) * seen[:, k]
+        moved[k] = centered @ errors[0] / max(centered @ centered, 1e-300)
+        cells[k] = 2 * np.pi / max(float(np.ptp(along[seen[:, k] > 0])), 1e-300)
+    return Displacements(places, moved, cells, _weakest_link(seen))
+
+
+def _seen(view: ApertureView, errors: Errors, places: np.ndarray) -> np.ndarray:
+    """1.0 where a pulse sees a place, else 0.0 (n, k): from the first to the last whose echo fits the image."""
+    import scipy.ndimage
+
+    v = view.contributions(errors, places, NO_LAG, taper=True)[:, :, 0]
+    # the part of every contribution in phase with the sum of all of them
+    level = (v * np.exp(-1j * np.angle(v.sum(axis=0)))).real.reshape(view.n, view.channels, -1).sum(axis=1)
+    size = max(view.n // AVERAGED, 3)
+    level = scipy.ndimage.uniform_filter1d(level.astype(np.float64), size, axis=0, mode="nearest")
+    could = (v != 0).reshape(view.n, view.channels, -1).any(axis=1)
+    seen = could & (level >= SEEN * level.max(axis=0))
+    seen = np.logical_or.accumulate(seen, axis=0) & np.logical_or.accumulate(seen[::-1], axis=0)[::-1]
+    return np.where(seen.sum(axis=0) >= MOST * could.sum(axis=0), could, seen).astype(np.float64)
+
+
+def _weakest_link(seen: np.ndarray) -> float:
+    """Least share of their pulses that two neighbours have in common, of the chain of all places where it is largest.
+
+    seen  (n, k), 1.0 where a pulse sees a place. The chain is grown from the first place (Prim's spanning tree)
+    """
+    pulses = seen.sum(axis=0)
+    share = seen.T @ seen / np.minimum(pulses[:, None], pulses)
+    chain, weakest = [0], 1.0
+    while len(chain) < len(pulses):
+        nearest = share[chain].max(axis=0)
+        nearest[chain] = -1.0
+        weakest = min(weakest, float(nearest.max()))
+        chain.append(int(nearest.argmax()))
+    return weakest

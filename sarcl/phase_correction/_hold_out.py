@@ -14,7 +14,8 @@ from typing import Any
 
 import numpy as np
 
-from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing
+from ..base.validation import sealed
+from . import _bright_points, _displacement, _phase_gradient, _phase_smoothing, _smooth_search
 from ._aperture_view import NO_LAG, WINDOW, ApertureView, Errors
 from ._constant_echo import without_constant_echo
 from ._search import GROWTH
@@ -27,6 +28,9 @@ AGREE = 0.4  # least closeness of two phases at which they agree; that of noise 
 GAIN = 1.05
 KEPT = 0.95  # least change in sharpness, which is that of noise too, of the echoes without those of constant delay
 LOST = 0.5  # of its power, less than which a point must not keep: pixels beside its maximum show about as much
+APART = 0.5  # resolution cells: what moves bright places against one another by more must be known for certain
+SURE = 0.98  # agreement of the halves of the band from which on it is; 0.95 to 0.98 has been wrong by 1.4 cells
+COMMON = 0.35  # share of their pulses that neighbouring bright places must have in common for it
 SPANS = 16  # of the aperture: a slope of the phase over one of them moves points, one over a few pulses blurs them
 PASSES = 3  # of the estimate from given places
 IN_FOCUS = (
@@ -46,6 +50,13 @@ LOST_POINT = (
     "a point that is bright now would be lost: no target is seen by all pulses; give beam=, a grid over targets that "
     "neighbouring pulses see, and pixels no coarser than the resolution"
 )
+MOVED_APART = (
+    "the correction would move bright places by {:.2g} m against one another, {:.1f} resolution cells, and {}: "
+    "it may distort the scene. Check the antenna positions (the radius of an arm) first; give beam=, "
+    "or a grid over places that the same pulses see"
+)
+UNSURE = "the halves of the band agree to {:.2f} only, where {} is wanted"
+UNLINKED = "of the pulses that see one of them too few see the next: {:.0%}, where {:.0%} is wanted"
 CLOSER = 1.05  # preference for the phase from all echoes, which is the most exact, unless its smoothing went wrong
 BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses
 
@@ -100,57 +111,103 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
 
     gains = np.array([ladder_of_gains(*test) for test in tests]).T
     best = int(gains[:, :2].prod(axis=1).argmax())
-    if agreement <= least and ladder[best] < n:
-        agreement, least = _smooth_agreement(bands, ladder[best], closeness)
+    modes, gain = ladder[best], gains[best, :2]
+    agree = agreement > least
+    curves = [_phase_smoothing.smooth(phase, modes) for phase in bands]
+    if modes < n:
+        agreement = closeness(*curves)
+        agree |= agreement > _least_of_curves(curves, modes, closeness)
+    if not agree:
+        other = _searched_as_curves(view, values, plain)
+        close = closeness(*other[1])
+        if close > _least_of_curves(other[1], other[0], closeness):
+            agree, agreement = True, close
+            modes, curves, gain = other
     # phases from some of the places have more noise, and ask for more smoothing
     apart = gains[:, 2:].min(axis=1).max() if len(tests) > 2 else np.inf
     log.debug("gains of %s cosines: %s", ladder, gains.round(3).tolist())
 
     # the result must sharpen the whole band too: a phase with an error of unwrapping would not
-    candidates = [errors[0], *bands]
-    smoothed = [view.shift_removed((_phase_smoothing.smooth(c, ladder[best]), shift)) for c in candidates]
+    candidates = [_phase_smoothing.smooth(errors[0], modes), *curves]
+    smoothed = [view.shift_removed((curve, shift)) for curve in candidates]
     both, old = np.concatenate(values, axis=1), np.concatenate(plain, axis=1)
     levels = np.array([_phase_gradient.sharpness(both, e[0], view.window) for e in smoothed])
     chosen = int((levels * (CLOSER, 1, 1)).argmax())
     was = _phase_gradient.sharpness(old, zero, view.window)
-    lowest = min(*gains[best, :2], apart, levels[chosen] / max(was, 1e-300))
+    lowest = min(*gain, apart, levels[chosen] / max(was, 1e-300))
     final = smoothed[chosen]
+    power = view.power(final)
+    displaced = _displacement.displacements(view, final, power)
     reason = ""
-    if agreement <= least:
+    if not agree:
         reason = DISAGREE.format(agreement)
     elif lowest > GAIN and not _sharpens_others(view, final):
         reason = BLURRED
-    elif lowest > GAIN and not _none_lost(view, final):
+    elif lowest > GAIN and not _none_lost(view, final, power):
         reason = LOST_POINT
-    elif gains[best, :2].min() > GAIN >= apart:
+    elif gain.min() > GAIN >= apart:
         reason = BLURRED
     elif lowest <= GAIN:
         reason = IN_FOCUS
+    else:
+        reason = _apart(displaced, agreement)
     return final, {
         "found": not reason,
-        "gain": float(np.sqrt(gains[best, :2].prod())),
+        "gain": float(np.sqrt(gain.prod())),
         "agreement": agreement,
         "spread": float(np.std(np.angle(difference * difference.sum().conj())) / 2),
-        "modes": ladder[best],
+        "modes": modes,
         "reason": reason,
+        "places": sealed(displaced.places),
+        "displacements": sealed(displaced.along),
     }
 
 
-def _smooth_agreement(
-    bands: list[np.ndarray], modes: int, closeness: Callable[[np.ndarray, np.ndarray], float]
-) -> tuple[float, float]:
-    """Closeness of the phases of both halves of the band, smoothed to `modes` cosines, and where they begin to agree.
+def _searched_as_curves(
+    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray]
+) -> tuple[int, list[np.ndarray], np.ndarray]:
+    """Phases of few cosines of both halves of the band, searched as such: their number, the phases, and their gains.
+
+    values, plain  contributions from the halves, with the range errors removed and without any correction
+    """
+    zero = np.zeros(view.n)
+    was = [max(_phase_gradient.sharpness(before, zero, view.window), 1e-300) for before in plain]
+    pairs = list(zip(*(_smooth_search.curves(v, view.window) for v in values), strict=True))
+
+    def gains(pair: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
+        moved = [_phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[0] for a, b in (pair, pair[::-1])]
+        sharp = [_phase_gradient.sharpness(values[1 - h], moved[h], view.window) / was[1 - h] for h in (0, 1)]
+        return np.array(sharp)
+
+    levels = [gains(pair) for pair in pairs]
+    best = int(np.argmax([level.prod() for level in levels]))
+    return _smooth_search.MODES[best], list(pairs[best]), levels[best]
+
+
+def _least_of_curves(
+    curves: list[np.ndarray], modes: int, closeness: Callable[[np.ndarray, np.ndarray], float]
+) -> float:
+    """Closeness from which on the phases of both halves of the band, smoothed to `modes` cosines, agree.
 
     With few points in a range cell the phases of single pulses, each free, focus them to fewer points than there are:
     two such phases have no more than the smooth curve in common on which they lie. Curves of few cosines are close by
     chance far more often, and curves near zero are close whatever they are: those must be closer to each other than to
     zero.
     """
-    first, second = (_phase_smoothing.smooth(phase, modes) for phase in bands)
-    zero = np.zeros(len(first))
-    return closeness(first, second), max(
-        AGREE, _phase_smoothing.chance(modes), closeness(first, zero), closeness(second, zero)
-    )
+    zero = np.zeros(len(curves[0]))
+    return max(AGREE, _phase_smoothing.chance(modes), *(closeness(curve, zero) for curve in curves))
+
+
+def _apart(moved: _displacement.Displacements, agreement: float) -> str:
+    """Why a correction that moves bright places against one another is refused; empty where it is not.
+
+    Each place alone is as sharp wherever it lies. That two of them belong where the phase puts them is known as far as
+    the same pulses see both, and as far as the halves of the band say the same.
+    """
+    if moved.apart <= APART or (agreement >= SURE and moved.common >= COMMON):
+        return ""
+    why = UNSURE.format(agreement, SURE) if agreement < SURE else UNLINKED.format(moved.common, COMMON)
+    return MOVED_APART.format(np.ptp(moved.along), moved.apart, why)
 
 
 def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
@@ -165,14 +222,15 @@ def _sharpens_others(view: ApertureView, errors: Errors) -> bool:
     return gain >= KEPT
 
 
-def _none_lost(view: ApertureView, errors: Errors) -> bool:
+def _none_lost(view: ApertureView, errors: Errors, power: np.ndarray) -> bool:
     """Whether no bright point of the image without any correction is lost in the corrected one.
+
+    power  of the corrected image
 
     Where no target is seen by all pulses, most may become sharper and others blurred. The bright points of a blurred
     image lie beside the targets: as far as the phase moves a place by its slope, which is more metres for a far place.
     """
     zero = np.zeros(view.n)
-    power = view.power(errors)
     new, now = _bright_points.pixels_and_levels(power, view.grid, _bright_points.CANDIDATES)
     # a phase that changes by so much per pulse moves a point by so much across range, unless it soon turns back
     span = max(1, view.n // SPANS)

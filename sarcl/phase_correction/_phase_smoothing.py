@@ -31,9 +31,9 @@ def smooth(phase: np.ndarray, modes: int, ways: list[np.ndarray] | None = None) 
         return unwrapped(phase, ways)
     best, closest = phase, -1.0
     for way in ways:
-        fit = _lowest(way, modes)
+        fit = lowest(way, modes)
         for _ in range(MENDINGS):
-            fit = fit + _lowest(_wrapped(phase - fit), modes)
+            fit = fit + lowest(_wrapped(phase - fit), modes)
         close = float(np.abs(np.exp(1j * (phase - fit)).mean()))
         if close > closest:
             best, closest = fit, close
@@ -81,7 +81,7 @@ def _unwrappings(phase: np.ndarray) -> Iterator[np.ndarray]:
         yield base + _wrapped(phase - base)
 
 
-def _lowest(curve: np.ndarray, modes: int) -> np.ndarray:
+def lowest(curve: np.ndarray, modes: int) -> np.ndarray:
     """Least-squares fit of a curve (n,) by the first `modes` cosines and a slope, which would take many cosines."""
     import scipy.fft
 

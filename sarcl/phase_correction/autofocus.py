@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import logging
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import NamedTuple
 
 import numpy as np
@@ -41,10 +41,13 @@ class PhaseErrors:
     frequency  Hz, centre of the band
     found      False: no correction passed cross-validation; phase and range are zero, and raw is as it was
     gain       gain in sharpness (sum |I|^4) of one half of the band by the phase estimated from the other
-    agreement  closeness of the halves' phases: 1 for equal phases, below 0.4 for unrelated ones
+    agreement  closeness of the halves' phases, smoothed as `phase` is: 1 for equal, below 0.4 for unrelated ones
     spread     rms difference of the halves' phases, halved, rad: the uncertainty of a pulse's phase before smoothing
     modes      number of cosines over the aperture that `phase` consists of, besides a slope; n_pulses: not smoothed
     reason     in words why nothing was applied, and what to do about it; empty where found is True
+    places     m (k, 3), the brightest points of the image with the correction, applied or not: ten at most
+    displacements  m (k,), by how much the correction, applied or not, moves each of them across range, positive
+               towards where the antennas move: the slope of the phase over the pulses that see the place
     """
 
     phase: NDArray[np.float64]
@@ -56,6 +59,8 @@ class PhaseErrors:
     spread: float
     modes: int
     reason: str = ""
+    places: NDArray[np.float64] = field(default_factory=lambda: sealed(np.zeros((0, 3))))
+    displacements: NDArray[np.float64] = field(default_factory=lambda: sealed(np.zeros(0)))
 
     def __repr__(self) -> str:
         return f"PhaseErrors({self})"
@@ -64,9 +69,11 @@ class PhaseErrors:
         tests = f"sharpness x {self.gain:.3f} in the other half of the band, halves agree to {self.agreement:.2f}"
         if not self.found:
             return f"no error found: {self.reason} ({tests})"
+        apart = float(np.ptp(self.displacements)) if len(self.displacements) else 0.0
         return (
             f"phase {np.std(self.phase):.2f} rad rms of {self.modes} cosines, +-{self.spread:.2f} per pulse; "
-            f"range {np.std(self.range):.4g} m rms; {tests}"
+            f"range {np.std(self.range):.4g} m rms; {tests}; "
+            f"bright places move by up to {apart:.2g} m against one another"
         )
 
 
@@ -103,9 +110,11 @@ def autofocus(
 
     Returns (raw, errors): the PhaseHistory corrected, lazily where its samples lie in a file, and a PhaseErrors.
     A correction is applied only if it sharpens echoes that it was not estimated from: the other half of the band, the
-    places at other ranges where there are bright ones, and if no bright point is lost. Otherwise raw is returned as it
-    was, errors.found is False, and errors.reason says why and what to do. Phases that only shift the image cannot be
-    estimated: the mean of the phase, and the least-squares fit of a shift across range, are not corrected.
+    places at other ranges where there are bright ones; if no bright point is lost; and if bright places stay within
+    half a resolution cell of where they were against one another, or the echoes show for certain where they belong.
+    Otherwise raw is returned as it was, errors.found is False, and errors.reason says why and what to do. Phases that
+    only shift the image cannot be estimated: the mean of the phase, and the least-squares fit of a shift across range,
+    are not corrected.
     TypeError, ValueError: arguments of the wrong kind; too few pulses; pulses that lack a channel others have; data
     not compressed; an image that is zero. SarclWarning: 1 % of the pixels or more lie outside the range window of
     every row. Sources: _phase_gradient.py; docs/theory/autofocus.md.

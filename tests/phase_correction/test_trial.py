@@ -2,11 +2,14 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import autofocus_trial as trials
 import numpy as np
 import pytest
 
 import sarcl
+from sarcl.base.constants import SPEED_OF_LIGHT
 
 RAIL = 10
 LEAK = 6  # a rail, five points and a leak of 5 dB: the halves of the band agree on a phase that focuses the leak
@@ -60,3 +63,43 @@ def test_phases_of_single_pulses_that_agree_by_their_smooth_curve_alone_are_enou
     # 20 points of a rail, and 2 points in clutter: unsmoothed, the halves of the band agree to 0.35 and 0.38
     row = trials.trial("error", seed)
     assert row["found"] and row["restored"] and not row["harmed"], row
+
+
+# rails with 40 points: free phases of the pulses sharpen a half of the band to fewer points than there are, 3 to 5
+# times sharper than the true phase, and agree to 0.5 with those of the other half
+@pytest.mark.parametrize("seed", [140, *(pytest.param(k, marks=pytest.mark.slow) for k in (58, 67, 103, 158))])
+def test_phases_of_crowded_scenes_are_searched_as_smooth_curves(seed):
+    row = trials.trial("error", seed)
+    assert row["found"] and row["restored"] and not row["harmed"] and not row["distorted"], row
+
+
+@pytest.mark.slow
+def test_what_is_corrected_on_arms_is_neither_harmed_nor_distorted():
+    rows = [trials.trial("arm", seed) for seed in (13, 15, 20, 21, 44, 50, 51, 55, 80)]
+    assert not any(row["harmed"] or row["distorted"] for row in rows), rows
+    assert any(row["found"] for row in rows), rows
+
+
+def test_the_trial_finds_points_that_a_phase_moves_against_one_another():
+    made = trials.scene("arm", 1)
+    raw, zero = made.raw, np.zeros(made.raw.n_rows)
+    assert np.abs(trials.places(made, zero, zero)).max() <= 0.1
+    turn = np.linspace(-np.pi / 2, np.pi / 2, len(zero))
+    phase = 10 * turn**2  # even: no part of it displaces the whole scene
+    found = trials.places(made, phase, zero)[:, 1]
+    for k, point in enumerate(made.points):
+        alone, _ = trials._echoes(
+            point[None], np.ones(1), raw.tx, made.beam[1], raw.reference_range, 24e9, 1.5e9, raw.n_samples
+        )
+        blurred = replace(alone, samples=(alone.samples * np.exp(1j * phase)[:, None]).astype(np.complex64))
+        grid = sarcl.ImageGrid.plane(center=point, shape=(121, 121), spacing=0.01)
+        level = np.abs(sarcl.backproject(blurred, grid, beam=made.beam).data)
+        peak = grid.at(*np.unravel_index(level.argmax(), level.shape)) - point
+        seen = made.seen[:, k] * (((point - raw.tx) * made.beam[1]).sum(axis=1)
+                                  >= np.cos(trials.BEAM / 2) * np.linalg.norm(point - raw.tx, axis=1)) > 0  # fmt: skip
+        look = point - raw.tx[seen]
+        ahead = look.mean(axis=0) / np.linalg.norm(look.mean(axis=0))
+        across = np.array([-ahead[1], ahead[0], 0])
+        cell = SPEED_OF_LIGHT / 24e9 / 2 / np.ptp((look / np.linalg.norm(look, axis=1)[:, None]) @ across)
+        assert found[k] == pytest.approx(peak @ across / cell, abs=0.3)
+    assert np.ptp(found) > 2
