@@ -25,6 +25,7 @@ AVERAGED = 8  # parts of the aperture over which amplitudes are averaged: noise 
 # share of the pulses that could see a place: with more, all of them do. Echoes of neighbours, a few Doppler cells
 # beside the place, hide as much of it at the ends of the aperture
 MOST = 0.75
+FITS = 4  # of a slope
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,13 +79,29 @@ def displacements(view: ApertureView, errors: Errors, power: np.ndarray) -> Disp
     """Displacements of the brightest points of the corrected image, whose power is given, by the correction."""
     places = bright_places(view, power)[0]
     seen = _seen(view, errors, places)
-    moved, cells = np.zeros(len(places)), np.empty(len(places))
+    moved, cells = np.empty(len(places)), np.empty(len(places))
     for k, place in enumerate(places):
         along = shift_phase(view, place, seen[:, k])
-        centered = (along - seen[:, k] @ along / seen[:, k].sum()) * seen[:, k]
-        moved[k] = centered @ errors[0] / max(centered @ centered, 1e-300)
+        moved[k] = _slope(errors[0], along, seen[:, k])
         cells[k] = 2 * np.pi / max(float(np.ptp(along[seen[:, k] > 0])), 1e-300)
     return Displacements(places, moved, cells, _weakest_link(seen))
+
+
+def _slope(phase: np.ndarray, along: np.ndarray, seen: np.ndarray) -> float:
+    """Slope of a phase against `along`, over the pulses that are seen (n,): the least-squares fit, from steps alone.
+
+    The fit is a weighted mean of the steps from pulse to pulse. Their phasors are averaged, so that steps of 2 pi in an
+    estimate that was not smoothed do not count.
+    """
+    weight = np.abs(np.cumsum((along - seen @ along / seen.sum()) * seen))[:-1] * (seen[1:] > 0) * (seen[:-1] > 0)
+    step, per_metre = np.diff(phase), np.diff(along)
+    scale = weight @ per_metre
+    if not scale:
+        return 0.0
+    slope = 0.0
+    for _ in range(FITS):  # steps of `along` differ
+        slope += float(np.angle(weight @ np.exp(1j * (step - slope * per_metre))) * weight.sum() / scale)
+    return slope
 
 
 def _seen(view: ApertureView, errors: Errors, places: np.ndarray) -> np.ndarray:

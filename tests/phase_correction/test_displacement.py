@@ -76,6 +76,19 @@ def test_displacements_are_those_of_the_peaks_in_images_of_each_point_alone(give
     assert found.apart > 1.0
 
 
+def test_a_slope_is_the_least_squares_fit_and_steps_of_two_pi_do_not_count():
+    random = np.random.default_rng(0)
+    n = 200
+    along = 30 * np.sin(np.linspace(-0.8, 0.9, n))
+    seen = (np.arange(n) >= 40) & (np.arange(n) < 130)
+    smooth = 0.7 * along + 4 * np.cos(np.linspace(0, 3, n))
+    wanted = np.polyfit(along[seen], smooth[seen], 1)[0]
+    assert _displacement._slope(smooth, along, seen.astype(float)) == pytest.approx(wanted, abs=1e-3)
+    slips = smooth + 0.5 * random.standard_normal(n) + 2 * np.pi * np.cumsum(random.integers(0, 10, n) == 0)
+    assert _displacement._slope(slips, along, seen.astype(float)) == pytest.approx(wanted, abs=0.05)
+    assert np.polyfit(along[seen], slips[seen], 1)[0] > wanted + 0.5
+
+
 def test_the_weakest_link_is_the_least_common_share_of_the_strongest_chain():
     seen = np.zeros((100, 4))
     for k, first in enumerate((0, 60, 20, 45)):  # windows of 40 pulses: 0 and 20 share half, 20 and 45 share 15
