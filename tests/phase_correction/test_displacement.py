@@ -110,6 +110,21 @@ def test_a_correction_that_moves_points_of_an_arm_against_one_another_is_refused
     assert np.ptp(errors.displacements) > 0.02  # m; cells are 0.03 to 0.1 m
 
 
+@pytest.mark.parametrize(
+    "seed, share",
+    [(26, 0.93), *(pytest.param(*task, marks=pytest.mark.slow) for task in ((3, 0.97), (3, 0.93), (8, 0.93)))],
+)
+def test_a_wrong_radius_of_an_arm_is_not_taken_for_a_phase(seed, share):
+    made = trials.scene("correct", seed)
+    assert made.words.startswith("arm")
+    wrong = replace(made.raw, tx=share * made.raw.tx)
+    better, errors = sarcl.autofocus(wrong, made.grid, beam=made.beam)
+    # the phase sharpens what it was not found from, and stretches the scene
+    assert errors.gain > 1.1 and np.ptp(errors.displacements) > 0.05
+    assert better is wrong and not errors.found
+    assert "against one another" in errors.reason and "radius" in errors.reason
+
+
 def test_what_a_correction_moves_is_said():
     row = trials.trial("error", 0)  # a rail, 20 points, 18.7 rad: what one point is moved, the next is too
     assert row["restored"] and row["apart"] <= 0.5
