@@ -117,7 +117,7 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     if modes < n:
         agreement = closeness(*curves)
         agree |= agreement > _least_of_curves(curves, modes, closeness)
-    if not agree:
+    if not agree and view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
         other = _searched_as_curves(view, values, plain)
         close = closeness(*other[1])
         if close > _least_of_curves(other[1], other[0], closeness):
