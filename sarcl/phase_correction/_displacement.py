@@ -26,6 +26,7 @@ AVERAGED = 8  # parts of the aperture over which amplitudes are averaged: noise 
 # beside the place, hide as much of it at the ends of the aperture
 MOST = 0.75
 FITS = 4  # of a slope
+FINE, REACH = 16, 128  # steps per resolution cell in which peaks are searched, and how many on each side
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,19 +35,21 @@ class Displacements:
 
     places  m (k, 3), brightest first
     along   m (k,), displacements of the places across range, positive towards where the antennas move
+    peaks   m (k,), the same of the highest points of the places' images, which a phase that blurs them moves otherwise
     cells   m (k,), resolution of each place across range, by the pulses that see it
     common  share of their pulses that two places have in common, at the weakest link of the strongest chain of all
     """
 
     places: NDArray[np.float64]
     along: NDArray[np.float64]
+    peaks: NDArray[np.float64]
     cells: NDArray[np.float64]
     common: float
 
     @property
     def apart(self) -> float:
         """Largest displacement of two places against one another, resolution cells."""
-        return float(np.ptp(self.along / self.cells)) if len(self.along) else 0.0
+        return max((float(np.ptp(moved / self.cells)) for moved in (self.along, self.peaks) if len(moved)), default=0.0)
 
 
 def bright_places(view: ApertureView, power: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -79,12 +82,23 @@ def displacements(view: ApertureView, errors: Errors, power: np.ndarray) -> Disp
     """Displacements of the brightest points of the corrected image, whose power is given, by the correction."""
     places = bright_places(view, power)[0]
     seen = _seen(view, errors, places)
-    moved, cells = np.empty(len(places)), np.empty(len(places))
+    moved, peaks, cells = (np.empty(len(places)) for _ in range(3))
     for k, place in enumerate(places):
         along = shift_phase(view, place, seen[:, k])
         moved[k] = _slope(errors[0], along, seen[:, k])
         cells[k] = 2 * np.pi / max(float(np.ptp(along[seen[:, k] > 0])), 1e-300)
-    return Displacements(places, moved, cells, _weakest_link(seen))
+        # over a narrow aperture nearly all pulses see nearly all places, and what blurs them moves all peaks alike
+        peaks[k] = moved[k] if view.is_narrow else moved[k] + _peak(errors[0] - moved[k] * along, along, seen[:, k])
+    return Displacements(places, moved, peaks, cells, _weakest_link(seen))
+
+
+def _peak(phase: np.ndarray, along: np.ndarray, seen: np.ndarray) -> float:
+    """Displacement at which the pulses that are seen, with a phase (n,) and equal amplitudes, add up to the most."""
+    lit = seen > 0
+    cell = 2 * np.pi / max(float(np.ptp(along[lit])), 1e-300)
+    trials = np.arange(-REACH, REACH + 1) * cell / FINE
+    level = np.abs(np.exp(1j * (phase[lit, None] - np.outer(along[lit], trials))).sum(axis=0))
+    return float(trials[level.argmax()])
 
 
 def _slope(phase: np.ndarray, along: np.ndarray, seen: np.ndarray) -> float:

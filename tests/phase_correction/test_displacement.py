@@ -69,6 +69,7 @@ def test_displacements_are_those_of_the_peaks_in_images_of_each_point_alone(give
         assert np.linalg.norm(found.places[k] - peak) <= 0.03  # a pixel and a half
         along = np.array([-np.sin(angle), np.cos(angle), 0])  # where the arm moves, before the point
         assert found.along[k] == pytest.approx((peak - point) @ along, abs=0.2 * found.cells[k])
+        assert found.peaks[k] == pytest.approx((peak - point) @ along, abs=0.2 * found.cells[k])
         # the beam, 60 degrees, turns the direction to the point by its chord over the distance
         chord = 2 * RADIUS * np.sin(BEAM / 2)
         cell = SPEED_OF_LIGHT / CARRIER / 2 / (chord / np.linalg.norm(point))
@@ -87,6 +88,14 @@ def test_a_slope_is_the_least_squares_fit_and_steps_of_two_pi_do_not_count():
     slips = smooth + 0.5 * random.standard_normal(n) + 2 * np.pi * np.cumsum(random.integers(0, 10, n) == 0)
     assert _displacement._slope(slips, along, seen.astype(float)) == pytest.approx(wanted, abs=0.05)
     assert np.polyfit(along[seen], slips[seen], 1)[0] > wanted + 0.5
+
+
+def test_the_peak_of_a_place_goes_where_most_pulses_move_it():
+    along = 20 * np.sin(np.linspace(-0.7, 0.7, 200))
+    # three quarters of the pulses are displaced by 1.5 m, six cells, the others not at all: the fit lies between
+    phase = 1.5 * np.minimum(along, along[150])
+    assert _displacement._slope(phase, along, np.ones(200)) < 1.35
+    assert _displacement._peak(phase, along, np.ones(200)) == pytest.approx(1.5, abs=0.05)
 
 
 def test_the_weakest_link_is_the_least_common_share_of_the_strongest_chain():
