@@ -67,6 +67,13 @@ class Box:
         nx, ny, nz = np.clip(places.max(axis=0) + MARGIN + 1, low + 1, last) - low
         return cls(low, (int(nx), int(ny), int(nz)))
 
+    def crossing(self, axis: int, part: Intervals) -> Intervals:
+        """The intervals along an axis whose lines pass through the box: those of bodies beside it are left out."""
+        across = [(axis + m) % 3 for m in (1, 2)]
+        node = part.lines - self.low[across]
+        within = ((node >= 0) & (node < np.array(self.shape)[across])).all(axis=1)
+        return Intervals(part.lines[within], part.start[within], part.end[within])
+
     def in_grid(self, lattice: Lattice, at: np.ndarray, component: int) -> np.ndarray:
         """Places in the grid of cells `at` (n,), numbers of a raveled array of the box, in the same order."""
         node = np.unravel_index(at, self.shape)
@@ -140,6 +147,7 @@ def edge_lengths(box: Box, intervals: Sequence[Intervals]) -> tuple[np.ndarray, 
 
 def free_lengths(box: Box, axis: int, part: Intervals) -> np.ndarray:
     """Share of each edge along an axis that is outside the body, float32 (*shape)."""
+    part = box.crossing(axis, part)
     first, last = np.floor(part.start).astype(int), np.floor(part.end).astype(int)
     free = np.ones(box.shape, np.float32)
     ends = np.stack([first, np.where(first == last, -1, last)], axis=1)
@@ -156,6 +164,7 @@ def free_lengths(box: Box, axis: int, part: Intervals) -> np.ndarray:
 
 def nodes_inside(box: Box, part: Intervals) -> np.ndarray:
     """Which nodes are inside the body, by its intervals along x: bool (*shape)."""
+    part = box.crossing(0, part)
     return _span(box, 0, part, np.ceil(part.start).astype(int), np.floor(part.end).astype(int))
 
 
