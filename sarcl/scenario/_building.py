@@ -176,6 +176,10 @@ def _stand(part: Scene, ground: Scene | None, place: Any) -> Scene:
 
 def _argument(key: str, value: Any) -> Any:
     """A value as its call takes it: pairs of a complex key become complex numbers."""
+    if key == "eps_r" and isinstance(value, list):
+        if len(value) != 2 or not all(isinstance(v, (int, float)) for v in value):
+            raise ValueError(f"eps_r is {value}; give a number, or with losses a pair [real, imaginary], as [3, -0.05]")
+        return complex(*value)
     if key in COMPLEX and isinstance(value, list) and value and all(isinstance(v, list) for v in value):
         for i, pair in enumerate(value):
             if len(pair) != 2 or not all(isinstance(v, (int, float)) for v in pair):

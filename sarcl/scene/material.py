@@ -22,8 +22,8 @@ COHERENT = ("smooth", "sinc")  # diagrams of a coherent reflection, like that of
 class Material:
     """A homogeneous half space under a surface that may be rough below the size of a facet.
 
-    eps_r         real part of the relative permittivity, at least 1
-    conductivity  S/m; inf is a perfect conductor
+    eps_r         relative permittivity eps' - j eps'', the same at all frequencies: eps' at least 1, eps'' at least 0
+    conductivity  S/m, whose losses add to eps''; inf is a perfect conductor
     height        rms height of the roughness finer than a facet, m: the coherent reflection falls by
                   exp(-(q.n height)^2/2); inf: there is none. Default 0, with a diagram inf
     diagram       re-irradiation of the incoherent part, d the angle between the normal and the bisector of the two
@@ -33,11 +33,12 @@ class Material:
     reflectivity  factor on the amplitude, 0 to 1
     name          for messages and scenario files
 
-    `Material()` is a perfect conductor; eps_r alone gives a lossless dielectric. ValueError for impossible values.
+    `Material()` is a perfect conductor; a real eps_r alone gives a lossless dielectric. ValueError for impossible
+    values.
     Source: Franceschetti et al. 1992 (SARAS), eq. (11) and appendix.
     """
 
-    eps_r: float = None  # type: ignore[assignment]
+    eps_r: complex = None  # type: ignore[assignment]
     conductivity: float = None  # type: ignore[assignment]
     height: float = None  # type: ignore[assignment]
     diagram: Diagram = "smooth"
@@ -57,11 +58,15 @@ class Material:
         }
         for name in ("eps_r", "conductivity", "height", "width", "reflectivity"):
             value = getattr(self, name)
-            value = default[name] if value is None else _number(name, value, name in ("conductivity", "height"))
+            if name == "eps_r" and value is not None and np.iscomplexobj(value):
+                value = _lossy(value)
+            else:
+                value = default[name] if value is None else _number(name, value, name in ("conductivity", "height"))
             object.__setattr__(self, name, value)
-        if not self.eps_r >= 1:
+        if not np.real(self.eps_r) >= 1:
             raise ValueError(
-                f"eps_r is {self.eps_r:g}; a relative permittivity is at least 1 (vacuum): losses go into conductivity"
+                f"eps_r is {self.eps_r:g}; a relative permittivity is at least 1 (vacuum), with losses as a negative "
+                "imaginary part or in conductivity"
             )
         for name, unit in (("conductivity", "S/m"), ("height", "m"), ("width", "rad"), ("reflectivity", "")):
             if not getattr(self, name) >= 0:
@@ -105,7 +110,8 @@ class Material:
     def permittivity(self, frequency: ArrayLike) -> Any:
         """Complex relative permittivity eps_r - j conductivity/(2 pi f eps0) at `frequency`, Hz, of its shape.
 
-        Its imaginary part is negative: fields vary as exp(+j 2 pi f t). inf for a perfect conductor.
+        eps_r may be complex itself: both losses add. The imaginary part is negative, because fields vary as
+        exp(+j 2 pi f t). inf for a perfect conductor.
         """
         frequency = validation.values("frequency", frequency)
         if not (frequency > 0).all():
@@ -137,6 +143,21 @@ def _number(name: str, value: Any, inf: bool) -> float:
     if inf and isinstance(value, (float, np.floating)) and value == np.inf:
         return np.inf
     return validation.number(name, value)
+
+
+def _lossy(value: Any) -> complex:
+    """A complex eps_r; a float where its imaginary part is 0."""
+    if np.ndim(value) or np.ma.is_masked(value):
+        raise ValueError(f"eps_r must be a number, got {value!r:.80}")
+    out = complex(value)
+    if not np.isfinite(out):
+        raise ValueError(f"eps_r is {out:g}; it must be finite")
+    if out.imag > 0:
+        raise ValueError(
+            f"eps_r is {out:g}, whose positive imaginary part would be gain: fields vary as exp(+j 2 pi f t), and "
+            f"losses are negative; give {out.conjugate():g}"
+        )
+    return out if out.imag else out.real
 
 
 def _made(name: str, eps_r: float, conductivity: float) -> tuple[str, Material]:

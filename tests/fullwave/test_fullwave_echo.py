@@ -315,6 +315,17 @@ def test_a_run_of_half_the_frequencies_takes_between_half_and_all_of_the_time():
     assert 0.5 * whole.run_seconds < halves.run_seconds < whole.run_seconds
 
 
+def test_the_report_says_which_conductivity_a_complex_permittivity_becomes(monkeypatch):
+    """eps'' = sigma/(omega eps_0) at 1.25 GHz: 0.05 is 3.48 mS/m."""
+    pretend(monkeypatch)
+    box = shapes.box((0.2, 0.3, 0.1), material=sarcl.Material(eps_r=3 - 0.05j, conductivity=0.01))
+    given = box + shapes.box((0.1, 0.1, 0.1), position=(1, 0, 0)), CHIRP, around(20)
+    said = "eps_r 3-0.05j as 0.0135 S/m, exact at 1.25 GHz"
+    raw = sarcl.fullwave_echo(*given, cells=12, model_error=False)
+    assert raw.report.plan["losses"] == sarcl.plan_fullwave_echo(*given, cells=12).plan["losses"] == said
+    assert "losses" not in sarcl.fullwave_echo(BOX, CHIRP, around(20), cells=8, model_error=False).report.plan
+
+
 def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
     sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
@@ -322,10 +333,10 @@ def test_the_log_is_quiet_without_files(caplog):
 
 
 @pytest.mark.slow
-@pytest.mark.parametrize("conductivity, allowed", [(0.0, 0.05), (0.05, 0.09)])
-def test_a_dielectric_sphere_has_the_echo_of_mie(conductivity, allowed):
+@pytest.mark.parametrize("eps_r, conductivity, allowed", [(3, 0.0, 0.05), (3, 0.05, 0.09), (3 - 0.5j, 0.02, 0.09)])
+def test_a_dielectric_sphere_has_the_echo_of_mie(eps_r, conductivity, allowed):
     """Permittivity 3, as a staircase of edges: 20 cells per wavelength in vacuum, 11.5 inside."""
-    material = sarcl.Material(eps_r=3, conductivity=conductivity)
+    material = sarcl.Material(eps_r=eps_r, conductivity=conductivity)
     ball = shapes.sphere(RADIUS, edge=0.01, material=material)
     raw = sarcl.fullwave_echo(ball, CHIRP, around(30, height=15.0), cells=20)
     (got,), k = samples(raw)

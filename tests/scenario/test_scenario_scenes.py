@@ -79,13 +79,14 @@ def test_materials_of_a_scene_get_names_of_their_own():
     triangle = np.eye(3)[None]
     kinds = [
         sarcl.Material(3), sarcl.Material(4), sarcl.Material(5, name="x"), sarcl.Material(6, name="x"),
-        sarcl.Material(7, name="metal"), METAL, MATERIALS["sand"], sarcl.Material(3, np.inf, diagram="cos2"),
+        sarcl.Material(7, name="metal"), sarcl.Material(3 - 0.05j, 0.01), METAL, MATERIALS["sand"],
+        sarcl.Material(3, np.inf, diagram="cos2"),
     ]  # fmt: skip
     scene = sarcl.Scene.facets(triangle, material=kinds[0])
     for kind in kinds[1:]:
         scene = scene + sarcl.Scene.facets(triangle, material=kind)
     made = Scenario(scene=scene)
-    assert len(made.materials) == 7 and "metal" not in made.materials
+    assert len(made.materials) == 8 and "metal" not in made.materials
     back = loads(made.dumps()).build_scene()
     for m, kind in zip((back.materials[i] for i in back.material), kinds, strict=True):
         assert m == sarcl.Material(
@@ -141,6 +142,14 @@ WRONG = {
     "bad material": (
         "[materials.x]\neps_r = 0.5\n[[scene.box]]\nsize = [1, 1, 1]\n",
         r"^f\.toml:2: \[materials\.x\] eps_r is 0.5",
+    ),
+    "gain": (
+        "[materials.x]\neps_r = [3, 0.5]\n[[scene.box]]\nsize = [1, 1, 1]\n",
+        r"^f\.toml:2: \[materials\.x\] eps_r is 3\+0.5j, whose positive imaginary part",
+    ),
+    "permittivity of three numbers": (
+        "[materials.x]\neps_r = [3, 0.5, 1]\n[[scene.box]]\nsize = [1, 1, 1]\n",
+        r"^f\.toml:2: \[materials\.x\] eps_r is \[3, 0.5, 1\]; give a number, or with losses a pair \[real, imag",
     ),
     "unknown key of a material": (
         "[materials.x]\nepsr = 5\n",

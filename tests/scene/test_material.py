@@ -31,6 +31,15 @@ def test_the_permittivity_is_that_of_the_formula_and_decays():
         m.permittivity([0, 1e9])
 
 
+def test_a_complex_permittivity_is_the_same_at_all_frequencies_and_adds_to_the_conductivity():
+    f = np.array([1e9, 1e10])
+    assert np.array_equal(sarcl.Material(3 - 0.05j).permittivity(f), [3 - 0.05j, 3 - 0.05j])
+    assert sarcl.Material(np.complex64(3)) == sarcl.Material(3) and isinstance(sarcl.Material(3 + 0j).eps_r, float)
+    both, conducting = sarcl.Material(3 - 0.05j, conductivity=0.1), sarcl.Material(3, conductivity=0.1)
+    assert np.allclose(both.permittivity(f), conducting.permittivity(f) - 0.05j, rtol=TOLERANCE["float64"])
+    assert sarcl.Material(3 - 0.05j, conductivity=np.inf).conducting and len({both, conducting}) == 2
+
+
 def test_roughness_is_none_without_a_diagram_and_total_with_one():
     for diagram in DIAGRAMS:
         width = 0.3 if diagram == "exp" else 0
@@ -64,7 +73,10 @@ BAD = {
     "negative permittivity": (dict(eps_r=-3), "eps_r is -3"),
     "permittivity nan": (dict(eps_r=nan), "eps_r is nan; it must be finite"),
     "permittivity infinite": (dict(eps_r=inf), "eps_r is inf; it must be finite"),
-    "complex permittivity": (dict(eps_r=4 - 1j), "eps_r must be a number"),
+    "gain by permittivity": (dict(eps_r=4 + 1j), "eps_r is 4\\+1j, whose positive imaginary part .* give 4-1j"),
+    "lossy permittivity below vacuum": (dict(eps_r=0.5 - 1j), "eps_r is 0.5-1j; a relative permittivity is at least 1"),
+    "complex permittivity nan": (dict(eps_r=complex(nan, -1)), "eps_r is nan-1j; it must be finite"),
+    "permittivities": (dict(eps_r=[4 - 1j]), "eps_r must be a number"),
     "negative conductivity": (dict(eps_r=4, conductivity=-1), "conductivity is -1 S/m; it cannot be negative"),
     "conductivity nan": (dict(eps_r=4, conductivity=nan), "conductivity is nan"),
     "negative height": (dict(eps_r=4, height=-0.01), "height is -0.01 m; it cannot be negative"),

@@ -7,6 +7,7 @@ import pytest
 from helpers.facet_cases import CONDUCTOR, UP, far_amplitude, plate, quarters
 from scipy.special import fresnel as fresnel_integrals
 
+import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.reference import facet
 from sarcl.reference.geometry import half_path
@@ -63,3 +64,23 @@ def test_permittivity_may_change_with_frequency():
         one = facet.facet_echo(plate(0.5), eps[i], BAND[i : i + 1], 1e3 * UP, 1e3 * UP, 1e3)
         assert got[i] == pytest.approx(one[0], rel=1e-12)
     assert abs(got[0, 0, 0] / BAND[0] - got[1, 0, 0] / BAND[1]) > 1e-3 * abs(got[0, 0, 0] / BAND[0])
+
+
+def test_a_complex_permittivity_reflects_alike_at_all_frequencies_and_a_conductivity_does_not():
+    """A plate seen along its normal: Fresnel's coefficient (1 - n)/(1 + n), over the -1 of a conductor."""
+    track = sarcl.Trajectory(None, np.array([[0, 0, 300.0]]))
+    chirp = sarcl.Waveform.chirp(center=3e9, bandwidth=1e9, duration=1e-7)
+
+    def samples(material):
+        raw = sarcl.echo(sarcl.shapes.plate((0.5, 0.4), material=material), chirp, track, tolerance=1e-4)
+        return np.asarray(raw.samples)[0], raw.frequency[0] + raw.frequency_step[0] * np.arange(raw.n_samples)
+
+    (metal, f), (lossy, _), (conducting, _) = map(
+        samples, ("metal", sarcl.Material(3 - 1.5j), sarcl.Material(3, conductivity=1.5 * 3e9 * 2 * np.pi * 8.854e-12))
+    )
+    inside = abs(f - 3e9) < 0.4e9
+    n = np.sqrt(3 - 1.5j)
+    assert np.abs(lossy / metal + (1 - n) / (1 + n))[inside].max() < 1e-3
+    n = np.sqrt(3 - 1.5j * 3e9 / f)
+    assert np.abs(conducting / metal + (1 - n) / (1 + n))[inside].max() < 1e-3
+    assert np.abs(conducting / lossy - 1)[inside].max() > 0.02

@@ -136,6 +136,7 @@ class _Sums:
             "left": float(f"{self.left:.1e}"),
             "bytes": round(task.cost.bytes(task.parts()[0].stop)),
             "seconds_per_run": float(f"{self.seconds / max(self.runs, 1):.3g}"),
+            **task.losses,
             **task.motion,
         }
         return Report(

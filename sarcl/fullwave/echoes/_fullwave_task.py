@@ -27,7 +27,7 @@ from ...simulation.scene_echoes import EchoRequest
 from .. import runs
 from ..lattice import Lattice
 from ..target import Target
-from ._closed_bodies import check_bodies, check_wavelengths, parts_of
+from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
 from ._grid_choice import SHARE, check_cells, grid_choice
 from ._run_progress import RunProgress
 
@@ -91,6 +91,11 @@ class FullwaveTask:
     def carried_cells(self) -> float:
         """Cells per shortest wavelength on the grid: those asked for, or little more."""
         return SPEED_OF_LIGHT / self.band[1] / self.lattice.cell
+
+    @property
+    def losses(self) -> dict[str, object]:
+        """What the report says of complex permittivities, which become conductivities."""
+        return losses_said(self.scene, self.waveform.center)
 
     @property
     def wavenumbers(self) -> np.ndarray:

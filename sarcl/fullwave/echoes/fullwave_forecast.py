@@ -91,6 +91,7 @@ def plan_fullwave_echo(
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
         "steps": task.cost.steps,
+        **task.losses,
         **task.motion,
     }
     return FullwaveForecast(
