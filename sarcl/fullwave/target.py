@@ -20,7 +20,7 @@ class Target:
     faces   places of H (m,);  weight (4, m): free length over free area of the edges c(+b), c, b(+c), b of a face in
             direction a, with b and c the directions after a
     resting  cells inside conductors that need no updates, int (k, 4): see resting_rows; None: none
-    gap     width, m, of gaps between conductors that are closed on this grid, because no node lies in them; None: none
+    gap     width, m, of gaps between conductors that are narrower than a cell; None: none
     """
 
     edges: np.ndarray

@@ -21,6 +21,7 @@ from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.fullwave.echoes._anchor_files import AnchorFiles
 from sarcl.fullwave.runs import RunEnd
 from sarcl.reference import mie
+from sarcl.scene.triangles import rotation
 
 RADIUS = 0.1  # m
 CHIRP = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)  # ka 2.1 to 3.1
@@ -179,13 +180,35 @@ def test_gaps_that_the_grid_closes_are_said_with_the_cells_that_leave_them_open(
     """With 16 cells the echo was that of the closed box, and differed by 43 % from those of 20 cells and more."""
     pretend(monkeypatch)
     halves = shapes.box((0.1, 0.1, 0.1)) + shapes.box((0.1, 0.1, 0.1), position=(0.112, 0, 0))
-    message = r"gaps of about 0\.012 m, .* closes them, .* cells=23\.8, which are 16 now, or close the gaps"
+    message = r"gaps of about 0\.012 m, narrower than .* cells=23\.8, which are 16 now, or close the gaps"
     with pytest.warns(sarcl.SarclWarning, match=message):
         sarcl.fullwave_echo(halves, CHIRP, around(20), cells=16)
     sarcl.fullwave_echo(halves, CHIRP, around(20), cells=23.8)
 
 
-def pretend(monkeypatch, stop_after=None):
+@pytest.mark.parametrize("width", [0.02, 0.3, 0.7, 0.95])
+@pytest.mark.parametrize("turned", [0.0, 0.4])
+def test_a_gap_narrower_than_a_cell_is_named_once_whether_nodes_lie_in_it_or_not(monkeypatch, width, turned):
+    """Waves go to and fro in it: the currents that are left are no second warning."""
+    done = pretend(monkeypatch, left=0.5)
+    gap = width * SPEED_OF_LIGHT / 1.5e9 / 8
+    halves = [shapes.box((0.1, 0.1, 0.1), position=(side * (0.1 + gap) / 2, 0, 0)).triangles for side in (-1, 1)]
+    body = np.concatenate(halves) @ rotation(np.array([0.3, turned, 2 * turned])).T
+    task = sarcl.Scene.facets(body if turned else np.concatenate(halves)), CHIRP, around(20, 65)
+    with pytest.warns(sarcl.SarclWarning) as said:
+        sarcl.fullwave_echo(*task, polarization="all", cells=8, model_error=False)
+    assert len(done) == 4
+    assert [f"gaps of about {gap:.2g} m, narrower than cells" in str(one.message) for one in said] == [True]
+
+
+def test_currents_that_are_left_are_said_once(monkeypatch):
+    pretend(monkeypatch, left=0.5)
+    with pytest.warns(sarcl.SarclWarning) as said:
+        sarcl.fullwave_echo(BOX, CHIRP, around(20, 65), polarization="all", cells=8, model_error=False)
+    assert ["of the currents would have followed" in str(one.message) for one in said] == [True]
+
+
+def pretend(monkeypatch, stop_after=None, left=0.0):
     """Runs of the grid replaced by random echoes; the list of those that are done. The one after `stop_after` fails."""
     done = []
 
@@ -195,7 +218,7 @@ def pretend(monkeypatch, stop_after=None):
         done.append(anchor)
         random = np.random.default_rng(int(1e6 * abs(np.concatenate(anchor).sum())))
         made = (random.normal(size=(len(tx), len(received), len(k), 2)) @ [1, 1j]).astype(np.complex64)
-        return [made, 2 * made][: 1 + (twin is not None)], runs.RunEnd(100, 0.0)
+        return [made, 2 * made][: 1 + (twin is not None)], runs.RunEnd(100, left)
 
     monkeypatch.setattr(_fullwave_task.runs, "run", run)
     return done
@@ -444,3 +467,48 @@ def test_a_task_that_was_killed_continues_and_gives_the_same_samples(tmp_path):
     assert np.array_equal(np.asarray(made.samples), np.asarray(whole.samples))
     assert made.report.plan["runs"] == 8 - len(kept) and whole.report.plan["runs"] == 8
     assert not folder.exists() and len(list(tmp_path.iterdir())) == 2
+
+
+KILLED_IN = """
+import os, signal, sys
+import numpy as np, sarcl
+from sarcl.fullwave.echoes import _anchor_files
+out, where = sys.argv[1:]
+box, chirp = sarcl.shapes.box((0.2, 0.3, 0.1)), sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
+angle = np.deg2rad([20, 40, 60])
+track = sarcl.Trajectory(None, np.stack([40 * np.cos(angle), 40 * np.sin(angle), 0 * angle], 1))
+calls, n_files = [], lambda: len([n for n in os.listdir(out + ".anchors") if n.endswith(".anchor")])
+
+def die():
+    os.kill(os.getpid(), signal.SIGKILL)
+
+def in_a_run(stage, done, total):
+    if os.path.isdir(out + ".anchors") and n_files() == 2:
+        calls.append(done)
+        if len(calls) == 3:  # the third run has done some of its windows
+            assert calls[0] < calls[1] < calls[2] < total
+            die()
+
+replace = os.replace
+if where == "file":
+    _anchor_files.os.replace = lambda *names: replace(*names) if n_files() < 2 else die()
+raw = sarcl.fullwave_echo(
+    box, chirp, track, cells=8, anchors=[0, 1, 2], model_error=False, out=out, progress=in_a_run if where == "run" else None
+)
+"""
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("where", ["run", "file"])
+def test_a_kill_in_the_middle_of_a_run_or_of_its_file_leaves_the_finished_anchors(tmp_path, where):
+    out, folder = tmp_path / "raw.h5", tmp_path / "raw.h5.anchors"
+    command = [sys.executable, "-c", KILLED_IN]
+    killed = subprocess.run([*command, str(out), where])
+    assert killed.returncode == -signal.SIGKILL and not out.exists()
+    assert len(list(folder.glob("*.anchor"))) == 2 and len(list(folder.iterdir())) == 2 + (where == "file")
+    subprocess.run([*command, str(out), ""], check=True)
+    subprocess.run([*command, str(tmp_path / "whole.h5"), ""], check=True)
+    resumed, whole = sarcl.read(out), sarcl.read(tmp_path / "whole.h5")
+    assert np.array_equal(np.asarray(resumed.samples), np.asarray(whole.samples))
+    assert (resumed.report.plan["runs"], whole.report.plan["runs"]) == (1, 3)
+    assert sorted(path.name for path in tmp_path.iterdir()) == ["raw.h5", "whole.h5"]

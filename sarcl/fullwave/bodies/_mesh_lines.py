@@ -37,7 +37,7 @@ class MeshLines:
     areas      of faces across x, y and z, exactly, for the same
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours
-    gap        width, m, of gaps between parallel facets in which no node lies; None: there are none
+    gap        width, m, of gaps between parallel facets that are narrower than a cell; None: there are none
     """
 
     intervals: tuple[Intervals, Intervals, Intervals]
@@ -94,8 +94,9 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
         between = -(-start // mesh.unit) > end // mesh.unit  # no node lies in these
         entered, left = (_facet_at(mesh, found, line[between], at[between]) for at in (start, end))
         thin.add_pairs(entered, left, _points(lattice, mesh, axis, line[between], start[between]))
-        # gaps on a line between two stretches of it, up to the next node
-        gap = np.flatnonzero((line[1:] == line[:-1]) & ((end[:-1] // mesh.unit + 1) * mesh.unit >= start[1:]))
+        # gaps between two stretches of a line: a line that is not normal to a gap is longer in it, up to sqrt(3) times
+        # on one axis at least
+        gap = np.flatnonzero((line[1:] == line[:-1]) & (start[1:] - end[:-1] < 2 * mesh.unit))
         left, entered = (_facet_at(mesh, found, line[gap], at) for at in (end[gap], start[gap + 1]))
         thin.add_gaps(left, entered, axis, (start[gap + 1] - end[gap]) / mesh.unit)
     x, y, z = intervals

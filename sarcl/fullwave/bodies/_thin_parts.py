@@ -7,8 +7,9 @@ thinner than a cell as well, however small the cells are. A part is refused, the
 - no node is inside within REACH cells, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
 
-Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Seams of
-meshes are closed on purpose. Therefore such gaps are measured, and the caller decides.
+Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Other gaps
+narrower than a cell hold a layer of nodes, in which waves go to and fro for long. Seams of meshes are closed on
+purpose. Therefore such gaps are measured, and the caller decides.
 """
 
 from __future__ import annotations
@@ -23,6 +24,7 @@ REACH = 4  # cells
 PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edges are taken as plates
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
 SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
+NARROW = 1 + 1e-4  # cells: a gap of one cell whose sides lie on nodes is closed, too
 SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
 
 
@@ -47,13 +49,13 @@ class ThinParts:
         self._bad.append((entered[plate], place[plate]))
 
     def add_gaps(self, left: np.ndarray, entered: np.ndarray, axis: int, length: np.ndarray) -> None:
-        """Facets (n,) through which lines along an axis leave, and enter again before the next node; lengths, cells."""
+        """Facets (n,) through which lines along an axis leave a body, and enter one again; lengths between, cells."""
         width = (length * np.abs(self._inwards[left, axis]))[self._parallel(left, entered)]
-        self._gaps.append(width[width > SEALED])
+        self._gaps.append(width[(width > SEALED) & (width < NARROW)])
 
     @property
     def gap(self) -> float | None:
-        """Width, m, of the gaps in which no node lies: their median; None: there are none."""
+        """Width, m, of the gaps that are narrower than a cell: their median; None: there are none."""
         widths = np.concatenate(self._gaps)
         return float(np.median(widths)) * self.lattice.cell if len(widths) else None
 

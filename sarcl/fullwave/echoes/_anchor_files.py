@@ -64,7 +64,7 @@ class AnchorFiles:
     def keep(self, pulse: int, sent: str, echoes: np.ndarray, ended: RunEnd) -> None:
         """Write the echoes of an anchor, complex64, completely or not at all; a warning where there is no room."""
         text = json.dumps({"mark": self.mark, "steps": ended.steps, "left": ended.left}).encode()
-        temporary = self.folder / f".{secrets.token_hex(8)}.tmp"
+        temporary = self.folder / f".{self.mark}-{secrets.token_hex(8)}.tmp"
         parts: tuple[Any, ...] = (
             MAGIC,
             len(text).to_bytes(HEAD, "little"),
@@ -95,8 +95,9 @@ class AnchorFiles:
 
     def clear(self) -> None:
         """Remove the files of this task, and the folder where nothing is left in it."""
-        for path in self.folder.glob(f"{self.mark}-*.anchor"):
-            path.unlink(missing_ok=True)
+        for pattern in (f"{self.mark}-*.anchor", f".{self.mark}-*.tmp"):  # a kill leaves a file that is half written
+            for path in self.folder.glob(pattern):
+                path.unlink(missing_ok=True)
         try:
             self.folder.rmdir()
         except OSError:  # not there, or files of other tasks are

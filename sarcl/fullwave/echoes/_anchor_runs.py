@@ -7,13 +7,10 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from ...base.errors import warn
 from ..runs import RunEnd, Twin
 from ._anchor_files import AnchorFiles
 from ._fullwave_task import FullwaveTask
 from ._run_progress import RunProgress
-
-UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 
 
 @dataclass(eq=False)
@@ -75,8 +72,4 @@ class AnchorRuns:
     def _look_at(self, pulse: int, ended: RunEnd) -> None:
         """Warn where the currents had not decayed."""
         self.left = max(self.left, ended.left)
-        if ended.left > UNFINISHED:
-            warn(
-                f"the run of pulse {pulse} ended after {ended.steps} steps, and {ended.left:.1e} of the currents would "
-                "have followed: the bodies resonate, and that part of the echo is missing"
-            )
+        self.task.warn_of_unfinished(pulse, ended)

@@ -32,6 +32,7 @@ from ._grid_choice import SHARE, check_cells, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
+UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
 
@@ -66,6 +67,7 @@ class FullwaveTask:
     along: np.ndarray
     _targets: list[Target] = field(default_factory=list)
     _twins: dict[str, dict[int, runs.Twin]] = field(default_factory=dict)
+    _unfinished: list[int] = field(default_factory=list)  # the pulse of the run that was warned of
 
     @property
     def device(self) -> Device:
@@ -117,13 +119,26 @@ class FullwaveTask:
         return self._targets[0]
 
     def warn_of_gaps(self) -> None:
-        """SarclWarning where gaps between conductors are closed on the grid, because they are narrower than a cell."""
+        """SarclWarning where gaps between conductors are narrower than a cell: closed, or with one layer of nodes."""
         if (gap := self.target().gap) is not None:
             needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / (runs.RESOLVED * gap)) / 10
             warn(
-                f"bodies have gaps of about {gap:.2g} m, in which no node of cells of {self.lattice.cell:.3g} m lies: "
-                f"the grid closes them, and what waves do in them is missing, also in report.model_error; give "
-                f"cells={needed:g}, which are {self.cells:g} now, or close the gaps in the mesh"
+                f"bodies have gaps of about {gap:.2g} m, narrower than cells of {self.lattice.cell:.3g} m: the grid "
+                "closes them, or has one layer of nodes in them, and what waves do in them is missing or wrong, also "
+                f"in report.model_error; give cells={needed:g}, which are {self.cells:g} now, or close the gaps in "
+                "the mesh"
+            )
+
+    def warn_of_unfinished(self, pulse: int, ended: runs.RunEnd) -> None:
+        """SarclWarning, once per task, where currents had not decayed when a run ended; none where a gap, which has
+        been warned of, is the reason.
+        """
+        if ended.left > UNFINISHED and self.target().gap is None and not self._unfinished:
+            self._unfinished.append(pulse)
+            warn(
+                f"the run of pulse {pulse} ended after {ended.steps} steps, and {ended.left:.1e} of the currents would "
+                "have followed: the bodies resonate, and that part of the echo is missing; report.plan['left'] is the "
+                "largest of all runs"
             )
 
     def sendings(self) -> Iterator[tuple[str, list[int]]]:

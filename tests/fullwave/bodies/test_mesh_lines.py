@@ -64,7 +64,7 @@ def test_the_volume_along_each_axis_approaches_that_of_the_mesh():
 
 
 @pytest.mark.parametrize("axis", [0, 1, 2])
-def test_gaps_between_nodes_are_found_with_their_width(axis):
+def test_gaps_narrower_than_a_cell_are_found_with_their_width(axis):
     """0.6 cells between 10.2 and 10.8, and 0.6 cells about a node; a surface on a node belongs to its body."""
 
     def gap(left, right):
@@ -75,7 +75,8 @@ def test_gaps_between_nodes_are_found_with_their_width(axis):
 
     assert np.isclose(gap(10.2, 10.8), 0.6 * CELL, rtol=1e-5)
     assert np.isclose(gap(10.0, 11.0), CELL, rtol=1e-5)
-    assert gap(9.7, 10.3) is None  # a node lies in it
+    assert np.isclose(gap(9.7, 10.3), 0.6 * CELL, rtol=1e-5)  # a node lies in it
+    assert gap(9.7, 10.8) is None and gap(10.1, 11.8) is None  # wider than a cell
     assert gap(10.4, 10.4) is None and gap(10.4, 10.4005) is None  # they touch
 
 
