@@ -20,6 +20,7 @@ from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.fullwave.echoes._anchor_files import AnchorFiles
 from sarcl.fullwave.runs import RunEnd
+from sarcl.opencl.choose_device import open_device
 from sarcl.reference import mie
 from sarcl.scene.triangles import rotation
 
@@ -349,6 +350,20 @@ def test_the_report_says_which_conductivity_a_complex_permittivity_becomes(monke
     assert "losses" not in sarcl.fullwave_echo(BOX, CHIRP, around(20), cells=8, model_error=False).report.plan
 
 
+def test_a_forecast_says_the_memory_it_assumed_and_with_that_memory_is_the_same(monkeypatch):
+    """Of another device, or of this one when it says that it has less, the band takes more parts."""
+    options = {"cells": 8, "range_window": (-100, 100)}
+    plain = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
+    memory = open_device(None).info.memory
+    assert plain.max_bytes == _grid_choice.SHARE * memory and plain.plan["memory"] == "0.5 of the device's"
+    monkeypatch.setattr(_fullwave_task, "SHARE", 1.5 * plain.run_bytes / 2 / memory)
+    less = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
+    assert less.plan["parts"] > plain.plan["parts"] == 1 and less.runs == less.plan["parts"] * plain.runs
+    again = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), max_bytes=plain.max_bytes, **options)
+    assert (again.runs, again.run_bytes, again.plan["memory"]) == (plain.runs, plain.run_bytes, "as given")
+    assert "with at most" in str(less) and "(max_bytes, 0.5 of the device's)" in str(less)
+
+
 def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
     sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
@@ -493,7 +508,8 @@ replace = os.replace
 if where == "file":
     _anchor_files.os.replace = lambda *names: replace(*names) if n_files() < 2 else die()
 raw = sarcl.fullwave_echo(
-    box, chirp, track, cells=8, anchors=[0, 1, 2], model_error=False, out=out, progress=in_a_run if where == "run" else None
+    box, chirp, track, cells=8, anchors=[0, 1, 2], model_error=False, out=out,
+    progress=in_a_run if where == "run" else None,
 )
 """
 

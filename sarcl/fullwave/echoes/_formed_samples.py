@@ -135,6 +135,8 @@ class _Sums:
             "steps": int(self.steps / self.runs) if self.runs else 0,
             "left": float(f"{self.left:.1e}"),
             "bytes": round(task.cost.bytes(task.parts()[0].stop)),
+            "max_bytes": round(task.max_bytes),
+            "parts": len(task.parts()),
             "seconds_per_run": float(f"{self.seconds / max(self.runs, 1):.3g}"),
             **task.losses,
             **task.motion,

@@ -17,6 +17,7 @@ from ...scene.scene import Scene
 from ...simulation.echo import echo_request
 from ._formed_samples import checked_anchors
 from ._fullwave_task import FullwaveTask, fullwave_task
+from ._grid_choice import SHARE
 from ._model_error import RATIO
 from ._run_speed import run_speed
 from .fullwave_echo import TOLERANCE, FullwaveOptions
@@ -39,7 +40,9 @@ class FullwaveForecast:
     runs               about the number of runs of the grid: anchors times polarisations sent times parts of the band
     run_bytes          memory of one run on the device;  run_seconds  about, on this device at its present speed
     seconds            about, of all runs, and of those for the model error and the check
-    plan               anchors, grid, cells, time steps
+    max_bytes          memory that a run was allowed to take: as given, or a part of what the device says that it has.
+                       With less, the band is divided into more parts; the same max_bytes gives the same number of runs
+    plan               anchors, parts of the band, grid, cells, time steps
     """
 
     n_rows: int
@@ -49,13 +52,16 @@ class FullwaveForecast:
     run_bytes: float
     run_seconds: float
     seconds: float
+    max_bytes: float
     plan: dict[str, object]
 
     def __str__(self) -> str:
         return (
             f"{self.n_rows} rows of {self.n_samples} samples: {size_text(self.bytes)}\n"
             f"about {self.runs} runs of {self.plan['grid']} cells and {self.plan['steps']} steps: "
-            f"{size_text(self.run_bytes)}, {duration(self.run_seconds)} each, about {duration(self.seconds)} in all"
+            f"{size_text(self.run_bytes)}, {duration(self.run_seconds)} each, about {duration(self.seconds)} in all\n"
+            f"with at most {size_text(self.max_bytes)} per run (max_bytes, {self.plan['memory']}): the band takes "
+            f"{self.plan['parts']} runs per anchor"
         )
 
 
@@ -87,6 +93,8 @@ def plan_fullwave_echo(
     also = (RATIO**-4 if given.get("model_error", True) else 0.0) + (1.0 if given.get("check", False) else 0.0)
     plan: dict[str, object] = {
         "anchors": n_anchors,
+        "parts": len(parts),
+        "memory": "as given" if given.get("max_bytes") is not None else f"{SHARE:g} of the device's",
         "cells": float(f"{task.carried_cells:.4g}"),
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
@@ -96,7 +104,7 @@ def plan_fullwave_echo(
     }
     return FullwaveForecast(
         n_rows, n_samples, n_rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), runs, task.cost.bytes(parts[0].stop),
-        run_seconds, (runs + also * sent * len(parts)) * run_seconds, plan,
+        run_seconds, (runs + also * sent * len(parts)) * run_seconds, task.max_bytes, plan,
     )  # fmt: skip
 
 
