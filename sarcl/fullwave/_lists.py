@@ -1,4 +1,4 @@
-"""Lists of cells on a device: those of a target, and those where an incident wave enters."""
+"""Lists of cells on a device: those of a target, coupled ones among them, and those where an incident wave enters."""
 
 from __future__ import annotations
 
@@ -9,6 +9,7 @@ import numpy as np
 from ..opencl.device import Device
 from ._incident import AFTER, BEFORE, Entrance, WaveTable
 from .lattice import LANES, GroupOrder, Lattice
+from .target import Target
 
 SAMPLES = 8  # samples of the residuals that are kept before they are transformed
 PARTS = 2  # of a list of the incident wave: components on an edge of its box are corrected twice
@@ -55,6 +56,16 @@ class TargetList:
         """First entry of a range of planes, and the first one after these."""
         return _span(self._first, self._groups, planes)
 
+    def numbers_of(self, at: np.ndarray) -> np.ndarray:
+        """The numbers (n,) of entries at places (n,), all of which are in the list."""
+        order = np.argsort(self.places)
+        return np.asarray(order[np.searchsorted(self.places[order], at)])
+
+    @property
+    def kept(self) -> tuple[Any, Any]:
+        """The buffers of old values and of residuals."""
+        return self._old, self.residual
+
     def start(self, field: np.ndarray) -> None:
         """Take old values from a field (3, *shape)."""
         if not self.conducts:
@@ -65,6 +76,25 @@ class TargetList:
     def residuals(self, n_samples: int) -> np.ndarray:
         """The first of the samples that are kept, float32 (n_samples, n)."""
         return self.device.download(self.residual, np.empty((n_samples, self.count), np.float32))[:, : len(self.places)]
+
+
+class CoupledList:
+    """Edges of a list whose field depends on the edges across them, with their weights (kernels/fdtd_coupled.cl)."""
+
+    def __init__(self, device: Device, lattice: Lattice, target: Target, edges: TargetList) -> None:
+        self._groups = lattice.groups
+        sort = GroupOrder.of(lattice, target.coupled)
+        places = target.coupled[sort.order]
+        self.count, self._first = len(places), sort.first
+        self.arrays: tuple[Any, ...] = ()
+        if self.count:
+            weight = target.coupling[:, sort.order].astype(np.float32)
+            number = edges.numbers_of(places).astype(np.int32)
+            self.arrays = tuple(device.copied(values) for values in (lattice.in_buffer(places), number, weight))
+
+    def span(self, planes: tuple[int, int]) -> tuple[int, int]:
+        """First entry of a range of planes, and the first one after these."""
+        return _span(self._first, self._groups, planes)
 
 
 class IncidentList:

@@ -15,7 +15,7 @@ from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ._absorber import layers
 from ._incident import COMPONENTS, SILENT, WaveTable, entrances
-from ._lists import SAMPLES, IncidentList, TargetList, heard
+from ._lists import SAMPLES, CoupledList, IncidentList, TargetList, heard
 from .lattice import COURANT, LANES, ROWS, Lattice
 from .target import Target
 
@@ -28,17 +28,21 @@ ITEMS = 4096  # work-items of a transform on a GPU
 LEAST_Z = 1e-6  # component along z of the direction of a wave across z, for kernels, which divide by it
 
 
-def tiles(n_planes: int, n_steps: int, width: int) -> Iterator[tuple[int, tuple[int, int]]]:
-    """Step and range of planes of a block of steps, in launch order; `width` planes per tile.
+def tiles(n_planes: int, n_steps: int, width: int, ahead: int = 0) -> Iterator[tuple[int, bool, tuple[int, int]]]:
+    """Step, field (True: H) and range of planes of a block of steps, in launch order; `width` planes per tile.
 
     A tile moves down by one plane from step to step: H needs E of the plane after, of the step before, and E needs H of
-    the plane before.
+    the plane before. Where E needs H of the plane after, too (coupled edges), H is one plane ahead, and a tile moves
+    down by two.
     """
-    for low in range(0, n_planes + n_steps - 1, width):
+    down = 1 + ahead
+    for low in range(0, n_planes + down * (n_steps - 1), width):
         for step in range(n_steps):
-            first, last = max(low - step, 0), min(low + width - step, n_planes)
-            if first < last:
-                yield step, (first, last)
+            for magnetic in (True, False):
+                move = ahead * magnetic - down * step
+                first, last = max(low + move, 0) if low else 0, min(low + width + move, n_planes)
+                if first < last:
+                    yield step, magnetic, (first, last)
 
 
 class Fields:
@@ -73,6 +77,8 @@ class Fields:
         self.e, self.h = (device.zeros(12 * lattice.component) for _ in range(2))
         self.edges = TargetList(device, lattice, target.edges, target.share)
         self.faces = TargetList(device, lattice, target.faces, target.weight)
+        self._coupled = CoupledList(device, lattice, target, self.edges)
+        self._couple = device.kernel("fdtd_coupled.cl", "couple") if self._coupled.count else None
         self._thickness, self._layers = absorber, layers(device, lattice, absorber)
         resting = np.zeros((*lattice.shape[:2], 2), np.uint16)
         if target.resting is not None:
@@ -91,9 +97,9 @@ class Fields:
     def advance(self, n_steps: int) -> None:
         """Do up to BLOCK steps, which do not pass a multiple of BLOCK."""
         self._load_wave()
-        for step, planes in tiles(self.lattice.shape[0], n_steps, self._tile):
-            for magnetic in (True, False):
-                self._half_step(self.step + step, planes, magnetic)
+        ahead = int(self._coupled.count > 0)
+        for step, magnetic, planes in tiles(self.lattice.shape[0], n_steps, self._tile, ahead):
+            self._half_step(self.step + step, planes, magnetic)
         self.step += n_steps
 
     def _load_wave(self) -> None:
@@ -144,6 +150,22 @@ class Fields:
                         field, *entrance.arrays, self._wave_values,
                     )  # fmt: skip
             self._correct(part, sample, part.span(planes), magnetic)
+        if not magnetic:
+            self._add_coupled(sample, self._coupled.span(planes))
+
+    def _add_coupled(self, sample: int | None, span: tuple[int, int]) -> None:
+        """Add to E along coupled edges what depends on the edges across them."""
+        if span[0] < span[1]:
+            grid = self.lattice
+            record = self.edges.numbers(sample)["record"]
+            self.device.run(
+                self._couple, (span[1] - span[0],), None,
+                launch_numbers(
+                    "fdtd_coupled.cl", "couple", n=self._coupled.count, first=span[0], record=record,
+                    component=grid.component, plane=grid.plane, row=grid.row, s=COURANT,
+                ),
+                self.e, self.h, *self._coupled.arrays, *self.edges.kept,
+            )  # fmt: skip
 
     def _correct(self, part: TargetList, sample: int | None, span: tuple[int, int], magnetic: bool) -> None:
         """Correct entries of the list of a target, each by a work-item."""

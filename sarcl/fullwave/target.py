@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 
 import numpy as np
 
@@ -20,6 +20,8 @@ class Target:
     faces   places of H (m,);  weight (4, m): free length over free area of the edges c(+b), c, b(+c), b of a face in
             direction a, with b and c the directions after a
     resting  cells inside conductors that need no updates, int (k, 4): see resting_rows; None: none
+    coupled  places of those of the edges (k,) whose field depends on D across them as well;  coupling  (4, k): weights
+            of D along b at the nodes before and after the edge, and of D along c, with b and c the directions after
     gap     width, m, of gaps between conductors that are narrower than a cell; None: none
     """
 
@@ -29,6 +31,8 @@ class Target:
     weight: np.ndarray
     resting: np.ndarray | None = None
     gap: float | None = None
+    coupled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
+    coupling: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
 
     @classmethod
     def nothing(cls) -> Target:

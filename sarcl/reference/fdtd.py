@@ -1,4 +1,4 @@
-"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl and fdtd_lists.cl.
+"""The steps of a Yee grid, term by term: kernels/fdtd_vacuum.cl, fdtd_lists.cl and fdtd_coupled.cl.
 
 Fields are float64 (3, nx, ny, nz): component a of E stands at half a cell along axis a, of H at half a cell along the
 other two. H is the magnetic field times the impedance of vacuum. Fields, `old` and `psi` are changed in place. Cells of
@@ -55,6 +55,24 @@ def edges(e: np.ndarray, at: np.ndarray, share: np.ndarray, old: np.ndarray) -> 
     old[:] = share[0] * old + share[1] * vacuum
     e.flat[at] = old
     return np.asarray(old - vacuum)
+
+
+def couple(e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, s: float) -> np.ndarray:
+    """E += sum of weights (4, n) times s curl H of the edges across those at places `at` (n,): what was added, (n,)."""
+    curl = np.zeros_like(h)
+    update_e(curl, h, s)
+    added = np.zeros(len(at))
+    component, *node = np.unravel_index(at, h.shape)
+    for a, b, c in CYCLIC:
+        some = component == a
+        cell = [x[some] for x in node]
+        for along, first in ((b, 0), (c, 2)):
+            for after in (0, 1):
+                for side in (0, 1):
+                    place = (x + (n == a) * after - (n == along) * side for n, x in enumerate(cell))
+                    added[some] += weight[first + after][some] * curl[(along, *place)]
+    e.flat[at] += added
+    return added
 
 
 def faces(e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, old: np.ndarray, s: float) -> np.ndarray:

@@ -64,10 +64,11 @@ def test_absorbing_layers_equal_the_twin(device, shape, layers):
     assert np.abs(vacuum.e - e).max() > 0.1  # the fields change much more than by rounding
 
 
-def test_lists_and_their_residuals_equal_the_twin(device):
+@pytest.mark.parametrize("coupled", [False, True])
+def test_lists_and_their_residuals_equal_the_twin(device, coupled):
     grid, rng = lattice_of((7, 9, 32)), np.random.default_rng(3)
     e, h = random_fields(grid.shape, rng)
-    target = random_target(grid, rng)
+    target = random_target(grid, rng, inside=2 * coupled, coupled=coupled)
     fields, twin = Fields(device, grid, target), Twin(grid, target, e, h)
     fields.start(e, h)
     fields.advance(5)
@@ -119,10 +120,11 @@ def test_running_transforms_equal_the_twin(device):
     assert np.abs(got[:, 0] + 1j * got[:, 1] - wanted).max() < 1e-6 * np.abs(wanted).max()
 
 
+@pytest.mark.parametrize("coupled", [False, True])
 @pytest.mark.parametrize("width", [1, 3, 16])
-def test_steps_done_tile_by_tile_give_the_same_bits(device, width):
+def test_steps_done_tile_by_tile_give_the_same_bits(device, width, coupled):
     grid, rng = lattice_of((17, 13, 32)), np.random.default_rng(5)
-    target, table = random_target(grid, rng, inside=6), wave_for(grid, 4)
+    target, table = random_target(grid, rng, inside=6, coupled=coupled), wave_for(grid, 4)
     runs = []
     for tile in (100, width):
         fields = Fields(device, grid, target, absorber=3, wave=table, tile=tile)
@@ -136,11 +138,14 @@ def test_steps_done_tile_by_tile_give_the_same_bits(device, width):
 
 
 @pytest.mark.parametrize("n_planes, n_steps, width", [(1, 1, 1), (5, 8, 2), (17, 3, 4), (16, 8, 16)])
-def test_tiles_visit_every_plane_of_every_step_after_what_it_needs(n_planes, n_steps, width):
-    done = np.zeros(n_planes, int)  # steps that each plane has done
-    for step, (first, last) in tiles(n_planes, n_steps, width):
-        assert (done[first:last] == step).all()
-        assert last == n_planes or done[last] >= step  # E of the step before, for H
-        assert first == 0 or done[first - 1] > step  # H of this step, for E
-        done[first:last] += 1
-    assert (done == n_steps).all()
+@pytest.mark.parametrize("ahead", [0, 1])
+def test_tiles_visit_every_plane_of_every_step_after_what_it_needs(n_planes, n_steps, width, ahead):
+    e, h = np.zeros((2, n_planes), int)  # steps that each plane has done
+    for step, magnetic, (first, last) in tiles(n_planes, n_steps, width, ahead):
+        if magnetic:
+            assert (h[first:last] == step).all() and (e[first : last + 1] == step).all()
+            h[first:last] += 1
+        else:
+            assert (e[first:last] == step).all() and (h[max(first - 1, 0) : last + ahead] == step + 1).all()
+            e[first:last] += 1
+    assert (e == n_steps).all() and (h == n_steps).all()

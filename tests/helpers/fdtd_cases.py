@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from sarcl.fullwave import _absorber, runs
@@ -60,6 +62,11 @@ class Twin:
         fdtd.update_e(self.e, self.h, COURANT)
         self._correct(self.e, self.h, magnetic=0)
         edges = fdtd.edges(self.e, self.target.edges, self.target.share, self.old[0])
+        if len(self.target.coupled):
+            added = fdtd.couple(self.e, self.h, self.target.coupled, self.target.coupling, COURANT)
+            number = np.argsort(self.target.edges)[np.searchsorted(np.sort(self.target.edges), self.target.coupled)]
+            edges[number] += added
+            self.old[0][number] += added
         self.step += 1
         return edges, faces
 
@@ -73,10 +80,16 @@ class Twin:
             fdtd.incident(to, part.at, values, rest, part.amount)
 
 
-def random_target(lattice, rng, inside=0):
-    """Lists of a few edges and faces at random places, `inside` cells or more from the walls of the grid."""
+def random_target(lattice, rng, inside=0, coupled=False):
+    """Lists of a few edges and faces at random places, `inside` cells or more from the walls of the grid; half of the
+    edges are coupled to those across them, if so asked.
+    """
     core = np.zeros((3, *lattice.shape), bool)
     core[(slice(None), *(slice(inside, n - inside) for n in lattice.shape))] = True
     places = np.flatnonzero(core)
     edges, faces = (rng.permutation(places)[: max(1, len(places) // 7)] for _ in range(2))
-    return Target(edges, rng.uniform(-0.4, 0.4, (2, len(edges))), faces, rng.uniform(0.2, 1.2, (4, len(faces))))
+    target = Target(edges, rng.uniform(-0.4, 0.4, (2, len(edges))), faces, rng.uniform(0.2, 1.2, (4, len(faces))))
+    if not coupled:
+        return target
+    some = edges[: len(edges) // 2]
+    return replace(target, coupled=some, coupling=rng.uniform(-0.1, 0.1, (4, len(some))))

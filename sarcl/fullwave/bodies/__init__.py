@@ -6,6 +6,7 @@ For other folders:
 
 For this folder alone:
 
+    _averages     means of the permittivity about points of the grid, and normals of surfaces
     _closed_mesh  closed meshes in whole numbers; refusals of open meshes
     _cut_cells    conductors that cut cells, from the intervals of grid lines inside them and the areas of faces
     _dielectrics  permittivities of the edges of the grid in dielectric and lossy bodies

@@ -1,25 +1,36 @@
-"""Permittivities of the edges of a grid in dielectric and lossy bodies.
+"""Permittivities of the edges of a grid in dielectric and lossy bodies: second order in the size of cells.
 
-The cell about an edge is sampled along nine lines, half a cell apart. Where the surface lies along an axis of the
-grid (ALIGNED), an edge has the mean over these lines of the harmonic mean along each: fields along a boundary see the
-mean of both permittivities, to a quarter of a cell, and fields across it the harmonic mean. Where the surface is askew,
-no number per edge is right for both. There an edge has the permittivity of what fills most of its cell: of all
-profiles across a boundary, a step alone has both the mean and the harmonic mean of the boundary itself.
+At a boundary with the normal n, E across it follows from D by the mean of the inverse permittivity, and E along it by
+the inverse of the mean: the inverse permittivity is the tensor
+
+    n n^T <1/eps> + (1 - n n^T) / <eps>
+
+with means over a cube of one cell (`_averages`). Its diagonal is taken at edges, the rest at nodes, whence each edge is
+coupled to the eight edges across its nodes (kernels/fdtd_coupled.cl). Waves in a body are slower on the grid than they
+should be: its permittivity is corrected for that (`on_grid`).
+Sources: A. Farjadpour et al., Opt. Lett. 31 (2006); G. R. Werner and J. R. Cary, J. Comput. Phys. 226 (2007).
 """
 
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import dataclass
 
 import numpy as np
 
 from ..lattice import COURANT, Lattice
 from ..target import VACUUM_PERMITTIVITY
-from ._cut_cells import Box, Intervals, free_lengths
+from ._averages import Contents, averages, mixed_cells
+from ._cut_cells import Box, Intervals
 
 LEAST_CELLS = 4  # per wavelength in a dielectric, and 2 pi times the depth that waves reach
-ALIGNED = 0.999  # cosine of the angle between an axis and the normal of a surface, at least
-LINES = [(m, n) for m in (-1, 0, 1) for n in (-1, 0, 1)]
+LEAST = 1e-6  # difference of a permittivity from 1, and coupling, of edges that are listed
+METAL = 1e-6  # share of conductors in a cell, by rounding
+DOMINANT = 0.98  # of the diagonal: sum of the rest of a row of the inverse permittivity, at most
+SLAB = 2**20  # cells of the box that are sampled at a time: bounds the memory, about 500 bytes each
+HALO = 2  # planes on both sides of a slab that its means reach
+
+Lines = tuple[Intervals, Intervals, Intervals]
 
 
 def halved(lattice: Lattice) -> Lattice:
@@ -46,67 +57,116 @@ def conductivities(lattice: Lattice, permittivity: np.ndarray, k: float) -> np.n
     conductivity dt/(2 eps_0 tan(omega dt/2)), at the frequency where |K| of `_dispersion`, averaged over directions, is
     that of a wavenumber k.
     """
-    length = np.sqrt(6 * (1 - np.sinc(k * lattice.cell / np.pi)))  # dx |K|
+    length = np.sqrt(_square(k * lattice.cell).real)  # dx |K|
     turn = np.arcsin(COURANT * length / 2)  # omega dt/2
     return np.asarray(-permittivity.imag * VACUUM_PERMITTIVITY * 2 / lattice.time_step * np.tan(turn))
 
 
-def edge_permittivities(
-    box: Box, axis: int, parts: Sequence[tuple[Intervals, complex]], conductor: Intervals | None = None
-) -> tuple[np.ndarray, np.ndarray]:
-    """Numbers of the edges of a box along an axis that are partly in dielectrics (n,), and their permittivities (n,).
-
-    parts      intervals along the axis on the halved grid, and permittivities; the later holds where parts overlap
-    conductor  intervals of conductors, which take what they cover; edges beside them have what fills most of the rest
+def on_grid(lattice: Lattice, permittivity: complex, k: float) -> complex:
+    """The permittivity on the grid in which waves have the wavelength that they should have at k, rad/m, averaged over
+    directions: less than the permittivity of the body.
     """
-    covers = [_covered(box, axis, part) for part, _ in parts]
-    metal = _covered(box, axis, conductor) if conductor is not None else None
-    at = np.flatnonzero(sum(_about(values, axis, line, half) for values in covers for line in LINES for half in (0, 1)))
-    size = len(at)
-    made, harmonic, uncut = np.zeros((len(parts) + 1, size)), np.zeros(size, complex), np.ones(size, bool)
-    tilt = np.zeros((3, size), complex)  # of the permittivity: along the edge, and along both axes after
-    for line in LINES:
-        weight, inverse = (2 - abs(line[0])) * (2 - abs(line[1])) / 16, np.zeros(size, complex)
-        for half in (0, 1):
-            left = np.ones(size)
-            if metal is not None:
-                left -= _about(metal, axis, line, half).flat[at]
-                uncut &= left > 1 - 1e-6
-            mean = np.zeros(size, complex)
-            for number in range(len(parts) - 1, -1, -1):
-                permittivity = parts[number][1]
-                share = np.minimum(_about(covers[number], axis, line, half).flat[at], left)
-                left -= share
-                made[number] += weight * share
-                inverse += share / 2 / permittivity
-                mean += share * permittivity
-            made[-1] += weight * left
-            inverse += left / 2
-            tilt += weight * (mean + left) * np.array([2 * (2 * half - 1), *line])[:, None] * [[1], [2], [2]]
-        harmonic += weight / np.where(inverse == 0, 1, inverse)
-    values = np.array([permittivity for _, permittivity in parts] + [1.0])
-    step = values[np.argmax(made, axis=0)]
-    slope = np.abs(tilt)
-    along = uncut & (slope.max(axis=0) >= ALIGNED * np.linalg.norm(slope, axis=0))
-    value = np.where(along, harmonic, step)
-    return at[value != 1], value[value != 1]
+    index = np.sqrt(complex(permittivity))
+    phase = k * lattice.cell
+    return complex(_square(index * phase) / _square(phase))
 
 
-def _covered(box: Box, axis: int, part: Intervals) -> np.ndarray:
-    """Covered shares of the edges of the halved grid, float32 (twice the box's shape)."""
-    nx, ny, nz = (2 * n for n in box.shape)
-    return np.asarray(1 - free_lengths(Box(2 * box.low, (nx, ny, nz)), axis, part))
+def _square(phase: complex) -> complex:
+    """(dx |K|)^2 of waves with `phase` rad per cell, averaged over directions."""
+    return complex(6 * (1 - np.sin(phase) / phase))
 
 
-def _about(covered: np.ndarray, axis: int, line: tuple[int, int], half: int) -> np.ndarray:
-    """Shares (*shape of the box) of half a line, `line` half cells from each edge along the axes after its own."""
-    some = [slice(None)] * 3
-    some[axis] = slice(half, None, 2)
-    out = covered[tuple(some)]
-    for step, along in zip(line, ((axis + 1) % 3, (axis + 2) % 3), strict=True):
-        some = [slice(None)] * 3
-        some[along] = slice(step % 2, None, 2)
-        out = out[tuple(some)]
-        if step < 0:
-            out = np.roll(out, 1, axis=along)  # nothing is covered beside the box
+@dataclass(frozen=True, eq=False)
+class Permittivities:
+    """Of the edges of a box that are partly in dielectrics, along one axis.
+
+    at       numbers in a raveled array of the box (n,)
+    values   complex (n,), 1 over which is the inverse permittivity along the edge
+    across   the inverse permittivity off its diagonal, a quarter of it, times `values`, complex (4, n): with D along b
+             at the nodes before and after the edge, and along c; b and c are the axes after. 0: not coupled
+    """
+
+    at: np.ndarray
+    values: np.ndarray
+    across: np.ndarray
+
+
+def permittivities(
+    box: Box, parts: Sequence[tuple[Lines, complex]], conductor: Lines | None = None
+) -> list[Permittivities]:
+    """Permittivities of the edges of a box along x, y and z.
+
+    parts      intervals along x, y and z on the halved grid, and permittivities; the later holds where parts overlap
+    conductor  intervals of conductors, which take what they cover; edges beside them have what fills most of the rest,
+               and are not coupled
+    """
+    values, tensor = np.ones((3, *box.shape), np.complex64), np.zeros((3, *box.shape), np.complex64)
+    cut = np.zeros((3, *box.shape), bool)
+    planes = max(1, SLAB // (box.shape[1] * box.shape[2]))
+    for first in range(0, box.shape[0], planes):
+        last = min(first + planes, box.shape[0])
+        start, stop = max(first - HALO, 0), min(last + HALO, box.shape[0])
+        slab = Box(box.low + np.array([start, 0, 0]), (stop - start, *box.shape[1:]))
+        core = slice(first - start, last - start)
+        for whole, part in zip((values, tensor, cut), _of_slab(slab, parts, conductor), strict=True):
+            whole[:, first:last] = part[:, core]
+    tensor *= _least_scale(values, tensor, cut)
+    tensor[np.abs(tensor) < LEAST] = 0
+    out = []
+    for axis in range(3):
+        across = np.stack(_at_nodes(tensor, axis)) * values[axis] / 4
+        at = np.flatnonzero((np.abs(values[axis] - 1) > LEAST) | across.any(axis=0))
+        out.append(Permittivities(at, values[axis].flat[at].astype(complex), across.reshape(4, -1)[:, at]))
     return out
+
+
+def _of_slab(
+    box: Box, parts: Sequence[tuple[Lines, complex]], conductor: Lines | None
+) -> tuple[np.ndarray, np.ndarray, np.ndarray]:
+    """Permittivities of edges, tensors off their diagonal (yz, zx, xy) at nodes, and which edges are near conductors:
+    (3, *shape of the box) each.
+    """
+    contents = [
+        Contents.of(box, axis, [(lines[axis], value) for lines, value in parts], conductor and conductor[axis])
+        for axis in range(3)
+    ]
+    mixed, alone = mixed_cells(contents)
+    values, tensor = np.stack([alone] * 3), np.zeros((3, *box.shape), complex)
+    cut = np.zeros(values.shape, bool)
+    inner = np.zeros(mixed.shape, bool)  # nothing is dielectric at the sides of the box
+    inner[1:-1, 1:-1, 1:-1] = mixed[1:-1, 1:-1, 1:-1]
+    values[:, mixed] = 1
+    cells = np.argwhere(inner)
+    kinds = np.array([value for _, value in parts] + [1.0])
+    for axis in range(3):
+        near = averages(contents, cells, np.arange(3) == axis)
+        across = near.normal[:, axis] ** 2
+        smooth = 1 / np.where(near.metal > METAL, 1, across * near.inverse + (1 - across) / (near.mean + near.metal))
+        smooth = np.where(near.normal.any(axis=1), smooth, near.series[:, axis])
+        metal = near.metal > METAL
+        rest = near.mean / np.maximum(1 - near.metal, METAL)
+        most = kinds[np.argmin(np.abs(rest[:, None] - kinds), axis=1)]
+        values[axis][inner], cut[axis][inner] = np.where(metal, most, smooth), metal
+    near = averages(contents, cells, (0, 0, 0))
+    step = np.where(near.metal > METAL, 0, near.inverse - 1 / (near.mean + near.metal))
+    for axis in range(3):
+        tensor[axis][inner] = step * near.normal[:, (axis + 1) % 3] * near.normal[:, (axis + 2) % 3]
+    return values, tensor, cut
+
+
+def _at_nodes(tensor: np.ndarray, axis: int) -> list[np.ndarray]:
+    """Of the edges along an axis, the elements that couple them to both axes after it, at both nodes of each edge."""
+    with_b, with_c = tensor[(axis + 2) % 3], tensor[(axis + 1) % 3]
+    return [moved for values in (with_b, with_c) for moved in (values, np.roll(values, -1, axis=axis))]
+
+
+def _least_scale(values: np.ndarray, tensor: np.ndarray, cut: np.ndarray) -> np.ndarray:
+    """Factors of the tensors at nodes, 0 to 1 (*shape): with them each row of the inverse permittivity, over all edges,
+    has a diagonal that is larger than the sum of the rest, so that the matrix is positive and the grid stable.
+    """
+    scale = np.ones(values.shape[1:])
+    for axis in range(3):
+        rest = sum(2 * np.abs(part) / 4 for part in _at_nodes(tensor, axis))
+        own = np.where(cut[axis], 0, DOMINANT * np.abs(1 / values[axis]) / np.maximum(rest, 1e-30))
+        scale = np.minimum(scale, np.minimum(own, np.roll(own, 1, axis=axis)))
+    return np.asarray(scale)

@@ -12,7 +12,7 @@ from ...base.validation import number
 from ..lattice import Lattice
 from ..target import Target, material_edges
 from ._cut_cells import Box, Intervals, conductor, edge_lengths
-from ._dielectrics import check_cells, conductivities, edge_permittivities, halved
+from ._dielectrics import Lines, check_cells, conductivities, halved, on_grid, permittivities
 from ._mesh_lines import MeshLines, mesh_lines
 
 
@@ -49,13 +49,13 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
     for i, part in enumerate(parts):
         if part.permittivity is not None:
             check_cells(lattice, part.permittivity, wavenumber)
-            dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, complex(part.permittivity)))
+            value = on_grid(lattice, part.permittivity, wavenumber)
+            dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, value))
     hidden = mesh_lines(fine, np.concatenate(metal)).intervals if metal else None
-    edges, values = _in_dielectrics(lattice, dielectric, hidden, found)
-    made_of = material_edges(lattice, edges, values.real, conductivities(lattice, values, wavenumber))
+    made_of = _dielectric_edges(lattice, dielectric, hidden, found, wavenumber)
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
-        made.faces, made.weight, made.resting, made.gap,
+        made.faces, made.weight, made.resting, made.gap, made_of.coupled, made_of.coupling,
     )  # fmt: skip
 
 
@@ -88,19 +88,21 @@ def _joined(group: list[Intervals]) -> Intervals:
     return Intervals(lines, start, end)
 
 
-def _in_dielectrics(
-    lattice: Lattice, parts: list[tuple[tuple[Intervals, Intervals, Intervals], complex]],
-    hidden: tuple[Intervals, Intervals, Intervals] | None, metal: MeshLines | None,
-) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
-    """Places of edges that are partly in dielectrics, none in a conductor alone, and their permittivities."""
+def _dielectric_edges(
+    lattice: Lattice, parts: list[tuple[Lines, complex]], hidden: Lines | None, metal: MeshLines | None, k: float
+) -> Target:
+    """The lists of edges that are partly in dielectrics, none in a conductor alone."""
     by_axis = [[intervals[axis] for intervals, _ in parts] for axis in range(3)]
     box = Box.around(lattice, [_joined(group) for group in by_axis])
     free = edge_lengths(box, metal.intervals)[1] if metal is not None else None
-    places, values = [], []
-    for axis in range(3):
-        along = [(intervals[axis], permittivity) for intervals, permittivity in parts]
-        at, value = edge_permittivities(box, axis, along, hidden[axis] if hidden is not None else None)
-        outside = np.ones(len(at), bool) if free is None else free[axis].flat[at] > 0
-        places.append(box.in_grid(lattice, at[outside], axis))
-        values.append(value[outside])
-    return np.concatenate(places), np.concatenate(values)
+    places, values, across = [], [], []
+    for axis, found in enumerate(permittivities(box, parts, hidden)):
+        outside = np.ones(len(found.at), bool) if free is None else free[axis].flat[found.at] > 0
+        places.append(box.in_grid(lattice, found.at[outside], axis))
+        values.append(found.values[outside])
+        across.append(found.across[:, outside])
+    at, value, coupling = np.concatenate(places), np.concatenate(values), np.concatenate(across, axis=1)
+    made = material_edges(lattice, at, value.real, conductivities(lattice, value, k))
+    weights = coupling.real * made.share[1]
+    some = np.abs(weights).max(axis=0, initial=0) > 0
+    return replace(made, coupled=at[some], coupling=weights[:, some])

@@ -28,7 +28,7 @@ from .. import runs
 from ..lattice import Lattice
 from ..target import Target
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
-from ._grid_choice import SHARE, check_cells, grid_choice
+from ._grid_choice import SHARE, check_cells, chosen_cells, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
@@ -228,13 +228,13 @@ class FullwaveTask:
 
 def fullwave_task(
     scene: Scene, waveform: Waveform, track: Trajectory, request: EchoRequest, *, receiver: Trajectory | None = None,
-    reference: Any = None, range_window: Any = None, compressed: bool = True, cells: float = 12.0,
+    reference: Any = None, range_window: Any = None, compressed: bool = True, cells: Any = "auto",
     max_bytes: float | None = None,
 ) -> FullwaveTask:  # fmt: skip
     """Checks the arguments of fullwave_echo, and chooses the grid. ValueError, MemoryError: what does not fit."""
     check_bodies(scene)
     band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-    cells = check_cells(cells, band)
+    cells = check_cells(chosen_cells(cells, scene, band[1], request.tolerance), band)
     check_wavelengths(scene, cells, band[1])
     if request.tolerance < LEAST_TOLERANCE:
         raise ToleranceUnreachable(request.tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")

@@ -1,8 +1,8 @@
 """The grid's own error, predicted from a run with larger cells.
 
-    error(cell) ~ |a(cell) - a(ratio cell)| / (ratio^ORDER - 1)
+    error(cell) ~ |a(cell) - a(ratio cell)| / (ratio^order - 1)
 
-for an error that falls with the ORDER-th power of the size of cells (Richardson's extrapolation). It depends as much on
+for an error that falls with a power of the size of cells (Richardson's extrapolation; `order`). It depends as much on
 where flat sides lie between nodes: `runs.grid_about` lays them on nodes in both grids. Echoes at many pulses count,
 formed from one anchor: more directions make the estimate steadier, and forming changes both alike.
 """
@@ -11,12 +11,15 @@ from __future__ import annotations
 
 import numpy as np
 
+from ._closed_bodies import parts_of
 from ._fullwave_task import FullwaveTask
 from ._run_progress import RunProgress
 
 RATIO = 1.5  # of the cells, about: such a run takes a fifth of the time, 1.5^-4
 FINER = 1.15  # by which its cells may be smaller, so that flat sides lie on nodes
-ORDER = 1.5  # measured on spheres, boxes, a cylinder and a cone: docs/theory/full_wave.md
+# powers of the size of cells with which errors fall, measured: docs/theory/full_wave.md
+CONDUCTOR, DIELECTRIC, LOSSY = 1.5, 2.0, 1.0
+LOSS = 0.05  # of a permittivity, imaginary over real part, from which on a body counts as lossy
 MOST_PULSES = 32  # at which echoes are compared
 
 
@@ -35,4 +38,10 @@ def grid_error(
     weight = np.abs(task.spectrum)
     change = float((np.abs((coarse - echoes[some]) * weight) ** 2).sum())
     power = float((np.abs(echoes[some] * weight) ** 2).sum())
-    return change / (ratio**ORDER - 1) ** 2, power
+    return change / (ratio ** order(task) - 1) ** 2, power
+
+
+def order(task: FullwaveTask) -> float:
+    """The power of the size of cells with which the error falls: the least of those of the materials."""
+    found = [eps for _, eps in parts_of(task.scene, task.waveform.center)]
+    return min(CONDUCTOR if e is None else LOSSY if -e.imag > LOSS * e.real else DIELECTRIC for e in found)

@@ -33,7 +33,7 @@ class FullwaveOptions(TypedDict, total=False):
     vertical: ArrayLike | None
     range_window: ArrayLike | None
     reference: ArrayLike | None
-    cells: float
+    cells: Literal["auto"] | float
     anchors: Literal["auto"] | int | Sequence[int]
     compressed: bool
     max_bytes: float | None
@@ -55,7 +55,7 @@ def fullwave_echo(
     vertical: ArrayLike | None = None,
     range_window: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-    cells: float = 12.0,
+    cells: Literal["auto"] | float = "auto",
     anchors: Literal["auto"] | int | Sequence[int] = "auto",
     compressed: bool = True,
     max_bytes: float | None = None,
@@ -78,7 +78,9 @@ def fullwave_echo(
     track, receiver, polarization, vertical, reference, compressed   as in `echo`. One run of the grid gives all
                   polarisations of one that is sent: HH and VH share theirs
     range_window  as in `echo`, but it must hold the scene; default: also what creeps round its bodies
-    cells         cells per shortest wavelength of the waveform's band, at least 8. Time grows as their fourth power
+    cells         cells per shortest wavelength of the waveform's band, at least 8; "auto": 12 for conductors, and for
+                  dielectrics of permittivity eps 10 sqrt(eps 3e-2/tolerance), from 8 to 20 sqrt(eps); the number is
+                  report.plan["cells"]. Time grows as their fourth power
     anchors       "auto": as many as the tolerance needs; a number, spaced evenly; or pulse numbers
     max_bytes     memory for one run of the grid, default half the memory of the device; frequencies that do not fit
                   take runs of their own

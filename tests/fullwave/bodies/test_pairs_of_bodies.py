@@ -29,14 +29,17 @@ def pair(seed):
 
 
 def coefficients(metal, dielectric):
-    """Of every edge, (2, 3, *shape), and of every face, (4, 3, *shape), as Fields takes them."""
+    """Of every edge (2, 3, *shape), of every face, and of coupled edges (4, 3, *shape), as Fields takes them."""
     made = bodies(GRID, [Body(metal), Body(dielectric, 2.5 - 0.3j)], K)
     edges, faces = np.zeros((2, 3, *GRID.shape)), np.ones((4, 3, *GRID.shape))
     edges[1] = 1
-    for out, at, values in ((edges, made.edges, made.share), (faces, made.faces, made.weight)):
+    coupling = np.zeros_like(faces)
+    lists = (edges, made.edges, made.share), (faces, made.faces, made.weight), (coupling, made.coupled, made.coupling)
+    for out, at, values in lists:
         assert len(np.unique(at)) == len(at)
         out.reshape(len(out), -1)[:, at] = values
-    return edges, faces
+    assert np.isin(made.coupled, made.edges).all()
+    return edges, faces, coupling
 
 
 def mirrored_body(triangles, axis):
@@ -66,17 +69,30 @@ def mirrored_weights(weight, axis):
     return out
 
 
+def mirrored_coupling(weight, axis):
+    """Weights (4, 3, *shape) of the axes after an edge's own, before and after it, on the mirrored grid."""
+    out = mirrored_values(weight, axis, magnetic=False)
+    for component in range(3):
+        if component == axis:
+            out[:, component] = -out[[1, 0, 3, 2], component]
+        else:
+            first = 0 if (component + 1) % 3 == axis else 2
+            out[first : first + 2, component] *= -1
+    return out
+
+
 @pytest.mark.parametrize("seed", range(50))
 def test_a_mirrored_pair_of_bodies_has_mirrored_coefficients_and_a_translated_one_the_same(seed):
     metal, dielectric = pair(seed)
-    edges, faces = coefficients(metal, dielectric)
+    edges, faces, coupling = coefficients(metal, dielectric)
     axis = seed % 3
     got = coefficients(mirrored_body(metal, axis), mirrored_body(dielectric, axis))
     assert np.abs(got[0] - mirrored_values(edges, axis, magnetic=False)).max() < 1e-5
     assert np.abs(got[1] - mirrored_weights(faces, axis)).max() < 1e-5
+    assert np.abs(got[2] - mirrored_coupling(coupling, axis)).max() < 1e-5
     steps = np.random.default_rng(seed).integers(-5, 6, 3)
     moved = coefficients(metal + steps, dielectric + steps)
-    for values, wanted in zip(moved, (edges, faces), strict=True):
+    for values, wanted in zip(moved, (edges, faces, coupling), strict=True):
         assert np.abs(values - np.roll(wanted, steps, axis=(2, 3, 4))).max() < 1e-5
 
 
