@@ -174,9 +174,34 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
         (shapes.box((90, 90, 1)), {}, ValueError, "track position 0 is 40 m from .* reaches 63.64 m"),
     ],
 )  # fmt: skip
-def test_what_the_grid_cannot_hold_is_refused(scene, options, error, message):
-    with pytest.raises(error, match=message):
-        sarcl.fullwave_echo(scene, CHIRP, around(20), **options)
+def test_what_the_grid_cannot_hold_is_refused_by_plan_and_run_alike(scene, options, error, message):
+    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
+        if "out" not in options or function is sarcl.fullwave_echo:
+            with pytest.raises(error, match=message):
+                function(scene, CHIRP, around(20), **options)
+
+
+def test_a_plate_that_the_grid_of_the_model_error_does_not_resolve_is_refused_before_any_run(monkeypatch):
+    done = pretend(monkeypatch)
+    plate = shapes.box((0.3, 0.3, 0.03), rotation=(0.5, 0.2, 0))  # 1.8 cells; 1.2 of the larger ones
+    thin = shapes.box((0.3, 0.3, 0.018), rotation=(0.5, 0.2, 0))
+    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
+        function(plate, CHIRP, around(20), cells=14)
+        with pytest.raises(ValueError, match=r"model_error takes a run with cells .* model_error=False, or cells=\d+"):
+            function(thin, CHIRP, around(20), cells=14)
+    assert len(done) == 2  # of the plate
+    sarcl.fullwave_echo(thin, CHIRP, around(20), cells=14, model_error=False)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_scenes_of_metal_and_dielectric_boxes_are_forecast_and_run(monkeypatch, seed):
+    pretend(monkeypatch)
+    rng = np.random.default_rng(seed)
+    metal = shapes.box((0.2, 0.2, 0.2), position=rng.uniform(-0.3, 0.3, 3))
+    block = shapes.box((0.1, 0.1, 0.1), position=rng.uniform(-0.3, 0.3, 3), material=sarcl.Material(2))
+    forecast = sarcl.plan_fullwave_echo(metal + block, CHIRP, around(20))
+    raw = sarcl.fullwave_echo(metal + block, CHIRP, around(20))
+    assert forecast.plan["grid"] == raw.report.plan["grid"] and forecast.plan["cells"] == raw.report.plan["cells"]
 
 
 def test_gaps_that_the_grid_closes_are_said_with_the_cells_that_leave_them_open(monkeypatch):

@@ -1,10 +1,13 @@
 """Refusal of parts of a body that fall between the nodes of a grid, with the size of cells that resolves them.
 
 Between nodes a plate or a wire is transparent: no edge of the grid lies in it. Tips and sharp edges of a body are
-thinner than a cell as well, however small the cells are. A part is refused, therefore, where
+thinner than a cell as well, however small the cells are. What counts is how far from a point of the surface the grid
+holds the body. A part is refused where
 
-- a line enters and leaves between two nodes through facets that are parallel, or
-- no node is inside within REACH cells, or
+- a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no cell that is inside as
+  a whole lies within RIM cells: a plate that is wider than the rim of a wing, or
+- no node is inside within REACH cells, and the facet across the body is parallel: a plate or a wire that no line meets,
+- no node is inside within EDGE cells: sharp edges reach that far from where they are as thick as a cell, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
 
 Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Other gaps
@@ -20,7 +23,7 @@ from ...base.errors import TooThin
 from ..lattice import Lattice
 from ._closed_mesh import ClosedMesh
 
-REACH = 4  # cells
+RIM, REACH, EDGE = 3, 4, 12  # cells; a wedge of 5 degrees is as thick as a cell at 11.4 cells from its edge
 PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edges are taken as plates
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
 SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
@@ -36,7 +39,7 @@ class ThinParts:
         self._inwards = -np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         self._inwards /= np.maximum(np.linalg.norm(self._inwards, axis=1), 1e-300)[:, None]
         self._points = [(np.arange(len(self.corners)), self.corners.mean(axis=1))]
-        self._bad: list[tuple[np.ndarray, np.ndarray]] = []
+        self._plates: list[tuple[np.ndarray, np.ndarray]] = []
         self._gaps: list[np.ndarray] = []
 
     def add(self, facet: np.ndarray, place: np.ndarray) -> None:
@@ -46,7 +49,7 @@ class ThinParts:
     def add_pairs(self, entered: np.ndarray, left: np.ndarray, place: np.ndarray) -> None:
         """Facets (n,) through which lines enter, in nodes (n, 3), and leave again before the next node."""
         plate = self._parallel(entered, left)
-        self._bad.append((entered[plate], place[plate]))
+        self._plates.append((entered[plate], place[plate]))
 
     def add_gaps(self, left: np.ndarray, entered: np.ndarray, axis: int, length: np.ndarray) -> None:
         """Facets (n,) through which lines along an axis leave a body, and enter one again; lengths between, cells."""
@@ -65,8 +68,6 @@ class ThinParts:
 
     def check(self, inside: np.ndarray, low: np.ndarray) -> None:
         """TooThin, a ValueError, where parts are too thin; inside: which nodes are, from node `low` (3,) on."""
-        from scipy.ndimage import maximum_filter
-
         size = self.lattice.cell * float(np.ptp(self.corners.reshape(-1, 3), axis=0).max())
         if size < self.lattice.cell:
             raise TooThin(
@@ -74,18 +75,12 @@ class ThinParts:
                 f"grid; give cells of at most {SHARE * size:.2g} m, or triangles in metres",
                 SHARE * size,
             )
-        near = maximum_filter(np.pad(inside, REACH), size=2 * REACH + 1, mode="constant", cval=False)
-        for facet, place in self._points:
-            node = np.rint(place).astype(int) - low + REACH
-            held = ((node >= 0) & (node < near.shape)).all(axis=1)
-            far = ~(near[tuple(np.where(held[:, None], node, 0).T)] & held)
-            self._bad.append((facet[far], place[far]))
-        facet, place = (np.concatenate(part) for part in zip(*self._bad, strict=True))
+        facet, place = self._unresolved(inside, low)
         if not len(facet):
             return
-        some = np.linspace(0, len(facet) - 1, min(RAYS, len(facet))).astype(int)
+        some = _spread(len(facet))
         cell = self.lattice.cell
-        thickness = cell * float(np.quantile(self._thickness(facet[some], place[some]), 0.25))
+        thickness = cell * float(np.quantile(self._across(facet[some], place[some])[0], 0.25))
         at = np.array2string(self.lattice.origin + cell * place[some[0]], precision=4)
         resolved, remedy = None, "give them a thickness"
         if thickness > 1e-5 * cell:
@@ -97,13 +92,30 @@ class ThinParts:
             resolved,
         )
 
-    def _thickness(self, facet: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Distance from points on facets (n,) inwards to where the body ends, in cells (n,); inf where no facet is met.
+    def _unresolved(self, inside: np.ndarray, low: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Points that are refused: facets (n,), places in nodes (n, 3)."""
+        plates, points = (
+            tuple(np.concatenate(part) for part in zip(*group, strict=True)) for group in (self._plates, self._points)
+        )
+        wide = _far(_whole_cells(inside), low, RIM, plates[1])
+        alone = _far(inside, low, EDGE, points[1])
+        far = np.flatnonzero(_far(inside, low, REACH, points[1]) & ~alone)
+        far = far[_spread(len(far))]
+        thickness, opposite = self._across(points[0][far], points[1][far])
+        flat = far[np.isfinite(thickness) & self._parallel(points[0][far], opposite)]
+        chosen = np.concatenate([np.flatnonzero(alone), flat])
+        return np.concatenate([plates[0][wide], points[0][chosen]]), np.concatenate(
+            [plates[1][wide], points[1][chosen]]
+        )
+
+    def _across(self, facet: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """Distance from points on facets (n,) inwards to where the body ends, in cells (n,), inf where no facet is met;
+        and that facet (n,).
 
         Source: T. Moeller and B. Trumbore, J. Graphics Tools 2 (1997): u and v in the facet, t along the ray.
         """
         first, second = self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0]
-        out = np.full(len(facet), np.inf)
+        out, opposite = np.full(len(facet), np.inf), np.zeros(len(facet), np.int64)
         for i, (ray, origin) in enumerate(zip(self._inwards[facet], place, strict=True)):
             across = np.cross(ray, second)
             from_corner = origin - self.corners[:, 0]
@@ -116,5 +128,34 @@ class ThinParts:
                     (turned * second).sum(1) * scale,
                 )
                 hit = (u > -1e-9) & (v > -1e-9) & (u + v < 1 + 1e-9) & (t > -1e-6) & (self._inwards @ ray < 0)
-            out[i] = np.maximum(t[hit], 0).min(initial=np.inf)
-        return out
+            if hit.any():
+                opposite[i] = np.flatnonzero(hit)[np.argmin(t[hit])]
+                out[i] = abs(max(float(t[opposite[i]]), 0.0))  # of a sheet -0.0, too
+        return out, opposite
+
+
+def _spread(n: int) -> np.ndarray:
+    """Up to RAYS of n numbers, evenly."""
+    return np.linspace(0, n - 1, min(RAYS, n)).astype(int)
+
+
+def _whole_cells(inside: np.ndarray) -> np.ndarray:
+    """Nodes at the corners of cells that are inside as a whole: all eight corners are."""
+    padded = np.pad(inside, 1)
+    for axis in range(3):
+        line = np.moveaxis(padded, axis, 0)  # a view
+        line[:-1] = line[:-1] & line[1:]
+    for axis in range(3):
+        line = np.moveaxis(padded, axis, 0)
+        line[1:] = line[1:] | line[:-1]
+    return np.asarray(padded[1:-1, 1:-1, 1:-1])
+
+
+def _far(held: np.ndarray, low: np.ndarray, reach: int, place: np.ndarray) -> np.ndarray:
+    """Which places in nodes (n, 3) have none of the nodes `held` of a box from node `low` on within `reach` cells."""
+    from scipy.ndimage import maximum_filter
+
+    near = maximum_filter(np.pad(held, reach), size=2 * reach + 1, mode="constant", cval=False)
+    node = np.rint(place).astype(int) - low + reach
+    inner = ((node >= 0) & (node < near.shape)).all(axis=1)
+    return np.asarray(~(near[tuple(np.where(inner[:, None], node, 0).T)] & inner))

@@ -13,7 +13,7 @@ from ..anchors import Anchored, anchored
 from ._anchor_files import AnchorFiles
 from ._anchor_runs import AnchorRuns
 from ._fullwave_task import FullwaveTask
-from ._model_error import grid_error
+from ._model_error import coarse_task, grid_error
 from ._run_progress import RunProgress
 
 
@@ -37,6 +37,8 @@ def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, m
     request, n_pulses = task.request, len(task.tx)
     anchors = checked_anchors(anchors, n_pulses)
     task.warn_of_gaps()
+    if model_error:
+        coarse_task(task)  # what it refuses is refused before the runs
     files = None if out is None else AnchorFiles(out, task.fingerprint())
     samples = np.empty((n_pulses, len(request.polarizations), len(task.frequencies)), np.complex64)
     progress = RunProgress(request.report, 1, task.cost.steps)

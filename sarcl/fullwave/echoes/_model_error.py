@@ -11,6 +11,8 @@ from __future__ import annotations
 
 import numpy as np
 
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import TooThin
 from ._closed_bodies import parts_of
 from ._fullwave_task import FullwaveTask
 from ._run_progress import RunProgress
@@ -32,13 +34,31 @@ def grid_error(
     """
     n = len(echoes)
     some = np.unique(np.append(np.linspace(0, n - 1, min(MOST_PULSES, n)).round().astype(int), pulse))
-    larger = task.coarser(RATIO, FINER)
+    larger = coarse_task(task)
     ratio = larger.lattice.cell / task.lattice.cell
     (coarse,), _ = larger.formed(pulse, sent, received, some, progress)
     weight = np.abs(task.spectrum)
     change = float((np.abs((coarse - echoes[some]) * weight) ** 2).sum())
     power = float((np.abs(echoes[some] * weight) ** 2).sum())
     return change / (ratio ** order(task) - 1) ** 2, power
+
+
+def coarse_task(task: FullwaveTask) -> FullwaveTask:
+    """The task on larger cells, whose bodies are cut. TooThin, a ValueError, where they do not resolve a part."""
+    larger = task.coarser(RATIO, FINER)
+    try:
+        larger.target()
+    except TooThin as thin:
+        remedy = "give model_error=False"
+        if thin.cell is not None:
+            needed = np.ceil(10 * RATIO * SPEED_OF_LIGHT / task.band[1] / thin.cell) / 10
+            remedy += f", or cells={needed:g}, which are {task.cells:g} now"
+        raise TooThin(
+            f"report.model_error takes a run with cells of {larger.lattice.cell:.3g} m, for which parts of the bodies "
+            f"are too thin; {remedy}",
+            thin.cell,
+        ) from thin
+    return larger
 
 
 def order(task: FullwaveTask) -> float:

@@ -18,10 +18,11 @@ from ...simulation.echo import echo_request
 from ._formed_samples import checked_anchors
 from ._fullwave_task import FullwaveTask, fullwave_task
 from ._grid_choice import SHARE
-from ._model_error import RATIO
+from ._model_error import RATIO, coarse_task
 from ._run_speed import run_speed
 from .fullwave_echo import TOLERANCE, FullwaveOptions
 
+MOST_CELLS = 5e7  # of a grid by which a forecast cuts the bodies: seconds, and some gigabytes
 FEWEST = 5  # anchors before any interval is bisected, where there are as many pulses
 # Spacing of anchors, in wavelengths over the length of the target, that has an error: boxes and cones of 3 wavelengths
 # and more; the error falls with about the fourth power of the spacing
@@ -70,10 +71,9 @@ def plan_fullwave_echo(
 ) -> FullwaveForecast:
     """Forecast of `fullwave_echo(scene, waveform, track, ...)` with these options, as a FullwaveForecast.
 
-    No run is done; a small grid is timed, which takes about a second. The number of anchors is estimated from the
-    length of the target in wavelengths, the angle that the track covers and the tolerance: with anchors="auto" the
-    runs themselves decide. Raises as `fullwave_echo` does, except for what is found when bodies are cut by the grid;
-    `out` is not written.
+    No run is done; a small grid is timed, which takes about a second, and bodies are cut by the grid, up to 5e7 cells.
+    The number of anchors is estimated from the length of the target in wavelengths, the angle that the track covers and
+    the tolerance: with anchors="auto" the runs themselves decide. Raises and warns as `fullwave_echo` does; `out` is not written.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
@@ -82,6 +82,11 @@ def plan_fullwave_echo(
     given: dict[str, Any] = {"tolerance": TOLERANCE, **options}
     request = echo_request(scene, (), **{k: v for k, v in given.items() if k in REQUEST})
     task = fullwave_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
+    cut = float(np.prod(task.lattice.shape)) <= MOST_CELLS
+    if cut:
+        task.warn_of_gaps()
+        if given.get("model_error", True):
+            coarse_task(task)
     parts, n_rows, n_samples = task.parts(), len(track) * len(request.polarizations), len(task.frequencies)
     n_anchors = expected_anchors(task, options.get("anchors", "auto"), request.tolerance)
     sent = len(list(task.sendings()))
@@ -99,6 +104,7 @@ def plan_fullwave_echo(
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
         "steps": task.cost.steps,
+        **({} if cut else {"bodies": "not looked at on so large a grid"}),
         **task.losses,
         **task.motion,
     }

@@ -314,6 +314,23 @@ def test_sharp_edges_are_no_thin_parts_however_small_the_cells():
             assert np.allclose(mesh_lines(grid_of(body, cell), body).volume[2], volume(body), rtol=0.1)
 
 
+@pytest.mark.parametrize("angle", [3, 6, 8, 10, 15, 20])
+def test_wedges_are_refused_below_five_degrees_and_run_above_wherever_they_lie(angle):
+    """A prism over a right triangle with this angle at its edge; turned, and with flat sides along the grid."""
+    height = np.tan(np.radians(angle))
+    corners = np.array([[x, y, z] for y in (0, 1) for x, z in ((0, 0), (1, 0), (1, height))], float)
+    faces = [[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [2, 5, 3], [2, 3, 0]]
+    wedge = corners[faces] if volume(corners[faces]) > 0 else corners[faces][:, ::-1]
+    rng = np.random.default_rng(angle)
+    for turned in [False] * 6 + [True] * 4:
+        body = wedge @ rotation(rng.uniform(-1, 1, 3) * turned).T
+        grid = grid_of(body, rng.uniform(1 / 50, 1 / 10))
+        if angle < 5:
+            refused(body, "too thin for cells", grid)
+        else:
+            mesh_lines(grid, body)
+
+
 def test_a_wire_between_grid_lines_and_a_mast_on_a_body_are_refused():
     wire = shapes.cylinder(0.02, 2.0, sections=8, position=(1.55, 1.55, 0.5)).triangles
     refused(wire, r"too thin for cells of 0\.1 m: about 0\.0\d+ m thick")
