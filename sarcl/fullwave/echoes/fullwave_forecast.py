@@ -73,7 +73,8 @@ def plan_fullwave_echo(
 
     No run is done; a small grid is timed, which takes about a second, and bodies are cut by the grid, up to 5e7 cells.
     The number of anchors is estimated from the length of the target in wavelengths, the angle that the track covers and
-    the tolerance: with anchors="auto" the runs themselves decide. Raises and warns as `fullwave_echo` does; `out` is not written.
+    the tolerance: with anchors="auto" the runs themselves decide. Raises and warns as `fullwave_echo` does; `out` is
+    not written.
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
