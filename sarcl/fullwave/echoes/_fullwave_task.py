@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...base import host_memory
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
@@ -28,7 +27,7 @@ from .. import runs
 from ..lattice import Lattice
 from ..target import Target
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
-from ._grid_choice import SHARE, check_cells, chosen_cells, grid_choice
+from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
@@ -245,9 +244,7 @@ def fullwave_task(
     reference_range = half_path(tx, rx, point)
     window = _window(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, *window, compressed)
-    budget = request.budget
-    if max_bytes is None:
-        budget = SHARE * min(request.device.info.memory, host_memory.installed())
+    budget = request.budget if max_bytes is not None else default_bytes(request.device)
     lattice, cost = grid_choice(scene, band, cells, budget)
     return FullwaveTask(
         request, scene, waveform, band, track, receiver, motion, reference_range, window,

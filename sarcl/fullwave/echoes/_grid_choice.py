@@ -6,9 +6,11 @@ from typing import Any
 
 import numpy as np
 
+from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.text import size_text
 from ...base.validation import choice, number
+from ...opencl.device import Device
 from ...scattering.physical_optics import normals_and_areas
 from ...scene.scene import Scene
 from .. import runs
@@ -21,7 +23,15 @@ AUTO = 12.0  # cells per shortest wavelength that "auto" takes for conductors
 # 3.4 % with 10, which fall with the square of the cells. More than the last take too long.
 AUTO_INSIDE, AUTO_ERROR, AUTO_LIMITS = 10.0, 3e-2, (8.0, 20.0)
 FLAT = 0.01  # of the surface: sides with less are not worth smaller cells
-SHARE = 0.5  # of the device's memory, where max_bytes is None: a run cannot be divided
+SHARE = 0.5  # of the installed memory, where max_bytes is None: a run cannot be divided
+
+
+def default_bytes(device: Device) -> float:
+    """Bytes that a run may take where max_bytes is None: SHARE of what a GPU has, or of what is installed beside a CPU,
+    whose drivers give less while other programs take some: forecasts do not depend on that.
+    """
+    installed = host_memory.installed()
+    return SHARE * (installed if device.is_cpu and np.isfinite(installed) else min(device.info.memory, installed))
 
 
 def chosen_cells(asked: Any, scene: Scene, highest: float, tolerance: float) -> float:

@@ -82,7 +82,7 @@ def fullwave_echo(
                   dielectrics of permittivity eps 10 sqrt(eps 3e-2/tolerance), from 8 to 20 sqrt(eps); the number is
                   report.plan["cells"]. Time grows as their fourth power
     anchors       "auto": as many as the tolerance needs; a number, spaced evenly; or pulse numbers
-    max_bytes     memory for one run of the grid, default half the memory of the device; frequencies that do not fit
+    max_bytes     memory for one run of the grid, default half the memory that is installed; frequencies that do not fit
                   take runs of their own
     out           an HDF5 file of sarcl's (.h5) for the samples. Echoes of finished anchors are kept beside it, in
                   OUT.anchors, until it is complete: after a kill, the same call continues from them

@@ -41,7 +41,7 @@ class FullwaveForecast:
     runs               about the number of runs of the grid: anchors times polarisations sent times parts of the band
     run_bytes          memory of one run on the device;  run_seconds  about, on this device at its present speed
     seconds            about, of all runs, and of those for the model error and the check
-    max_bytes          memory that a run was allowed to take: as given, or a part of what the device says that it has.
+    max_bytes          memory that a run was allowed to take: as given, or a part of what is installed, not what is free.
                        With less, the band is divided into more parts; the same max_bytes gives the same number of runs
     plan               anchors, parts of the band, grid, cells, time steps
     """
@@ -100,7 +100,7 @@ def plan_fullwave_echo(
     plan: dict[str, object] = {
         "anchors": n_anchors,
         "parts": len(parts),
-        "memory": "as given" if given.get("max_bytes") is not None else f"{SHARE:g} of the device's",
+        "memory": "as given" if given.get("max_bytes") is not None else f"{SHARE:g} of what is installed",
         "cells": float(f"{task.carried_cells:.4g}"),
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
