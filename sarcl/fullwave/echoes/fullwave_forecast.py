@@ -41,7 +41,7 @@ class FullwaveForecast:
     runs               about the number of runs of the grid: anchors times polarisations sent times parts of the band
     run_bytes          memory of one run on the device;  run_seconds  about, on this device at its present speed
     seconds            about, of all runs, and of those for the model error and the check
-    max_bytes          memory that a run was allowed to take: as given, or a part of what is installed, not what is free.
+    max_bytes          memory that a run was allowed to take: as given, or a part of what is installed, not of the free.
                        With less, the band is divided into more parts; the same max_bytes gives the same number of runs
     plan               anchors, parts of the band, grid, cells, time steps
     """
