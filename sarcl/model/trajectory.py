@@ -83,6 +83,14 @@ class Trajectory:
     def __len__(self) -> int:
         return len(self.positions)
 
+    def __repr__(self) -> str:
+        first, last = ("(" + ", ".join(f"{x:.6g}" for x in self.positions[i]) + ")" for i in (0, -1))
+        times = "without times" if self.times is None else f"over {np.ptp(self.times):.6g} s"
+        more = ("velocities", "attitude", "accelerations")
+        known = "".join(f", {name}" for name in more if getattr(self, name) is not None)
+        moving = "" if self.stop_and_go else ", not stop-and-go"
+        return f"Trajectory({len(self)} pulses {times}, from {first} to {last} m{known}{moving})"
+
     @property
     def known_times(self) -> NDArray[np.float64]:
         """Times, s (n,); ValueError where the track has none."""

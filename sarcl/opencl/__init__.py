@@ -18,6 +18,7 @@ For this folder alone:
     _after_fork    refusal of OpenCL in a process that was forked after its parent had used it
     _cache_folder  a cache folder that can be written, which drivers need
     _host_arrays   buffers of CPU devices in the memory of host arrays, which stays until the kernels have ended
+    _linker        the linker of PoCL, tried in another process where it is missing
     _launches      launches of kernels on GPUs, cut into parts of about 0.2 s
     _queries       questions to a driver, each guarded
     _trial         kernels whose results are known, which a device must pass

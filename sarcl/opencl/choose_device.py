@@ -6,7 +6,7 @@ import numbers
 import os
 from typing import Any
 
-from . import _cache_folder
+from . import _cache_folder, _linker
 from .device import Device, DeviceChoice, once
 from .device_list import DeviceInfo, devices, distinct, listed, tried
 
@@ -45,8 +45,8 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
             if working:
                 return _open(max(working, key=lambda i: (i.rate, -i.index)).index)
     if not any(info.works for info in devices()):
-        remedy = _cache_folder.prepare() or REMEDY
-        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}")
+        remedy = _cache_folder.prepare() or ("" if any(_linker.is_missing(i.platform) for i in devices()) else REMEDY)
+        raise NoDeviceError(f"no OpenCL device could build a kernel. Found: {_listing()}. {remedy}".strip())
     raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
 
 

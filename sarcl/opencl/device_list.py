@@ -7,8 +7,8 @@ from collections.abc import Iterable
 from dataclasses import dataclass, field, replace
 from typing import Any
 
-from . import _after_fork, _cache_folder, _queries, _trial_record
-from ._trial import trial, version
+from . import _after_fork, _cache_folder, _linker, _queries, _trial_record
+from ._trial import Outcome, trial, version
 
 NOT_TRIED = "not tried"
 
@@ -98,8 +98,9 @@ def tried(index: int) -> DeviceInfo:
         return info
     found = _trial_record.find(key := _key(info, handle))
     if found is None:
-        offered = bool(_queries.asked(handle, "double_fp_config"))
-        found = trial(handle, info.vector_width, offered, info.local_memory, info.max_group)
+        if _linker.is_missing(info.platform) and (why := _linker.trouble(index)):
+            return replace(info, why=why)
+        found = trial_of(index)
         if found.settled:
             _trial_record.keep(key, found)
     if found.why:
@@ -108,6 +109,13 @@ def tried(index: int) -> DeviceInfo:
         info, works=True, why=found.why64, fp64=found.fp64, fast_fp64=found.fp64 and found.fast_fp64,
         rate=found.rate, local_memory=found.local_memory, warp=info.warp or found.warp,
     )  # fmt: skip
+
+
+def trial_of(index: int) -> Outcome:
+    """The result of a trial of device `index` now."""
+    info, handle = listed()[index]
+    offered = bool(_queries.asked(handle, "double_fp_config"))
+    return trial(handle, info.vector_width, offered, info.local_memory, info.max_group)
 
 
 def distinct(infos: Iterable[DeviceInfo]) -> list[DeviceInfo]:
@@ -139,6 +147,8 @@ def _alike(info: DeviceInfo, infos: list[DeviceInfo]) -> tuple[str, int, int]:
 
 
 def _key(info: DeviceInfo, handle: Any) -> str:
-    """What the result of a trial depends on: the device, the versions of driver and platform, and the trial itself."""
+    """What the result of a trial depends on: the device, the versions of driver and platform, the trial itself, and
+    whether PoCL finds a linker."""
     platform = _queries.text_of(_queries.asked(handle, "platform"), "version")
-    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {platform}, trial {version()}"
+    linker = ", no ld" if _linker.is_missing(info.platform) else ""
+    return f"{info.index} {info.name}, driver {info.driver}, {info.platform} {platform}, trial {version()}{linker}"

@@ -55,6 +55,21 @@ def test_contract_on_any_track(track, tolerance):
         hold(noise_on(TRACKS[track]), grid, tolerance)
 
 
+@pytest.mark.parametrize("scale", [1e-26, 1.0, 1e16, 1e25])
+def test_the_norm_of_a_dark_image_is_that_of_any_other_scale(scale):
+    """Squares of float32 overflow from 2e19 on, and vanish below 1e-23; a warning is an error here."""
+    raw = noise_on(TRACKS["arc"])
+    beside = sarcl.ImageGrid.plane(center=(7, 6, 0), shape=(20, 20), spacing=0.1)
+    dark = replace(raw, samples=np.ones_like(raw.samples))  # a point at the references
+    with warnings.catch_warnings():
+        warnings.simplefilter("error")
+        plans = [
+            sarcl.polar_format(replace(dark, samples=dark.samples * np.complex64(s)), beside).report.plan
+            for s in (1.0, scale)
+        ]
+    assert "error of a dark image" in plans[0] and plans[1] == plans[0]
+
+
 RECEIVERS = {
     "moved on": ARC + np.array([0, 40.0, 0]),
     "on a track of its own": ARC[::-1] * [0.6, 1, 1.4],

@@ -1,6 +1,9 @@
 """The trial of a device: what the kernels that matter compute, compared with NumPy; devices that get it wrong."""
 
+import os
 import re
+import subprocess
+import sys
 from dataclasses import replace
 from types import SimpleNamespace
 
@@ -8,7 +11,7 @@ import numpy as np
 import pytest
 
 import sarcl
-from sarcl.opencl import _programs, _trial, choose_device, device_list
+from sarcl.opencl import _linker, _programs, _trial, _trial_record, choose_device, device_list
 from sarcl.opencl._trial import RESULTS, Outcome
 from sarcl.opencl.choose_device import open_device, open_devices
 
@@ -176,3 +179,30 @@ def test_all_takes_one_device_once(monkeypatch, case):
     devices, wanted = SAME[case]
     fake(monkeypatch, *devices, rates=[1e9 * (i + 1) for i in range(len(devices))])
     assert open_devices("all") == wanted
+
+
+@pytest.mark.skipif(sys.platform != "linux", reason="PoCL's linker ld")
+def test_a_missing_linker_is_named_where_pocl_would_end_the_process(tmp_path):
+    if not any(info.platform == _linker.PLATFORM for info, _ in device_list.listed()):
+        pytest.skip("no PoCL here")
+    code = (
+        "import sarcl\n"
+        "found = [d for d in sarcl.devices() if d.platform == 'Portable Computing Language']\n"
+        "print(all(d.works for d in found) or found[0].why)"
+    )
+    own = {"PATH": str(tmp_path), "XDG_CACHE_HOME": str(tmp_path), "POCL_CACHE_DIR": str(tmp_path)}
+    run = subprocess.run([sys.executable, "-c", code], env={**os.environ, **own}, capture_output=True, text=True)
+    assert run.returncode == 0, run.stderr
+    if run.stdout.strip() == "True":
+        pytest.skip("this PoCL holds a linker of its own")
+    assert "PoCL links kernels with the program ld, and there is none on PATH" in run.stdout
+    assert str(tmp_path) in run.stdout and "apt-get install binutils" in run.stdout and "ld\" doesn't" not in run.stdout
+
+
+def test_where_ld_is_missing_a_device_that_builds_kernels_is_used(monkeypatch):
+    monkeypatch.setattr(_linker, "is_missing", lambda platform: True)
+    monkeypatch.setattr(_trial_record, "find", lambda key: None)
+    monkeypatch.setattr(_trial_record, "keep", lambda key, found: None)
+    for info, _ in device_list.listed():
+        if device_list.tried(info.index).works:
+            assert device_list.tried.__wrapped__(info.index).works  # ld is there: the trial passes in the other process

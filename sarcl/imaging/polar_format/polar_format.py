@@ -85,7 +85,7 @@ def polar_format(
 
     data = engine.image(made.samples, grid.shape, budget, clock, on_progress)
     check_digits(made.samples.largest)
-    norm, random = float(np.linalg.norm(data)), float(np.sqrt(made.samples.energy() * grid.size))
+    norm, random = _norm(data), float(np.sqrt(made.samples.energy() * grid.size))
     details = plan.describe()
     if norm < random:
         details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
@@ -210,6 +210,12 @@ def _describe(bent: Curvature) -> dict[str, str]:
         "displaced by": f"{bent.distortion:.2g} m",
         "sharp within": f"{bent.radius:.3g} m",
     }
+
+
+def _norm(data: np.ndarray) -> float:
+    """Euclidean norm of pixels, row by row in float64: squares of float32 overflow from 2e19 on, and vanish below
+    1e-23."""
+    return float(np.sqrt(sum(np.linalg.norm(row.astype(np.complex128)) ** 2 for row in data)))
 
 
 def _measure_error(task: FocusingTask, grid: ImageGrid, waves: Waves, data: np.ndarray) -> float:
