@@ -84,12 +84,12 @@ def spectral(tolerance: float, **options: Any) -> Any:
     )  # fmt: skip
 
 
-def full_wave(**options: Any) -> Any:
-    """A conducting sphere, each pulse with a run of its own or formed from one run."""
+def full_wave(material: Any = "metal", cells: float = 10, **options: Any) -> Any:
+    """A sphere, each pulse with a run of its own or formed from one run."""
     angle = np.deg2rad([20.0, 21, 22, 23, 24, 25, 26, 27])
     track = sarcl.Trajectory(None, 40 * np.stack([np.cos(angle), np.sin(angle), 0 * angle], 1))
     chirp = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
-    return sarcl.fullwave_echo(shapes.sphere(0.1, edge=0.02), chirp, track, cells=10, **options)
+    return sarcl.fullwave_echo(shapes.sphere(0.1, edge=0.02, material=material), chirp, track, cells=cells, **options)
 
 
 def antenna_beam(**options: Any) -> Any:
@@ -107,6 +107,7 @@ OWN: dict[str, Callable[[], Any]] = {
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),
     "fullwave_echo": lambda: full_wave(anchors=2),
+    "fullwave_echo dielectric": lambda: full_wave(sarcl.Material(eps_r=3.0), 12, anchors=2),
     "antenna beam": antenna_beam,
     "antenna beam window": lambda: antenna_beam(window="hamming"),
     "pixel taper": lambda: output_hashes.focus(beam=0.0015, window=(None, "hamming")),

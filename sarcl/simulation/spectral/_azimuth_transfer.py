@@ -12,7 +12,7 @@ over a few Fresnel zones: there the samples do not depend on it. docs/theory/spe
 
 from __future__ import annotations
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -174,8 +174,8 @@ def _lags(aspects: Aspects, slant_range: float, step: float, n: int) -> tuple[in
 
 
 @dataclass(frozen=True, eq=False)
-class Brightest:
-    """The scatterers that the pulses see brightest: factors (n, J), places along the track and slant ranges, m (n,)."""
+class SeenScatterers:
+    """Some scatterers: factors (n, J), places along the track and slant ranges, m (n,)."""
 
     factors: np.ndarray
     azimuth: np.ndarray
@@ -184,12 +184,12 @@ class Brightest:
 
 def plan_transfer(
     aspects: Aspects, functions: Functions, factors: np.ndarray, track: StraightTrack, reach: tuple[float, float],
-    tolerance: float, asked: float, time: PlanningTime, brightest: Brightest | None = None,
+    tolerance: float, asked: float, time: PlanningTime, groups: Sequence[SeenScatterers] = (),
 ) -> AzimuthTransfer:  # fmt: skip
     """The smallest tables whose responses differ from the formula by at most `tolerance`.
 
     factors    of some scatterers (n, J);  asked  the whole tolerance, for the message;  time  that the plan may take
-    brightest  where a beam weighs aspects: their samples are compared too, at the pulses that there are
+    groups     of scatterers whose samples are compared too, at the pulses that there are
     """
     best, n_lags = np.inf, lags_of(track, reach)
     some, n_functions = factors[:TESTED].shape
@@ -198,8 +198,7 @@ def plan_transfer(
         time.spend(table_samples(aspects, n_functions, *tried), n_lags)
         made = transfer_tables(aspects, functions, *tried)
         error = response_error(made, functions, factors[:TESTED], track, reach)
-        if brightest is not None:
-            error = max(error, _seen_error(made, functions, brightest, track, reach))
+        error = max(error, *(_seen_error(made, functions, group, track, reach) for group in groups), 0.0)
         error *= SAFETY
         best = min(best, error)
         if error <= tolerance:
@@ -247,9 +246,9 @@ def _power_and_error(
 
 
 def _seen_error(
-    made: AzimuthTransfer, functions: Functions, seen: Brightest, track: StraightTrack, reach: tuple[float, float]
+    made: AzimuthTransfer, functions: Functions, seen: SeenScatterers, track: StraightTrack, reach: tuple[float, float]
 ) -> float:
-    """Relative error of the samples of the brightest scatterers, at all pulses.
+    """Relative error of the samples of some scatterers, at all pulses.
 
     A short track may see them far below what stretches elsewhere along the track would.
     """

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ...base.errors import NotApplicable, ToleranceUnreachable
+from ...base.rows import spread_over
 from ...base.tolerances import askable, rounded_up
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
@@ -19,7 +20,7 @@ from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspe
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
 from ._azimuth_transfer import (
     TESTED,
-    Brightest,
+    SeenScatterers,
     compared_samples,
     doppler_grid,
     lags_of,
@@ -40,6 +41,7 @@ from ._straight_track import StraightTrack, tangent
 # Shares of the tolerance: of amplitudes over aspect, transfer functions, what lies outside the beam, the grids.
 EXPANSION, TRANSFER, OUTSIDE, GRID = 0.35, 0.25, 0.15, 0.2
 MANY = 64  # scatterers, the strongest of which try the responses along the track
+SPREAD = 8  # of these, over all slant ranges, which try them together
 
 
 @dataclass(frozen=True, eq=False)
@@ -174,7 +176,12 @@ def plan_part(
     drawn = some[np.linspace(0, len(some) - 1, min(len(some), MANY)).astype(int)]
     factors = np.stack([expansion.factors(drawn, j) for j in range(len(expansion))], axis=-1)
     factors = factors[:, np.abs(factors).sum(axis=(0, 2)).argmax()]
-    brightest = _brightest(amplitudes, track, drawn, factors, band) if has_beam else None
+    groups = []
+    if has_beam or len(expansion) > 1:  # those of other ranges and elevations are other sums of the functions
+        apart = np.argsort(ranges[drawn], kind="stable")[spread_over(len(drawn), SPREAD)]
+        groups.append(SeenScatterers(factors[apart], azimuth[drawn[apart]], ranges[drawn[apart]]))
+    if has_beam:
+        groups.append(_brightest(amplitudes, track, drawn, factors, band))
     factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
     if variant == "saras":
         n_lags = lags_of(track, reach)
@@ -185,7 +192,7 @@ def plan_part(
         transfer = replace(transfer, error=error)
     else:
         transfer = plan_transfer(
-            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, time, brightest
+            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, time, groups
         )  # fmt: skip
     grid = doppler_grid(transfer, track, reach)
     numbers = range_wavenumbers(transfer, grid)
@@ -208,14 +215,14 @@ def plan_part(
 def _brightest(
     amplitudes: ScattererAmplitudes, track: StraightTrack, drawn: np.ndarray, factors: np.ndarray,
     band: tuple[float, float],
-) -> Brightest:  # fmt: skip
+) -> SeenScatterers:  # fmt: skip
     """Those of some scatterers (n,), with factors (n, J), that the middle or an end of the track sees brightest."""
     power = np.zeros(len(drawn))
     for place in (0.0, track.length / 2, track.length):
         made = amplitudes(drawn, amplitudes.sines(place, drawn), sum(band) / 2)
         power = np.maximum(power, (np.abs(made) ** 2).sum(axis=1))
     best = np.argsort(-power, kind="stable")[:TESTED]
-    return Brightest(factors[best], amplitudes.azimuth[drawn[best]], amplitudes.slant_range[drawn[best]])
+    return SeenScatterers(factors[best], amplitudes.azimuth[drawn[best]], amplitudes.slant_range[drawn[best]])
 
 
 def _check_saras(of_amplitudes: float, of_transfer: float, outside: float, allowed: float, asked: float) -> None:

@@ -121,9 +121,9 @@ def test_the_gain_is_the_sum_of_the_weights_of_the_rows(raw, window):
     weights = np.random.default_rng(3).uniform(0.5, 1.0, raw.n_rows)
     image = sarcl.range_doppler(raw, window=window, weights=weights, check=False, **BEAM)
     task = _task.make_task(raw, 0.0, "right", 1e-2, window, weights, None, None, None, strip_map.ANGLE,
-                           BEAM["doppler"], "geometry", None, None)  # fmt: skip
+                           BEAM["doppler"], None, "geometry", None, None)  # fmt: skip
     index, _ = image.grid.sample(200, seed=2)
-    share = _row_weights(task.track, task.plan, image.grid.times[index[0]], image.grid.ranges[index[1]],
+    share = _row_weights(task.track, task.plan, task.plan.times[index[0]], image.grid.ranges[index[1]],
                          task.wavelength).real  # fmt: skip
     wanted = task.sample_weight.sum() * share @ task.row_weight
     seen = image.gain[index] > 0

@@ -134,3 +134,16 @@ def test_pulses_that_hardly_see_the_scene_are_no_measure_of_the_error():
     power = (np.abs(raw.samples) ** 2).sum(axis=1)
     assert (power > 1e-3 * power.max()).mean() < 0.06
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
+
+
+def test_ranges_at_other_elevations_of_the_beam_keep_the_error():
+    """Away from the strongest scatterers the amplitudes are other sums of the functions of the aspect."""
+    random = np.random.default_rng(2)
+    track = sarcl.Trajectory.line(start=(-1040, -0.29, 500), velocity=(0, 100, 0), prf=863, n_pulses=6)
+    track = pointing.stripmap(track, look=np.arctan2(1040, 500), side="right")
+    places = np.c_[random.uniform(-73, 73, 600), random.uniform(-2.2, 2.2, 600), np.zeros(600)]
+    scene = sarcl.Scene.points(places, np.exp(2j * np.pi * random.random(600)))
+    chirp = sarcl.Waveform.chirp(center=28.9e9, bandwidth=1.67e9, duration=1e-6)
+    antenna = sarcl.Antenna.rectangular(size=(0.42, 0.31), taper=0.3)
+    raw = sarcl.spectral_echo(scene, chirp, track, antenna=antenna, tolerance=8e-3, check=True)
+    assert raw.report.measured_error <= raw.report.predicted_error <= 8e-3
