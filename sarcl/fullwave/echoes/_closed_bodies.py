@@ -48,11 +48,12 @@ def check_wavelengths(scene: Scene, cells: float, highest: float) -> None:
     for material in scene.materials:
         if material.conducting:
             continue
-        shorter = float(np.abs(np.sqrt(material.permittivity(highest))))
+        permittivity = complex(material.permittivity(highest))
+        shorter = float(np.abs(np.sqrt(permittivity)))
         if cells / shorter < LEAST_INSIDE:
             raise ValueError(
                 f"cells is {cells:g}, which leaves {cells / shorter:.2g} cells per wavelength in {_named(material)} of "
-                f"relative permittivity {complex(material.permittivity(highest)):.3g}; give "
+                f"relative permittivity {permittivity if permittivity.imag else permittivity.real:.3g}; give "
                 f'cells={np.ceil(10 * LEAST_INSIDE * shorter) / 10:g}, or material="metal" where waves do not pass '
                 "through the body"
             )
