@@ -7,12 +7,14 @@ from dataclasses import dataclass
 import numpy as np
 
 from ._scatterer_amplitudes import ScattererAmplitudes
+from ._straight_track import tangent
 
 PROFILE, DRAWN = 2048, 48  # aspects, and scatterers whose gains are averaged at each
 MEASURED = 32768  # scatterers among which the energy that limits leave out is measured
 PAIRS = 1024  # of these, each at an aspect
 HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
 TRIES = 8  # limits that are tried, each leaving out less energy than the one before
+ON = 1e-6  # pulse intervals
 DEVIATIONS = 2  # standard deviations of measured energies that are allowed for
 
 
@@ -95,7 +97,7 @@ class _Energy:
         if len(size) > MEASURED:  # those that are measured stand for all
             self.some = np.searchsorted(chance[:-1], (np.arange(MEASURED) + 0.5) / MEASURED * chance[-1])
             self.weight = chance[-1] / MEASURED / (size[self.some] + size.mean())
-        self.size, self.first, self.last = size[self.some], first[self.some], last[self.some]
+        self.size = size[self.some]
 
     def _seen(self, first: np.ndarray, last: np.ndarray, size: np.ndarray) -> np.ndarray:
         """Sum of the sizes of the scatterers that are seen within each of PROFILE - 1 intervals, evenly spaced between
@@ -107,43 +109,53 @@ class _Energy:
         return np.asarray(np.maximum(np.cumsum(change[: PROFILE - 1]), 0))
 
     def power(self, some: np.ndarray, sines: np.ndarray) -> np.ndarray:
-        """Of scatterers (n,), each at one of the sines (n,), times the density of pulses over the sine: (n,)."""
-        some = some if self.among is None else self.among[some]
-        made = sum((np.abs(self.amplitudes(some, sines, f)) ** 2).sum(axis=1) for f in self.band)
-        return np.asarray(made * self.amplitudes.slant_range[some] * (1 - sines**2) ** -1.5)
+        """Of scatterers (n,), each at one of the sines (n,): (n,)."""
+        return np.asarray(sum((np.abs(self.amplitudes(some, sines, f)) ** 2).sum(axis=1) for f in self.band))
 
     def profile(self, limits: tuple[float, float]) -> np.ndarray:
         """Energy at PROFILE sines between limits: a mean gain, by the sizes of the scatterers that are seen there."""
         sines, n = np.linspace(*limits, PROFILE), len(self.drawn)
-        gain = self.power(np.repeat(self.drawn, PROFILE), np.tile(sines, n)).reshape(n, PROFILE)
+        drawn = self.drawn if self.among is None else self.among[self.drawn]
+        gain = self.power(np.repeat(drawn, PROFILE), np.tile(sines, n)).reshape(n, PROFILE)
         at = (sines - self.ends[0]) * ((PROFILE - 1) / (self.ends[1] - self.ends[0]))
-        return np.asarray((self.share @ gain) * self.seen[np.clip(at.astype(np.int64), 0, PROFILE - 2)])
+        seen = self.seen[np.clip(at.astype(np.int64), 0, PROFILE - 2)]
+        share = self.share * self.amplitudes.slant_range[drawn]  # pulses per sine: range / cosine^3
+        return np.asarray((share @ gain) * seen * (1 - sines**2) ** -1.5)
 
     def left_out(self, low: float, high: float) -> float:
-        """Relative error of leaving out what lies below `low` and above `high`, measured, with a margin."""
-        length = self.last - self.first
-        below, above = np.clip(low - self.first, 0, length), np.clip(self.last - high, 0, length)
-        if not below.any() and not above.any():
+        """Relative error of leaving out what lies below `low` and above `high`, measured at pulses, with a margin.
+
+        A narrow beam may pass scatterers between two pulses, which then see side lobes alone.
+        """
+        track, n = self.amplitudes.track, self.amplitudes.track.n_pulses
+        some = self.some if self.among is None else self.among[self.some]
+        azimuth, slant_range = self.amplitudes.azimuth[some], self.amplitudes.slant_range[some]
+        ends = [(azimuth + slant_range * float(tangent(end))) / track.spacing for end in (low, high)]
+        first = np.clip(np.ceil(ends[0] - ON), 0, n)  # pulse of each that is not below
+        stop = np.clip(np.floor(ends[1] + ON) + 1, first, n)
+        if not first.any() and (stop == n).all():
             return 0.0
-        lost, deviation = self._measured((self.first, below), (self.last - above, above))
-        kept, uncertain = self._measured((self.first + below, np.maximum(length - below - above, 0)))
+        lost, deviation = self._measured((np.zeros(len(some)), first), (stop, n - stop))
+        kept, uncertain = self._measured((first, stop - first))
         most, least = lost + DEVIATIONS * deviation, max(kept - DEVIATIONS * uncertain, kept / 2)
         return float(np.sqrt(most / (least + most))) if most else 0.0
 
-    def _measured(self, *intervals: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
-        """Energy within intervals of each scatterer, (begin, length), and its standard deviation, from PAIRS of them.
+    def _measured(self, *runs: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
+        """Energy at runs of pulses of each scatterer, (first, number), and its standard deviation, from PAIRS of them.
 
         Half of the pairs are drawn by size, half by its square, as the energies of smooth facets are.
         """
-        begin, length = (np.concatenate(one) for one in zip(*intervals, strict=True))
-        size = np.tile(self.size, len(intervals))
-        plain = np.tile(self.weight, len(intervals)) * size * length
+        first, number = (np.concatenate(one) for one in zip(*runs, strict=True))
+        size = np.tile(self.size, len(runs))
+        plain = np.tile(self.weight, len(runs)) * size * number
         if not plain.any():
             return 0.0, 0.0
         squared = plain * size
         chance = 0.5 * (plain / plain.sum() + squared / squared.sum())
         at = np.searchsorted(np.cumsum(chance)[:-1], self.random.random(PAIRS))
-        sines = begin[at] + self.random.random(PAIRS) * length[at]
+        pulse = first[at] + np.floor(self.random.random(PAIRS) * number[at])
         which = at % len(self.some)
-        found = self.power(self.some[which], sines) * self.weight[which] * length[at] / chance[at]
+        some = self.some[which] if self.among is None else self.among[self.some[which]]
+        sines = self.amplitudes.sines(pulse * self.amplitudes.track.spacing, some)
+        found = self.power(some, sines) * self.weight[which] * number[at] / chance[at]
         return float(found.mean()), float(found.std() / np.sqrt(PAIRS))

@@ -147,3 +147,17 @@ def test_ranges_at_other_elevations_of_the_beam_keep_the_error():
     antenna = sarcl.Antenna.rectangular(size=(0.42, 0.31), taper=0.3)
     raw = sarcl.spectral_echo(scene, chirp, track, antenna=antenna, tolerance=8e-3, check=True)
     assert raw.report.measured_error <= raw.report.predicted_error <= 8e-3
+
+
+@pytest.mark.parametrize("n_pulses", [2, 6])
+def test_a_beam_that_passes_the_scene_between_two_pulses_is_not_cut_off(n_pulses):
+    """All that pulses receive are side lobes then: 0.1 m of scene, 0.15 m of beam, pulses 0.7 m apart."""
+    random = np.random.default_rng(n_pulses)
+    track = sarcl.Trajectory.line(
+        start=(-10, -0.35 - 0.7 * (n_pulses // 2 - 1), 10), velocity=(0, 100, 0), prf=100 / 0.7, n_pulses=n_pulses
+    )
+    track = pointing.stripmap(track, look=np.pi / 4, side="right")
+    scene = sarcl.Scene.points(random.uniform(-0.05, 0.05, (50, 3)) * (1, 1, 0), np.exp(6j * random.random(50)))
+    antenna = sarcl.Antenna.rectangular(size=(3.0, 0.2), taper=0.3)
+    raw = sarcl.spectral_echo(scene, CHIRP, track, antenna=antenna, tolerance=2e-2)
+    assert achieved(raw, scene, track, antenna, list(range(n_pulses))) <= raw.report.predicted_error <= 2e-2
