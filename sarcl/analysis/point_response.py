@@ -248,21 +248,21 @@ def _axes(interpolated: ImageInterpolator, point: np.ndarray) -> tuple[np.ndarra
 def _ascend(interpolated: ImageInterpolator, start: np.ndarray, axes: tuple[np.ndarray, ...]) -> np.ndarray | None:
     """Position of the maximum near `start`, m (3,), from parabolas through log |I| along each axis in turn; None where
     they find none."""
-    found = None
+    peak = None
     for step in (interpolated.step, interpolated.step / FINER):
-        x = np.array(start if found is None else found)
+        x = np.array(start if peak is None else peak)
         for _ in range(MOST_STEPS):
             before = x
             for axis in axes:
                 x = x + _move(interpolated, x, step * axis)
             if np.linalg.norm(x - start) > FARTHEST * interpolated.step:
-                return found
+                return peak
             if np.linalg.norm(x - before) < 1e-5 * step:
                 break
         else:
-            return found
-        found = x
-    return found
+            return peak
+        peak = x
+    return peak
 
 
 def _move(interpolated: ImageInterpolator, x: np.ndarray, step: np.ndarray) -> np.ndarray:

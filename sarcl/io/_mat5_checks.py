@@ -49,7 +49,7 @@ class _Room:
 
 def check(data: bytes) -> None:
     """Damaged where elements do not fit into the file, or numbers into their elements; TooLarge where a few bytes
-    stand for far more memory."""
+    unpack to far more memory."""
     if len(data) < 128 or data[126:128] not in (b"IM", b"MI"):
         raise Damaged("its head of 128 bytes is not whole")
     order, room = "little" if data[126:128] == b"IM" else "big", _Room(len(data))

@@ -66,7 +66,7 @@ def spectra_of(
     _check_meant(kind, bandwidth, pulse_time, sweep_rate, reference_range, scene_range)
     band = None
     if kind == "rf":
-        band = _rf_band(samples, rate, carrier, bandwidth, waveform)
+        band = _rf_band(samples, rate, carrier, bandwidth, waveform, pulse_time)
         carrier, bandwidth = sum(band) / 2, band[1] - band[0]
         kind = "compressed" if waveform is None else "chirped"
     if carrier is None and waveform is None:
@@ -129,7 +129,9 @@ def spectra_of(
     return of_pulses(samples, rate, start, carrier, kept, factor, sent=None if band is None else start), waveform
 
 
-def _rf_band(samples: Any, rate: float, carrier: Any, bandwidth: Any, waveform: Waveform | None) -> tuple[float, float]:
+def _rf_band(
+    samples: Any, rate: float, carrier: Any, bandwidth: Any, waveform: Waveform | None, pulse_time: Any
+) -> tuple[float, float]:
     """The band (low, high), Hz, of real samples of the signal itself."""
     if np.dtype(samples.dtype).kind == "c":
         raise ValueError(
@@ -137,20 +139,19 @@ def _rf_band(samples: Any, rate: float, carrier: Any, bandwidth: Any, waveform: 
         )
     if carrier is not None:
         raise ValueError("carrier is the middle of bandwidth=(low, high) where kind is 'rf'; leave it out")
-    if bandwidth is None and waveform is not None:
+    if waveform is None and pulse_time != "start":
+        raise ValueError(f"pulse_time is {pulse_time!r}, and without waveform= samples are compressed; leave it out")
+    if waveform is not None and bandwidth is not None:
+        raise ValueError("bandwidth and waveform are both given, and the band is the waveform's; leave bandwidth out")
+    if waveform is not None:
         bandwidth = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-    elif bandwidth is None or np.shape(bandwidth) != (2,):
+    elif bandwidth is None or validation.ndim("bandwidth", bandwidth) != 1:
         raise ValueError(f"bandwidth is {bandwidth!r:.60}; kind 'rf' needs bandwidth=(low, high), Hz")
     low, high = (float(f) for f in validation.array("bandwidth", bandwidth, np.float64, (2,)))
     if not 0 < low < high <= rate / 2 * (1 + 1e-9):
         raise ValueError(
             f"bandwidth is ({low:g}, {high:g}) Hz; wanted 0 < low < high, and high at most half of rate, "
             f"{rate / 2:g} Hz"
-        )
-    if waveform is not None and abs((low + high) / 2 - waveform.center) > 1e-9 * waveform.center:
-        raise ValueError(
-            f"the middle of bandwidth is {(low + high) / 2:.9g} Hz but waveform.center {waveform.center:.9g} Hz; they "
-            "must be one frequency"
         )
     return low, high
 
@@ -161,11 +162,16 @@ def _mixed(block: np.ndarray, rate: float, start: np.ndarray, carrier: np.ndarra
     start  s (n_rows,), of sample 0 after the transmission
     """
     n = block.shape[1]
-    one_side = 1.0 + np.sign(np.fft.fftfreq(n))
-    if n % 2 == 0:
-        one_side[n // 2] = 1.0
     cycles = (carrier * start)[:, None] % 1 + (carrier / rate)[:, None] * np.arange(n)
-    return np.asarray(np.fft.ifft(np.fft.fft(block.real, axis=1) * one_side, axis=1) * np.exp(-2j * np.pi * cycles))
+    return np.asarray(np.fft.ifft(np.fft.fft(block.real, axis=1) * _one_side(n), axis=1) * np.exp(-2j * np.pi * cycles))
+
+
+def _one_side(n: int) -> np.ndarray:
+    """Weights (n,) of an FFT of real samples that leave the positive frequencies, twice: the analytic signal."""
+    out = 1.0 + np.sign(np.fft.fftfreq(n))
+    if n % 2 == 0:
+        out[n // 2] = 1.0
+    return np.asarray(out)
 
 
 def _in_band(chirp: Waveform) -> complex:
@@ -287,9 +293,7 @@ def of_beats(
     # receiver times conjugate reference has the beat frequency -K tau: the form of a phase history
     flipped = (1 if beat in (None, "positive") else -1) == (1 if sweep_rate > 0 else -1)
     f = np.fft.fftfreq(n, 1 / rate)
-    one_side = 1.0 + np.sign(f)  # of real samples: the positive frequencies, twice
-    if n % 2 == 0:
-        one_side[n // 2] = 1.0
+    one_side = _one_side(n)
     video = np.exp(-1j * np.pi * f**2 / sweep_rate) if scene is None else None
     late = np.zeros(len(start)) if scene is None else 2 * (scene - reference) / SPEED_OF_LIGHT
     cycles, _ = _carrier_phase(start, carrier, reference if scene is None else scene)

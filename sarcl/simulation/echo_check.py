@@ -48,15 +48,15 @@ def measure_error(
     take two or three seconds where there are more than 20 000 facets, and at least 16, or 4 above 2 million.
 
     Half of the pulses are drawn by the energy of their samples, so that those are among them whose narrow beam sees the
-    scene; each counts for as many pulses as it stands for. Relative to the larger of their norm and the norm they would
-    have if scatterers added with random phases. Facets as they were cut, each by its centroid's plane wave at every
-    frequency.
+    scene; each is weighted by the number of pulses that it represents. The error is relative to the larger of their
+    norm and the norm they would have if scatterers added with random phases. Facets are as they were cut, each by its
+    centroid's plane wave at every frequency.
     """
     random = np.random.default_rng(0)
     wrong = right = random_phases = 0.0
     draws = draws_of(scene)
-    pulses, stands_for = _drawn(samples, draws, random)
-    for p, share in zip(pulses.tolist(), stands_for.tolist(), strict=True):
+    pulses, represented = _drawn(samples, draws, random)
+    for p, share in zip(pulses.tolist(), represented.tolist(), strict=True):
         n = random.integers(0, len(frequencies), draws)
         wanted, power = exact(scene, antennas, p, frequencies[n], scene.weights)
         wanted *= spectrum[n]
@@ -67,7 +67,7 @@ def measure_error(
 
 
 def _drawn(samples: Any, draws: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
-    """Random pulses (draws,), and the pulses that each stands for, up to a factor."""
+    """Random pulses (draws,), and the number of pulses that each represents, up to a factor."""
     some = spread_over(len(samples), CANDIDATES)
     energy = np.array([np.linalg.norm(samples[p].astype(np.complex128, copy=False)) ** 2 for p in some.tolist()])
     chance = np.full(len(some), 1 / len(some))

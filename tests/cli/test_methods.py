@@ -112,6 +112,8 @@ def test_polar_format_and_backproject_choose_a_plane_on_the_earth(here, capsys):
     ("options", "said"),
     [
         (["--method", "range_doppler"], "give side='left' or side='right'"),
+        (["--method", "range_doppler", "--side", "right", "--near", 5], "near is for doppler='data'"),
+        (["--near", 5], "--near is for range_doppler; --method auto"),
         ([], r"give side='left' or 'right' of it (--side)"),
         (
             ["--method", "range_doppler", "--side", "right", "--center", 1, 2, 3],

@@ -11,6 +11,7 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 LOW, HIGH, RATE, N = 3.4e9, 4.6e9, 13e9, 2048
 MIDDLE, BAND = (LOW + HIGH) / 2, HIGH - LOW
 RAIL = np.stack([np.zeros(101), np.linspace(-1, 1, 101), np.zeros(101)], axis=1)
+CHIRP = sarcl.Waveform.chirp(center=3e6, bandwidth=1e6, duration=1e-6)
 POINT, AMPLITUDE = np.array([9.0, 0.3, 0.0]), 0.8 * np.exp(0.7j)
 
 
@@ -99,7 +100,10 @@ def test_a_pulse_that_is_not_compressed_yet_awaits_compress(pulse_time):
         ({"bandwidth": (1e6, 6e6)}, "high at most half of rate, 5e.06 Hz"),
         ({"sweep_rate": 1e9}, "sweep_rate is for dechirped samples"),
         ({"beat": "positive"}, "have no beat; leave it out"),
-        ({"waveform": sarcl.Waveform.chirp(center=3e6, bandwidth=1e6, duration=1e-6)}, "they must be one frequency"),
+        ({"waveform": CHIRP}, "bandwidth and waveform are both given"),
+        ({"waveform": CHIRP, "bandwidth": None, "rate": 5e6}, "high at most half of rate, 2.5e.06 Hz"),
+        ({"pulse_time": "middle"}, "pulse_time is 'middle', and without waveform= samples are compressed"),
+        ({"bandwidth": (1e6, 2e6, 3e6)}, "bandwidth has shape"),
         ({"kind": "compressed", "bandwidth": None, "carrier": 3e6}, 'real samples of the received .* kind="rf"'),
     ],
 )  # fmt: skip

@@ -42,18 +42,18 @@ class Contents:
         """parts  intervals on the halved grid, and permittivities; the later holds where parts overlap"""
         nx, ny, nz = (2 * n for n in box.shape)
         fine = Box(2 * box.low, (nx, ny, nz))
-        left = np.ones(fine.shape, np.float32)
+        vacuum = np.ones(fine.shape, np.float32)
         metal = np.zeros(fine.shape, np.float32)
         if conductor is not None:
-            left = free_lengths(fine, axis, conductor)
-            metal = 1 - left
+            vacuum = free_lengths(fine, axis, conductor)
+            metal = 1 - vacuum
         mean, inverse = np.zeros((2, *fine.shape), np.complex64)
         for intervals, permittivity in reversed(parts):
-            share = np.minimum(1 - free_lengths(fine, axis, intervals), left)
-            left = left - share
+            share = np.minimum(1 - free_lengths(fine, axis, intervals), vacuum)
+            vacuum = vacuum - share
             mean += share * np.complex64(permittivity)
             inverse += share / np.complex64(permittivity)
-        return cls(mean + left, inverse + left, metal)
+        return cls(mean + vacuum, inverse + vacuum, metal)
 
 
 @dataclass(frozen=True, eq=False)

@@ -139,6 +139,11 @@ def make_plan(
     errors = {"hyperbolic ranges": model_error, "rounding": rounding, "ends of the Doppler band": band.error}
     spare = tolerance - fixed - band.error
     if not spare > 0.2 * tolerance:
+        if not band.error <= tolerance / 2:
+            limit = "the ends of the Doppler band, which are bright in these data beside dark pixels"
+            raise ToleranceUnreachable(
+                tolerance, None, limit, "use backproject, or give times=, ranges= of bright pixels"
+            )
         best = rounded_up(2 * fixed)
         limit = "rounding of complex64" if model_error < rounding else "the track's ranges, which are no hyperbolas"
         raise ToleranceUnreachable(tolerance, askable(best), limit, "use backproject, which takes any track")

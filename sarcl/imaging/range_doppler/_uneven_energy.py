@@ -34,7 +34,7 @@ class UnevenEnergy:
 
     near    root mean square of the samples about the pixels, whole  of all samples: relative to that at the pixels
     sines   of the squint angles (rows, pixels);  power, about (rows, pixels) of the profiles at and about the pixels
-    each    rows for which one that was read stands
+    each    number of rows that each row that was read represents
     """
 
     near: float
@@ -98,14 +98,16 @@ def uneven_energy(
     at = np.rint(delays * (2 * float(raw.frequency_step[0]) * length / SPEED_OF_LIGHT)).astype(np.int64) % length
     weight = np.abs(extent.band.row_weight(sines, fresnel(wavelength, r))) ** 2
     power, about, energy = np.empty(at.shape), np.empty(at.shape), np.empty(len(rows))
-    scale = None
+    largest = np.zeros(len(rows))
     for i, row in enumerate(rows.tolist()):
         samples = raw.read(row, row + 1)[0] * (sample_weight * row_weight[row])
-        scale = scale or (float(np.abs(samples).max()) or None)  # squares of tiny samples must not underflow
-        profile = np.abs(np.fft.ifft(samples / (scale or 1.0), length)) ** 2 * length**2
+        largest[i] = np.abs(samples).max()  # squares must neither overflow nor underflow
+        profile = np.abs(np.fft.ifft(samples / (largest[i] or 1.0), length)) ** 2 * length**2
         power[i], energy[i] = profile[at[i]], profile.mean()
         sums = np.cumsum(np.concatenate([profile[-ABOUT * FINER :], profile, profile[: ABOUT * FINER + 1]]))
         about[i] = (sums[at[i] + 2 * ABOUT * FINER] - sums[at[i]]) / (2 * ABOUT * FINER)
+    relative = (largest / (largest.max() or 1.0)) ** 2
+    power, about, energy = power * relative[:, None], about * relative[:, None], energy * relative
     here = float((weight * power).sum())
     floor = 1e-20 * float((weight * energy[:, None]).sum())  # where every pixel is at an exact null
     if floor == 0:

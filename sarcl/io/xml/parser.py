@@ -37,7 +37,7 @@ class _Builder(ElementTree.TreeBuilder):
         return super().end(tag)
 
     def doctype(self, name: str, public: str | None, system: str | None) -> None:
-        """Entities of a document type may stand for far more text than the file has, or for other files."""
+        """Entities of a document type may expand to far more text than the file has, or read other files."""
         raise Refused("has a document type (<!DOCTYPE>), which may define entities")
 
     def pi(self, target: str, data: str | None = None) -> Any:

@@ -11,10 +11,10 @@ from ._straight_track import tangent
 
 PROFILE, DRAWN = 2048, 48  # aspects, and scatterers whose gains are averaged at each
 MEASURED = 32768  # scatterers among which the energy that limits leave out is measured
-PAIRS = 1024  # of these, each at an aspect
+PAIRS = 1024  # of these scatterers, each with a pulse
 HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
 TRIES = 8  # limits that are tried, each leaving out less energy than the one before
-ON = 1e-6  # pulse intervals
+ROUNDING = 1e-6  # pulse intervals: a limit so near to a pulse is at the pulse
 DEVIATIONS = 2  # standard deviations of measured energies that are allowed for
 
 
@@ -41,7 +41,7 @@ def beam_extent(
     first, last  sines between which the track sees each scatterer (n,);  band  Hz, its limits
     among        indices of these scatterers (n,); None: all
     The aspects are those of all scatterers, by their sizes. Limits come from a mean gain; what they leave out is then
-    measured at scatterers and aspects of its own, and counts in the prediction.
+    measured at scatterers and pulses drawn for that purpose, and counts in the prediction.
     """
     ends, share = (float(first.min()), float(last.max())), allowed / 2
     if not ends[0] < ends[1]:
@@ -56,13 +56,16 @@ def beam_extent(
         low, high = _within(near, inner, share)
         outside = energy.left_out(low, high)
         if outside <= allowed:
-            above = np.flatnonzero(near >= HALF_POWER * near.max())
-            sines = np.linspace(*inner, PROFILE)
-            return BeamExtent(low, high, outside, (float(sines[above[0]]), float(sines[above[-1]])))
+            return BeamExtent(low, high, outside, _main_lobe(near, inner))
         share *= 0.5 * allowed / outside
-    above = np.flatnonzero(whole >= HALF_POWER * whole.max())
-    sines = np.linspace(*ends, PROFILE)
-    return BeamExtent(*ends, 0.0, (float(sines[above[0]]), float(sines[above[-1]])))
+    return BeamExtent(*ends, 0.0, _main_lobe(whole, ends))
+
+
+def _main_lobe(power: np.ndarray, limits: tuple[float, float]) -> tuple[float, float]:
+    """The first and the last of evenly spaced sines at which a beam has half its power or more."""
+    lit = np.flatnonzero(power >= HALF_POWER * power.max())
+    sines = np.linspace(*limits, len(power))
+    return float(sines[lit[0]]), float(sines[lit[-1]])
 
 
 def _within(power: np.ndarray, limits: tuple[float, float], share: float) -> tuple[float, float]:
@@ -94,7 +97,7 @@ class _Energy:
             self.drawn = np.searchsorted(chance[:-1], np.sort(self.random.random(n)) * chance[-1])
             self.share = 1 / (size[self.drawn] + size.mean())
         self.some, self.weight = np.arange(len(size)), np.ones(len(size))
-        if len(size) > MEASURED:  # those that are measured stand for all
+        if len(size) > MEASURED:  # each of those that are measured represents several
             self.some = np.searchsorted(chance[:-1], (np.arange(MEASURED) + 0.5) / MEASURED * chance[-1])
             self.weight = chance[-1] / MEASURED / (size[self.some] + size.mean())
         self.size = size[self.some]
@@ -131,8 +134,8 @@ class _Energy:
         some = self.some if self.among is None else self.among[self.some]
         azimuth, slant_range = self.amplitudes.azimuth[some], self.amplitudes.slant_range[some]
         ends = [(azimuth + slant_range * float(tangent(end))) / track.spacing for end in (low, high)]
-        first = np.clip(np.ceil(ends[0] - ON), 0, n)  # pulse of each that is not below
-        stop = np.clip(np.floor(ends[1] + ON) + 1, first, n)
+        first = np.clip(np.ceil(ends[0] - ROUNDING), 0, n)  # pulse of each that is not below
+        stop = np.clip(np.floor(ends[1] + ROUNDING) + 1, first, n)
         if not first.any() and (stop == n).all():
             return 0.0
         lost, deviation = self._measured((np.zeros(len(some)), first), (stop, n - stop))
