@@ -56,7 +56,7 @@ __kernel void aspect_amplitudes(aspect_amplitudes_numbers given, __global const 
     fv twice = (fv)(2.0f * wave);
     complex_v mean = triangle_mean(twice * t_dot(u, edge_1), twice * t_dot(u, edge_2));
 #if ROUGH
-    mean = rough_mean(mean, twice * cosine, cosine, (fv)0.5f * twice_area, wave, facets + F_ROUGH * (size_t)n, at, n);
+    mean = rough_mean(mean, (fv)1.0f, twice * cosine, cosine, (fv)0.5f * twice_area, wave, facets + F_ROUGH * (size_t)n, at, n);
 #endif
 #if WEIGHTS
     fv away = LOAD(at, across + 3 * (size_t)n) / (fv)c;

@@ -17,6 +17,7 @@
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
 //           ROUGH, DIAGRAM_*  see facet_planes.clh
+//           PARTLY     1: lit parts of the facets, at every pulse node, stand in place of whole ones (lit_parts.cl)
 //           TILE       facets per tile, a multiple of VW
 //           GROUPED    1: work-groups of 64 items: each shares the facets of a tile, or adds a row up in local memory, TILE a
 //                      multiple of 64; 0: each work-item does so alone
@@ -70,6 +71,7 @@ typedef struct {
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
 //   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
 //   moments  (pulse nodes)            where between these two a pulse node lies: 0 at the one, 1 at the other, or beyond
+//   parts    (pulse nodes, 1 + 2 NODES, n_tiles TILE)   where PARTLY: share of the area, and mean re, im at each f_m
 //   nodes    (3, NODES)               f_m/c, cycles/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and the axis that replaces it for vectors along it
 //   patterns, second, axes (pulse nodes, 18), range, reach (6)   see gains.clh;  radius (n_tiles)   m, of the facets' centres
@@ -79,8 +81,8 @@ typedef struct {
 __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const float *restrict constants,
                                __global const float *restrict offsets, __global const float *restrict facets,
                                __global const uchar *restrict seen, __global const uchar *restrict later,
-                               __global const float *restrict moments, __global const float *restrict nodes,
-                               __global const float *restrict up, __global const float *restrict patterns,
+                               __global const float *restrict moments, __global const float *restrict parts,
+                               __global const float *restrict nodes, __global const float *restrict up, __global const float *restrict patterns,
                                __global const float *restrict axes, __global const float *restrict reach,
                                __global const float *restrict radius, __global float *restrict out,
                                __global uchar *restrict marks) {
@@ -125,7 +127,13 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
         iv front = t_dot(normal, u_t) > 0;
         rx_range = tx_range;
 #endif
-        fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share);
+        fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share), root_of_share = (fv)1.0f;
+#if PARTLY
+        __global const float *part = parts + (size_t)q * (1 + 2 * NODES) * given.n_offsets;
+        fv part_share = LOAD(at, part);
+        root_of_share = sqrt(part_share);
+        amplitude = part_share > 0 ? amplitude : (fv)0.0f;
+#endif
         STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
         STORE(fabs(amplitude), 0, is_bright);
 #pragma unroll
@@ -156,11 +164,16 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
                 S = scatter_back(normal, u_t, h_t, v_t, inverse_root);
 #endif
             }
+#if PARTLY
+            __global const float *part_mean = part + (1 + 2 * m) * (size_t)given.n_offsets;
+            complex_v mean = c_make(LOAD(at, part_mean), LOAD(at, part_mean + given.n_offsets));
+#else
             complex_v mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
+#endif
 #if ROUGH
             fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
-            mean = rough_mean(mean, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area, nodes[m],
-                              facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
+            mean = rough_mean(mean, root_of_share, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area,
+                              nodes[m], facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
 #endif
 #if WEIGHTS
             if (m == 0 || VARIES) gain = weight(view, patterns, given.second, nodes[2 * NODES + m]);

@@ -12,9 +12,28 @@ from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
 from ..scene.triangles import centroids, normals
 from ..visibility.illumination import Illumination, Span
+from ..visibility.lit_parts import LitParts
 
 AT_ONCE = 100_000  # amplitudes computed per block
 POLARIZATIONS = ("HH", "HV", "VH", "VV")
+
+
+@dataclass(frozen=True, eq=False)
+class Light:
+    """What pulses see of facets `index` (r,), which others occlude.
+
+    share  of the area, 0 to 1, float32 (n_pulses, r)
+    mean   of exp(j k_m (u_t + u_r).rho) over whole facets, counting the lit part alone: complex64 (n_pulses, r, m)
+    """
+
+    index: np.ndarray
+    share: np.ndarray
+    mean: np.ndarray
+
+    @classmethod
+    def whole(cls, n_pulses: int, n_waves: int) -> Light:
+        """Every facet is seen whole."""
+        return cls(np.zeros(0, np.int64), np.zeros((n_pulses, 0)), np.zeros((n_pulses, 0, n_waves), np.complex64))
 
 
 @dataclass(frozen=True, eq=False)
@@ -25,6 +44,8 @@ class FacetSet:
     illumination  share of each facet that both antennas see, by blocks of pulses; None: every facet is seen whole
     kept          indices of the facets in the illumination (k,)
     random        complex Gaussian numbers of unit power (k,), for the incoherent echo of rough facets
+    lit_parts     what pulses see of facets that others occlude; None: no facet occludes another
+    lit_rows      number of each facet among the partly lit ones, -1 where every pulse sees it whole (k,)
     """
 
     triangles: np.ndarray
@@ -35,6 +56,8 @@ class FacetSet:
     illumination: Illumination | None
     kept: np.ndarray
     random: np.ndarray
+    lit_parts: LitParts | None = None
+    lit_rows: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -46,22 +69,71 @@ class FacetSet:
             return np.where(np.isinf(eps), 0, 1 / np.sqrt(eps))
 
     def spans(self, n_pulses: int) -> Iterator[Span]:
-        """The track in parts, in each of which the share of each facet that is seen, uint8 (k,), changes evenly."""
+        """The track in parts, in each of which the amplitude of each facet's illuminated share, uint8 (k,), changes
+        evenly."""
         if self.illumination is None:
             all_of_all = np.full(len(self), 255, np.uint8)
             yield Span(0, n_pulses, all_of_all, all_of_all)
             return
         for span in self.illumination.spans():
-            share = span.share[self.kept]
-            yield Span(span.first, span.stop, share, share if span.later is span.share else span.later[self.kept])
+            share = self._weighed(span.share[self.kept])
+            later = share if span.later is span.share else self._weighed(span.later[self.kept])
+            yield Span(span.first, span.stop, share, later)
 
     def between(self, first: int, stop: int) -> FacetSet:
         """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
-        return self if self.illumination is None else replace(self, illumination=self.illumination.between(first, stop))
+        return replace(
+            self,
+            illumination=self.illumination and self.illumination.between(first, stop),
+            lit_parts=self.lit_parts and self.lit_parts.between(first),
+        )
+
+    def split(self) -> list[FacetSet]:
+        """The facets that every pulse sees past the others, and those of which some pulse sees a part: sets that hold
+        any."""
+        if self.lit_parts is None or self.lit_rows is None:
+            return [self]
+        steady = self.lit_rows < 0
+        parts = (self._some(steady, None, None), self._some(~steady, self.lit_parts, self.lit_rows[~steady]))
+        return [part for part in parts if len(part)]
+
+    def _some(self, which: np.ndarray, lit_parts: LitParts | None, lit_rows: np.ndarray | None) -> FacetSet:
+        return FacetSet(
+            self.triangles[which], self.reflectivity[which], self.two_sided[which], self.material[which],
+            self.materials, self.illumination, self.kept[which],
+            self.random[which] if len(self.random) else self.random, lit_parts, lit_rows,
+        )  # fmt: skip
+
+    def light(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> Light:
+        """What consecutive pulses from `first` on see of the partly lit facets among them.
+
+        ends  antennas of these pulses, m (n, 3), one or two;  waves  rad/m (m,)
+        """
+        if self.lit_parts is None or self.lit_rows is None:
+            return Light.whole(len(ends[0]), len(waves))
+        index = np.flatnonzero(self.lit_rows >= 0)
+        share, mean = self.lit_parts.at(first, ends, waves)
+        rows = self.lit_rows[index]
+        return Light(index, share[:, rows], mean[:, rows])
 
     def share_at(self, pulse: int) -> np.ndarray:
-        """Share of each facet that a pulse sees, 0 to 1 (k,)."""
-        return np.ones(len(self)) if self.illumination is None else self.illumination.fraction_at(pulse)[self.kept]
+        """Amplitude of the share of each facet that a pulse sees, 0 to 1 (k,), counting terrain horizons alone where
+        there are lit parts."""
+        if self.illumination is None:
+            return np.ones(len(self))
+        for span in self.illumination.between(pulse, pulse + 1).spans():
+            share, later = (self._weighed(side[self.kept]) for side in (span.share, span.later))
+            return share / 255 + float(span.moments(np.zeros(1))[0]) * (later / 255 - share / 255)
+        return np.ones(len(self))
+
+    def _weighed(self, share: np.ndarray) -> np.ndarray:
+        """Amplitudes, uint8 (k,), of illuminated shares, uint8 (k,): without a coherent part the power of a facet is
+        that of the share."""
+        random = np.array([np.isinf(m.height) for m in self.materials])
+        if not random.any():
+            return share
+        root = np.rint(np.sqrt(np.arange(256) * 255.0)).astype(np.uint8)
+        return np.where(random[self.material], root[share], share)
 
     @property
     def is_rough(self) -> bool:
@@ -82,10 +154,13 @@ class FacetSet:
 
     def amplitudes(
         self, tx: np.ndarray, rx: np.ndarray, frequencies: np.ndarray, polarizations: Sequence[str],
-        vertical: np.ndarray,
+        vertical: np.ndarray, light: Light | None = None,
     ) -> np.ndarray:  # fmt: skip
         """Amplitude of every facet for antennas at tx, rx, m (3,), about its centroid, in float64: the reference of
-        kernels/spread_facets.cl, without gains and shadows; complex128 (n frequencies, k, n_polarizations)."""
+        kernels/spread_facets.cl, without gains and terrain shadows; complex128 (n frequencies, k, n_polarizations).
+
+        light  of this pulse at these frequencies: facets that are lit in part; None: every facet is seen whole
+        """
         from ._rough_surface import rough_mean
         from .physical_optics import fresnel, normals_and_areas, scattering_parts, triangle_mean, turned
 
@@ -102,16 +177,21 @@ class FacetSet:
         n, k = len(frequencies), len(self)
         out = np.empty((n, k, len(polarizations)), np.complex128)
         step = max(1, AT_ONCE // max(k, 1))
+        root = np.ones(k)
+        if light is not None:
+            root[light.index] = np.sqrt(light.share[0])
         for first in range(0, n, step):
             wave = frequencies[first : first + step, None] / SPEED_OF_LIGHT
             mean = triangle_mean(2 * np.pi * wave * phases[:, 0, 0], 2 * np.pi * wave * phases[:, 1, 0])
+            if light is not None:
+                mean[:, light.index] = light.mean[0, :, first : first + step].T
             if self.is_rough:
                 q = 2 * np.pi * wave[..., None] * both
                 for i, material in enumerate(self.materials):
                     of = self.material == i
                     if of.any():
                         mean[:, of] = rough_mean(
-                            mean[:, of], material, q[:, of], facing[of], areas[of], 1 / wave, self.random[of]
+                            mean[:, of], material, q[:, of], facing[of], areas[of], 1 / wave, self.random[of] * root[of]
                         )
             eps = np.array(
                 [[m.permittivity(float(f)) for m in self.materials] for f in frequencies[first : first + step]]

@@ -10,12 +10,14 @@ import numpy as np
 
 from ..base import boxes, counter_rng
 from ..base.constants import EDGE_ON, SPEED_OF_LIGHT
+from ..base.errors import warn
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
-from ..visibility.illumination import lit
+from ..visibility.illumination import ALL_DARK, lit
+from ..visibility.lit_parts import LitParts
 from .facets import FacetSet
 
 RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
@@ -51,10 +53,12 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 def facets_of(
     scene: Scene, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, seed: int, skips: set[str],
-    max_bytes: float, device: Any, tell: Callable[[int], object],
+    max_bytes: float, device: Any, tell: Callable[[int], object], occluders: Scene | None = None, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene that is cut, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
+    occluders  the scene before it was cut, whose facets cast exact shadows; None: shadows are shares, by sampled rays
+    margin     m: antennas of channels stand up to this far from these
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
     n_pulses = len(antennas.tx)
@@ -75,18 +79,29 @@ def facets_of(
         left_out["facing away"] = int(away.sum()) * n_pulses
         keep &= ~away
     tell(2)
-    illumination = None
-    if shadows and keep.any():
+    illumination, lit_parts = None, None
+    mirrors = np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
+    exact = mirrors if occluders is not None else np.zeros(len(keep), bool)
+    if shadows and keep.any() and (terrain or not exact[keep].all()):
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
             two_sided=scene.two_sided, wanted=keep,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
-            engine="embree" if shadows == "embree" else "opencl",
+            engine="embree" if shadows == "embree" else "opencl", by_facets=~exact,
         )  # fmt: skip
-        occluded = keep & illumination.dark
-        left_out["shadowed"] = int(occluded.sum()) * n_pulses
-        keep &= ~occluded
+        left_out["shadowed"] = int((keep & illumination.dark).sum()) * n_pulses
+        keep &= ~illumination.dark
+    if shadows and occluders is not None and (keep & exact).any():
+        on = _terrain(occluders, antennas).get("on_heights", np.zeros(len(occluders.triangles), bool))
+        lit_parts = LitParts(
+            device, scene.triangles, occluders.triangles[~on], antennas.ends, two_sided=scene.two_sided,
+            wanted=keep & exact, max_bytes=max_bytes, margin=margin,
+        )  # fmt: skip
+        left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
+        if keep.any() and not (keep & ~lit_parts.dark).any():
+            warn(ALL_DARK)
+        keep &= ~lit_parts.dark
     tell(3)
     if not keep.any():
         return None, left_out
@@ -98,7 +113,8 @@ def facets_of(
         random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
     return FacetSet(
         triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
-        illumination, np.flatnonzero(keep), random,
+        illumination, np.flatnonzero(keep), random, lit_parts,
+        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[keep],
     ), left_out  # fmt: skip
 
 

@@ -14,7 +14,7 @@ from ..numerics.error_bounds import FLOAT32
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
-from ..scattering.facets import FacetSet
+from ..scattering.facets import FacetSet, Light
 from ..scattering.physical_optics import lit_share, turned
 from ..scene.triangles import centroids, normals
 from .spreading import Counts
@@ -57,9 +57,11 @@ class ExactFacets:
             seen_side = np.where((part.two_sided & turned(given, *looks))[:, None], -given, given)
             front = lit_share(seen_side, *looks) > 0
             inside = inside_window(part, self.antennas, p) if self.gated else np.ones(len(part), bool)
+            ends, waves = [end[p : p + 1] for end in self.antennas.ends], 2 * np.pi * self.frequencies / SPEED_OF_LIGHT
             values, _ = facet_samples(
-                part, self.antennas, p, self.frequencies, self.polarizations, self.vertical, self.weights, inside
-            )
+                part, self.antennas, p, self.frequencies, self.polarizations, self.vertical, self.weights, inside,
+                part.light(p, ends, waves),
+            )  # fmt: skip
             samples[row] += values.astype(np.complex64)
             away = int((inside & ~front).sum())
             counts += Counts(len(part), int((~inside).sum()), away)
@@ -78,11 +80,11 @@ def inside_window(part: FacetSet, antennas: PulseGeometry, pulse: int) -> np.nda
 
 def facet_samples(
     part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray, polarizations: Sequence[str],
-    vertical: np.ndarray, weights: AntennaWeights, inside: np.ndarray,
+    vertical: np.ndarray, weights: AntennaWeights, inside: np.ndarray, light: Light,
 ) -> tuple[np.ndarray, np.ndarray]:  # fmt: skip
     """Samples (n_polarizations, n) of a pulse at frequencies, Hz (n,), and their power at random phases.
 
-    inside  the facets that count (k,)
+    inside  the facets that count (k,);  light  what the pulse sees of them at the frequencies
     """
     tx, rx, places = antennas.tx[pulse], antennas.rx[pulse], centroids(part.triangles)
     steps = (places.astype(np.longdouble) - end for end in (tx, rx))  # a metre is thousands of cycles of a long path
@@ -94,7 +96,8 @@ def facet_samples(
     step = max(1, AT_ONCE // max(1, len(part)))
     for first in range(0, len(frequencies), step):
         block = frequencies[first : first + step]
-        sent = part.amplitudes(tx, rx, block, polarizations, vertical)
+        lit = Light(light.index, light.share, light.mean[:, :, first : first + step])
+        sent = part.amplitudes(tx, rx, block, polarizations, vertical, lit)
         for j, f in enumerate(block.tolist()):
             wave = np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(np.float64))
             a = sent[j] * (weight * weights.weights(places, pulse, f))[:, None]

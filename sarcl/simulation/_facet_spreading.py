@@ -19,7 +19,7 @@ from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
-from ..scattering.pulse_nodes import plan_pulse_nodes
+from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scene.triangles import centroids
 from ..visibility.illumination import Span
 from ._kernel_images import sample_patches
@@ -84,9 +84,11 @@ class FacetSpreader:
         left = tolerance - facet_plan.predicted_error
         band = Band(self.n_samples, bandwidth, float(antennas.frequency.mean()))
         room = left - band.least_tolerance(len(facets), left)  # what range profiles need comes first
-        self.pulse_nodes = plan_pulse_nodes(
+        self.partly = facets.lit_parts is not None
+        # edges of shadows move from pulse to pulse
+        self.pulse_nodes = every(len(antennas)) if self.partly else plan_pulse_nodes(
             facets, weights, self.made, vertical, float(frequencies[-1]), min(NODES_SHARE * left, room)
-        )
+        )  # fmt: skip
         left -= self.pulse_nodes.error
         self.plan = held.plan(antennas, band, left, least_tolerance=0.0)
         self.predicted_error = self.plan.predicted_error + facet_plan.predicted_error + self.pulse_nodes.error
@@ -107,6 +109,7 @@ class FacetSpreader:
             "ROUGH": int(self.facets.is_rough),
             "PULSE_NODES": self.pulse_nodes.order,
             "GROUPED": int(self.grouped),
+            "PARTLY": int(self.partly),
             **{name: int(name in self.made) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
@@ -136,7 +139,13 @@ class FacetSpreader:
         room = budget / 2
         pulses = max(1, min(most, int(room / 2 / per_pulse)) // lanes) * lanes
         n_nodes = pulses if spacing == 1 else pulses // spacing + self.pulse_nodes.order + 1
+        parts = 4 * (1 + 2 * len(self.held.facet_plan.nodes)) if self.partly else 0
         per_tile = tiles.per_tile * (8 * self.channels + 1) * n_nodes
+        if parts:
+            pulses = (
+                max(1, min(pulses, int(room / 4 / (2 * parts * tiles.per_tile * tiles.n_tiles))) // lanes) * lanes
+                or lanes
+            )
         return pulses, int(np.clip(room / 2 / per_tile, 1, tiles.n_tiles))
 
     def add(
@@ -181,6 +190,7 @@ class FacetSpreader:
         seen = device.upload(span.share[held.order])
         later = seen if span.later is span.share else device.upload(span.later[held.order])
         moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
+        parts = device.upload(self._parts(start, stop)) if self.partly else moments
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
         n_offsets, each, ends = tiles.offsets.shape[1], 1, (1, 1) if device.is_cpu else None
@@ -196,8 +206,8 @@ class FacetSpreader:
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
                 ),
-                node_constants, held.offsets, held.planes, seen, later, moments, self.nodes, self.up, self.patterns,
-                node_axes, self.reach, held.radius, made, marks,
+                node_constants, held.offsets, held.planes, seen, later, moments, parts, self.nodes, self.up,
+                self.patterns, node_axes, self.reach, held.radius, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (each * used, self.splits), ends,
@@ -211,6 +221,18 @@ class FacetSpreader:
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)
+
+    def _parts(self, start: int, stop: int) -> np.ndarray:
+        """Lit parts of the facets at pulses start ... stop - 1, as the kernel reads them: float32 (n, 1 + 2 m, .)."""
+        waves = 2 * np.pi * self.held.facet_plan.nodes / SPEED_OF_LIGHT
+        light = self.facets.light(start, [end[start:stop] for end in self.antennas.ends], waves)
+        order = self.tiles.order
+        out = np.empty((stop - start, 1 + 2 * len(waves), len(order)), np.float32)
+        out[:, 0] = light.share[:, order]
+        out[:, 1::2], out[:, 2::2] = (
+            side.transpose(0, 2, 1)[:, :, order] for side in (light.mean.real, light.mean.imag)
+        )
+        return out
 
     def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
         """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""

@@ -7,10 +7,11 @@ from typing import Any
 
 import numpy as np
 
+from ..base.constants import SPEED_OF_LIGHT
 from ..base.rows import spread_over
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scattering.antenna_weights import AntennaWeights
-from ..scattering.facets import FacetSet
+from ..scattering.facets import FacetSet, Light
 from ..scattering.scatterers import Points
 from ._exact_facets import facet_samples, inside_window
 from .scene_echoes import SceneEchoes
@@ -20,6 +21,7 @@ MOST_DRAWS = 16  # pulses, and frequencies at each of them
 FEWEST_DRAWS, MANY_FACETS = (4, 2), 2_000_000  # up to so many facets, and above
 FACET_SAMPLES = 256 * 20_000  # facets times samples: two or three seconds
 PER_FACET, PER_POINT = 5e-7, 6e-8  # s, to recompute the share of a facet or point in a sample, on one core
+PER_LIT_PART = 5e-3  # s, to recompute the lit part of a facet, past some ten occluders, on one core
 
 
 def draws_of(scene: SceneEchoes) -> int:
@@ -31,7 +33,10 @@ def draws_of(scene: SceneEchoes) -> int:
 def seconds_to_check(scene: SceneEchoes) -> float:
     """About the seconds that `measure_error` takes, on one core."""
     points, facets = (0 if part is None else len(part) for part in (scene.points, scene.facets))
-    return MOST_DRAWS**2 * points * PER_POINT + draws_of(scene) ** 2 * facets * PER_FACET
+    rows = None if scene.facets is None else scene.facets.lit_rows
+    partly = 0 if rows is None else int((rows >= 0).sum())
+    draws = draws_of(scene)
+    return MOST_DRAWS**2 * points * PER_POINT + draws**2 * facets * PER_FACET + draws * partly * PER_LIT_PART
 
 
 def worth_checking(scene: SceneEchoes, check: bool | None, channels: float = 1) -> bool:
@@ -106,7 +111,17 @@ def _exact(
     """Samples (n_polarizations, n) of pulse p at frequencies, Hz, and their power at random phases."""
     if isinstance(part, FacetSet):
         inside = inside_window(part, antennas, p)
-        return facet_samples(part, antennas, p, frequencies, polarizations, vertical, beam, inside)
+        return facet_samples(
+            part,
+            antennas,
+            p,
+            frequencies,
+            polarizations,
+            vertical,
+            beam,
+            inside,
+            _light(part, antennas, p, frequencies),
+        )
     from ..reference.echo import echo as exact_echo
 
     tx, rx, places = antennas.tx[p], antennas.rx[p], part.positions
@@ -122,3 +137,18 @@ def _exact(
         values[same, j] = exact_echo(places, a, frequencies[j : j + 1], *place)[0]
         powers[same, j] = (np.abs(a) ** 2).sum()
     return values, powers
+
+
+def _light(part: FacetSet, antennas: PulseGeometry, pulse: int, frequencies: np.ndarray) -> Light:
+    """What a pulse sees of the partly lit facets, by the reference."""
+    from ..reference.lit_part import lit_part
+
+    if part.lit_parts is None or part.lit_rows is None:
+        return Light.whole(1, len(frequencies))
+    index, waves = np.flatnonzero(part.lit_rows >= 0), 2 * np.pi * frequencies / SPEED_OF_LIGHT
+    ends = [end[pulse] for end in antennas.ends]
+    share, mean = np.empty((1, len(index))), np.empty((1, len(index), len(waves)), np.complex128)
+    for i, k in enumerate(index.tolist()):
+        occluders = part.lit_parts.occluders_at(pulse, int(part.lit_rows[k]))
+        share[0, i], mean[0, i] = lit_part(part.triangles[k], occluders, ends, waves, part.lit_parts.on_plane)
+    return Light(index, share, mean)

@@ -82,7 +82,8 @@ class SceneEchoes:
 
     weights, weight_error  of antennas and distances, and their errors
     subdivision            how facets were cut, None where there are none
-    points, facets         None where none are left;  tiled_points, tiled_facets  the same on the device
+    points, facets         None where none are left;  tiled_points, tiled_facets  the same on the device, partly lit
+                           facets apart from the others
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
@@ -95,7 +96,7 @@ class SceneEchoes:
     points: Points | None
     facets: FacetSet | None
     tiled_points: TiledScatterers | None
-    tiled_facets: TiledFacets | None
+    tiled_facets: tuple[TiledFacets, ...]
     skipped: dict[str, int]
     mesh_warnings: dict[str, Any]
     error_budget: float
@@ -104,6 +105,11 @@ class SceneEchoes:
     def __len__(self) -> int:
         """Number of points and facets."""
         return sum(len(part) for part in (self.points, self.facets) if part is not None)
+
+    @property
+    def gain(self) -> float:
+        """Norm of the cut facets over that of the facets as they were given, both added with random phases."""
+        return 1.0 if self.subdivision is None else self.subdivision.gain
 
     def channel(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int = 0
@@ -121,9 +127,9 @@ class SceneEchoes:
             for band in bands:
                 if self.tiled_points is not None:
                     self._plan_points(self.tiled_points, antennas, band)
-                if self.tiled_facets is not None and self.subdivision is not None:
-                    left = self.error_budget / self.subdivision.gain - self.tiled_facets.facet_plan.predicted_error
-                    self.tiled_facets.plan(antennas, band, left, least_tolerance=0.0)
+                for tiled in self.tiled_facets:
+                    left = self.error_budget / self.gain - tiled.facet_plan.predicted_error
+                    tiled.plan(antennas, band, left, least_tolerance=0.0)
 
     @contextmanager
     def _unreachable_for_the_caller(self) -> Iterator[None]:
@@ -149,33 +155,38 @@ class SceneEchoes:
         request = self.request
         weights = self.weights.at(antennas, slice(first, first + len(antennas)))
         plan, nodes, parts = None, np.zeros(0), []
-        spreader: FacetSpreader | ExactFacets | None = None
+        spreaders: list[FacetSpreader | ExactFacets] = []
+        stop = first + len(antennas)
         if self.points is not None and self.tiled_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
             plan, error = self._plan_points(self.tiled_points, antennas, band)
             parts.append((plan.predicted_error + error, plan.describe("spread")))
-        if self.facets is not None and self.tiled_facets is not None and self.subdivision is not None:
-            facets, stop = self.facets, first + len(antennas)
+        if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
+            facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
+            exact = ExactFacets(
+                facets, self.subdivision.plan, antennas, frequencies, request.gated, request.polarizations,
+                request.vertical, weights,
+            )  # fmt: skip
+            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings))
+            spreaders.append(exact)
+        spread = []
+        for tiled in self.tiled_facets:
+            facets = tiled.facets if stop - first == self.n_pulses else tiled.facets.between(first, stop)
             spreader = FacetSpreader(
-                self.tiled_facets, facets if stop - first == self.n_pulses else facets.between(first, stop), antennas,
-                waveform.bandwidth, frequencies, self.error_budget / self.subdivision.gain, request.budget,
-                request.gated, request.polarizations, request.vertical, weights,
+                tiled, facets, antennas, waveform.bandwidth, frequencies, self.error_budget / self.gain,
+                request.budget, request.gated, request.polarizations, request.vertical, weights,
             )  # fmt: skip
-            words = spreader.plan.describe("spread") | self.tiled_facets.facet_plan.describe()
+            words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
             words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
-            parts.append((self.subdivision.gain * spreader.predicted_error, words))
-        elif self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
-            facets, stop = self.facets, first + len(antennas)
-            spreader = ExactFacets(
-                facets if stop - first == self.n_pulses else facets.between(first, stop), self.subdivision.plan,
-                antennas, frequencies, request.gated, request.polarizations, request.vertical, weights,
-            )  # fmt: skip
-            parts.append((self.subdivision.gain * spreader.predicted_error, spreader.describe() | self.mesh_warnings))
+            spread.append((self.gain * spreader.predicted_error, words))
+            spreaders.append(spreader)
+        if spread:  # relative to the norm of the facets that each adds: not more of all of them
+            parts.append((max(error for error, _ in spread), spread[0][1]))
         chosen = max(parts, key=lambda part: part[0])[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(
-            self, antennas, weights, frequencies, plan, nodes, spreader,
+            self, antennas, weights, frequencies, plan, nodes, tuple(spreaders),
             float(np.sqrt(sum(error**2 for error, _ in parts))),
             {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})},
         )  # fmt: skip
@@ -208,7 +219,7 @@ class ChannelEchoes:
     """The echoes of a scene in one channel at one receiver, as they are planned.
 
     weights          as the channel's antennas see the scatterers;  frequencies  Hz, of its samples
-    point_plan       with gains at `nodes`, Hz;  spreader  of facets; both None where there are none
+    point_plan       with gains at `nodes`, Hz, None where there are no points;  spreaders  of facets
     predicted_error  relative, of the channel;  plan  in words, of its part with the largest error
     """
 
@@ -218,7 +229,7 @@ class ChannelEchoes:
     frequencies: np.ndarray
     point_plan: Plan | None
     nodes: np.ndarray
-    spreader: FacetSpreader | ExactFacets | None
+    spreaders: tuple[FacetSpreader | ExactFacets, ...]
     predicted_error: float
     plan: dict[str, Any]
 
@@ -243,8 +254,8 @@ class ChannelEchoes:
             samples[:, request.same[1:]] = samples[:, request.same[:1]]
         elif scene.points is not None:  # in these polarisations points send nothing back
             counts = Counts(len(scene.points) * len(samples))
-        if self.spreader is not None:
-            counts += self.spreader.add(samples, pulses, request.clock, on_progress)
+        for spreader in self.spreaders:
+            counts += spreader.add(samples, pulses, request.clock, on_progress)
         return counts
 
 
@@ -269,7 +280,8 @@ def prepare_scene(
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
     points, skipped = points_of(scene, request.skips, len(antennas))
-    facets, held_points, held_facets, mesh_warnings = None, None, None, dict[str, Any]()
+    facets, held_points, mesh_warnings = None, None, dict[str, Any]()
+    held_facets: tuple[TiledFacets, ...] = ()
     if subdivision is not None:
         facet_plan, pieces = subdivision.apply(scene)
         subdivision = replace(subdivision, plan=facet_plan)
@@ -281,11 +293,13 @@ def prepare_scene(
         facets, left_out = facets_of(
             pieces, waveform, antennas, shadows=request.shadows, seed=request.seed, skips=request.skips,
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
+            occluders=scene if tiled and request.shadows is True else None, margin=margin,
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
         if facets is not None and tiled and not facet_plan.is_float64:
-            held_facets = TiledFacets(
-                device, facets, facet_plan, antennas, waveform, weights, request.polarizations, vertical
+            held_facets = tuple(
+                TiledFacets(device, part, facet_plan, antennas, waveform, weights, request.polarizations, vertical)
+                for part in facets.split()
             )
     if facets is None and points is not None and not request.same:
         raise NothingSeen(

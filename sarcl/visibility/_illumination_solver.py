@@ -33,6 +33,7 @@ class IlluminationSolver:
         wanted: np.ndarray | None = None,
         tolerance: float = 0.25,
         engine: str = "opencl",
+        by_facets: np.ndarray | bool = True,
     ) -> None:
         self.device, k = device, len(triangles)
         on = np.full(k, heights is not None) if on_heights is None else on_heights
@@ -41,7 +42,8 @@ class IlluminationSolver:
         one_sided = np.broadcast_to(~np.asarray(two_sided), k)
         self.facets = DeviceFacets(device, triangles, frame, one_sided)
         self.occluders: Any = None
-        if not on.all():
+        self._by_facets = np.broadcast_to(np.asarray(by_facets), k)
+        if self._by_facets.any() and not on.all():
             self.occluders = _caster(engine)(device, triangles[~on], frame)
         length = self.facets.length
         large = length > LARGE * np.quantile(length, 0.25) if k > FEW else np.ones(k, bool)
@@ -62,11 +64,11 @@ class IlluminationSolver:
         out = np.zeros(len(self.facets.length), np.uint8)
         horizons = [None if self.terrain is None else self.terrain.sweep(v) for v in viewpoints]
         partly = [self._large]
-        for part in _chunks(self._small):
+        for part in self._chunks(self._small):
             seen = self._count(part, self._probes, viewpoints, horizons, slack)
             out[part] = np.where(seen == len(PROBES), 255, 0)
             partly.append(part[(seen > 0) & (seen < len(PROBES))])
-        for part in _chunks(np.concatenate(partly)):
+        for part in self._chunks(np.concatenate(partly)):
             seen = self._count(part, self._samples, viewpoints, horizons, slack)
             out[part] = np.rint(seen * (255 / self.n_samples))
         return out
@@ -77,6 +79,7 @@ class IlluminationSolver:
     ) -> np.ndarray:  # fmt: skip
         """Number of sample points of each facet in `index` that all viewpoints see, uint8 (n,).
 
+        index   facets that are all occluded by facets, or all by the terrain alone
         points  buffer of barycentric coordinates, and their number
         """
         device, n = self.device, len(index)
@@ -92,11 +95,17 @@ class IlluminationSolver:
         for viewpoint, other, horizon in zip(viewpoints, viewpoints[::-1], horizons, strict=True):
             if horizon is not None:
                 horizon.hide(self.facets, which, n, points, other, hidden)
-            if self.occluders is not None:
+            if self.occluders is not None and self._by_facets[index[0]]:
                 self.occluders.hide(self.facets, which, n, points, viewpoint, other, hidden)
         seen = device.empty(n)
         device.run(device.kernel("ray_casting.cl", "seen"), (n,), None, hidden, points[1], seen)
         return device.download(seen, np.empty(n, np.uint8))
+
+    def _chunks(self, index: np.ndarray) -> list[np.ndarray]:
+        """Facets in parts that `_count` takes."""
+        by_facets = self._by_facets[index]
+        kinds = index[by_facets], index[~by_facets]
+        return [kind[i : i + CHUNK] for kind in kinds for i in range(0, len(kind), CHUNK)]
 
 
 def _caster(engine: str) -> Any:
@@ -105,7 +114,3 @@ def _caster(engine: str) -> Any:
     from ._embree_rays import EmbreeOccluders
 
     return EmbreeOccluders
-
-
-def _chunks(index: np.ndarray) -> list[np.ndarray]:
-    return [index[i : i + CHUNK] for i in range(0, len(index), CHUNK)]

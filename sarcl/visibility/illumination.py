@@ -32,6 +32,11 @@ from ._illumination_solver import IlluminationSolver
 
 log = logging.getLogger(__name__)
 
+ALL_DARK = (
+    "the whole scene is in shadow: no facet faces the antennas with nothing in between; check the side the track is "
+    "on, the winding of the mesh, and heights; or pass shadows=False"
+)
+
 
 @dataclass(frozen=True, eq=False)
 class Span:
@@ -155,6 +160,7 @@ def lit(
     tolerance: float = 0.25,
     max_bytes: float | None = None,
     engine: Literal["opencl", "embree"] = "opencl",
+    by_facets: np.ndarray | bool = True,
     device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Illumination:
@@ -173,6 +179,7 @@ def lit(
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
     engine      "opencl", or "embree" for the rays (package embreex; single samples at edges may differ)
+    by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
     progress    called as progress(block, blocks)
 
     Raises ValueError for an antenna below the terrain. Warns with SarclWarning where nothing at all is illuminated.
@@ -190,7 +197,7 @@ def lit(
     grid = None if heights is None else heights_of(heights)
     on_heights = None if on_heights is None else _mask("on_heights", on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
-    two_sided = _mask("two_sided", two_sided, k)
+    two_sided, by_facets = _mask("two_sided", two_sided, k), _mask("by_facets", by_facets, k)
     if grid is not None:
         for name, end in zip(("tx", "rx"), ends, strict=False):
             check_above(name, grid, end)
@@ -213,7 +220,7 @@ def lit(
     slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
-        tolerance=tolerance, engine=engine,
+        tolerance=tolerance, engine=engine, by_facets=by_facets,
     )  # fmt: skip
 
     def look(place: int) -> np.ndarray:
@@ -242,10 +249,7 @@ def lit(
     viewpoints = offered[chosen]
     blocks = blocks_around(viewpoints, len(tx))
     if not ever.any() and n_wanted:
-        warn(
-            "the whole scene is in shadow: no facet faces the antennas with nothing in between; check the side the "
-            "track is on, the winding of the mesh, and heights; or pass shadows=False"
-        )
+        warn(ALL_DARK)
     log.info("%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - ever.sum(), k)
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~ever), sealed(always), sealed(np.array(dark, np.int64)),

@@ -1,0 +1,102 @@
+"""The part of a facet that is in no shadow: every occluder, every edge, in float64."""
+
+from __future__ import annotations
+
+import numpy as np
+
+from ..base.vectors import unit
+from ..scattering.physical_optics import triangle_mean
+
+
+def shadow(facet: np.ndarray, occluder: np.ndarray, antenna: np.ndarray, on_plane: float) -> np.ndarray:
+    """Shadow of an occluder, m (3, 3), on the plane of a facet, m (3, 3), about its centroid: corners (n, 2), n 0 to 5.
+
+    on_plane  m: corners nearer to the plane lie in it
+    """
+    axes, center = plane_axes(facet), facet.mean(axis=0)
+    eye = (antenna - center) @ axes.T
+    solid = (occluder - center) @ axes.T
+    solid[:, 2] *= np.sign(eye[2])
+    solid[np.abs(solid[:, 2]) <= on_plane, 2] = 0
+    height = abs(eye[2])
+    for limit, sign in ((0.0, 1), (0.999999 * height, -1)):
+        rest = []
+        for a, b in zip(solid, np.roll(solid, -1, axis=0), strict=True):
+            above, next_above = sign * (a[2] - limit), sign * (b[2] - limit)
+            if above >= 0:
+                rest.append(a)
+            if above * next_above < 0:
+                rest.append(a + above / (above - next_above) * (b - a))
+        solid = np.array(rest).reshape(-1, 3)
+    if len(solid) < 3 or solid[:, 2].max() <= 0:
+        return np.zeros((0, 2))
+    flat = solid[:, :2] + (solid[:, :2] - eye[:2]) * (solid[:, 2] / (height - solid[:, 2]))[:, None]
+    return flat[::-1] if area(flat) < 0 else flat
+
+
+def plane_axes(facet: np.ndarray) -> np.ndarray:
+    """Unit vectors x along the first edge of a facet, y, and z along its normal (3, 3)."""
+    x, z = unit(facet[1] - facet[0]), unit(np.cross(facet[1] - facet[0], facet[2] - facet[0]))
+    return np.stack([x, np.cross(z, x), z])
+
+
+def area(corners: np.ndarray) -> float:
+    """Area of a polygon (n, 2), positive anticlockwise."""
+    after = np.roll(corners, -1, axis=0)
+    return float((corners[:, 0] * after[:, 1] - corners[:, 1] * after[:, 0]).sum() / 2)
+
+
+def lit_pieces(facet: np.ndarray, shadows: list[np.ndarray]) -> list[np.ndarray]:
+    """Convex polygons (n, 2) that together are a facet less its shadows: each shadow cut off edge by edge."""
+    pieces = [(facet - facet.mean(axis=0)) @ plane_axes(facet)[:2].T]
+    for corners in shadows:
+        left = []
+        for piece in pieces:
+            for a, b in zip(corners, np.roll(corners, -1, axis=0), strict=True):
+                outside, piece = _halves(piece, a, b)
+                if len(outside) > 2:
+                    left.append(outside)
+                if len(piece) < 3:
+                    break
+        pieces = left
+    return pieces
+
+
+def _halves(piece: np.ndarray, a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """The parts of a convex polygon to the right and to the left of the line from a to b."""
+    right, left = [], []
+    side = (b[0] - a[0]) * (piece[:, 1] - a[1]) - (b[1] - a[1]) * (piece[:, 0] - a[0])
+    for i, point in enumerate(piece):
+        if side[i] <= 0:
+            right.append(point)
+        if side[i] >= 0:
+            left.append(point)
+        j = (i + 1) % len(piece)
+        if side[i] * side[j] < 0:
+            middle = point + side[i] / (side[i] - side[j]) * (piece[j] - point)
+            right.append(middle)
+            left.append(middle)
+    return np.array(right).reshape(-1, 2), np.array(left).reshape(-1, 2)
+
+
+def lit_part(
+    facet: np.ndarray, occluders: np.ndarray, antennas: list[np.ndarray], waves: np.ndarray, on_plane: float = 1e-9
+) -> tuple[float, np.ndarray]:
+    """Share of a facet, m (3, 3), that one antenna or two, m (3,), see past occluders, m (k, 3, 3), and the mean over
+    the whole facet of exp(j k (u_t + u_r).rho) on that part, rho from the centroid, at wavenumbers k, rad/m: (m,)."""
+    shadows = [shadow(facet, other, antenna, on_plane) for antenna in antennas for other in occluders]
+    pieces = lit_pieces(facet, [s for s in shadows if len(s) and area(s) > 0])
+    center = facet.mean(axis=0)
+    sights = [unit(antenna - center) for antenna in antennas]
+    both = plane_axes(facet)[:2] @ (2 * sights[0] if len(sights) == 1 else sights[0] + sights[1])
+    total = float(np.linalg.norm(np.cross(facet[1] - facet[0], facet[2] - facet[0]))) / 2
+    share, mean = 0.0, np.zeros(len(waves), np.complex128)
+    for piece in pieces:
+        for i in range(1, len(piece) - 1):
+            corners = piece[[0, i, i + 1]]
+            phases = np.outer(waves, corners @ both)
+            part = area(corners) / total
+            share += part
+            about = np.exp(1j * phases.mean(axis=1))
+            mean += part * about * triangle_mean(phases[:, 1] - phases[:, 0], phases[:, 2] - phases[:, 0])
+    return share, mean

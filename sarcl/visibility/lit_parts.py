@@ -1,0 +1,243 @@
+"""The part of each facet that both antennas see past other facets, at every pulse: its share and its phase integral."""
+
+from __future__ import annotations
+
+import copy
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+
+import numpy as np
+
+from ..base.boxes import box
+from ..base.vectors import dot, unit
+from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
+from ..scene.triangles import areas, centroids, edges, normals
+from ._aspect_blocks import pulse_blocks, shadow_length
+from ._shadow_pairs import PAIRS_AT_ONCE, candidate_pairs
+
+KERNELS = "lit_parts.cl"
+SHADOW, MOST_WAVES = 15, 16  # numbers of a shadow; wavenumbers per launch: as in the kernels
+# Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
+# what rounding moves corners by
+SLACK = {True: 1e-12, False: 2e-6}  # in float64; in float32
+# Corners nearer to a facet's plane than this, relative to the scene's diagonal, lie in it: sheets that coincide, or
+# touch within the digits of float32 files, do not shadow one another
+ON_PLANE = 1e-6
+MOST_TURN = 0.5  # of the usual occluder's width, by which shadows may move within a block of pulses
+
+
+@dataclass(frozen=True, eq=False)
+class _Block:
+    """Pulses first ... stop - 1, and pairs (n, 2) of a partly lit facet and an occluder, in the order of facets."""
+
+    first: int
+    stop: int
+    pairs: np.ndarray
+
+
+class LitParts:
+    """Facets, m (k, 3, 3), and others that occlude them, m (n, 3, 3), from antennas along a track.
+
+    dark    (k,) bool: facets of which no pulse sees anything
+    partly  (k,) bool: the other facets of which some pulse sees a part, or nothing
+    """
+
+    def __init__(
+        self,
+        device: Device,
+        triangles: np.ndarray,
+        occluders: np.ndarray,
+        ends: list[np.ndarray],
+        *,
+        two_sided: np.ndarray,
+        wanted: np.ndarray,
+        max_bytes: float,
+        margin: float = 0.0,
+    ) -> None:
+        """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
+        two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: facets whose lit part
+        is computed;  max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
+        """
+        self.device, self.max_bytes, self._margin, self._first = device, max_bytes, margin, 0
+        self._real = np.float64 if device.info.fp64 else np.float32
+        points = np.concatenate([triangles.reshape(-1, 3), occluders.reshape(-1, 3)])
+        bounds = box(points)
+        self._origin = bounds.mean(axis=0)
+        size = float(np.linalg.norm(bounds[1] - bounds[0]))
+        self._on_plane = ON_PLANE * size
+        keep = np.flatnonzero(wanted & (areas(triangles) > 0))
+        solid = occluders[areas(occluders) > 0]
+        self._receivers = _Receivers(keep, triangles[keep], two_sided[keep])
+        self._occluders = solid
+        self._blocks: list[_Block] = []
+        self.dark, self.partly = np.zeros((2, len(triangles)), bool)
+        if len(keep) and len(solid):
+            self._look(ends, bounds)
+        self._rows = np.flatnonzero(self.partly[keep])
+
+    def _look(self, ends: list[np.ndarray], bounds: np.ndarray) -> None:
+        """Find blocks of pulses and the pairs of each; and which facets are dark, or partly lit."""
+        width = float(np.median(np.sqrt(areas(self._occluders))))
+        limits = [MOST_TURN * width / max(shadow_length(bounds, end), 1e-300) for end in ends]
+        blocks, viewpoints, turns = pulse_blocks(ends, bounds, limits)
+        dark_pulses = np.zeros(len(self._receivers.index), np.int64)
+        changing = np.zeros(len(self._receivers.index), bool)
+        for (first, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
+            pairs = self._pairs([end[viewpoint] for end in ends], turn, bounds)
+            which = np.unique(pairs[:, 0])
+            here = np.zeros(len(changing), bool)
+            if self._margin:  # other antennas may see what these do not
+                here[which] = True
+            else:
+                antennas = [end[first:stop] for end in ends]
+                for some, share, _ in self._light(which, pairs, antennas, np.zeros(0)):
+                    dark_pulses[which[some]] += (share == 0).sum(axis=0)
+                    here[which[some]] = (share < 1).any(axis=0)
+            changing |= here
+            self._blocks.append(_Block(first, stop, pairs[here[pairs[:, 0]]]))
+        dark = dark_pulses == len(ends[0])
+        self.dark[self._receivers.index], self.partly[self._receivers.index] = dark, changing & ~dark
+        lasting = self.partly[self._receivers.index]
+        self._blocks = [_Block(b.first, b.stop, b.pairs[lasting[b.pairs[:, 0]]]) for b in self._blocks]
+
+    def _pairs(self, antennas: list[np.ndarray], turn: float, bounds: np.ndarray) -> np.ndarray:
+        """Pairs of a facet and an occluder that may cast a shadow on it from pulses near one."""
+        r = self._receivers
+        away = min(float(np.linalg.norm(at - np.clip(at, *bounds))) for at in antennas)
+        turn = min(turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
+        cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
+        # a facet is not seen from a side that is turned away from an antenna by more than directions change
+        front = np.all([c > -2 * turn for c in cosines], axis=0)
+        back = r.two_sided & np.all([c < 2 * turn for c in cosines], axis=0)
+        seen = np.flatnonzero(front | back)
+
+        def casts(pairs: np.ndarray) -> np.ndarray:
+            which = seen[pairs[:, 0]]
+            heights = ((self._occluders[pairs[:, 1]] - r.center[which, None]) * r.normal[which, None]).sum(axis=2)
+            above, below = heights.max(axis=1) > self._on_plane, heights.min(axis=1) < -self._on_plane
+            return np.asarray((front[which] & above) | (back[which] & below))
+
+        found = [candidate_pairs(r.triangles[seen], self._occluders, at, turn, casts) for at in antennas]
+        pairs = found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0)
+        pairs[:, 0] = seen[pairs[:, 0]]
+        return pairs
+
+    def at(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+        """What consecutive pulses from `first` on see of the partly lit facets, in their order.
+
+        ends   antennas of these pulses, m (n, 3), one or two;  waves  wavenumbers k_m, rad/m (m,)
+        Returns shares of the areas, 0 to 1, float32 (n, r), and the means of exp(j k_m (u_t + u_r).rho) over whole
+        facets that count lit parts alone, rho from the centroid, complex64 (n, r, m).
+        """
+        n, first = len(ends[0]), first + self._first
+        share = np.ones((n, len(self._rows)), np.float32)
+        mean = np.empty((n, len(self._rows), len(waves)), np.complex64)
+        for block in self._blocks:
+            here = slice(max(block.first - first, 0), min(block.stop - first, n))
+            if here.start < here.stop:
+                antennas = [end[here] for end in ends]
+                for some, part_share, part_mean in self._light(self._rows, block.pairs, antennas, waves):
+                    share[here, some], mean[here, some] = part_share, part_mean
+        return share, mean
+
+    def occluders_at(self, pulse: int, row: int) -> np.ndarray:
+        """Facets that may cast a shadow on partly lit facet number `row`, as a pulse sees it, m (n, 3, 3)."""
+        pulse += self._first
+        block = next(block for block in self._blocks if block.first <= pulse < block.stop)
+        begin, end = np.searchsorted(block.pairs[:, 0], [self._rows[row], self._rows[row] + 1])
+        return np.asarray(self._occluders[block.pairs[begin:end, 1]])
+
+    @property
+    def on_plane(self) -> float:
+        """Distance, m, from the plane of a facet below which corners of occluders lie in it."""
+        return self._on_plane
+
+    def between(self, first: int) -> LitParts:
+        """The same, with pulses counted from `first`."""
+        out = copy.copy(self)
+        out._first = self._first + first
+        return out
+
+    def _light(
+        self, which: np.ndarray, pairs: np.ndarray, ends: list[np.ndarray], waves: np.ndarray
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, increasing; in parts, each with its slice.
+
+        pairs  (., 2), of these facets, in their order
+        """
+        antennas = np.stack([end - self._origin for end in ends], axis=1).astype(self._real)
+        per_pair = antennas.shape[0] * len(ends) * (SHADOW * np.dtype(self._real).itemsize + 1)
+        most = int(np.clip(self.max_bytes / 2 / per_pair, 1, PAIRS_AT_ONCE))
+        begins = np.searchsorted(pairs[:, 0], np.append(which, np.iinfo(np.int64).max))
+        at = 0
+        while at < len(which):
+            until = max(at + 1, int(np.searchsorted(begins, begins[at] + most, "right")) - 1)
+            some = slice(at, min(until, len(which), at + PAIRS_AT_ONCE))
+            here = pairs[begins[some.start] : begins[some.stop], 1]
+            yield (
+                some,
+                *self._computed(which[some], begins[some.start : some.stop + 1] - begins[at], here, antennas, waves),
+            )
+            at = some.stop
+
+    def _computed(
+        self, which: np.ndarray, begins: np.ndarray, occluder: np.ndarray, antennas: np.ndarray, waves: np.ndarray
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
+        device, real, n_pairs = self.device, self._real, max(len(occluder), 1)
+        macros = {"ENDS": antennas.shape[1], "REAL64": int(real is np.float64), "VW": 1}
+        cast, light = (device.kernel(KERNELS, name, **macros) for name in ("cast_shadows", "lit_parts"))
+        receivers = device.upload(self._receivers.packed(which, self._origin, self._on_plane, real))
+        (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
+        size = pulses * ends * n_pairs
+        shadows, corners = device.empty(size * SHADOW * np.dtype(real).itemsize), device.empty(size)
+        if len(occluder):
+            picked, at = np.unique(occluder, return_inverse=True)
+            solid = device.upload((self._occluders[picked] - self._origin).astype(real).reshape(-1, 9))
+            owner = np.repeat(np.arange(len(which), dtype=np.int32), np.diff(begins))
+            device.run(
+                cast, (n_pairs, pulses * ends), None, launch_numbers(KERNELS, "cast_shadows", n_pairs=n_pairs),
+                receivers, device.upload(owner), device.upload(at.astype(np.int32)), solid, seen, shadows, corners,
+            )  # fmt: skip
+        first, means = device.upload(begins.astype(np.int32)), []
+        share = np.empty((pulses, len(which)), np.float32)
+        for some in np.split(waves, range(MOST_WAVES, len(waves), MOST_WAVES)):
+            mean = np.empty((pulses, len(which), len(some)), np.complex64)
+            out = device.empty(share.nbytes), device.empty(max(mean.nbytes, 8))
+            device.run(
+                light, (len(which), pulses), None,
+                launch_numbers(KERNELS, "lit_parts", n_pairs=n_pairs, n_waves=len(some)),
+                receivers, first, seen, shadows, corners, device.upload(np.append(some, 0.0).astype(real)), *out,
+            )  # fmt: skip
+            device.download(out[0], share)
+            means.append(device.download(out[1], mean) if len(some) else mean)
+        return share, np.concatenate(means, axis=2)
+
+
+@dataclass(frozen=True, eq=False)
+class _Receivers:
+    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect."""
+
+    index: np.ndarray
+    triangles: np.ndarray
+    two_sided: np.ndarray
+    center: np.ndarray = field(init=False)
+    normal: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", centroids(self.triangles))
+        object.__setattr__(self, "normal", normals(self.triangles))
+
+    def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float, real: type) -> np.ndarray:
+        """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
+        triangles, center, normal = self.triangles[which], self.center[which], self.normal[which]
+        along = unit(triangles[:, 1] - triangles[:, 0])
+        across = np.cross(normal, along)
+        flat = np.stack(
+            [((triangles - center[:, None]) * axis[:, None]).sum(axis=2) for axis in (along, across)], axis=2
+        )
+        longest = np.maximum.reduce(edges(triangles))
+        slack = SLACK[real is np.float64] * longest
+        columns = center - origin, along, across, normal, flat.reshape(-1, 6), areas(triangles)[:, None], slack[:, None]
+        return np.concatenate([*columns, np.full((len(which), 1), on_plane)], axis=1).astype(real)

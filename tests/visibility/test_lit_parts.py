@@ -1,0 +1,170 @@
+"""Lit parts of facets: shares and phase integrals against polygons clipped another way, and degenerate polygons."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.lit_cases import lit_polygon
+
+import sarcl
+from sarcl.reference.lit_part import lit_part
+from sarcl.visibility._shadow_pairs import candidate_pairs
+from sarcl.visibility.lit_parts import LitParts
+
+WAVES = np.array([1.0, 30.0, 200.0, 400.0])  # rad/m
+TOLERANCE = {
+    True: 2e-7,  # float64, stored in float32
+    False: 3e-3,  # float32: an antenna at a facet's own size away projects places with few digits
+}
+FACET = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
+
+
+def lit_parts(device, triangles, occluders, ends, *, two_sided=True, margin=0.0):
+    k = len(triangles)
+    return LitParts(
+        device, triangles, occluders, ends, two_sided=np.full(k, two_sided), wanted=np.ones(k, bool), max_bytes=1e8,
+        margin=margin,
+    )  # fmt: skip
+
+
+def shares(device, triangles, occluders, ends, **options):
+    """Shares of all facets at each pulse (n, k)."""
+    parts = lit_parts(device, triangles, occluders, ends, **options)
+    out = np.ones((len(ends[0]), len(triangles)))
+    out[:, parts.partly] = parts.at(0, ends, np.zeros(0))[0]
+    out[:, parts.dark] = 0
+    return out
+
+
+def soup(seed):
+    """A facet, up to 11 occluders above, below and through it, and one antenna or two from near to far, 3 pulses."""
+    random = np.random.default_rng(seed)
+    facet = random.uniform(-1, 1, (1, 3, 3)) * [1, 1, 0.05]
+    occluders = random.uniform(-0.7, 0.7, (random.integers(1, 12), 3, 3)) * [1, 1, 0.5] + [0, 0, 0.3]
+    antenna = random.uniform(-3, 3, 3) * [1, 1, 0] + [0, 0, random.choice([1.5, 10, 1e4])]
+    ends = [antenna + random.normal(0, 0.02, (3, 3))]
+    if seed % 2:
+        ends.append(ends[0] + random.normal(0, 0.5, 3) * [1, 1, 0.1])
+    return facet, occluders, ends
+
+
+@pytest.mark.parametrize("seed", range(24))
+def test_share_and_phase_integral_are_those_of_the_facet_less_every_shadow(device, seed):
+    facet, occluders, ends = soup(seed)
+    parts = lit_parts(device, facet, occluders, ends)
+    limit = TOLERANCE[device.info.fp64]
+    share, mean = parts.at(0, ends, WAVES)
+    for pulse in range(3):
+        wanted, integral = lit_part(facet[0], occluders, [end[pulse] for end in ends], WAVES, parts.on_plane)
+        if parts.partly[0]:
+            assert share[pulse, 0] == pytest.approx(wanted, abs=limit)
+            np.testing.assert_allclose(mean[pulse, 0], integral, atol=limit)
+        else:
+            assert wanted == pytest.approx(0 if parts.dark[0] else 1, abs=limit)
+
+
+@pytest.mark.parametrize("seed", range(24, 36))
+def test_the_reference_has_the_areas_of_another_librarys_polygons(seed):
+    facet, occluders, ends = soup(seed)
+    antennas = [end[0] for end in ends]
+    polygon = lit_polygon(facet[0], occluders, antennas)
+    area = np.linalg.norm(np.cross(facet[0, 1] - facet[0, 0], facet[0, 2] - facet[0, 0])) / 2
+    assert lit_part(facet[0], occluders, antennas, WAVES)[0] == pytest.approx(polygon.area / area, abs=1e-9)
+
+
+ABOVE = [np.array([[0.1, 0.2, 1e4]])]
+
+
+def shifted(x, y, z, size=0.2):
+    return np.array([[[x, y, z], [x + size, y, z], [x, y + size, z]]])
+
+
+@pytest.mark.parametrize(
+    "occluders, share",
+    [
+        (shifted(0.1, 0.1, 0.3), 0.96),
+        (np.concatenate([shifted(0.1, 0.1, 0.3)] * 3), 0.96),  # the same sheet three times
+        (np.concatenate([shifted(0.1, 0.1, 0.3), shifted(0.1, 0.1, 0.3)[:, ::-1]]), 0.96),  # wound both ways
+        (np.concatenate([shifted(0.1, 0.1, 0.2), shifted(0.3, 0.1, 0.2)[:, [1, 2, 0]]]), 0.92),  # touch in a corner
+        (sarcl.shapes.plate((0.2, 0.2)).triangles + [0.2, 0.2, 0.2], 0.92),  # a square of two triangles
+        (FACET, 1.0),  # the facet itself
+        (np.add(FACET, [0, 0, 1e-9]), 1.0),  # a sheet that coincides
+        (FACET - [0, 0, 0.1], 1.0),  # below
+        (np.add(FACET, [0, 0, 2e4]), 1.0),  # beyond the antenna
+        (np.array([[[0, 0, 0], [1, 0, 0], [0, 0, 1]]], float), 1.0),  # a wall on the facet's edge, seen edge-on
+        (np.array([[[-5, -5, 1], [5, -5, 1], [0, 5, 1]]], float), 0.0),  # over all of it
+        (np.array([[[0.1, 0.1, 0.1], [0.1, 0.1, 0.1], [0.3, 0.1, 0.1]]]), 1.0),  # without area
+    ],
+)  # fmt: skip
+def test_shares_where_polygons_degenerate(every_device, occluders, share):
+    far = [np.array([[0.3, 0.3, 1e8]])]  # shadows are as large as what casts them
+    if np.abs(occluders).max() > 1e3:
+        far = ABOVE
+    found = shares(every_device, FACET, occluders, far)
+    assert found[0, 0] == pytest.approx(share, abs=1e-7 if every_device.info.fp64 else 1e-3)
+
+
+@pytest.mark.parametrize("azimuth", [0.0, 0.3, np.pi / 4, 2.0])
+def test_a_closed_box_on_a_plate_hides_what_is_under_it_and_its_shadow(every_device, azimuth):
+    """Faces touch at edges, stand on the plate, and are seen along their planes: every border counts once."""
+    plate = sarcl.shapes.plate((8.0, 8.0)).triangles
+    box = sarcl.shapes.box((1.0, 1.0, 1.0)).triangles
+    u = np.array([np.sin(0.7) * np.cos(azimuth), np.sin(0.7) * np.sin(azimuth), np.cos(0.7)])
+    scene = np.concatenate([plate, box])
+    found = shares(every_device, plate, scene, [2e6 * u[None]])
+    shift = np.abs(u[:2] / u[2])
+    hull = 1 + shift[0] * 1 + shift[1] * 1  # area of a unit square swept along the shift
+    area = np.linalg.norm(np.cross(plate[:, 1] - plate[:, 0], plate[:, 2] - plate[:, 0]), axis=1) / 2
+    assert (area * (1 - found[0])).sum() == pytest.approx(hull, abs=2e-5 if every_device.info.fp64 else 2e-2)
+
+
+def test_faces_of_a_convex_body_do_not_shadow_one_another(every_device):
+    sphere = sarcl.shapes.sphere(1.0, edge=0.4).triangles
+    found = shares(every_device, sphere, sphere, [np.array([[30.0, 20.0, 40.0]])], two_sided=False)
+    assert (found == 1).all()
+
+
+def test_a_pole_that_passes_between_two_pulses_is_found_at_the_pulse_that_it_hides(every_device):
+    """0.01 m wide and seen by one pulse of 200 on a facet of 0.1 m: no sampling of pulses decides."""
+    pole = np.array([[[1.995, -3, 0.5], [2.005, -3, 0.5], [2.0, 3, 0.5]]])
+    small = 0.1 * FACET - [0.05, 0.05, 0]
+    along = np.linspace(0, 40, 200)
+    track = np.stack([along, np.zeros(200), np.full(200, 5.0)], axis=1)
+    found = shares(every_device, small, pole, [track])[:, 0]
+    for pulse in np.flatnonzero(found < 1):
+        assert abs(track[pulse, 0] / 10 - 2.0) < 0.2
+    wanted = [lit_part(small[0], pole, [place], WAVES)[0] for place in track]
+    np.testing.assert_allclose(found, wanted, atol=TOLERANCE[every_device.info.fp64])
+    assert found.min() < 0.95 and (found < 1).sum() < 10
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
+    random = np.random.default_rng(seed)
+    receivers = random.uniform(-5, 5, (60, 1, 3)) + random.standard_normal((60, 3, 3)) * random.choice([0.05, 0.5])
+    occluders = random.uniform(-5, 5, (50, 1, 3)) + random.standard_normal((50, 3, 3)) * random.choice([0.05, 2.0])
+    middle = random.standard_normal(3)
+    middle *= random.choice([2.0, 20.0, 500.0]) / np.linalg.norm(middle)
+    turn = 0.02
+    away = max(np.linalg.norm(middle) - 12, 0)
+    others = middle + random.uniform(-1, 1, (8, 3)) * turn * away / 2
+    found = {
+        tuple(pair) for pair in candidate_pairs(receivers, occluders, middle, turn, lambda p: np.ones(len(p), bool))
+    }
+    for antenna in others:
+        for i, facet in enumerate(receivers):
+            for j, occluder in enumerate(occluders):
+                if (i, j) not in found:
+                    assert lit_part(facet, occluder[None], [antenna], WAVES[:1])[0] == pytest.approx(1, abs=1e-9)
+
+
+def test_other_antennas_within_the_margin_see_their_own_shadows(every_device):
+    facet, occluders = FACET, shifted(-0.3, -0.3, 10.0, size=0.6)
+    track = np.array([[0.5, 0.2, 30.0], [0.6, 0.2, 30.0]])
+    parts = lit_parts(every_device, facet, occluders, [track], margin=2.0)
+    moved = track - [1.0, 1.0, 0.0]
+    share, _ = parts.at(0, [moved], WAVES)
+    assert (share < 1).all()
+    for pulse in range(2):
+        wanted = lit_part(facet[0], occluders, [moved[pulse]], WAVES, parts.on_plane)[0]
+        assert share[pulse, 0] == pytest.approx(wanted, abs=TOLERANCE[every_device.info.fp64])
