@@ -15,30 +15,29 @@
 //           shadow    (SHADOW,): least and largest x, least and largest y, up to five corners (x, y) anticlockwise, area
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
-//           REAL64    1 float64, 0 float32
-//           VW        1
+//           (all in float64: edges of shadows that coincide are told apart by 1e-12 of a facet)
 // reference: sarcl/reference/lit_part.py:lit_part
 
-#include "common.clh"
+#pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
 enum { RECEIVER = 21, SHADOW = 15, COVERS = 255, MOST_WAVES = 16, SLIVER = 300 };
 
-typedef struct { REAL x, y; } point;
+typedef struct { double x, y; } point;
 
-static inline REAL crossed(REAL ax, REAL ay, REAL bx, REAL by) { return ax * by - ay * bx; }
+static inline double crossed(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 
 // Corners of a polygon on the inner side of a plane z = limit: below it where `below`, else above it.
-static inline int cut_polygon(const REAL *in, int n, REAL limit, int below, REAL *out) {
+static inline int cut_polygon(const double *in, int n, double limit, int below, double *out) {
     int made = 0;
     for (int i = 0; i < n; i++) {
-        const REAL *a = in + 3 * i, *b = in + 3 * (i + 1 == n ? 0 : i + 1);
-        REAL from = below ? limit - a[2] : a[2] - limit, to = below ? limit - b[2] : b[2] - limit;
+        const double *a = in + 3 * i, *b = in + 3 * (i + 1 == n ? 0 : i + 1);
+        double from = below ? limit - a[2] : a[2] - limit, to = below ? limit - b[2] : b[2] - limit;
         if (from >= 0) {
             for (int j = 0; j < 3; j++) out[3 * made + j] = a[j];
             made++;
         }
         if ((from > 0 && to < 0) || (from < 0 && to > 0)) {
-            REAL part = from / (from - to);
+            double part = from / (from - to);
             for (int j = 0; j < 2; j++) out[3 * made + j] = a[j] + part * (b[j] - a[j]);
             out[3 * made + 2] = limit;
             made++;
@@ -48,10 +47,10 @@ static inline int cut_polygon(const REAL *in, int n, REAL limit, int below, REAL
 }
 
 // Whether points all lie beyond one edge of an anticlockwise polygon.
-static inline int apart(const point *polygon, int n, const point *others, int m, REAL slack) {
+static inline int apart(const point *polygon, int n, const point *others, int m, double slack) {
     for (int i = 0; i < n; i++) {
         point a = polygon[i], b = polygon[i + 1 == n ? 0 : i + 1];
-        REAL ex = b.x - a.x, ey = b.y - a.y, margin = slack * sqrt(ex * ex + ey * ey);
+        double ex = b.x - a.x, ey = b.y - a.y, margin = slack * sqrt(ex * ex + ey * ey);
         int beyond = 1;
         for (int j = 0; j < m; j++) beyond &= crossed(ex, ey, others[j].x - a.x, others[j].y - a.y) <= margin;
         if (beyond) return 1;
@@ -65,48 +64,48 @@ typedef struct { int n_pairs; } cast_shadows_numbers;
 //   receivers  (n, RECEIVER);  pair_receiver, pair_occluder (n_pairs);  occluders (., 9)   corners, m
 //   antennas   (pulses, ENDS, 3)   m
 //   shadows    (pulses, ENDS, n_pairs, SHADOW);  corners (pulses, ENDS, n_pairs)
-__kernel void cast_shadows(cast_shadows_numbers given, __global const REAL *restrict receivers,
+__kernel void cast_shadows(cast_shadows_numbers given, __global const double *restrict receivers,
                            __global const int *restrict pair_receiver, __global const int *restrict pair_occluder,
-                           __global const REAL *restrict occluders, __global const REAL *restrict antennas,
-                           __global REAL *restrict shadows, __global uchar *restrict corners) {
+                           __global const double *restrict occluders, __global const double *restrict antennas,
+                           __global double *restrict shadows, __global uchar *restrict corners) {
     size_t pair = get_global_id(0), end = get_global_id(1), at = end * given.n_pairs + pair;
-    __global const REAL *r = receivers + RECEIVER * (size_t)pair_receiver[pair];
-    __global const REAL *occluder = occluders + 9 * (size_t)pair_occluder[pair];
+    __global const double *r = receivers + RECEIVER * (size_t)pair_receiver[pair];
+    __global const double *occluder = occluders + 9 * (size_t)pair_occluder[pair];
     corners[at] = 0;
-    REAL eye[3], away = 0, solid[3 * 3], above[3 * 4], kept[3 * 5], highest = 0;
+    double eye[3], away = 0, solid[3 * 3], above[3 * 4], kept[3 * 5], highest = 0;
     for (int i = 0; i < 3; i++) {
-        REAL part = antennas[3 * end + i] - r[i];
+        double part = antennas[3 * end + i] - r[i];
         away += part * part;
     }
     for (int j = 0; j < 3; j++) {
         eye[j] = 0;
         for (int i = 0; i < 3; i++) eye[j] += (antennas[3 * end + i] - r[i]) * r[3 + 3 * j + i];
     }
-    REAL side = eye[2] < 0 ? (REAL)-1.0f : (REAL)1.0f, height = side * eye[2];
-    if (!(height > (REAL)1e-6f * sqrt(away))) return;  // the facet is seen edge-on
+    double side = eye[2] < 0 ? -1.0 : 1.0, height = side * eye[2];
+    if (!(height > 1e-6 * sqrt(away))) return;  // the facet is seen edge-on
     for (int v = 0; v < 3; v++) {
         for (int j = 0; j < 3; j++) {
-            REAL sum = 0;
+            double sum = 0;
             for (int i = 0; i < 3; i++) sum += (occluder[3 * v + i] - r[i]) * r[3 + 3 * j + i];
             solid[3 * v + j] = sum;
         }
-        REAL z = side * solid[3 * v + 2];
-        solid[3 * v + 2] = fabs(z) <= r[20] ? (REAL)0.0f : z;
+        double z = side * solid[3 * v + 2];
+        solid[3 * v + 2] = fabs(z) <= r[20] ? 0.0 : z;
         highest = max(highest, solid[3 * v + 2]);
     }
     if (!(highest > 0)) return;
-    int n = cut_polygon(solid, 3, (REAL)0.0f, 0, above);
-    const REAL *from = above;
-    REAL top = (REAL64 ? (REAL)0.999999f : (REAL)0.999f) * height;  // projections of what is higher lose too many digits
+    int n = cut_polygon(solid, 3, 0.0, 0, above);
+    const double *from = above;
+    double top = 0.999999 * height;
     if (highest > top) {  // what lies beyond the antenna casts no shadow
         n = cut_polygon(above, n, top, 1, kept);
         from = kept;
     }
     if (n < 3) return;
     point polygon[5], facet[3];
-    REAL area = 0, around = 0;
+    double area = 0, around = 0;
     for (int i = 0; i < n; i++) {
-        REAL stretch = from[3 * i + 2] / (height - from[3 * i + 2]);
+        double stretch = from[3 * i + 2] / (height - from[3 * i + 2]);
         polygon[i].x = from[3 * i] + (from[3 * i] - eye[0]) * stretch;
         polygon[i].y = from[3 * i + 1] + (from[3 * i + 1] - eye[1]) * stretch;
     }
@@ -129,8 +128,8 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const REAL *rest
     }
     if (apart(facet, 3, polygon, n, r[19]) || apart(polygon, n, facet, 3, r[19])) return;
     int covers = 1;
-    __global REAL *out = shadows + SHADOW * at;
-    REAL low_x = polygon[0].x, high_x = low_x, low_y = polygon[0].y, high_y = low_y;
+    __global double *out = shadows + SHADOW * at;
+    double low_x = polygon[0].x, high_x = low_x, low_y = polygon[0].y, high_y = low_y;
     for (int i = 0; i < n; i++) {
         point a = polygon[i], b = polygon[i + 1 == n ? 0 : i + 1];
         for (int j = 0; j < 3; j++) covers &= crossed(b.x - a.x, b.y - a.y, facet[j].x - a.x, facet[j].y - a.y) >= 0;
@@ -150,11 +149,11 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const REAL *rest
 }
 
 // Part of the line a + s d, 0 <= s <= 1, inside an anticlockwise polygon.
-static inline int crosses(__global const REAL *corner, int n, point a, point d, REAL *from, REAL *to) {
-    REAL low = 0, high = 1, x0 = corner[2 * n - 2], y0 = corner[2 * n - 1];
+static inline int crosses(__global const double *corner, int n, point a, point d, double *from, double *to) {
+    double low = 0, high = 1, x0 = corner[2 * n - 2], y0 = corner[2 * n - 1];
     for (int i = 0; i < n; i++) {
-        REAL x1 = corner[2 * i], y1 = corner[2 * i + 1], ex = x1 - x0, ey = y1 - y0;
-        REAL inside = crossed(ex, ey, a.x - x0, a.y - y0), change = crossed(ex, ey, d.x, d.y);
+        double x1 = corner[2 * i], y1 = corner[2 * i + 1], ex = x1 - x0, ey = y1 - y0;
+        double inside = crossed(ex, ey, a.x - x0, a.y - y0), change = crossed(ex, ey, d.x, d.y);
         if (change > 0) low = max(low, -inside / change);
         else if (change < 0) high = min(high, -inside / change);
         else if (inside < 0) return 0;
@@ -166,28 +165,28 @@ static inline int crosses(__global const REAL *corner, int n, point a, point d, 
     return low < high;
 }
 
-static inline REAL sinc(REAL x) { return fabs(x) < (REAL)1e-3f ? (REAL)1.0f - x * x / (REAL)6.0f : sin(x) / x; }
+static inline double sinc(double x) { return fabs(x) < 1e-3 ? 1.0 - x * x / 6.0 : sin(x) / x; }
 
 // Integral of exp(j phase)/(2 area) over a triangle whose corners have the phases 0, b and c, rad.
-static inline void triangle_integral(REAL b, REAL c, REAL *re, REAL *im) {
-    REAL zero = 0, low = min(b, c), high = max(b, c), x = min(low, zero), z = max(high, zero), y = max(low, min(high, zero));
-    REAL u = (REAL)0.5f * (z - y), v = (REAL)0.5f * (y - x), w = u + v, su = sinc(u), sv = sinc(v), quotient;
-    if (w < (REAL)0.5f) {  // (sinc u - sinc v)/(u + v) in powers of u and v: no digits are lost
-        REAL uu = u * u, vv = v * v, series = 0, h = 0, power = 1, factorial = 1, sign = 1;
+static inline void triangle_integral(double b, double c, double *re, double *im) {
+    double zero = 0, low = min(b, c), high = max(b, c), x = min(low, zero), z = max(high, zero), y = max(low, min(high, zero));
+    double u = 0.5 * (z - y), v = 0.5 * (y - x), w = u + v, su = sinc(u), sv = sinc(v), quotient;
+    if (w < 0.5) {  // (sinc u - sinc v)/(u + v) in powers of u and v: no digits are lost
+        double uu = u * u, vv = v * v, series = 0, h = 0, power = 1, factorial = 1, sign = 1;
         for (int m = 1; m < 8; m++) {
             h = power + uu * h;
             power *= vv;
-            factorial *= (REAL)(2 * m * (2 * m + 1));
+            factorial *= 2 * m * (2 * m + 1);
             sign = -sign;
             series += sign / factorial * h;
         }
         quotient = (u - v) * series;
     } else
         quotient = (su - sv) / w;
-    REAL real = (REAL)0.5f * sinc((REAL)0.5f * w) * (su + sv), imaginary = -cos((REAL)0.5f * w) * quotient;
-    REAL turn = (v - u) / (REAL)6.0f + (b + c) / (REAL)3.0f, s = sin(turn), t = cos(turn);
-    *re = (REAL)0.5f * (real * t - imaginary * s);
-    *im = (REAL)0.5f * (real * s + imaginary * t);
+    double real = 0.5 * sinc(0.5 * w) * (su + sv), imaginary = -cos(0.5 * w) * quotient;
+    double turn = (v - u) / 6.0 + (b + c) / 3.0, s = sin(turn), t = cos(turn);
+    *re = 0.5 * (real * t - imaginary * s);
+    *im = 0.5 * (real * s + imaginary * t);
 }
 
 typedef struct { int n_pairs, n_waves; } lit_parts_numbers;
@@ -198,16 +197,16 @@ typedef struct { int n_pairs, n_waves; } lit_parts_numbers;
 //   waves    (n_waves <= MOST_WAVES)  k_m, rad/m
 //   share    (pulses, receivers)      0 ... 1
 //   mean     (pulses, receivers, n_waves, 2)   re, im
-__kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict receivers, __global const int *restrict first,
-                        __global const REAL *restrict antennas, __global const REAL *restrict shadows,
-                        __global const uchar *restrict corners, __global const REAL *restrict waves,
+__kernel void lit_parts(lit_parts_numbers given, __global const double *restrict receivers, __global const int *restrict first,
+                        __global const double *restrict antennas, __global const double *restrict shadows,
+                        __global const uchar *restrict corners, __global const double *restrict waves,
                         __global float *restrict share, __global float *restrict mean) {
     size_t pulse = get_global_id(1), at = pulse * get_global_size(0) + get_global_id(0);
-    __global const REAL *r = receivers + RECEIVER * get_global_id(0);
+    __global const double *r = receivers + RECEIVER * get_global_id(0);
     int begin = first[get_global_id(0)], stop = first[get_global_id(0) + 1], dark = 0;
-    REAL qx = 0, qy = 0, area = 0, sums[2 * MOST_WAVES];
+    double qx = 0, qy = 0, area = 0, sums[2 * MOST_WAVES];
     for (int e = 0; e < ENDS; e++) {
-        REAL d[3], length = 0, px = 0, py = 0;
+        double d[3], length = 0, px = 0, py = 0;
         for (int i = 0; i < 3; i++) {
             d[i] = antennas[3 * (pulse * ENDS + e) + i] - r[i];
             length += d[i] * d[i];
@@ -215,8 +214,8 @@ __kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict r
             py += d[i] * r[6 + i];
         }
         length = sqrt(length);
-        qx += px / length * (REAL)(ENDS == 1 ? 2.0f : 1.0f);
-        qy += py / length * (REAL)(ENDS == 1 ? 2.0f : 1.0f);
+        qx += px / length * (ENDS == 1 ? 2.0 : 1.0);
+        qy += py / length * (ENDS == 1 ? 2.0 : 1.0);
         for (int i = begin; i < stop; i++) dark |= corners[(pulse * ENDS + e) * given.n_pairs + i] == COVERS;
     }
     for (int m = 0; m < 2 * given.n_waves; m++) sums[m] = 0;
@@ -225,21 +224,21 @@ __kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict r
         for (int i = e < 0 ? stop - 1 : begin; i < stop; i++) {
             size_t own = (pulse * ENDS + (e < 0 ? 0 : e)) * given.n_pairs + i;
             int n = e < 0 ? 3 : corners[own];
-            __global const REAL *polygon = e < 0 ? r + 12 : shadows + SHADOW * own + 4;
-            REAL own_area = e < 0 ? (REAL)0.0f : shadows[SHADOW * own + 14];
+            __global const double *polygon = e < 0 ? r + 12 : shadows + SHADOW * own + 4;
+            double own_area = e < 0 ? 0.0 : shadows[SHADOW * own + 14];
             for (int side = 0; side < n; side++) {
                 int next = side + 1 == n ? 0 : side + 1;
                 point a = {polygon[2 * side], polygon[2 * side + 1]}, d = {polygon[2 * next] - a.x, polygon[2 * next + 1] - a.y};
-                REAL length = sqrt(d.x * d.x + d.y * d.y), s = 0, end = 1;
+                double length = sqrt(d.x * d.x + d.y * d.y), s = 0, end = 1;
                 if (!(length > 0)) continue;
-                REAL off_x = d.y / length * r[19], off_y = -d.x / length * r[19];
+                double off_x = d.y / length * r[19], off_y = -d.x / length * r[19];
                 point right = {a.x + off_x, a.y + off_y}, left = {a.x - off_x, a.y - off_y};
                 point lit = e < 0 ? left : right;  // beside the edge, where the facet may be lit
                 if (e >= 0 && !crosses(r + 12, 3, lit, d, &s, &end)) continue;
-                REAL low_x = min(a.x, a.x + d.x) - r[19], high_x = max(a.x, a.x + d.x) + r[19];
-                REAL low_y = min(a.y, a.y + d.y) - r[19], high_y = max(a.y, a.y + d.y) + r[19];
+                double low_x = min(a.x, a.x + d.x) - r[19], high_x = max(a.x, a.x + d.x) + r[19];
+                double low_y = min(a.y, a.y + d.y) - r[19], high_y = max(a.y, a.y + d.y) + r[19];
                 while (s < end) {  // from s on to the end of the shadows there, and then to the begin of the next one
-                    REAL until = end;
+                    double until = end;
                     int moved = 1;
                     while (moved && s < end) {
                         moved = 0;
@@ -248,9 +247,9 @@ __kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict r
                             for (int k = begin; k < stop; k++) {
                                 size_t other = (pulse * ENDS + e_2) * given.n_pairs + k;
                                 if (corners[other] == 0 || (e >= 0 && other == own)) continue;
-                                __global const REAL *shadow = shadows + SHADOW * other;
+                                __global const double *shadow = shadows + SHADOW * other;
                                 if (shadow[0] > high_x || shadow[1] < low_x || shadow[2] > high_y || shadow[3] < low_y) continue;
-                                REAL from, to;
+                                double from, to;
                                 int covered = crosses(shadow + 4, corners[other], lit, d, &from, &to);
                                 if (covered && from <= s && to > s) {
                                     s = to;
@@ -268,11 +267,11 @@ __kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict r
                             }
                     }
                     if (s >= end) break;
-                    REAL ax = a.x + s * d.x, ay = a.y + s * d.y, bx = a.x + until * d.x, by = a.y + until * d.y;
-                    REAL twice = (e < 0 ? (REAL)1.0f : (REAL)-1.0f) * crossed(ax, ay, bx, by);
-                    area += (REAL)0.5f * twice;
+                    double ax = a.x + s * d.x, ay = a.y + s * d.y, bx = a.x + until * d.x, by = a.y + until * d.y;
+                    double twice = (e < 0 ? 1.0 : -1.0) * crossed(ax, ay, bx, by);
+                    area += 0.5 * twice;
                     for (int m = 0; m < given.n_waves; m++) {
-                        REAL re, im;
+                        double re, im;
                         triangle_integral(waves[m] * (qx * ax + qy * ay), waves[m] * (qx * bx + qy * by), &re, &im);
                         sums[2 * m] += twice * re;
                         sums[2 * m + 1] += twice * im;
@@ -281,8 +280,8 @@ __kernel void lit_parts(lit_parts_numbers given, __global const REAL *restrict r
                 }
             }
         }
-    REAL part = area / r[18];
-    int none = dark || !(part > (REAL)1e-9f);
-    share[at] = none ? 0.0f : (float)min(part, (REAL)1.0f);
+    double part = area / r[18];
+    int none = dark || !(part > 1e-9);
+    share[at] = none ? 0.0f : (float)min(part, 1.0);
     for (int m = 0; m < 2 * given.n_waves; m++) mean[at * 2 * given.n_waves + m] = none ? 0.0f : (float)(sums[m] / r[18]);
 }

@@ -50,6 +50,19 @@ def open_device(choice: DeviceChoice | None = None) -> Device:
     raise NoDeviceError(f"{source} {choice!r} matches no working OpenCL device. Found: {_listing()}")
 
 
+def with_float64(device: Device) -> Device:
+    """A device itself where it has float64, else another working one that has. NoDeviceError where there is none."""
+    if device.info.fp64:
+        return device
+    able = [info for info in devices() if info.works and info.fp64]
+    if not able:
+        raise NoDeviceError(
+            f"edges of shadows need float64, which {device.info.name!r} lacks, as every other OpenCL device here does; "
+            f"pass shadows=False, or install a driver for the CPU beside it. {REMEDY}"
+        )
+    return _open(max(able, key=lambda i: (i.rate, -i.index)).index)
+
+
 def _matches(info: DeviceInfo, choice: Any) -> bool:
     text = str(choice).strip().lower()
     if text.isdecimal() or not isinstance(choice, str):

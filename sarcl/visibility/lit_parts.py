@@ -10,6 +10,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..base.vectors import dot, unit
+from ..opencl.choose_device import with_float64
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
@@ -20,7 +21,7 @@ KERNELS = "lit_parts.cl"
 SHADOW, MOST_WAVES = 15, 16  # numbers of a shadow; wavenumbers per launch: as in the kernels
 # Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
 # what rounding moves corners by
-SLACK = {True: 1e-12, False: 2e-6}  # in float64; in float32
+SLACK = 1e-12
 # Corners nearer to a facet's plane than this, relative to the scene's diagonal, lie in it: sheets that coincide, or
 # touch within the digits of float32 files, do not shadow one another
 ON_PLANE = 1e-6
@@ -39,6 +40,7 @@ class _Block:
 class LitParts:
     """Facets, m (k, 3, 3), and others that occlude them, m (n, 3, 3), from antennas along a track.
 
+    A device without float64 leaves this to another one on the machine; NoDeviceError where there is none.
     dark    (k,) bool: facets of which no pulse sees anything
     partly  (k,) bool: the other facets of which some pulse sees a part, or nothing
     """
@@ -59,8 +61,7 @@ class LitParts:
         two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: facets whose lit part
         is computed;  max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
         """
-        self.device, self.max_bytes, self._margin, self._first = device, max_bytes, margin, 0
-        self._real = np.float64 if device.info.fp64 else np.float32
+        self.device, self.max_bytes, self._margin, self._first = with_float64(device), max_bytes, margin, 0
         points = np.concatenate([triangles.reshape(-1, 3), occluders.reshape(-1, 3)])
         bounds = box(points)
         self._origin = bounds.mean(axis=0)
@@ -166,8 +167,8 @@ class LitParts:
 
         pairs  (., 2), of these facets, in their order
         """
-        antennas = np.stack([end - self._origin for end in ends], axis=1).astype(self._real)
-        per_pair = antennas.shape[0] * len(ends) * (SHADOW * np.dtype(self._real).itemsize + 1)
+        antennas = np.stack([end - self._origin for end in ends], axis=1)
+        per_pair = antennas.shape[0] * len(ends) * (SHADOW * 8 + 1)
         most = int(np.clip(self.max_bytes / 2 / per_pair, 1, PAIRS_AT_ONCE))
         begins = np.searchsorted(pairs[:, 0], np.append(which, np.iinfo(np.int64).max))
         at = 0
@@ -185,16 +186,15 @@ class LitParts:
         self, which: np.ndarray, begins: np.ndarray, occluder: np.ndarray, antennas: np.ndarray, waves: np.ndarray
     ) -> tuple[np.ndarray, np.ndarray]:
         """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
-        device, real, n_pairs = self.device, self._real, max(len(occluder), 1)
-        macros = {"ENDS": antennas.shape[1], "REAL64": int(real is np.float64), "VW": 1}
-        cast, light = (device.kernel(KERNELS, name, **macros) for name in ("cast_shadows", "lit_parts"))
-        receivers = device.upload(self._receivers.packed(which, self._origin, self._on_plane, real))
+        device, n_pairs = self.device, max(len(occluder), 1)
+        cast, light = (device.kernel(KERNELS, name, ENDS=antennas.shape[1]) for name in ("cast_shadows", "lit_parts"))
+        receivers = device.upload(self._receivers.packed(which, self._origin, self._on_plane))
         (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
         size = pulses * ends * n_pairs
-        shadows, corners = device.empty(size * SHADOW * np.dtype(real).itemsize), device.empty(size)
+        shadows, corners = device.empty(size * SHADOW * 8), device.empty(size)
         if len(occluder):
             picked, at = np.unique(occluder, return_inverse=True)
-            solid = device.upload((self._occluders[picked] - self._origin).astype(real).reshape(-1, 9))
+            solid = device.upload((self._occluders[picked] - self._origin).reshape(-1, 9))
             owner = np.repeat(np.arange(len(which), dtype=np.int32), np.diff(begins))
             device.run(
                 cast, (n_pairs, pulses * ends), None, launch_numbers(KERNELS, "cast_shadows", n_pairs=n_pairs),
@@ -208,7 +208,7 @@ class LitParts:
             device.run(
                 light, (len(which), pulses), None,
                 launch_numbers(KERNELS, "lit_parts", n_pairs=n_pairs, n_waves=len(some)),
-                receivers, first, seen, shadows, corners, device.upload(np.append(some, 0.0).astype(real)), *out,
+                receivers, first, seen, shadows, corners, device.upload(np.append(some, 0.0)), *out,
             )  # fmt: skip
             device.download(out[0], share)
             means.append(device.download(out[1], mean) if len(some) else mean)
@@ -229,7 +229,7 @@ class _Receivers:
         object.__setattr__(self, "center", centroids(self.triangles))
         object.__setattr__(self, "normal", normals(self.triangles))
 
-    def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float, real: type) -> np.ndarray:
+    def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
         triangles, center, normal = self.triangles[which], self.center[which], self.normal[which]
         along = unit(triangles[:, 1] - triangles[:, 0])
@@ -238,6 +238,6 @@ class _Receivers:
             [((triangles - center[:, None]) * axis[:, None]).sum(axis=2) for axis in (along, across)], axis=2
         )
         longest = np.maximum.reduce(edges(triangles))
-        slack = SLACK[real is np.float64] * longest
+        slack = SLACK * longest
         columns = center - origin, along, across, normal, flat.reshape(-1, 6), areas(triangles)[:, None], slack[:, None]
-        return np.concatenate([*columns, np.full((len(which), 1), on_plane)], axis=1).astype(real)
+        return np.concatenate([*columns, np.full((len(which), 1), on_plane)], axis=1)
