@@ -83,7 +83,10 @@ class AmplitudeSamples:
             self.share = 1 / chance[self.which]
         self.weight = 1 / np.sqrt(chance[self.some])
         self.at = seen(self.which, random)
-        self.frequencies = random.uniform(*band, 4).tolist()
+        # evenly over the band: amplitudes that grow along it err most far from a term's frequency, and a few random
+        # frequencies may all lie near it. Halfway between the frequencies of terms
+        parts = FREQUENCIES - 1
+        self.frequencies = (band[0] + (np.arange(parts) + 0.5) / parts * (band[1] - band[0])).tolist()
         self.exact = np.stack([amplitudes(self.which, self.at, f) for f in self.frequencies])
 
     def error(self, expansion: AspectExpansion) -> float:

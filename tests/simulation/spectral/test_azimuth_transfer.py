@@ -91,3 +91,21 @@ def test_sums_of_products_are_found_with_as_many_terms():
 
     with pytest.raises(sarcl.ToleranceUnreachable, match="use echo"):
         expand(AmplitudeSamples(unlike, np.ones(500), (9.0, 11.0), seen), (-0.1, 0.1), 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize("n", [200, 225, 250, 275, 300])
+def test_amplitudes_that_change_along_the_band_are_predicted(n):
+    """One term is exact at one frequency, and off by more, the farther a frequency is from it."""
+
+    def amplitudes(some, sine, frequency):
+        return 1 - 0.01 * (some[:, None] / n) * (frequency - 9) / 2 + 0j
+
+    def seen(some, random):
+        return random.uniform(-0.1, 0.1, len(some))
+
+    sizes = np.random.default_rng(n).random(n)
+    found = expand(AmplitudeSamples(amplitudes, sizes, (9.0, 11.0), seen), (-0.1, 0.1), 0.1, 0.1)
+    some, factors = np.arange(n), found.factors(np.arange(n), 0)
+    wrong = [factors * found.functions(np.zeros(1), f)[0] - amplitudes(some, 0.0, f) for f in np.linspace(9, 11, 101)]
+    assert len(found) == 1
+    assert np.sqrt(np.mean(np.abs(wrong) ** 2)) <= found.error
