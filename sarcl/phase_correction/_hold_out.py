@@ -119,10 +119,11 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     if modes < n:
         agreement = closeness(*curves)
         agree |= agreement > _least_of_curves(curves, modes, closeness)
-    if not agree and view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
-        other = _searched_as_curves(view, values, plain)
+    if view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
+        other = _searched_as_curves(view, values, plain, bands)
         close = closeness(*other[1])
-        if close > _least_of_curves(other[1], other[0], closeness):
+        sharper = other[2].prod() > gain.prod()  # phases of single pulses may focus several points to one
+        if close > _least_of_curves(other[1], other[0], closeness) and (sharper or not agree):
             agree, agreement = True, close
             modes, curves, gain = other
     # phases from some of the places have more noise, and ask for more smoothing
@@ -166,15 +167,17 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
 
 
 def _searched_as_curves(
-    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray]
+    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray], free: list[np.ndarray]
 ) -> tuple[int, list[np.ndarray], np.ndarray]:
     """Phases of few cosines of both halves of the band, searched as such: their number, the phases, and their gains.
 
     values, plain  contributions from the halves, with the range errors removed and without any correction
+    free           phases of single pulses that sharpen the halves
     """
     zero = np.zeros(view.n)
     was = [max(_phase_gradient.sharpness(before, zero, view.window), 1e-300) for before in plain]
-    pairs = list(zip(*(_smooth_search.curves(v, view.window) for v in values), strict=True))
+    searched = [_smooth_search.curves(v, phase, view.window) for v, phase in zip(values, free, strict=True)]
+    pairs = list(zip(*searched, strict=True))
 
     def gains(pair: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         moved = [_phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[0] for a, b in (pair, pair[::-1])]

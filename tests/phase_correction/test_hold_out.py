@@ -1,4 +1,4 @@
-"""Near and far places, which hold out one another: both have targets, or there is no test."""
+"""What cross-validation compares: near and far places that both have targets; phases of few cosines."""
 
 from __future__ import annotations
 
@@ -7,6 +7,7 @@ import pytest
 
 import sarcl
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.phase_correction import _phase_smoothing, _smooth_search
 from sarcl.phase_correction._hold_out import _near_and_far
 from sarcl.phase_correction.autofocus import _aperture_view
 
@@ -42,3 +43,19 @@ def test_a_set_of_side_lobes_alone_gives_way_to_one_with_a_target():
 @pytest.mark.parametrize("cells", [(0.0, 0.5), (0.0, 1.9)])
 def test_targets_too_close_in_range_are_not_divided(cells):
     assert sets([*cells, 5, 7], [1, 1, SIDE_LOBE, SIDE_LOBE]) == ([], [])
+
+
+def test_a_large_smooth_phase_is_found_from_that_of_single_pulses():
+    random, n, modes = np.random.default_rng(1), 128, 8
+    phase = _phase_smoothing.cosines(n, modes)[:, 2:] @ random.normal(size=modes - 2)
+    phase *= 15 / np.abs(phase).max()
+    # in every column two points side by side, which phases of single pulses may focus to one
+    pulses = np.arange(n)[:, None]
+    points = 1 + np.exp(2j * np.pi * (3 * pulses / n + random.random(20)))
+    v = (points * np.exp(2j * np.pi * random.random(20) + 1j * phase[:, None])).astype(np.complex64)
+    free = np.angle(np.exp(1j * (phase + random.normal(scale=0.4, size=n))))
+    found = _smooth_search.curves(v, free, 64.0)[_smooth_search.MODES.index(modes)]
+    left = _phase_smoothing.detrended(found - phase)
+    assert left.std() < 0.1
+    lost = _smooth_search.curves(v, np.zeros(n), 64.0)[_smooth_search.MODES.index(modes)]
+    assert _phase_smoothing.detrended(lost - phase).std() > 1
