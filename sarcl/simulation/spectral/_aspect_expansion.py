@@ -93,7 +93,7 @@ class AmplitudeSamples:
         self.exact = np.stack([amplitudes(self.which, self.at, f) for f in self.frequencies])
 
     def error(self, expansion: AspectExpansion) -> float:
-        """Relative error of an expansion, with a margin; where terms cancel, rounding of the factors grows with them."""
+        """Relative error of an expansion, with a margin; terms that cancel multiply the rounding of the factors."""
         factors = np.stack([expansion.factors(self.which, j) for j in range(len(expansion))], axis=-1)
         wrong = right = apart = 0.0
         for f, exact in zip(self.frequencies, self.exact, strict=True):
