@@ -58,6 +58,8 @@ MOVED_APART = (
 UNSURE = "the halves of the band agree to {:.2f} only, where {} is wanted"
 UNLINKED = "of the pulses that see one of them too few see the next: {:.0%}, where {:.0%} is wanted"
 CLOSER = 1.05  # preference for the phase from all echoes, which is the most exact, unless its smoothing went wrong
+# of the power of the brightest place: side lobes in range, of a Hamming window over the band, are below (-43 dB)
+SIDE_LOBES = 1e-4
 BETWEEN = 2.0  # range cells of half the band behind the border of near and far places, which neither uses
 
 
@@ -117,10 +119,11 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
     if modes < n:
         agreement = closeness(*curves)
         agree |= agreement > _least_of_curves(curves, modes, closeness)
-    if not agree and view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
-        other = _searched_as_curves(view, values, plain)
+    if view.is_narrow:  # where each place has its own pulses, few cosines leave the places apart
+        other = _searched_as_curves(view, values, plain, bands)
         close = closeness(*other[1])
-        if close > _least_of_curves(other[1], other[0], closeness):
+        sharper = other[2].prod() > gain.prod()  # phases of single pulses may focus several points to one
+        if close > _least_of_curves(other[1], other[0], closeness) and (sharper or not agree):
             agree, agreement = True, close
             modes, curves, gain = other
     # phases from some of the places have more noise, and ask for more smoothing
@@ -164,15 +167,17 @@ def cross_validated(view: ApertureView, errors: Errors, tick: Callable[[], None]
 
 
 def _searched_as_curves(
-    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray]
+    view: ApertureView, values: list[np.ndarray], plain: list[np.ndarray], free: list[np.ndarray]
 ) -> tuple[int, list[np.ndarray], np.ndarray]:
     """Phases of few cosines of both halves of the band, searched as such: their number, the phases, and their gains.
 
     values, plain  contributions from the halves, with the range errors removed and without any correction
+    free           phases of single pulses that sharpen the halves
     """
     zero = np.zeros(view.n)
     was = [max(_phase_gradient.sharpness(before, zero, view.window), 1e-300) for before in plain]
-    pairs = list(zip(*(_smooth_search.curves(v, view.window) for v in values), strict=True))
+    searched = [_smooth_search.curves(v, phase, view.window) for v, phase in zip(values, free, strict=True)]
+    pairs = list(zip(*searched, strict=True))
 
     def gains(pair: tuple[np.ndarray, np.ndarray]) -> np.ndarray:
         moved = [_phase_smoothing.alignment(a, b, view.shift_phase, view.cell / 2)[0] for a, b in (pair, pair[::-1])]
@@ -247,16 +252,26 @@ def _none_lost(view: ApertureView, errors: Errors, power: np.ndarray) -> bool:
 def _near_and_far(
     view: ApertureView, places: np.ndarray, values: list[np.ndarray], phase: np.ndarray
 ) -> tuple[np.ndarray, np.ndarray]:
-    """Two sets of places, bool (k,) each, at different ranges, of sharpness as equal as can be."""
+    """Two sets of places, bool (k,) each, at different ranges, of sharpness as equal as can be.
+
+    Places between the sets belong to neither. Where they are all the targets that one of them has, the sets are those
+    of which the fainter is as sharp as can be; where these lack a target too, both are empty.
+    """
     middle = view.n // 2 * view.channels
     cells = _bright_points.delay(view.raw, middle, places) * view.raw.bandwidth[0]
     level = np.maximum(*(sum(abs(_phase_gradient.turned(v, e).sum(axis=0)) ** 4 for v in values)
                          for e in (phase, 0 * phase)))  # fmt: skip
     level = level.reshape(view.channels, -1).sum(axis=0)
     order = np.argsort(cells)
-    total = np.cumsum(level[order])
-    border = cells[order][int(np.minimum(total, total[-1] - total).argmax())]
-    return cells <= border, cells > border + BETWEEN
+    ranges, total = cells[order], np.concatenate([[0.0], np.cumsum(level[order], dtype=np.float64)])
+    beyond = np.searchsorted(ranges, ranges + BETWEEN, side="right")
+    bright = level >= SIDE_LOBES**2 * level.max()
+    for first in (np.arange(1, len(order) + 1), beyond):  # of the places behind each border, in order of range
+        border = ranges[int(np.minimum(total[1:], total[-1] - total[first]).argmax())]
+        sets = cells <= border, cells > border + BETWEEN
+        if all((some & bright).any() for some in sets):
+            return sets
+    return np.zeros(len(cells), bool), np.zeros(len(cells), bool)
 
 
 def _phase(view: ApertureView, v: np.ndarray) -> np.ndarray:

@@ -7,7 +7,7 @@ import pytest
 import scipy.special
 
 import sarcl
-from sarcl.simulation.spectral._aspect_expansion import AmplitudeSamples, expand
+from sarcl.simulation.spectral._aspect_expansion import AmplitudeSamples, AspectExpansion, expand
 from sarcl.simulation.spectral._aspect_window import aspects, wavenumber
 from sarcl.simulation.spectral._azimuth_transfer import response_error, transfer_tables
 from sarcl.simulation.spectral._straight_track import straight_track, tangent
@@ -91,3 +91,57 @@ def test_sums_of_products_are_found_with_as_many_terms():
 
     with pytest.raises(sarcl.ToleranceUnreachable, match="use echo"):
         expand(AmplitudeSamples(unlike, np.ones(500), (9.0, 11.0), seen), (-0.1, 0.1), 1e-3, 1e-3)
+
+
+@pytest.mark.parametrize("n", [200, 225, 250, 275, 300])
+def test_amplitudes_that_change_along_the_band_are_predicted(n):
+    """One term is exact at one frequency, and off by more, the farther a frequency is from it."""
+
+    def amplitudes(some, sine, frequency):
+        return 1 - 0.01 * (some[:, None] / n) * (frequency - 9) / 2 + 0j
+
+    def seen(some, random):
+        return random.uniform(-0.1, 0.1, len(some))
+
+    sizes = np.random.default_rng(n).random(n)
+    found = expand(AmplitudeSamples(amplitudes, sizes, (9.0, 11.0), seen), (-0.1, 0.1), 0.1, 0.1)
+    some, factors = np.arange(n), found.factors(np.arange(n), 0)
+    wrong = [factors * found.functions(np.zeros(1), f)[0] - amplitudes(some, 0.0, f) for f in np.linspace(9, 11, 101)]
+    assert len(found) == 1
+    assert np.sqrt(np.mean(np.abs(wrong) ** 2)) <= found.error
+
+
+def size_of_terms(found, n, frequency):
+    """Root mean square of the terms of an expansion of n amplitudes of 1, at one frequency."""
+    some, psi = np.arange(n), found.functions(np.zeros(1), frequency)[:, 0]
+    terms = np.stack([found.factors(some, j)[:, 0] * psi[j] for j in range(len(found))])
+    return float(np.sqrt((np.abs(terms) ** 2).sum(axis=0).mean()))
+
+
+def test_terms_of_a_wide_band_do_not_cancel():
+    """Phases of up to 4 rad over the band, 1e-3 rad over the aspects: rounding of terms grows as they cancel."""
+    place = np.random.default_rng(0).uniform(-1, 1, 200)
+
+    def amplitudes(some, sine, frequency):
+        phase = place[some] * (4 * (frequency - 10) + np.sin(17 * place[some]) * np.asarray(sine))
+        return np.exp(1j * phase)[:, None]
+
+    def seen(some, random):
+        return random.uniform(-1e-3, 1e-3, len(some))
+
+    found = expand(AmplitudeSamples(amplitudes, np.ones(200), (9.0, 11.0), seen), (-1e-3, 1e-3), 2e-3, 2e-3)
+    assert max(size_of_terms(found, 200, f) for f in np.linspace(9, 11, 33)) < 10
+
+
+def test_rounding_of_terms_that_cancel_is_predicted():
+    some = np.arange(50)
+
+    def amplitudes(some, sine, frequency):
+        return np.ones((len(some), 1), complex)
+
+    samples = AmplitudeSamples(amplitudes, np.ones(50), (9.0, 11.0), lambda some, random: np.zeros(len(some)))
+    # 1 = 5001 - 5000
+    found = AspectExpansion(
+        amplitudes, np.zeros(2), np.full(2, 10.0), some[:1], np.zeros(1, int), np.array([[5001.0], [-5000.0]]), 0.0
+    )
+    assert 7e-3 <= samples.error(found) <= 3e-2
