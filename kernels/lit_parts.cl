@@ -15,47 +15,68 @@
 //           shadow    (SHADOW,): least and largest x, least and largest y, up to five corners (x, y) anticlockwise, area
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
+//           WAVES     wavenumbers of a launch, 0 to 4
 //           (all in float64: edges of shadows that coincide are told apart by 1e-12 of a facet)
 // reference: sarcl/reference/lit_part.py:lit_part
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable
 
-enum { RECEIVER = 21, SHADOW = 15, COVERS = 255, MOST_WAVES = 16, SLIVER = 300 };
+enum { RECEIVER = 21, SHADOW = 15, COVERS = 255, SLIVER = 300 };
 
 typedef struct { double x, y; } point;
 
 static inline double crossed(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
 
-// Corners of a polygon on the inner side of a plane z = limit: below it where `below`, else above it.
-static inline int cut_polygon(const double *in, int n, double limit, int below, double *out) {
-    int made = 0;
+// Whether points all lie beyond one edge of an anticlockwise polygon; corners x, y.
+static inline int apart(__global const double *polygon, int n, __global const double *others, int m, double slack) {
     for (int i = 0; i < n; i++) {
-        const double *a = in + 3 * i, *b = in + 3 * (i + 1 == n ? 0 : i + 1);
-        double from = below ? limit - a[2] : a[2] - limit, to = below ? limit - b[2] : b[2] - limit;
-        if (from >= 0) {
-            for (int j = 0; j < 3; j++) out[3 * made + j] = a[j];
-            made++;
-        }
-        if ((from > 0 && to < 0) || (from < 0 && to > 0)) {
-            double part = from / (from - to);
-            for (int j = 0; j < 2; j++) out[3 * made + j] = a[j] + part * (b[j] - a[j]);
-            out[3 * made + 2] = limit;
-            made++;
-        }
-    }
-    return made;
-}
-
-// Whether points all lie beyond one edge of an anticlockwise polygon.
-static inline int apart(const point *polygon, int n, const point *others, int m, double slack) {
-    for (int i = 0; i < n; i++) {
-        point a = polygon[i], b = polygon[i + 1 == n ? 0 : i + 1];
-        double ex = b.x - a.x, ey = b.y - a.y, margin = slack * sqrt(ex * ex + ey * ey);
-        int beyond = 1;
-        for (int j = 0; j < m; j++) beyond &= crossed(ex, ey, others[j].x - a.x, others[j].y - a.y) <= margin;
+        int next = i + 1 == n ? 0 : i + 1, beyond = 1;
+        double x = polygon[2 * i], y = polygon[2 * i + 1], ex = polygon[2 * next] - x, ey = polygon[2 * next + 1] - y;
+        double margin = slack * sqrt(ex * ex + ey * ey);
+        for (int j = 0; j < m; j++) beyond &= crossed(ex, ey, others[2 * j] - x, others[2 * j + 1] - y) <= margin;
         if (beyond) return 1;
     }
     return 0;
+}
+
+typedef struct { double x, y, z; } place;
+
+// Projection of a place from an antenna at `eye` onto the plane z = 0.
+static inline place projected(place at, place eye) {
+    double stretch = at.z / (eye.z - at.z);
+    place out = {at.x + (at.x - eye.x) * stretch, at.y + (at.y - eye.y) * stretch, 0};
+    return out;
+}
+
+static inline place between(place a, place b, double limit) {
+    double part = (a.z - limit) / (a.z - b.z);
+    place out = {a.x + part * (b.x - a.x), a.y + part * (b.y - a.y), limit};
+    return out;
+}
+
+static inline void put_corner(__global double *out, int *n, place at, place eye) {
+    place flat = projected(at, eye);
+    out[4 + 2 * *n] = flat.x;
+    out[5 + 2 * *n] = flat.y;
+    (*n)++;
+}
+
+// Corners of the edge from a to b within the slab 0 <= z <= top, its end left out: the way around a triangle gives the
+// corners of the part of it that lies in the slab, in their order.
+static inline void put_edge(__global double *out, int *n, place a, place b, double top, place eye) {
+    double first = a.z < b.z ? 0 : top, second = top - first;
+    if (a.z >= 0 && a.z <= top) put_corner(out, n, a, eye);
+    if ((a.z - first) * (b.z - first) < 0) put_corner(out, n, between(a, b, first), eye);
+    if ((a.z - second) * (b.z - second) < 0) put_corner(out, n, between(a, b, second), eye);
+}
+
+// A place, m, in the axes of a receiver; z on the antenna's side, 0 within `on_plane`.
+static inline place in_axes(__global const double *r, double x, double y, double z, double side) {
+    double dx = x - r[0], dy = y - r[1], dz = z - r[2];
+    place out = {dx * r[3] + dy * r[4] + dz * r[5], dx * r[6] + dy * r[7] + dz * r[8],
+                 side * (dx * r[9] + dy * r[10] + dz * r[11])};
+    out.z = fabs(out.z) <= r[20] ? 0 : out.z;
+    return out;
 }
 
 typedef struct { int n_pairs; } cast_shadows_numbers;
@@ -72,79 +93,47 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const double *re
     __global const double *r = receivers + RECEIVER * (size_t)pair_receiver[pair];
     __global const double *occluder = occluders + 9 * (size_t)pair_occluder[pair];
     corners[at] = 0;
-    double eye[3], away = 0, solid[3 * 3], above[3 * 4], kept[3 * 5], highest = 0;
-    for (int i = 0; i < 3; i++) {
-        double part = antennas[3 * end + i] - r[i];
-        away += part * part;
-    }
-    for (int j = 0; j < 3; j++) {
-        eye[j] = 0;
-        for (int i = 0; i < 3; i++) eye[j] += (antennas[3 * end + i] - r[i]) * r[3 + 3 * j + i];
-    }
-    double side = eye[2] < 0 ? -1.0 : 1.0, height = side * eye[2];
-    if (!(height > 1e-6 * sqrt(away))) return;  // the facet is seen edge-on
-    for (int v = 0; v < 3; v++) {
-        for (int j = 0; j < 3; j++) {
-            double sum = 0;
-            for (int i = 0; i < 3; i++) sum += (occluder[3 * v + i] - r[i]) * r[3 + 3 * j + i];
-            solid[3 * v + j] = sum;
-        }
-        double z = side * solid[3 * v + 2];
-        solid[3 * v + 2] = fabs(z) <= r[20] ? 0.0 : z;
-        highest = max(highest, solid[3 * v + 2]);
-    }
-    if (!(highest > 0)) return;
-    int n = cut_polygon(solid, 3, 0.0, 0, above);
-    const double *from = above;
-    double top = 0.999999 * height;
-    if (highest > top) {  // what lies beyond the antenna casts no shadow
-        n = cut_polygon(above, n, top, 1, kept);
-        from = kept;
-    }
+    __global const double *antenna = antennas + 3 * end;
+    double dx = antenna[0] - r[0], dy = antenna[1] - r[1], dz = antenna[2] - r[2];
+    double above = dx * r[9] + dy * r[10] + dz * r[11], side = above < 0 ? -1 : 1, height = fabs(above);
+    if (!(height > 1e-6 * sqrt(dx * dx + dy * dy + dz * dz))) return;  // the facet is seen edge-on
+    place eye = {dx * r[3] + dy * r[4] + dz * r[5], dx * r[6] + dy * r[7] + dz * r[8], height};
+    place a = in_axes(r, occluder[0], occluder[1], occluder[2], side);
+    place b = in_axes(r, occluder[3], occluder[4], occluder[5], side);
+    place c = in_axes(r, occluder[6], occluder[7], occluder[8], side);
+    if (!(max(a.z, max(b.z, c.z)) > 0)) return;
+    // anticlockwise, as the antenna sees it
+    double bx = b.x - a.x, by = b.y - a.y, bz = b.z - a.z, cx = c.x - a.x, cy = c.y - a.y, cz = c.z - a.z;
+    double faces = crossed(by, bz, cy, cz) * (eye.x - a.x) + crossed(bz, bx, cz, cx) * (eye.y - a.y) +
+                   crossed(bx, by, cx, cy) * (eye.z - a.z);
+    place second = faces < 0 ? c : b, third = faces < 0 ? b : c;
+    double top = 0.999999 * height;  // what lies beyond the antenna casts no shadow
+    __global double *out = shadows + SHADOW * at;
+    int n = 0, covers = 1;
+    put_edge(out, &n, a, second, top, eye);
+    put_edge(out, &n, second, third, top, eye);
+    put_edge(out, &n, third, a, top, eye);
     if (n < 3) return;
-    point polygon[5], facet[3];
-    double area = 0, around = 0;
+    double area = 0, around = 0, low_x = out[4], high_x = low_x, low_y = out[5], high_y = low_y;
     for (int i = 0; i < n; i++) {
-        double stretch = from[3 * i + 2] / (height - from[3 * i + 2]);
-        polygon[i].x = from[3 * i] + (from[3 * i] - eye[0]) * stretch;
-        polygon[i].y = from[3 * i + 1] + (from[3 * i + 1] - eye[1]) * stretch;
-    }
-    for (int i = 0; i < n; i++) {
-        point a = polygon[i], b = polygon[i + 1 == n ? 0 : i + 1];
-        area += crossed(a.x, a.y, b.x, b.y);
-        around += fabs(b.x - a.x) + fabs(b.y - a.y);
+        int next = i + 1 == n ? 0 : i + 1;
+        double x = out[4 + 2 * i], y = out[5 + 2 * i], ex = out[4 + 2 * next] - x, ey = out[5 + 2 * next] - y;
+        area += crossed(x - out[4], y - out[5], ex, ey);
+        around += fabs(ex) + fabs(ey);
+        for (int j = 0; j < 3; j++) covers &= crossed(ex, ey, r[12 + 2 * j] - x, r[13 + 2 * j] - y) >= 0;
+        low_x = min(low_x, x);
+        high_x = max(high_x, x);
+        low_y = min(low_y, y);
+        high_y = max(high_y, y);
     }
     // An occluder that is seen edge-on: near the tips of its shadow all edges are within `slack` of one another.
-    if (!(fabs(area) > SLIVER * r[19] * around)) return;
-    if (area < 0)
-        for (int i = 0; i < n / 2; i++) {
-            point swap = polygon[i];
-            polygon[i] = polygon[n - 1 - i];
-            polygon[n - 1 - i] = swap;
-        }
-    for (int i = 0; i < 3; i++) {
-        facet[i].x = r[12 + 2 * i];
-        facet[i].y = r[13 + 2 * i];
-    }
-    if (apart(facet, 3, polygon, n, r[19]) || apart(polygon, n, facet, 3, r[19])) return;
-    int covers = 1;
-    __global double *out = shadows + SHADOW * at;
-    double low_x = polygon[0].x, high_x = low_x, low_y = polygon[0].y, high_y = low_y;
-    for (int i = 0; i < n; i++) {
-        point a = polygon[i], b = polygon[i + 1 == n ? 0 : i + 1];
-        for (int j = 0; j < 3; j++) covers &= crossed(b.x - a.x, b.y - a.y, facet[j].x - a.x, facet[j].y - a.y) >= 0;
-        low_x = min(low_x, a.x);
-        high_x = max(high_x, a.x);
-        low_y = min(low_y, a.y);
-        high_y = max(high_y, a.y);
-        out[4 + 2 * i] = a.x;
-        out[5 + 2 * i] = a.y;
-    }
+    if (!(area > SLIVER * r[19] * around)) return;
+    if (apart(r + 12, 3, out + 4, n, r[19]) || apart(out + 4, n, r + 12, 3, r[19])) return;
     out[0] = low_x;
     out[1] = high_x;
     out[2] = low_y;
     out[3] = high_y;
-    out[14] = fabs(area);
+    out[14] = area;
     corners[at] = covers ? COVERS : n;
 }
 
@@ -189,14 +178,14 @@ static inline void triangle_integral(double b, double c, double *re, double *im)
     *im = 0.5 * (real * s + imaginary * t);
 }
 
-typedef struct { int n_pairs, n_waves; } lit_parts_numbers;
+typedef struct { int n_pairs; } lit_parts_numbers;
 
 // Lit parts of receivers. global size (receivers; pulses)
 //   receivers, antennas, shadows, corners   as above
 //   first    (receivers + 1)          first pair of each receiver
-//   waves    (n_waves <= MOST_WAVES)  k_m, rad/m
+//   waves    (WAVES)                  k_m, rad/m
 //   share    (pulses, receivers)      0 ... 1
-//   mean     (pulses, receivers, n_waves, 2)   re, im
+//   mean     (pulses, receivers, WAVES, 2)   re, im
 __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict receivers, __global const int *restrict first,
                         __global const double *restrict antennas, __global const double *restrict shadows,
                         __global const uchar *restrict corners, __global const double *restrict waves,
@@ -204,21 +193,17 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
     size_t pulse = get_global_id(1), at = pulse * get_global_size(0) + get_global_id(0);
     __global const double *r = receivers + RECEIVER * get_global_id(0);
     int begin = first[get_global_id(0)], stop = first[get_global_id(0) + 1], dark = 0;
-    double qx = 0, qy = 0, area = 0, sums[2 * MOST_WAVES];
+    double qx = 0, qy = 0, area = 0, sums[2 * WAVES + 1];
     for (int e = 0; e < ENDS; e++) {
-        double d[3], length = 0, px = 0, py = 0;
-        for (int i = 0; i < 3; i++) {
-            d[i] = antennas[3 * (pulse * ENDS + e) + i] - r[i];
-            length += d[i] * d[i];
-            px += d[i] * r[3 + i];
-            py += d[i] * r[6 + i];
-        }
-        length = sqrt(length);
-        qx += px / length * (ENDS == 1 ? 2.0 : 1.0);
-        qy += py / length * (ENDS == 1 ? 2.0 : 1.0);
+        __global const double *antenna = antennas + 3 * (pulse * ENDS + e);
+        double dx = antenna[0] - r[0], dy = antenna[1] - r[1], dz = antenna[2] - r[2];
+        double ways = (ENDS == 1 ? 2.0 : 1.0) / sqrt(dx * dx + dy * dy + dz * dz);
+        qx += ways * (dx * r[3] + dy * r[4] + dz * r[5]);
+        qy += ways * (dx * r[6] + dy * r[7] + dz * r[8]);
         for (int i = begin; i < stop; i++) dark |= corners[(pulse * ENDS + e) * given.n_pairs + i] == COVERS;
     }
-    for (int m = 0; m < 2 * given.n_waves; m++) sums[m] = 0;
+#pragma unroll
+    for (int m = 0; m < 2 * WAVES; m++) sums[m] = 0;
     // edges of the facet, and then of each shadow
     for (int e = -1; e < ENDS && !dark; e++)
         for (int i = e < 0 ? stop - 1 : begin; i < stop; i++) {
@@ -270,7 +255,8 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                     double ax = a.x + s * d.x, ay = a.y + s * d.y, bx = a.x + until * d.x, by = a.y + until * d.y;
                     double twice = (e < 0 ? 1.0 : -1.0) * crossed(ax, ay, bx, by);
                     area += 0.5 * twice;
-                    for (int m = 0; m < given.n_waves; m++) {
+#pragma unroll
+                    for (int m = 0; m < WAVES; m++) {
                         double re, im;
                         triangle_integral(waves[m] * (qx * ax + qy * ay), waves[m] * (qx * bx + qy * by), &re, &im);
                         sums[2 * m] += twice * re;
@@ -283,5 +269,6 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
     double part = area / r[18];
     int none = dark || !(part > 1e-9);
     share[at] = none ? 0.0f : (float)min(part, 1.0);
-    for (int m = 0; m < 2 * given.n_waves; m++) mean[at * 2 * given.n_waves + m] = none ? 0.0f : (float)(sums[m] / r[18]);
+#pragma unroll
+    for (int m = 0; m < 2 * WAVES; m++) mean[at * 2 * WAVES + m] = none ? 0.0f : (float)(sums[m] / r[18]);
 }

@@ -16,6 +16,7 @@ For other folders:
     geometry       half the two-way path less the reference range
     image          multilooking
     interp         interpolation of one profile
+    lit_part       the part of a facet that is in no shadow
     map_drift      correlation and displacement of two looks along the track
     merge          profiles about a tile's centre, and their decimation
     mie            echoes of a sphere
@@ -39,6 +40,7 @@ __all__ = [
     "geometry",
     "image",
     "interp",
+    "lit_part",
     "map_drift",
     "merge",
     "mie",

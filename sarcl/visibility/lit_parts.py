@@ -18,7 +18,9 @@ from ._aspect_blocks import pulse_blocks, shadow_length
 from ._shadow_pairs import PAIRS_AT_ONCE, candidate_pairs
 
 KERNELS = "lit_parts.cl"
-SHADOW, MOST_WAVES = 15, 16  # numbers of a shadow; wavenumbers per launch: as in the kernels
+SHADOW = 15  # numbers of a shadow, as in the kernels
+# Wavenumbers per launch, on CPUs and on other devices: GPUs keep the sums of no more in registers
+MOST_WAVES = 4, 1
 # Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
 # what rounding moves corners by
 SLACK = 1e-12
@@ -187,7 +189,7 @@ class LitParts:
     ) -> tuple[np.ndarray, np.ndarray]:
         """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
         device, n_pairs = self.device, max(len(occluder), 1)
-        cast, light = (device.kernel(KERNELS, name, ENDS=antennas.shape[1]) for name in ("cast_shadows", "lit_parts"))
+        cast = device.kernel(KERNELS, "cast_shadows", ENDS=antennas.shape[1], WAVES=0)
         receivers = device.upload(self._receivers.packed(which, self._origin, self._on_plane))
         (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
         size = pulses * ends * n_pairs
@@ -202,12 +204,14 @@ class LitParts:
             )  # fmt: skip
         first, means = device.upload(begins.astype(np.int32)), []
         share = np.empty((pulses, len(which)), np.float32)
-        for some in np.split(waves, range(MOST_WAVES, len(waves), MOST_WAVES)):
+        most = MOST_WAVES[not device.is_cpu]
+        for some in np.split(waves, range(most, len(waves), most)):
+            light = device.kernel(KERNELS, "lit_parts", ENDS=antennas.shape[1], WAVES=len(some))
             mean = np.empty((pulses, len(which), len(some)), np.complex64)
             out = device.empty(share.nbytes), device.empty(max(mean.nbytes, 8))
             device.run(
                 light, (len(which), pulses), None,
-                launch_numbers(KERNELS, "lit_parts", n_pairs=n_pairs, n_waves=len(some)),
+                launch_numbers(KERNELS, "lit_parts", n_pairs=n_pairs),
                 receivers, first, seen, shadows, corners, device.upload(np.append(some, 0.0)), *out,
             )  # fmt: skip
             device.download(out[0], share)

@@ -25,6 +25,7 @@ from sarcl.opencl._programs import names_in, source
 from sarcl.opencl.device import Device
 from sarcl.opencl.device_list import DeviceInfo
 from sarcl.opencl.launch_numbers import _layout
+from sarcl.visibility import lit_parts
 
 KERNEL = re.compile(r"__kernel\s+(?:__attribute__\(\(.*?\)\)\s+)?void\s+(\w+)\s*\(")
 PAPER = DeviceInfo(
@@ -167,6 +168,7 @@ def on_paper(device: PaperDevice) -> Iterator[None]:
         mock.patch.object(choose_device, "tried", lambda index: device.info),
         mock.patch.object(choose_device, "devices", lambda: (device.info,)),
         mock.patch.object(choose_device, "_open", lambda index: device),
+        mock.patch.object(lit_parts, "with_float64", lambda chosen: chosen),  # another device's work on a real machine
         mock.patch.object(fft, "_reikna", lambda device, data, inverse: data),
         mock.patch.object(fft, "in_place", lambda device, buffer, shape, dtype: None),
         mock.patch.dict(os.environ),
