@@ -151,11 +151,15 @@ def too_many_cells(shape: np.ndarray) -> bool:
     return 3 * (LANES + (nx + 2) * (ny + 1) * (nz + LANES) + (ny + 1) * (nz + LANES)) >= 2**31
 
 
-def target_of(lattice: Lattice, parts: Sequence[tuple[np.ndarray, complex | None]], k: float) -> Target:
+def target_of(
+    lattice: Lattice, parts: Sequence[tuple[np.ndarray, complex | None]], k: float, strip: float = 0.0,
+    sheets: bool = False,
+) -> Target:  # fmt: skip
     """Closed bodies on the grid: facets, m (k, 3, 3), and relative permittivity at the wavenumber k of each material,
-    None: a perfect conductor. ValueError as `bodies` raises it.
+    None: a perfect conductor; strip  m, widest strip of a conductor thinner than a cell that may be left out, unless
+    `sheets` take its place. ValueError as `bodies` raises it.
     """
-    return bodies(lattice, [Body(*part) for part in parts], k)
+    return bodies(lattice, [Body(*part) for part in parts], k, strip / lattice.cell, sheets)
 
 
 def mirror_twins(

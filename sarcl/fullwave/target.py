@@ -23,6 +23,7 @@ class Target:
     coupled  places of those of the edges (k,) whose field depends on D across them as well;  coupling  (4, k): weights
             of D along b at the nodes before and after the edge, and of D along c, with b and c the directions after
     gap     width, m, of gaps between conductors that are narrower than a cell; None: none
+    strip_area  m^2, of strips of conductors thinner than a cell, and what the grid misses of it
     """
 
     edges: np.ndarray
@@ -31,6 +32,7 @@ class Target:
     weight: np.ndarray
     resting: np.ndarray | None = None
     gap: float | None = None
+    strip_area: tuple[float, float] = (0.0, 0.0)
     coupled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     coupling: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
 

@@ -31,6 +31,9 @@ from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
+# wavelengths, at the highest frequency: widest strip thinner than a cell that the grid leaves out. Its echo is then a part
+# of report.model_error; a wider one is refused, because it may carry currents of its own: half a wavelength resonates
+STRIP = 0.1
 UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
@@ -45,6 +48,8 @@ class FullwaveTask:
     cells             per shortest wavelength;  lattice, cost  the grid, and what a run on it takes
     max_bytes         allowed for a run
     along             angle along the path of directions in which the target sees the transmitter, rad (P,)
+    strip             m, widest strip of a conductor, thinner than a cell, that the grid may leave out
+    sheets            such strips are sheets of conductor instead
     """
 
     request: EchoRequest
@@ -64,6 +69,8 @@ class FullwaveTask:
     cost: runs.RunCost
     max_bytes: float
     along: np.ndarray
+    strip: float
+    sheets: bool = False
     _targets: list[Target] = field(default_factory=list)
     _twins: dict[str, dict[int, runs.Twin]] = field(default_factory=dict)
     _unfinished: list[int] = field(default_factory=list)  # the pulse of the run that was warned of
@@ -109,7 +116,8 @@ class FullwaveTask:
             middle = self.waveform.center
             try:
                 parts = parts_of(self.scene, middle)
-                self._targets.append(runs.target_of(self.lattice, parts, 2 * np.pi * middle / SPEED_OF_LIGHT))
+                k = 2 * np.pi * middle / SPEED_OF_LIGHT
+                self._targets.append(runs.target_of(self.lattice, parts, k, self.strip, self.sheets))
             except TooThin as thin:
                 if thin.cell is None:
                     raise
@@ -220,9 +228,18 @@ class FullwaveTask:
         return checksum(*leaves(parts))
 
     def coarser(self, ratio: float, finer: float) -> FullwaveTask:
-        """The same task with cells larger by a factor, divided by up to `finer`."""
+        """The same task with cells larger by a factor, divided by up to `finer`. Strips that it leaves out are wider in
+        proportion, as those at the edge of a wedge are.
+        """
         lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
-        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[], _twins={})
+        strip = self.strip * lattice.cell / self.lattice.cell
+        return replace(
+            self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip, _targets=[], _twins={}
+        )
+
+    def with_sheets(self) -> FullwaveTask:
+        """The same task with sheets of conductor in place of strips that the grid leaves out."""
+        return replace(self, sheets=True, _targets=[], _twins={})
 
 
 def fullwave_task(
@@ -249,7 +266,7 @@ def fullwave_task(
     return FullwaveTask(
         request, scene, waveform, band, track, receiver, motion, reference_range, window,
         frequency + step * np.arange(n_samples), step, compressed, cells, lattice, cost, budget,
-        _along(unit(tx - scene.center)),
+        _along(unit(tx - scene.center)), STRIP * SPEED_OF_LIGHT / band[1],
     )  # fmt: skip
 
 
