@@ -12,7 +12,7 @@ from ...base.validation import number
 from ..lattice import Lattice
 from ..target import Target, material_edges
 from ._cut_cells import Box, Intervals, conductor, edge_lengths
-from ._dielectrics import Lines, check_cells, conductivities, halved, on_grid, permittivities
+from ._dielectrics import Lines, check_cells, conductivities, halved, lagging_weights, on_grid, permittivities
 from ._mesh_lines import MeshLines, mesh_lines
 
 
@@ -63,6 +63,7 @@ def bodies(
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
         made.faces, made.weight, made.resting, made.gap, made.strip_area, made_of.coupled, made_of.coupling,
+        made_of.lagging, made_of.keep,
     )  # fmt: skip
 
 
@@ -118,6 +119,7 @@ def _dielectric_edges(
         across.append(found.across[:, outside])
     at, value, coupling = np.concatenate(places), np.concatenate(values), np.concatenate(across, axis=1)
     made = material_edges(lattice, at, value.real, conductivities(lattice, value, k))
-    weights = coupling.real * made.share[1]
-    some = np.abs(weights).max(axis=0, initial=0) > 0
-    return replace(made, coupled=at[some], coupling=weights[:, some])
+    some = np.abs(coupling).max(axis=0, initial=0) > 0
+    weights, lagging, keep = lagging_weights(lattice, coupling[:, some], k)
+    own = made.share[1][some]
+    return replace(made, coupled=at[some], coupling=weights * own, lagging=lagging * own, keep=keep)
