@@ -24,7 +24,7 @@ class Target:
             of D along b at the nodes before and after the edge, and of D along c, with b and c the directions after
     lagging  (4, k): weights of what lags behind D in the same way, in lossy bodies;  keep  part of it that each step keeps
     gap     width, m, of gaps between conductors that are narrower than a cell; None: none
-    strip_area  m^2, of strips of conductors thinner than a cell, and what the grid misses of it
+    strip_area  m^2, of strips of conductors thinner than a cell, which are sheets on the grid
     """
 
     edges: np.ndarray
@@ -33,7 +33,7 @@ class Target:
     weight: np.ndarray
     resting: np.ndarray | None = None
     gap: float | None = None
-    strip_area: tuple[float, float] = (0.0, 0.0)
+    strip_area: float = 0.0
     coupled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     coupling: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
     lagging: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))

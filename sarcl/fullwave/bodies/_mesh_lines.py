@@ -38,8 +38,8 @@ class MeshLines:
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours
     gap        width, m, of gaps between parallel facets that are narrower than a cell; None: there are none
-    strips     nodes beside narrow parts that are thinner than a cell, in which no node lies, int (n, 3)
-    strip_area m^2, of those parts, and what the grid misses of it
+    strips     nodes of sheets in place of narrow parts that are thinner than a cell, int (n, 3)
+    strip_area m^2, of those parts
     """
 
     intervals: tuple[Intervals, Intervals, Intervals]
@@ -47,7 +47,7 @@ class MeshLines:
     volume: np.ndarray
     gap: float | None
     strips: np.ndarray
-    strip_area: tuple[float, float]
+    strip_area: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -78,7 +78,7 @@ class _Spans:
 def mesh_lines(lattice: Lattice, triangles: np.ndarray, reach: float = 0.0) -> MeshLines:
     """Intervals of grid lines inside closed bodies of facets, corners in m (k, 3, 3), as of a Scene or a trimesh.
 
-    reach  widest strip thinner than a cell that may be left out, cells; at least `_thin_parts.RIM`
+    reach  widest strip thinner than a cell that may become a sheet, cells; at least `_thin_parts.RIM`
     ValueError: the mesh is open, is wound inwards, intersects itself, has parts thinner than a cell, or leaves the
     grid. Separate bodies may intersect each other.
     """

@@ -7,12 +7,13 @@ holds the body. A part is refused where
 - a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no part that the grid
   holds lies within RIM cells, or within `reach` where that is more: a plate that is wider than the rim of a wing. Held
   are cells that are inside as a whole, and plates where they are as thick as a cell; or
-- no node is inside within REACH cells, and the facet across the body is parallel: a plate or a wire that no line meets,
+- no node is inside within REACH cells, or no held part as above, and the facet across the body is parallel and less than a
+  cell away: a plate or a wire that no line meets, or that a node lies in here and there,
 - no node is inside within EDGE cells: sharp edges reach that far from where they are as thick as a cell, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
 
-Narrower strips, as at the trailing edge of a wing, are left out of the grid. The nodes beside them are named, so that the
-caller can compute what a sheet of conductor in their place would change.
+Narrower strips, as at the trailing edge of a wing, become sheets of conductor: the nodes beside them are named, as nodes
+that are inside as well.
 
 Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Other gaps
 narrower than a cell hold a layer of nodes, in which waves go to and fro for long. Seams of meshes are closed on
@@ -32,7 +33,6 @@ PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edg
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
 SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
 NARROW = 1 + 1e-4  # cells: a gap of one cell whose sides lie on nodes is closed, too
-FULL = 0.5  # cells: the grid misses thinner plates as a whole, although single nodes lie in them, and thicker ones in part
 BESIDE = 1.0  # cells along a plate from where a line meets it, to nodes of its sheet: lines end up to a cell from its edge
 SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
 
@@ -48,7 +48,7 @@ class ThinParts:
         self._plates: list[tuple[np.ndarray, np.ndarray]] = []
         self._sheets: list[tuple[np.ndarray, np.ndarray]] = []
         self._held: list[np.ndarray] = []
-        self._area = np.zeros(2)  # of plates thinner than a cell, and what is missing of it, cells
+        self._area = 0.0  # of plates thinner than a cell, cells
         self._gaps: list[np.ndarray] = []
 
     def add(self, facet: np.ndarray, place: np.ndarray) -> None:
@@ -62,14 +62,12 @@ class ThinParts:
         (n, 3); `empty`: where no node lies between.
         """
         plate, slope = self._parallel(entered, left), np.abs(self._inwards[entered, axis])
-        thickness = (end - place)[:, axis] * slope
-        thick = thickness >= 1
+        thick = (end - place)[:, axis] * slope >= 1
         self._held += [place[plate & thick], end[plate & thick]]
         thin, missed = plate & ~thick, plate & empty
         self._sheets.append((entered[thin], (place[thin] + end[thin]) / 2))
         self._plates.append((entered[missed], place[missed]))
-        missing = np.minimum(1, (1 - thickness[thin]) / (1 - FULL))
-        self._area += np.array([slope[thin].sum(), (slope[thin] * missing).sum()])  # sum of n_a^2 = 1 over the axes
+        self._area += float(slope[thin].sum())  # of all axes: sum of n_a^2 = 1 per cell of the plate
 
     def add_gaps(self, left: np.ndarray, entered: np.ndarray, axis: int, length: np.ndarray) -> None:
         """Facets (n,) through which lines along an axis leave a body, and enter one again; lengths between, cells."""
@@ -83,24 +81,23 @@ class ThinParts:
         return float(np.median(widths)) * self.lattice.cell if len(widths) else None
 
     @property
-    def strips(self) -> tuple[np.ndarray, tuple[float, float]]:
+    def strips(self) -> tuple[np.ndarray, float]:
         """Nodes of sheets in place of plates thinner than a cell, each once, int (n, 3); the area, m^2, of
-        these plates, and what the grid misses of it. None where nodes lie on all lines through them.
+        these plates. None where nodes lie on all lines through them.
 
         Nodes within (|n_x| + |n_y| + |n_z|)/2 cells of a plane of normal n are joined by edges and leave no hole (Andres,
         Acharya and Sibata, Graph. Models Image Process. 59, 1997: standard planes).
         """
         facet, place = (np.concatenate(part) for part in zip(*self._sheets, strict=True))
         if not any(len(part) for part, _ in self._plates):
-            return np.zeros((0, 3), np.int64), (0.0, 0.0)
+            return np.zeros((0, 3), np.int64), 0.0
         normal = self._inwards[facet][:, None]
         node = np.rint(place).astype(np.int64)[:, None] + np.indices((3, 3, 3)).reshape(3, -1).T - 1
         to = node - place[:, None]
         height = (to * normal).sum(axis=2, keepdims=True)
         beside = np.linalg.norm(to - height * normal, axis=2) < BESIDE
         near = beside & (np.abs(height[..., 0]) <= np.abs(normal).sum(axis=2) / 2)
-        area, missing = (self._area * self.lattice.cell**2).tolist()
-        return np.unique(node[near], axis=0), (area, missing)
+        return np.unique(node[near], axis=0), self._area * self.lattice.cell**2
 
     def _parallel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Which facets (n,) are parallel, and face opposite ways."""
@@ -137,25 +134,29 @@ class ThinParts:
         plates, points = (
             tuple(np.concatenate(part) for part in zip(*group, strict=True)) for group in (self._plates, self._points)
         )
-        wide = self._wide(_whole_cells(inside), low, plates[1])
+        whole = _whole_cells(inside)
+        wide = self._wide(whole, low, plates[1])
         alone = _far(inside, low, EDGE, points[1])
-        far = np.flatnonzero(_far(inside, low, REACH, points[1]) & ~alone)
+        far = np.flatnonzero((_far(inside, low, REACH, points[1]) | self._wide(whole, low, points[1])) & ~alone)
         far = far[_spread(len(far))]
         thickness, opposite = self._across(points[0][far], points[1][far])
-        flat = far[np.isfinite(thickness) & self._parallel(points[0][far], opposite)]
+        flat = far[(thickness < 1) & self._parallel(points[0][far], opposite)]
         chosen = np.concatenate([np.flatnonzero(alone), flat])
         return np.concatenate([plates[0][wide], points[0][chosen]]), np.concatenate(
             [plates[1][wide], points[1][chosen]]
         )
 
     def _wide(self, whole: np.ndarray, low: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Which places in nodes (n, 3) have no part that the grid holds within `reach` cells along each axis."""
+        """Which places in nodes (n, 3) have no cell that is inside as a whole within RIM cells along each axis, and no part
+        that the grid holds within `reach` cells.
+        """
         from scipy.spatial import KDTree
 
-        far = _far(whole, low, int(self.reach), place)
-        held = np.concatenate(self._held)
-        if far.any() and len(held):
-            far[far] = ~np.isfinite(KDTree(held).query(place[far], p=np.inf, distance_upper_bound=self.reach + 0.5)[0])
+        far = _far(whole, low, RIM, place)
+        if far.any():
+            held = np.concatenate([np.argwhere(whole) + low, *self._held])
+            held = held[(np.abs(held - np.clip(held, *np.quantile(place[far], (0, 1), axis=0))) <= self.reach).all(axis=1)]
+            far[far] = ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0]) if len(held) else True
         return far
 
     def _across(self, facet: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -14,6 +14,7 @@ from ..target import Target, material_edges
 from ._cut_cells import Box, Intervals, conductor, edge_lengths
 from ._dielectrics import Lines, check_cells, conductivities, halved, lagging_weights, on_grid, permittivities
 from ._mesh_lines import MeshLines, mesh_lines
+from ._thin_parts import RIM as RIM
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,14 +29,12 @@ class Body:
     permittivity: complex | None = None
 
 
-def bodies(
-    lattice: Lattice, parts: Sequence[Body], k: float | None = None, reach: float = 0.0, sheets: bool = False
-) -> Target:
+def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None, reach: float = 0.0) -> Target:
     """The lists of several bodies.
 
-    k       wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity; conductors need none
-    reach   widest strip of a conductor, thinner than a cell, that may be left out, cells; at least `_thin_parts.RIM`
-    sheets  such strips are not left out, but sheets of conductor through the nodes beside them
+    k      wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity; conductors need none
+    reach  widest strip of a conductor, thinner than a cell, that may be a sheet through the nodes beside it, cells; at
+           least `_thin_parts.RIM`
     Conductors take what they cover; where dielectrics overlap, the later one holds.
 
     ValueError: `mesh_lines` refuses a mesh, a permittivity is not one of a passive body, or cells are too large for it.
@@ -46,8 +45,8 @@ def bodies(
     made, found = Target.nothing(), None
     if metal:
         found = mesh_lines(lattice, np.concatenate(metal), reach)
-        if sheets:
-            found = replace(found, intervals=(_with_nodes(found.intervals[0], found.strips), *found.intervals[1:]))
+        along_x, along_y, along_z = found.intervals
+        found = replace(found, intervals=(_with_nodes(along_x, found.strips), along_y, along_z))
         made = conductor(lattice, found.intervals, found.areas)
         made = replace(made, gap=found.gap, strip_area=found.strip_area)
     if len(metal) == len(parts):

@@ -6,10 +6,14 @@ for an error that falls with a power of the size of cells (Richardson's extrapol
 where flat sides lie between nodes: `runs.grid_about` lays them on nodes in both grids. Echoes at many pulses count,
 formed from one anchor: more directions make the estimate steadier, and forming changes both alike.
 
-Strips of conductors that are thinner than a cell are in neither grid. What they would change is found by a further run
-of the grid itself, in which sheets of conductor take their place:
+Strips of conductors that are thinner than a cell are sheets in both grids, whose edges are off by parts of a cell: this
+error is of first order.
 
-    strips(cell) ~ |a_sheets(cell) - a(cell)| SHEETS missing area / area of sheets
+A complex eps_r, whose losses are the same at all frequencies, is a conductivity on the grid, whose losses fall as 1/f. A
+run with larger cells and the conductivity that is right at the upper end f_1 of the band, instead of its centre f_0, says
+what that does, by a line through both:
+
+    losses(f) ~ (a_1(f) - a_0(f)) (f - f_0) / (f_1 - f_0)
 
 Squares of both errors are added.
 """
@@ -27,9 +31,8 @@ from ._run_progress import RunProgress
 RATIO = 1.5  # of the cells, about: such a run takes a fifth of the time, 1.5^-4
 FINER = 1.15  # by which its cells may be smaller, so that flat sides lie on nodes
 # powers of the size of cells with which errors fall, measured: docs/theory/full_wave.md
-CONDUCTOR, DIELECTRIC, LOSSY = 1.5, 2.0, 1.0
+CONDUCTOR, SHEETS, DIELECTRIC, LOSSY = 1.5, 1.0, 2.0, 1.25
 LOSS = 0.05  # of a permittivity, imaginary over real part, from which on a body counts as lossy
-SHEETS = 1.5  # ratio of the error by strips to the echo of sheets, which was 0.7 to 1.7 of that error: docs/theory/full_wave.md
 MOST_PULSES = 32  # at which echoes are compared
 
 
@@ -48,12 +51,13 @@ def grid_error(
     weight = np.abs(task.spectrum)
     weighted = echoes[some] * weight
     error = float(np.linalg.norm(coarse * weight - weighted)) / (ratio ** order(task) - 1)
-    area, missing = task.target().strip_area
-    strips = 0.0
-    if missing:
-        (closed,), _ = task.with_sheets().formed(pulse, sent, received, some, progress)
-        strips = SHEETS * missing / area * float(np.linalg.norm(closed * weight - weighted))
-    return error**2 + strips**2, float(np.linalg.norm(weighted)) ** 2
+    losses = 0.0
+    if task.losses:
+        upper, centre = task.band[1], task.waveform.center
+        (other,), _ = larger.with_losses_of(upper).formed(pulse, sent, received, some, progress)
+        share = (task.frequencies - centre) / (upper - centre)
+        losses = float(np.linalg.norm((other - coarse) * share * weight))
+    return error**2 + losses**2, float(np.linalg.norm(weighted)) ** 2
 
 
 def coarse_task(task: FullwaveTask) -> FullwaveTask:
@@ -75,6 +79,8 @@ def coarse_task(task: FullwaveTask) -> FullwaveTask:
 
 
 def order(task: FullwaveTask) -> float:
-    """The power of the size of cells with which the error falls: the least of those of the materials."""
-    found = [eps for _, eps in parts_of(task.scene, task.waveform.center)]
-    return min(CONDUCTOR if e is None else LOSSY if -e.imag > LOSS * e.real else DIELECTRIC for e in found)
+    """The power of the size of cells with which the error falls: the least of those of the materials and of sheets."""
+    orders = [SHEETS] if task.target().strip_area else []
+    for _, eps in parts_of(task.scene, task.waveform.center):
+        orders.append(CONDUCTOR if eps is None else LOSSY if -eps.imag > LOSS * eps.real else DIELECTRIC)
+    return min(orders)
