@@ -58,8 +58,8 @@ def edges(e: np.ndarray, at: np.ndarray, share: np.ndarray, old: np.ndarray) -> 
 
 
 def couple(
-    e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, late: np.ndarray, lagging: np.ndarray, keep: float,
-    s: float,
+    e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, late: np.ndarray, lagging: np.ndarray,
+    keep: float, s: float,
 ) -> np.ndarray:  # fmt: skip
     """E += sum of weights (4, n) times s curl H of the edges across those at places `at` (n,), plus what lags behind,
     late <- keep late + (1 - keep) times the same sum by weights `lagging` (4, n): what was added, (n,).

@@ -1,4 +1,4 @@
-"""The aircraft PRIME of the Austin RCS benchmark, with closed ducts: about two wavelengths long, fins thin at their ends."""
+"""The aircraft PRIME of the Austin RCS benchmark, ducts closed: two wavelengths long, fins thin at their ends."""
 
 from __future__ import annotations
 

@@ -6,8 +6,8 @@ the inverse of the mean: the inverse permittivity is the tensor
     n n^T <1/eps> + (1 - n n^T) / <eps>
 
 with means over a cube of one cell (`_averages`). Its diagonal is taken at edges, the rest at nodes, whence each edge is
-coupled to the eight edges across its nodes (kernels/fdtd_coupled.cl), in lossy bodies by complex weights, whose phase is
-that of a part that lags behind (`lagging_weights`). Waves in a body are slower on the grid than they
+coupled to the eight edges across its nodes (kernels/fdtd_coupled.cl). In lossy bodies these
+weights are complex: a part of them lags behind (`lagging_weights`). Waves in a body are slower on the grid than they
 should be: its permittivity is corrected for that (`on_grid`).
 Sources: A. Farjadpour et al., Opt. Lett. 31 (2006); G. R. Werner and J. R. Cary, J. Comput. Phys. 226 (2007).
 """

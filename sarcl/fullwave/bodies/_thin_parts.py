@@ -7,13 +7,13 @@ holds the body. A part is refused where
 - a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no part that the grid
   holds lies within RIM cells, or within `reach` where that is more: a plate that is wider than the rim of a wing. Held
   are cells that are inside as a whole, and plates where they are as thick as a cell; or
-- no node is inside within REACH cells, or no held part as above, and the facet across the body is parallel and less than a
-  cell away: a plate or a wire that no line meets, or that a node lies in here and there,
+- no node is inside within REACH cells, or no held part as above, and the facet across the body is parallel and less
+  than a cell away: a plate or a wire that no line meets, or that a node lies in here and there,
 - no node is inside within EDGE cells: sharp edges reach that far from where they are as thick as a cell, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
 
-Narrower strips, as at the trailing edge of a wing, become sheets of conductor: the nodes beside them are named, as nodes
-that are inside as well.
+Narrower strips, as at the trailing edge of a wing, become sheets of conductor: the nodes beside them are named, as
+nodes that are inside as well.
 
 Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Other gaps
 narrower than a cell hold a layer of nodes, in which waves go to and fro for long. Seams of meshes are closed on
@@ -33,7 +33,9 @@ PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edg
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
 SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
 NARROW = 1 + 1e-4  # cells: a gap of one cell whose sides lie on nodes is closed, too
-BESIDE = 1.0  # cells along a plate from where a line meets it, to nodes of its sheet: lines end up to a cell from its edge
+BESIDE = (
+    1.0  # cells along a plate from where a line meets it, to nodes of its sheet: lines end up to a cell from its edge
+)
 SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
 
 
@@ -58,8 +60,8 @@ class ThinParts:
     def add_pairs(
         self, entered: np.ndarray, left: np.ndarray, axis: int, place: np.ndarray, end: np.ndarray, empty: np.ndarray
     ) -> None:
-        """Facets (n,) through which lines along an axis enter a body, at `place`, and leave it again, at `end`, in nodes
-        (n, 3); `empty`: where no node lies between.
+        """Facets (n,) through which lines along an axis enter a body, at `place`, and leave it again, at `end`, in
+        nodes (n, 3); `empty`: where no node lies between.
         """
         plate, slope = self._parallel(entered, left), np.abs(self._inwards[entered, axis])
         thick = (end - place)[:, axis] * slope >= 1
@@ -85,8 +87,8 @@ class ThinParts:
         """Nodes of sheets in place of plates thinner than a cell, each once, int (n, 3); the area, m^2, of
         these plates. None where nodes lie on all lines through them.
 
-        Nodes within (|n_x| + |n_y| + |n_z|)/2 cells of a plane of normal n are joined by edges and leave no hole (Andres,
-        Acharya and Sibata, Graph. Models Image Process. 59, 1997: standard planes).
+        Nodes within (|n_x| + |n_y| + |n_z|)/2 cells of a plane of normal n are joined by edges and leave no hole
+        (Andres, Acharya and Sibata, Graph. Models Image Process. 59, 1997: standard planes).
         """
         facet, place = (np.concatenate(part) for part in zip(*self._sheets, strict=True))
         if not any(len(part) for part, _ in self._plates):
@@ -147,16 +149,20 @@ class ThinParts:
         )
 
     def _wide(self, whole: np.ndarray, low: np.ndarray, place: np.ndarray) -> np.ndarray:
-        """Which places in nodes (n, 3) have no cell that is inside as a whole within RIM cells along each axis, and no part
-        that the grid holds within `reach` cells.
+        """Which places in nodes (n, 3) have no cell that is inside as a whole within RIM cells along each axis, and no
+        part that the grid holds within `reach` cells.
         """
         from scipy.spatial import KDTree
 
         far = _far(whole, low, RIM, place)
         if far.any():
             held = np.concatenate([np.argwhere(whole) + low, *self._held])
-            held = held[(np.abs(held - np.clip(held, *np.quantile(place[far], (0, 1), axis=0))) <= self.reach).all(axis=1)]
-            far[far] = ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0]) if len(held) else True
+            held = held[
+                (np.abs(held - np.clip(held, *np.quantile(place[far], (0, 1), axis=0))) <= self.reach).all(axis=1)
+            ]
+            far[far] = (
+                ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0]) if len(held) else True
+            )
         return far
 
     def _across(self, facet: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

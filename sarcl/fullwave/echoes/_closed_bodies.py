@@ -66,8 +66,8 @@ def _named(material: Material) -> str:
 def parts_of(scene: Scene, frequency: float, exact: float | None = None) -> list[tuple[np.ndarray, complex | None]]:
     """Facets of each material (k, 3, 3), and its permittivity, relative, at a frequency, Hz; None: a conductor.
 
-    exact  frequency, Hz, at which the imaginary part of a complex eps_r is that of the conductivity that the grid has in
-           its place; default: the same frequency
+    exact  frequency, Hz, at which the imaginary part of a complex eps_r is that of the conductivity that the grid has
+           in its place; default: the same frequency
     """
     more = 0.0 if exact is None else exact / frequency - 1
     out: list[tuple[np.ndarray, complex | None]] = []

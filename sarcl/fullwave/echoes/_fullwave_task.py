@@ -31,8 +31,8 @@ from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
-# wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the quarter
-# of a wavelength at which strips on a body resonate. Wider parts are refused: they are a plate or a mast of their own
+# wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the
+# quarter of a wavelength at which strips on a body resonate. Wider parts are plates or masts, and refused
 STRIP = 0.1
 UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
@@ -234,14 +234,12 @@ class FullwaveTask:
         return checksum(*leaves(parts))
 
     def coarser(self, ratio: float, finer: float) -> FullwaveTask:
-        """The same task with cells larger by a factor, divided by up to `finer`. Strips thinner than a cell are wider in
-        proportion, as at the edge of a wedge, and their width is known to RIM cells.
+        """The same task with cells larger by a factor, divided by up to `finer`. Strips thinner than a cell are wider
+        in proportion, as at the edge of a wedge, and their width is known to RIM cells.
         """
         lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
         strip = self.strip * lattice.cell / self.lattice.cell + runs.RIM * lattice.cell
-        return replace(
-            self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip, _targets=[], _twins={}
-        )
+        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip, _targets=[], _twins={})
 
     def with_losses_of(self, frequency: float) -> FullwaveTask:
         """The same task with conductivities that have the losses of each complex eps_r at another frequency, Hz."""

@@ -9,9 +9,9 @@ formed from one anchor: more directions make the estimate steadier, and forming 
 Strips of conductors that are thinner than a cell are sheets in both grids, whose edges are off by parts of a cell: this
 error is of first order.
 
-A complex eps_r, whose losses are the same at all frequencies, is a conductivity on the grid, whose losses fall as 1/f. A
-run with larger cells and the conductivity that is right at the upper end f_1 of the band, instead of its centre f_0, says
-what that does, by a line through both:
+A complex eps_r, whose losses are the same at all frequencies, is a conductivity on the grid, whose losses fall as 1/f.
+A run with larger cells and the conductivity that is right at the upper end f_1 of the band, instead of its centre f_0,
+says what that does, by a line through both:
 
     losses(f) ~ (a_1(f) - a_0(f)) (f - f_0) / (f_1 - f_0)
 
