@@ -85,11 +85,11 @@ def plan_fullwave_echo(
     task = fullwave_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
     cut = float(np.prod(task.lattice.shape)) <= MOST_CELLS
     also = 1.0 if given.get("check", False) else 0.0  # runs for each polarisation that is sent, beside those of anchors
-    if given.get("model_error", True):
-        also += RATIO**-4 * (2 if task.losses else 1)
+    predicts = bool(given.get("model_error", True))
+    also += predicts * RATIO**-4 * (2 if task.losses else 1)
     if cut:
         task.warn_of_gaps()
-        if given.get("model_error", True):
+        if predicts:
             coarse_task(task)
     parts, n_rows, n_samples = task.parts(), len(track) * len(request.polarizations), len(task.frequencies)
     n_anchors = expected_anchors(task, options.get("anchors", "auto"), request.tolerance)
