@@ -7,8 +7,8 @@ holds the body. A part is refused where
 - a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no part that the grid
   holds lies within RIM cells, or within `reach` where that is more: a plate that is wider than the rim of a wing. Held
   are cells that are inside as a whole, and plates where they are as thick as a cell; or
-- no node is inside within REACH cells, or no held part as above, and the facet across the body is parallel and less
-  than a cell away: a plate or a wire that no line meets, or that a node lies in here and there,
+- no node is inside within REACH cells, or none within a cell and no held part as above, and the facet across the body
+  is parallel and less than a cell away: a plate or a wire that no line meets, or that a node lies in here and there,
 - no node is inside within EDGE cells: sharp edges reach that far from where they are as thick as a cell, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
 
@@ -139,7 +139,8 @@ class ThinParts:
         whole = _whole_cells(inside)
         wide = self._wide(whole, low, plates[1])
         alone = _far(inside, low, EDGE, points[1])
-        far = np.flatnonzero((_far(inside, low, REACH, points[1]) | self._wide(whole, low, points[1])) & ~alone)
+        sparse = _far(inside, low, 1, points[1]) & self._wide(whole, low, points[1])
+        far = np.flatnonzero((_far(inside, low, REACH, points[1]) | sparse) & ~alone)
         far = far[_spread(len(far))]
         thickness, opposite = self._across(points[0][far], points[1][far])
         flat = far[(thickness < 1) & self._parallel(points[0][far], opposite)]
@@ -156,13 +157,12 @@ class ThinParts:
 
         far = _far(whole, low, RIM, place)
         if far.any():
-            held = np.concatenate([np.argwhere(whole) + low, *self._held])
-            held = held[
-                (np.abs(held - np.clip(held, *np.quantile(place[far], (0, 1), axis=0))) <= self.reach).all(axis=1)
-            ]
-            far[far] = (
-                ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0]) if len(held) else True
-            )
+            first = np.maximum(np.floor(place[far].min(axis=0) - self.reach).astype(int) - low, 0)
+            last = np.maximum(np.ceil(place[far].max(axis=0) + self.reach).astype(int) - low, 0)
+            near = whole[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))]
+            held = np.concatenate([np.argwhere(near) + low + first, *self._held])
+            if len(held):
+                far[far] = ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0])
         return far
 
     def _across(self, facet: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -370,6 +370,11 @@ def test_masts_and_plates_thinner_than_a_cell_are_refused_where_they_are_longer_
             mesh_lines(grid_of(body, CELL), body, 6)
 
 
+def test_a_sheet_with_flat_sides_along_the_axes_runs_whatever_its_thickness_where_nodes_lie_in_it():
+    found = mesh_lines(GRID, box((6, 5, 14.9), (24, 25, 15.1)))
+    assert len(found.strips) == 0 == found.strip_area and np.isclose(found.volume[2], 0.072, rtol=0.01)
+
+
 def test_a_wire_between_grid_lines_and_a_mast_on_a_body_are_refused():
     wire = shapes.cylinder(0.02, 2.0, sections=8, position=(1.55, 1.55, 0.5)).triangles
     refused(wire, r"too thin for cells of 0\.1 m: about 0\.0\d+ m thick")
