@@ -88,9 +88,10 @@ class CoupledList:
         self.count, self._first = len(places), sort.first
         self.arrays: tuple[Any, ...] = ()
         if self.count:
-            weight = target.coupling[:, sort.order].astype(np.float32)
+            weight = np.concatenate([target.coupling, target.lagging])[:, sort.order].astype(np.float32)
             number = edges.numbers_of(places).astype(np.int32)
-            self.arrays = tuple(device.copied(values) for values in (lattice.in_buffer(places), number, weight))
+            late = np.zeros(self.count, np.float32)
+            self.arrays = tuple(device.copied(values) for values in (lattice.in_buffer(places), number, weight, late))
 
     def span(self, planes: tuple[int, int]) -> tuple[int, int]:
         """First entry of a range of planes, and the first one after these."""

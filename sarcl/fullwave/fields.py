@@ -78,6 +78,7 @@ class Fields:
         self.edges = TargetList(device, lattice, target.edges, target.share)
         self.faces = TargetList(device, lattice, target.faces, target.weight)
         self._coupled = CoupledList(device, lattice, target, self.edges)
+        self._keep = target.keep
         self._couple = device.kernel("fdtd_coupled.cl", "couple") if self._coupled.count else None
         self._thickness, self._layers = absorber, layers(device, lattice, absorber)
         resting = np.zeros((*lattice.shape[:2], 2), np.uint16)
@@ -162,7 +163,7 @@ class Fields:
                 self._couple, (span[1] - span[0],), None,
                 launch_numbers(
                     "fdtd_coupled.cl", "couple", n=self._coupled.count, first=span[0], record=record,
-                    component=grid.component, plane=grid.plane, row=grid.row, s=COURANT,
+                    component=grid.component, plane=grid.plane, row=grid.row, s=COURANT, keep=self._keep,
                 ),
                 self.e, self.h, *self._coupled.arrays, *self.edges.kept,
             )  # fmt: skip

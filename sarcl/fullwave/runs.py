@@ -17,6 +17,7 @@ from ._lists import PARTS, SAMPLES
 from ._mirrors import Twin as Twin
 from ._mirrors import mirror_axes, mirrored_echoes, twins
 from ._pulse import Pulse
+from .bodies.materials import RIM as RIM
 from .bodies.materials import Body, bodies
 from .fields import WAVE_STEPS
 from .lattice import COURANT, LANES, ROWS, Lattice
@@ -151,11 +152,14 @@ def too_many_cells(shape: np.ndarray) -> bool:
     return 3 * (LANES + (nx + 2) * (ny + 1) * (nz + LANES) + (ny + 1) * (nz + LANES)) >= 2**31
 
 
-def target_of(lattice: Lattice, parts: Sequence[tuple[np.ndarray, complex | None]], k: float) -> Target:
+def target_of(
+    lattice: Lattice, parts: Sequence[tuple[np.ndarray, complex | None]], k: float, strip: float = 0.0
+) -> Target:
     """Closed bodies on the grid: facets, m (k, 3, 3), and relative permittivity at the wavenumber k of each material,
-    None: a perfect conductor. ValueError as `bodies` raises it.
+    None: a perfect conductor; strip  m, widest strip of a conductor thinner than a cell that may be a sheet. ValueError
+    as `bodies` raises it.
     """
-    return bodies(lattice, [Body(*part) for part in parts], k)
+    return bodies(lattice, [Body(*part) for part in parts], k, strip / lattice.cell)
 
 
 def mirror_twins(

@@ -22,7 +22,10 @@ class Target:
     resting  cells inside conductors that need no updates, int (k, 4): see resting_rows; None: none
     coupled  places of those of the edges (k,) whose field depends on D across them as well;  coupling  (4, k): weights
             of D along b at the nodes before and after the edge, and of D along c, with b and c the directions after
+    lagging  (4, k): weights of what lags behind D in the same way, in lossy bodies;  keep  part of it that each step
+            keeps
     gap     width, m, of gaps between conductors that are narrower than a cell; None: none
+    strip_area  m^2, of strips of conductors thinner than a cell, which are sheets on the grid
     """
 
     edges: np.ndarray
@@ -31,8 +34,11 @@ class Target:
     weight: np.ndarray
     resting: np.ndarray | None = None
     gap: float | None = None
+    strip_area: float = 0.0
     coupled: np.ndarray = field(default_factory=lambda: np.zeros(0, np.int64))
     coupling: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
+    lagging: np.ndarray = field(default_factory=lambda: np.zeros((4, 0)))
+    keep: float = 0.0
 
     @classmethod
     def nothing(cls) -> Target:

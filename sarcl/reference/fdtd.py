@@ -57,12 +57,25 @@ def edges(e: np.ndarray, at: np.ndarray, share: np.ndarray, old: np.ndarray) -> 
     return np.asarray(old - vacuum)
 
 
-def couple(e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, s: float) -> np.ndarray:
-    """E += sum of weights (4, n) times s curl H of the edges across those at places `at` (n,): what was added, (n,)."""
+def couple(
+    e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, late: np.ndarray, lagging: np.ndarray,
+    keep: float, s: float,
+) -> np.ndarray:  # fmt: skip
+    """E += sum of weights (4, n) times s curl H of the edges across those at places `at` (n,), plus what lags behind,
+    late <- keep late + (1 - keep) times the same sum by weights `lagging` (4, n): what was added, (n,).
+    """
     curl = np.zeros_like(h)
     update_e(curl, h, s)
+    added = _across(curl, at, weight)
+    late[:] = keep * late + (1 - keep) * _across(curl, at, lagging)
+    e.flat[at] += added + late
+    return added + late
+
+
+def _across(curl: np.ndarray, at: np.ndarray, weight: np.ndarray) -> np.ndarray:
+    """Sum of weights (4, n) times the curl (3, *shape) at the edges across those at places `at` (n,)."""
     added = np.zeros(len(at))
-    component, *node = np.unravel_index(at, h.shape)
+    component, *node = np.unravel_index(at, curl.shape)
     for a, b, c in CYCLIC:
         some = component == a
         cell = [x[some] for x in node]
@@ -71,7 +84,6 @@ def couple(e: np.ndarray, h: np.ndarray, at: np.ndarray, weight: np.ndarray, s: 
                 for side in (0, 1):
                     place = (x + (n == a) * after - (n == along) * side for n, x in enumerate(cell))
                     added[some] += weight[first + after][some] * curl[(along, *place)]
-    e.flat[at] += added
     return added
 
 

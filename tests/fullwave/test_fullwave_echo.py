@@ -195,6 +195,65 @@ def test_a_plate_that_the_grid_of_the_model_error_does_not_resolve_is_refused_be
     sarcl.fullwave_echo(thin, CHIRP, around(20), cells=14, model_error=False)
 
 
+def finned(width, thickness):
+    """A block of 0.12 x 0.3 x 0.06 m with a strip of a width and a thickness, m, along the middle of a side; turned."""
+    z, x = 0.03, 0.12
+    outline = [(0, -z), (x, -z), (x, -thickness / 2), (x + width, -thickness / 2)]
+    outline = np.array(outline + [(a, -b) for a, b in outline[::-1]])
+    corners = np.array([[a, y, b] for y in (0, 0.3) for a, b in outline])
+    cut = [(0, 1, 2), (0, 2, 5), (0, 5, 7), (7, 5, 6), (2, 3, 4), (2, 4, 5)]
+    faces = [*cut, *[(c + 8, b + 8, a + 8) for a, b, c in cut]]
+    for i, j in zip(range(8), (*range(1, 8), 0), strict=True):
+        faces += [(j, i, i + 8), (j, i + 8, j + 8)]
+    body = corners[np.array(faces)]
+    body = body if np.linalg.det(body).sum() > 0 else body[:, ::-1]
+    return sarcl.Scene.facets((body - corners.mean(axis=0)) @ rotation(np.array([0.1, 0.2, 0.3])).T)
+
+
+STRIP_CHIRP = sarcl.Waveform.chirp(center=0.9e9, bandwidth=200e6, duration=2e-8)  # wavelength 0.3 m at its upper end
+
+
+def test_a_strip_thinner_than_a_cell_runs_up_to_a_tenth_of_a_wavelength_and_is_said(monkeypatch):
+    """With 45 cells per wavelength its thickness is half a cell, and its width 3.6 cells, more than RIM."""
+    done = pretend(monkeypatch)
+    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
+        got = function(finned(0.024, 0.0036), STRIP_CHIRP, around(10), cells=45)
+        said = (got.plan if function is sarcl.plan_fullwave_echo else got.report.plan)["strips"]
+        assert said.endswith("m^2 thinner than a cell, as sheets")
+        assert np.isclose(float(said.split()[0]), 0.3 * 0.024, rtol=0.1)
+        with pytest.raises(ValueError, match="too thin for cells of"):
+            function(finned(0.048, 0.0036), STRIP_CHIRP, around(10), cells=45)
+    assert len(done) == 2
+    assert "strips" not in sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), cells=8).plan
+
+
+@pytest.mark.slow
+def test_a_strip_thinner_than_a_cell_has_its_echo_within_the_error_that_is_predicted():
+    """Against cells of less than its thickness. Without the strip HH differs by 30 %."""
+    track = sarcl.Trajectory(None, 40 * np.array([[0.9698, 0.171, 0.1736]]))
+    body, options = finned(0.024, 0.0054), {"polarization": ("HH", "VV"), "anchors": 1}
+    wanted = np.asarray(sarcl.fullwave_echo(body, STRIP_CHIRP, track, cells=70, model_error=False, **options).samples)
+    raw = sarcl.fullwave_echo(body, STRIP_CHIRP, track, cells=30, **options)
+    error = difference(np.asarray(raw.samples), wanted)
+    assert error < 0.08 and error < raw.report.model_error < 3 * error + 0.05
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("radius, cells", [(0.1, 20), (0.05, 20)])
+def test_losses_that_are_the_same_at_all_frequencies_are_an_error_over_a_wide_band_that_is_predicted(radius, cells):
+    """Permittivity 3 - 1j from 1 to 1.5 GHz: the conductivity on the grid has 1.25 and 0.83 for 1 at the ends."""
+    material = sarcl.Material(eps_r=3 - 1j)
+    ball = shapes.sphere(radius, facets=8000, rotation=(0.3, 0.5, -0.2), material=material)
+    errors = []
+    for chirp in (CHIRP, sarcl.Waveform.chirp(center=1.25e9, bandwidth=25e6, duration=2e-8)):
+        raw = sarcl.fullwave_echo(ball, chirp, around(30, height=15.0), cells=cells)
+        (got,), k = samples(raw)
+        error = difference(got[0], np.array([mie.dielectric_sphere(radius, one, 3 - 1j)[0] for one in k]))
+        assert error < raw.report.model_error < 2.5 * error
+        errors.append(error)
+    assert errors[1] < 0.035 < errors[0]
+
+
 @pytest.mark.parametrize("seed", range(6))
 def test_scenes_of_metal_and_dielectric_boxes_are_forecast_and_run(monkeypatch, seed):
     pretend(monkeypatch)
@@ -419,12 +478,12 @@ def test_the_log_is_quiet_without_files(caplog):
 @pytest.mark.parametrize(
     "eps_r, conductivity, radius, cells, allowed",
     [(3, 0, 0.1, 20, 0.02), (3, 0, 0.1, 12, 0.06), (3, 0, 0.1115, 20, 0.03), (2, 0, 0.05, 14, 0.045),
-     (5, 0, 0.05, 22, 0.04), (3, 0.05, 0.1, 20, 0.09), (3, 0.05, 0.05, 20, 0.06)],
+     (5, 0, 0.05, 22, 0.04), (3, 0.05, 0.1, 20, 0.035), (3, 0.05, 0.05, 20, 0.03)],
 )  # fmt: skip
 def test_a_dielectric_sphere_has_the_echo_of_mie_and_the_error_that_is_predicted(
     eps_r, conductivity, radius, cells, allowed
 ):
-    """0.1115 m: ka 2.3 to 3.5. Errors are of second order in the cells; of lossy bodies, of first order."""
+    """0.1115 m: ka 2.3 to 3.5."""
     material = sarcl.Material(eps_r=eps_r, conductivity=conductivity)
     ball = shapes.sphere(radius, facets=8000, material=material)
     raw = sarcl.fullwave_echo(ball, CHIRP, around(30, height=15.0), cells=cells)

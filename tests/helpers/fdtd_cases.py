@@ -41,6 +41,7 @@ class Twin:
         self.lattice, self.target, self.wave, self.step = lattice, target, wave, 0
         self.e, self.h = np.array(e, float), np.array(h, float)
         self.old = [self.e.flat[target.edges], self.h.flat[target.faces]]
+        self.late = np.zeros(len(target.coupled))
         self.layers = [
             [self._along(axis, absorber, magnetic) for magnetic in (0, 1)] for axis in range(3 if absorber else 0)
         ]
@@ -63,7 +64,8 @@ class Twin:
         self._correct(self.e, self.h, magnetic=0)
         edges = fdtd.edges(self.e, self.target.edges, self.target.share, self.old[0])
         if len(self.target.coupled):
-            added = fdtd.couple(self.e, self.h, self.target.coupled, self.target.coupling, COURANT)
+            added = fdtd.couple(self.e, self.h, self.target.coupled, self.target.coupling, self.late,
+                                self.target.lagging, self.target.keep, COURANT)  # fmt: skip
             number = np.argsort(self.target.edges)[np.searchsorted(np.sort(self.target.edges), self.target.coupled)]
             edges[number] += added
             self.old[0][number] += added
@@ -92,4 +94,5 @@ def random_target(lattice, rng, inside=0, coupled=False):
     if not coupled:
         return target
     some = edges[: len(edges) // 2]
-    return replace(target, coupled=some, coupling=rng.uniform(-0.1, 0.1, (4, len(some))))
+    coupling, lagging = rng.uniform(-0.1, 0.1, (2, 4, len(some)))
+    return replace(target, coupled=some, coupling=coupling, lagging=lagging, keep=0.9)

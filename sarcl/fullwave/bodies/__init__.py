@@ -13,7 +13,7 @@ For this folder alone:
     _face_areas   how much of each face of the grid closed meshes cover
     _least_areas  the least areas of cut faces with which the time steps are stable
     _mesh_lines   where grid lines are inside bodies of closed meshes
-    _thin_parts   refusals of parts of a mesh that are thinner than a cell
+    _thin_parts   parts of a mesh that are thinner than a cell: refusals, and sheets in place of narrow strips
 """
 
 __all__ = ["materials"]

@@ -6,7 +6,8 @@ the inverse of the mean: the inverse permittivity is the tensor
     n n^T <1/eps> + (1 - n n^T) / <eps>
 
 with means over a cube of one cell (`_averages`). Its diagonal is taken at edges, the rest at nodes, whence each edge is
-coupled to the eight edges across its nodes (kernels/fdtd_coupled.cl). Waves in a body are slower on the grid than they
+coupled to the eight edges across its nodes (kernels/fdtd_coupled.cl). In lossy bodies these
+weights are complex: a part of them lags behind (`lagging_weights`). Waves in a body are slower on the grid than they
 should be: its permittivity is corrected for that (`on_grid`).
 Sources: A. Farjadpour et al., Opt. Lett. 31 (2006); G. R. Werner and J. R. Cary, J. Comput. Phys. 226 (2007).
 """
@@ -57,9 +58,25 @@ def conductivities(lattice: Lattice, permittivity: np.ndarray, k: float) -> np.n
     conductivity dt/(2 eps_0 tan(omega dt/2)), at the frequency where |K| of `_dispersion`, averaged over directions, is
     that of a wavenumber k.
     """
-    length = np.sqrt(_square(k * lattice.cell).real)  # dx |K|
-    turn = np.arcsin(COURANT * length / 2)  # omega dt/2
+    turn = _half_turn(lattice, k)
     return np.asarray(-permittivity.imag * VACUUM_PERMITTIVITY * 2 / lattice.time_step * np.tan(turn))
+
+
+def lagging_weights(lattice: Lattice, weights: np.ndarray, k: float) -> tuple[np.ndarray, np.ndarray, float]:
+    """Real weights w and v, and the part d of a sum that each step keeps, with which w + v (1 - d)/(1 - d exp(-j omega
+    dt)) is the complex weight, at k, rad/m. Below omega the lagging part has all of its weight, above it little.
+    """
+    turn = 2 * _half_turn(lattice, k)
+    keep = float(np.exp(-turn))
+    response = (1 - keep) / (1 - keep * np.exp(-1j * turn))
+    lagging = weights.imag / response.imag
+    return weights.real - lagging * response.real, lagging, keep
+
+
+def _half_turn(lattice: Lattice, k: float) -> float:
+    """omega dt/2 at the frequency where |K|, averaged over directions, is that of a wavenumber k, rad/m."""
+    length = np.sqrt(_square(k * lattice.cell).real)  # dx |K|
+    return float(np.arcsin(COURANT * length / 2))
 
 
 def on_grid(lattice: Lattice, permittivity: complex, k: float) -> complex:

@@ -38,12 +38,16 @@ class MeshLines:
     volume     m^3, by the lines along each axis (3,): lengths inside times the area of a cell; a line in the surface
                counts as the mean of its four neighbours
     gap        width, m, of gaps between parallel facets that are narrower than a cell; None: there are none
+    strips     nodes of sheets in place of narrow parts that are thinner than a cell, int (n, 3)
+    strip_area m^2, of those parts
     """
 
     intervals: tuple[Intervals, Intervals, Intervals]
     areas: tuple[FaceAreas, FaceAreas, FaceAreas]
     volume: np.ndarray
     gap: float | None
+    strips: np.ndarray
+    strip_area: float
 
 
 @dataclass(frozen=True, eq=False)
@@ -71,14 +75,15 @@ class _Spans:
     winding: np.ndarray
 
 
-def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
+def mesh_lines(lattice: Lattice, triangles: np.ndarray, reach: float = 0.0) -> MeshLines:
     """Intervals of grid lines inside closed bodies of facets, corners in m (k, 3, 3), as of a Scene or a trimesh.
 
+    reach  widest strip thinner than a cell that may become a sheet, cells; at least `_thin_parts.RIM`
     ValueError: the mesh is open, is wound inwards, intersects itself, has parts thinner than a cell, or leaves the
     grid. Separate bodies may intersect each other.
     """
     mesh = closed_mesh(lattice, triangles)
-    intervals, volume, thin = [], [], ThinParts(lattice, mesh)
+    intervals, volume, thin = [], [], ThinParts(lattice, mesh, reach)
     for axis in range(3):
         found = _crossings(lattice, mesh, axis)
         whole = _wound(found.line, found.at, found.turn)
@@ -91,9 +96,10 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
         nodes = np.stack(np.divmod(line, lattice.shape[(axis + 2) % 3]), axis=1)
         intervals.append(Intervals(nodes, start / mesh.unit, end / mesh.unit))
         thin.add(found.facet, _points(lattice, mesh, axis, found.line // 4, found.at))
-        between = -(-start // mesh.unit) > end // mesh.unit  # no node lies in these
-        entered, left = (_facet_at(mesh, found, line[between], at[between]) for at in (start, end))
-        thin.add_pairs(entered, left, _points(lattice, mesh, axis, line[between], start[between]))
+        empty = -(-start // mesh.unit) > end // mesh.unit  # no node lies in these
+        entered, left = (_facet_at(mesh, found, line, at) for at in (start, end))
+        first, last = (_points(lattice, mesh, axis, line, at) for at in (start, end))
+        thin.add_pairs(entered, left, axis, first, last, empty)
         # gaps between two stretches of a line: a line that is not normal to a gap is longer in it, up to sqrt(3) times
         # on one axis at least
         gap = np.flatnonzero((line[1:] == line[:-1]) & (start[1:] - end[:-1] < 2 * mesh.unit))
@@ -103,7 +109,7 @@ def mesh_lines(lattice: Lattice, triangles: np.ndarray) -> MeshLines:
     box = Box.around(lattice, intervals)
     thin.check(nodes_inside(box, x), box.low)
     across_x, across_y, across_z = (face_areas(lattice, mesh, axis) for axis in range(3))
-    return MeshLines((x, y, z), (across_x, across_y, across_z), np.array(volume), thin.gap)
+    return MeshLines((x, y, z), (across_x, across_y, across_z), np.array(volume), thin.gap, *thin.strips)
 
 
 def _crossings(lattice: Lattice, mesh: ClosedMesh, axis: int) -> _Crossings:

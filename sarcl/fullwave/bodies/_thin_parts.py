@@ -4,11 +4,16 @@ Between nodes a plate or a wire is transparent: no edge of the grid lies in it. 
 thinner than a cell as well, however small the cells are. What counts is how far from a point of the surface the grid
 holds the body. A part is refused where
 
-- a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no cell that is inside as
-  a whole lies within RIM cells: a plate that is wider than the rim of a wing, or
-- no node is inside within REACH cells, and the facet across the body is parallel: a plate or a wire that no line meets,
+- a line enters and leaves between two nodes through facets that are parallel (PARALLEL), and no part that the grid
+  holds lies within RIM cells, or within `reach` where that is more: a plate that is wider than the rim of a wing. Held
+  are cells that are inside as a whole, and plates where they are as thick as a cell; or
+- no node is inside within REACH cells, or none within a cell and no held part as above, and the facet across the body
+  is parallel and less than a cell away: a plate or a wire that no line meets, or that a node lies in here and there,
 - no node is inside within EDGE cells: sharp edges reach that far from where they are as thick as a cell, or
 - the whole mesh is smaller than a cell: a node inside it conducts, and no edge does.
+
+Narrower strips, as at the trailing edge of a wing, become sheets of conductor: the nodes beside them are named, as
+nodes that are inside as well.
 
 Gaps between nodes are closed on the grid: an edge whose ends are both in a conductor conducts as a whole. Other gaps
 narrower than a cell hold a layer of nodes, in which waves go to and fro for long. Seams of meshes are closed on
@@ -28,28 +33,43 @@ PARALLEL = np.cos(np.radians(5))  # of the angle between two facets: sharper edg
 RAYS = 64  # at most, through the parts that are refused, to find how thick they are
 SEALED = 1e-3  # cells: narrower gaps are inaccuracies of a mesh
 NARROW = 1 + 1e-4  # cells: a gap of one cell whose sides lie on nodes is closed, too
+BESIDE = (
+    1.0  # cells along a plate from where a line meets it, to nodes of its sheet: lines end up to a cell from its edge
+)
 SHARE = 0.7  # of the thickness: cells that leave nodes inside of a round wire, too
 
 
 class ThinParts:
     """Points of a surface, collected axis by axis, and the check of all."""
 
-    def __init__(self, lattice: Lattice, mesh: ClosedMesh) -> None:
-        self.lattice, self.corners = lattice, mesh.corners / mesh.unit
+    def __init__(self, lattice: Lattice, mesh: ClosedMesh, reach: float) -> None:
+        self.lattice, self.corners, self.reach = lattice, mesh.corners / mesh.unit, max(float(RIM), reach)
         self._inwards = -np.cross(self.corners[:, 1] - self.corners[:, 0], self.corners[:, 2] - self.corners[:, 0])
         self._inwards /= np.maximum(np.linalg.norm(self._inwards, axis=1), 1e-300)[:, None]
         self._points = [(np.arange(len(self.corners)), self.corners.mean(axis=1))]
         self._plates: list[tuple[np.ndarray, np.ndarray]] = []
+        self._sheets: list[tuple[np.ndarray, np.ndarray]] = []
+        self._held: list[np.ndarray] = []
+        self._area = 0.0  # of plates thinner than a cell, cells
         self._gaps: list[np.ndarray] = []
 
     def add(self, facet: np.ndarray, place: np.ndarray) -> None:
         """Points on facets (n,), in nodes (n, 3)."""
         self._points.append((facet, place))
 
-    def add_pairs(self, entered: np.ndarray, left: np.ndarray, place: np.ndarray) -> None:
-        """Facets (n,) through which lines enter, in nodes (n, 3), and leave again before the next node."""
-        plate = self._parallel(entered, left)
-        self._plates.append((entered[plate], place[plate]))
+    def add_pairs(
+        self, entered: np.ndarray, left: np.ndarray, axis: int, place: np.ndarray, end: np.ndarray, empty: np.ndarray
+    ) -> None:
+        """Facets (n,) through which lines along an axis enter a body, at `place`, and leave it again, at `end`, in
+        nodes (n, 3); `empty`: where no node lies between.
+        """
+        plate, slope = self._parallel(entered, left), np.abs(self._inwards[entered, axis])
+        thick = (end - place)[:, axis] * slope >= 1
+        self._held += [place[plate & thick], end[plate & thick]]
+        thin, missed = plate & ~thick, plate & empty
+        self._sheets.append((entered[thin], (place[thin] + end[thin]) / 2))
+        self._plates.append((entered[missed], place[missed]))
+        self._area += float(slope[thin].sum())  # of all axes: sum of n_a^2 = 1 per cell of the plate
 
     def add_gaps(self, left: np.ndarray, entered: np.ndarray, axis: int, length: np.ndarray) -> None:
         """Facets (n,) through which lines along an axis leave a body, and enter one again; lengths between, cells."""
@@ -61,6 +81,25 @@ class ThinParts:
         """Width, m, of the gaps that are narrower than a cell: their median; None: there are none."""
         widths = np.concatenate(self._gaps)
         return float(np.median(widths)) * self.lattice.cell if len(widths) else None
+
+    @property
+    def strips(self) -> tuple[np.ndarray, float]:
+        """Nodes of sheets in place of plates thinner than a cell, each once, int (n, 3); the area, m^2, of
+        these plates. None where nodes lie on all lines through them.
+
+        Nodes within (|n_x| + |n_y| + |n_z|)/2 cells of a plane of normal n are joined by edges and leave no hole
+        (Andres, Acharya and Sibata, Graph. Models Image Process. 59, 1997: standard planes).
+        """
+        facet, place = (np.concatenate(part) for part in zip(*self._sheets, strict=True))
+        if not any(len(part) for part, _ in self._plates):
+            return np.zeros((0, 3), np.int64), 0.0
+        normal = self._inwards[facet][:, None]
+        node = np.rint(place).astype(np.int64)[:, None] + np.indices((3, 3, 3)).reshape(3, -1).T - 1
+        to = node - place[:, None]
+        height = (to * normal).sum(axis=2, keepdims=True)
+        beside = np.linalg.norm(to - height * normal, axis=2) < BESIDE
+        near = beside & (np.abs(height[..., 0]) <= np.abs(normal).sum(axis=2) / 2)
+        return np.unique(node[near], axis=0), self._area * self.lattice.cell**2
 
     def _parallel(self, first: np.ndarray, second: np.ndarray) -> np.ndarray:
         """Which facets (n,) are parallel, and face opposite ways."""
@@ -97,16 +136,34 @@ class ThinParts:
         plates, points = (
             tuple(np.concatenate(part) for part in zip(*group, strict=True)) for group in (self._plates, self._points)
         )
-        wide = _far(_whole_cells(inside), low, RIM, plates[1])
+        whole = _whole_cells(inside)
+        wide = self._wide(whole, low, plates[1])
         alone = _far(inside, low, EDGE, points[1])
-        far = np.flatnonzero(_far(inside, low, REACH, points[1]) & ~alone)
+        sparse = _far(inside, low, 1, points[1]) & self._wide(whole, low, points[1])
+        far = np.flatnonzero((_far(inside, low, REACH, points[1]) | sparse) & ~alone)
         far = far[_spread(len(far))]
         thickness, opposite = self._across(points[0][far], points[1][far])
-        flat = far[np.isfinite(thickness) & self._parallel(points[0][far], opposite)]
+        flat = far[(thickness < 1) & self._parallel(points[0][far], opposite)]
         chosen = np.concatenate([np.flatnonzero(alone), flat])
         return np.concatenate([plates[0][wide], points[0][chosen]]), np.concatenate(
             [plates[1][wide], points[1][chosen]]
         )
+
+    def _wide(self, whole: np.ndarray, low: np.ndarray, place: np.ndarray) -> np.ndarray:
+        """Which places in nodes (n, 3) have no cell that is inside as a whole within RIM cells along each axis, and no
+        part that the grid holds within `reach` cells.
+        """
+        from scipy.spatial import KDTree
+
+        far = _far(whole, low, RIM, place)
+        if far.any():
+            first = np.maximum(np.floor(place[far].min(axis=0) - self.reach).astype(int) - low, 0)
+            last = np.maximum(np.ceil(place[far].max(axis=0) + self.reach).astype(int) - low, 0)
+            near = whole[tuple(slice(a, b + 1) for a, b in zip(first, last, strict=True))]
+            held = np.concatenate([np.argwhere(near) + low + first, *self._held])
+            if len(held):
+                far[far] = ~np.isfinite(KDTree(held).query(place[far], distance_upper_bound=self.reach)[0])
+        return far
 
     def _across(self, facet: np.ndarray, place: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Distance from points on facets (n,) inwards to where the body ends, in cells (n,), inf where no facet is met;

@@ -12,8 +12,9 @@ from ...base.validation import number
 from ..lattice import Lattice
 from ..target import Target, material_edges
 from ._cut_cells import Box, Intervals, conductor, edge_lengths
-from ._dielectrics import Lines, check_cells, conductivities, halved, on_grid, permittivities
+from ._dielectrics import Lines, check_cells, conductivities, halved, lagging_weights, on_grid, permittivities
 from ._mesh_lines import MeshLines, mesh_lines
+from ._thin_parts import RIM as RIM
 
 
 @dataclass(frozen=True, eq=False)
@@ -28,10 +29,12 @@ class Body:
     permittivity: complex | None = None
 
 
-def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> Target:
+def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None, reach: float = 0.0) -> Target:
     """The lists of several bodies.
 
-    k  wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity; conductors need none
+    k      wavenumber in vacuum, rad/m, at which permittivities hold: eps'' becomes a conductivity; conductors need none
+    reach  widest strip of a conductor, thinner than a cell, that may be a sheet through the nodes beside it, cells; at
+           least `_thin_parts.RIM`
     Conductors take what they cover; where dielectrics overlap, the later one holds.
 
     ValueError: `mesh_lines` refuses a mesh, a permittivity is not one of a passive body, or cells are too large for it.
@@ -41,8 +44,11 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
     metal = [part.triangles for part in parts if part.permittivity is None]
     made, found = Target.nothing(), None
     if metal:
-        found = mesh_lines(lattice, np.concatenate(metal))
-        made = replace(conductor(lattice, found.intervals, found.areas), gap=found.gap)
+        found = mesh_lines(lattice, np.concatenate(metal), reach)
+        along_x, along_y, along_z = found.intervals
+        found = replace(found, intervals=(_with_nodes(along_x, found.strips), along_y, along_z))
+        made = conductor(lattice, found.intervals, found.areas)
+        made = replace(made, gap=found.gap, strip_area=found.strip_area)
     if len(metal) == len(parts):
         return made
     wavenumber, fine, dielectric = number("k", k, above=0), halved(lattice), []
@@ -51,12 +57,21 @@ def bodies(lattice: Lattice, parts: Sequence[Body], k: float | None = None) -> T
             check_cells(lattice, part.permittivity, wavenumber)
             value = on_grid(lattice, part.permittivity, wavenumber)
             dielectric.append((_named(f"parts[{i}]", fine, part.triangles).intervals, value))
-    hidden = mesh_lines(fine, np.concatenate(metal)).intervals if metal else None
+    hidden = mesh_lines(fine, np.concatenate(metal), 2 * reach).intervals if metal else None
     made_of = _dielectric_edges(lattice, dielectric, hidden, found, wavenumber)
     return Target(
         np.concatenate([made.edges, made_of.edges]), np.concatenate([made.share, made_of.share], axis=1),
-        made.faces, made.weight, made.resting, made.gap, made_of.coupled, made_of.coupling,
+        made.faces, made.weight, made.resting, made.gap, made.strip_area, made_of.coupled, made_of.coupling,
+        made_of.lagging, made_of.keep,
     )  # fmt: skip
+
+
+def _with_nodes(along_x: Intervals, nodes: np.ndarray) -> Intervals:
+    """Intervals along x, with nodes (n, 3) that are inside as well: edges between two of these conduct."""
+    place = nodes[:, 0].astype(float)
+    return Intervals(
+        np.concatenate([along_x.lines, nodes[:, 1:]]), np.append(along_x.start, place), np.append(along_x.end, place)
+    )
 
 
 def _named(name: str, lattice: Lattice, triangles: np.ndarray) -> MeshLines:
@@ -103,6 +118,7 @@ def _dielectric_edges(
         across.append(found.across[:, outside])
     at, value, coupling = np.concatenate(places), np.concatenate(values), np.concatenate(across, axis=1)
     made = material_edges(lattice, at, value.real, conductivities(lattice, value, k))
-    weights = coupling.real * made.share[1]
-    some = np.abs(weights).max(axis=0, initial=0) > 0
-    return replace(made, coupled=at[some], coupling=weights[:, some])
+    some = np.abs(coupling).max(axis=0, initial=0) > 0
+    weights, lagging, keep = lagging_weights(lattice, coupling[:, some], k)
+    own = made.share[1][some]
+    return replace(made, coupled=at[some], coupling=weights * own, lagging=lagging * own, keep=keep)

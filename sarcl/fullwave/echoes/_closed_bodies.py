@@ -63,13 +63,21 @@ def _named(material: Material) -> str:
     return f"a material {material.name!r}" if material.name else "a material"
 
 
-def parts_of(scene: Scene, frequency: float) -> list[tuple[np.ndarray, complex | None]]:
-    """Facets of each material (k, 3, 3), and its permittivity, relative, at a frequency, Hz; None: a conductor."""
+def parts_of(scene: Scene, frequency: float, exact: float | None = None) -> list[tuple[np.ndarray, complex | None]]:
+    """Facets of each material (k, 3, 3), and its permittivity, relative, at a frequency, Hz; None: a conductor.
+
+    exact  frequency, Hz, at which the imaginary part of a complex eps_r is that of the conductivity that the grid has
+           in its place; default: the same frequency
+    """
+    more = 0.0 if exact is None else exact / frequency - 1
     out: list[tuple[np.ndarray, complex | None]] = []
     for number, material in enumerate(scene.materials):
         triangles = scene.triangles[scene.material == number]
         if len(triangles):
-            out.append((triangles, None if material.conducting else complex(material.permittivity(frequency))))
+            permittivity = None
+            if not material.conducting:
+                permittivity = complex(material.permittivity(frequency)) + 1j * more * float(np.imag(material.eps_r))
+            out.append((triangles, permittivity))
     return out
 
 

@@ -140,6 +140,7 @@ class _Sums:
             "max_bytes": round(task.max_bytes),
             "parts": len(task.parts()),
             "seconds_per_run": float(f"{self.seconds / max(self.runs, 1):.3g}"),
+            **task.strips,
             **task.losses,
             **task.motion,
         }

@@ -31,6 +31,9 @@ from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
+# wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the
+# quarter of a wavelength at which strips on a body resonate. Wider parts are plates or masts, and refused
+STRIP = 0.1
 UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
@@ -45,6 +48,8 @@ class FullwaveTask:
     cells             per shortest wavelength;  lattice, cost  the grid, and what a run on it takes
     max_bytes         allowed for a run
     along             angle along the path of directions in which the target sees the transmitter, rad (P,)
+    strip             m, widest strip of a conductor, thinner than a cell, that may be a sheet on the grid
+    exact             frequency, Hz, at which a complex eps_r is that of the grid; None: the waveform's centre
     """
 
     request: EchoRequest
@@ -64,6 +69,8 @@ class FullwaveTask:
     cost: runs.RunCost
     max_bytes: float
     along: np.ndarray
+    strip: float
+    exact: float | None = None
     _targets: list[Target] = field(default_factory=list)
     _twins: dict[str, dict[int, runs.Twin]] = field(default_factory=dict)
     _unfinished: list[int] = field(default_factory=list)  # the pulse of the run that was warned of
@@ -108,14 +115,21 @@ class FullwaveTask:
         if not self._targets:
             middle = self.waveform.center
             try:
-                parts = parts_of(self.scene, middle)
-                self._targets.append(runs.target_of(self.lattice, parts, 2 * np.pi * middle / SPEED_OF_LIGHT))
+                parts = parts_of(self.scene, middle, self.exact)
+                k = 2 * np.pi * middle / SPEED_OF_LIGHT
+                self._targets.append(runs.target_of(self.lattice, parts, k, self.strip))
             except TooThin as thin:
                 if thin.cell is None:
                     raise
                 needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / thin.cell) / 10
                 raise TooThin(f"{thin}: cells={needed:g}, which are {self.cells:g} now", thin.cell) from None
         return self._targets[0]
+
+    @property
+    def strips(self) -> dict[str, object]:
+        """What the report says of parts of conductors that are thinner than a cell."""
+        area = self.target().strip_area
+        return {"strips": f"{area:.2g} m^2 thinner than a cell, as sheets"} if area else {}
 
     def warn_of_gaps(self) -> None:
         """SarclWarning where gaps between conductors are narrower than a cell: closed, or with one layer of nodes."""
@@ -220,9 +234,16 @@ class FullwaveTask:
         return checksum(*leaves(parts))
 
     def coarser(self, ratio: float, finer: float) -> FullwaveTask:
-        """The same task with cells larger by a factor, divided by up to `finer`."""
+        """The same task with cells larger by a factor, divided by up to `finer`. Strips thinner than a cell are wider
+        in proportion, as at the edge of a wedge, and their width is known to RIM cells.
+        """
         lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
-        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, _targets=[], _twins={})
+        strip = self.strip * lattice.cell / self.lattice.cell + runs.RIM * lattice.cell
+        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip, _targets=[], _twins={})
+
+    def with_losses_of(self, frequency: float) -> FullwaveTask:
+        """The same task with conductivities that have the losses of each complex eps_r at another frequency, Hz."""
+        return replace(self, exact=frequency, _targets=[], _twins={})
 
 
 def fullwave_task(
@@ -249,7 +270,7 @@ def fullwave_task(
     return FullwaveTask(
         request, scene, waveform, band, track, receiver, motion, reference_range, window,
         frequency + step * np.arange(n_samples), step, compressed, cells, lattice, cost, budget,
-        _along(unit(tx - scene.center)),
+        _along(unit(tx - scene.center)), STRIP * SPEED_OF_LIGHT / band[1],
     )  # fmt: skip
 
 

@@ -84,9 +84,12 @@ def plan_fullwave_echo(
     request = echo_request(scene, (), **{k: v for k, v in given.items() if k in REQUEST})
     task = fullwave_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
     cut = float(np.prod(task.lattice.shape)) <= MOST_CELLS
+    also = 1.0 if given.get("check", False) else 0.0  # runs for each polarisation that is sent, beside those of anchors
+    predicts = bool(given.get("model_error", True))
+    also += predicts * RATIO**-4 * (2 if task.losses else 1)
     if cut:
         task.warn_of_gaps()
-        if given.get("model_error", True):
+        if predicts:
             coarse_task(task)
     parts, n_rows, n_samples = task.parts(), len(track) * len(request.polarizations), len(task.frequencies)
     n_anchors = expected_anchors(task, options.get("anchors", "auto"), request.tolerance)
@@ -96,7 +99,6 @@ def plan_fullwave_echo(
     cells = float(np.prod(task.lattice.shape))
     run_seconds = task.cost.steps * (cells / speed.cells + entries / speed.sums)
     runs = n_anchors * sent * len(parts)
-    also = (RATIO**-4 if given.get("model_error", True) else 0.0) + (1.0 if given.get("check", False) else 0.0)
     plan: dict[str, object] = {
         "anchors": n_anchors,
         "parts": len(parts),
@@ -105,7 +107,7 @@ def plan_fullwave_echo(
         "cell_m": float(f"{task.lattice.cell:.4g}"),
         "grid": " x ".join(map(str, task.lattice.shape)),
         "steps": task.cost.steps,
-        **({} if cut else {"bodies": "not looked at on so large a grid"}),
+        **(task.strips if cut else {"bodies": "not looked at on so large a grid"}),
         **task.losses,
         **task.motion,
     }

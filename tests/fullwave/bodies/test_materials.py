@@ -99,6 +99,15 @@ def test_a_curved_surface_has_the_tensor_of_both_means_by_its_normal():
                 assert np.abs(off).max() < 0.02 and np.sqrt((off[np.abs(off) > 1e-9] ** 2).mean()) < 0.003
 
 
+def test_weights_of_lossy_bodies_have_their_phase_at_the_frequency_of_the_permittivity():
+    """w + v (1 - d)/(1 - d exp(-j omega dt)), omega where |K| averaged over directions is that of K."""
+    wanted = np.array([0.3 - 0.2j, -0.1 + 0.05j, 0.2])
+    weights, lagging, keep = _dielectrics.lagging_weights(GRID, wanted, K)
+    turn = 2 * np.arcsin(COURANT * np.sqrt(6 * (1 - np.sin(K * CELL) / (K * CELL))) / 2)
+    assert np.isclose(turn, K * CELL * COURANT, rtol=0.02) and lagging[2] == 0 and weights[2] == 0.2
+    assert np.allclose(weights + lagging * (1 - keep) / (1 - keep * np.exp(-1j * turn)), wanted)
+
+
 def test_slabs_of_few_planes_give_the_same_lists(monkeypatch):
     ball = shapes.sphere(0.62, facets=500, position=(1.5, 1.5, 1.6), rotation=(0.3, 0.5, -0.2)).triangles
     parts = [Body(box((3, 9, 3), (14, 16, 25))), Body(ball, 2.5 - 0.3j)]

@@ -314,13 +314,18 @@ def test_sharp_edges_are_no_thin_parts_however_small_the_cells():
             assert np.allclose(mesh_lines(grid_of(body, cell), body).volume[2], volume(body), rtol=0.1)
 
 
-@pytest.mark.parametrize("angle", [3, 6, 8, 10, 15, 20])
-def test_wedges_are_refused_below_five_degrees_and_run_above_wherever_they_lie(angle):
-    """A prism over a right triangle with this angle at its edge; turned, and with flat sides along the grid."""
+def wedge_of(angle):
+    """A prism over a right triangle with this angle, degrees, at its edge; 1 m long and wide."""
     height = np.tan(np.radians(angle))
     corners = np.array([[x, y, z] for y in (0, 1) for x, z in ((0, 0), (1, 0), (1, height))], float)
     faces = [[0, 1, 2], [3, 5, 4], [0, 3, 4], [0, 4, 1], [1, 4, 5], [1, 5, 2], [2, 5, 3], [2, 3, 0]]
-    wedge = corners[faces] if volume(corners[faces]) > 0 else corners[faces][:, ::-1]
+    return corners[faces] if volume(corners[faces]) > 0 else corners[faces][:, ::-1]
+
+
+@pytest.mark.parametrize("angle", [3, 6, 8, 10, 15, 20])
+def test_wedges_are_refused_below_five_degrees_and_run_above_wherever_they_lie(angle):
+    """A prism over a right triangle with this angle at its edge; turned, and with flat sides along the grid."""
+    wedge = wedge_of(angle)
     rng = np.random.default_rng(angle)
     for turned in [False] * 6 + [True] * 4:
         body = wedge @ rotation(rng.uniform(-1, 1, 3) * turned).T
@@ -329,6 +334,45 @@ def test_wedges_are_refused_below_five_degrees_and_run_above_wherever_they_lie(a
             refused(body, "too thin for cells", grid)
         else:
             mesh_lines(grid, body)
+
+
+@pytest.mark.parametrize("turn", [(0.3, 0.5, -0.2), (0.1, -0.4, 1.1)])
+def test_the_strip_at_the_edge_of_a_wedge_is_a_sheet_where_it_may_be_as_wide(turn):
+    """A wedge of 4 degrees is as thick as a cell at 14.3 cells from its edge."""
+    body, cell = wedge_of(4) @ rotation(np.array(turn)).T, 0.02
+    grid, width = grid_of(body, cell), cell / np.tan(np.radians(4))
+    with pytest.raises(ValueError, match="too thin for cells of"):
+        mesh_lines(grid, body, 11)
+    found = mesh_lines(grid, body, 16)
+    assert np.isclose(found.strip_area, width, rtol=0.1)
+    along = (grid.origin + cell * found.strips) @ rotation(np.array(turn))  # back to the edge at x = 0
+    assert np.abs(along[:, 0].min()) < 1.5 * cell and np.isclose(along[:, 0].max(), width, atol=2 * cell)
+
+
+def test_sheets_of_strips_are_joined_by_edges_without_holes():
+    """Nodes beside a tilted strip: each has a neighbour along the grid, and no line through the strip misses them."""
+    from scipy.ndimage import label
+
+    body = wedge_of(4) @ rotation(np.array([0.3, 0.5, -0.2])).T
+    found = mesh_lines(grid_of(body, 0.02), body, 16)
+    low = found.strips.min(axis=0)
+    held = np.zeros(np.ptp(found.strips, axis=0) + 1, bool)
+    held[tuple((found.strips - low).T)] = True
+    sizes = np.bincount(label(held)[0][held])[1:]
+    assert sizes.max() > 0.98 * sizes.sum()
+
+
+def test_masts_and_plates_thinner_than_a_cell_are_refused_where_they_are_longer_than_a_strip_may_be():
+    mast = shapes.cylinder(0.03, 1.3, sections=8, rotation=(0.3, 0.2, 0), position=(1.5, 1.5, 1.5)).triangles
+    plate = shapes.box((1.6, 1.4, 0.04), position=(0, 0, 0.03)).triangles @ rotation(np.array([0.4, 0.1, 0])).T + 1.5
+    for body in (np.concatenate([box((8, 8, 8), (20, 20, 17)), mast]), plate):
+        with pytest.raises(ValueError, match="too thin for cells"):
+            mesh_lines(grid_of(body, CELL), body, 6)
+
+
+def test_a_sheet_with_flat_sides_along_the_axes_runs_whatever_its_thickness_where_nodes_lie_in_it():
+    found = mesh_lines(GRID, box((6, 5, 14.9), (24, 25, 15.1)))
+    assert len(found.strips) == 0 == found.strip_area and np.isclose(found.volume[2], 0.072, rtol=0.01)
 
 
 def test_a_wire_between_grid_lines_and_a_mast_on_a_body_are_refused():
