@@ -122,8 +122,8 @@ def echo(
                   ("separated" only); "all": every element receives all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
-    shadows       True: of every facet only the share counts that both antennas see at each pulse; "embree": the
-                  same, with rays by that library (package embreex), faster, but not bit-identical on all devices
+    shadows       True: of every facet only the part counts that both antennas see at each pulse; "embree": its share
+                  of the area, by rays of that library (package embreex), not bit-identical on all devices
                   (docs/theory/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
