@@ -121,10 +121,9 @@ class FacetSet:
         there are lit parts."""
         if self.illumination is None:
             return np.ones(len(self))
-        for span in self.illumination.between(pulse, pulse + 1).spans():
-            share, later = (self._weighed(side[self.kept]) for side in (span.share, span.later))
-            return share / 255 + float(span.moments(np.zeros(1))[0]) * (later / 255 - share / 255)
-        return np.ones(len(self))
+        *shares, part = self.illumination.shares_around(pulse)
+        before, after = (self._weighed(share[self.kept]) / np.float32(255) for share in shares)
+        return np.asarray(before + part * (after - before))
 
     def _weighed(self, share: np.ndarray) -> np.ndarray:
         """Amplitudes, uint8 (k,), of illuminated shares, uint8 (k,): without a coherent part the power of a facet is

@@ -111,6 +111,12 @@ class SceneEchoes:
         """Norm of the cut facets over that of the facets as they were given, both added with random phases."""
         return 1.0 if self.subdivision is None else self.subdivision.gain
 
+    @property
+    def _partly_lit(self) -> dict[str, int]:
+        """Number of facets of which some pulse sees a part past the others, for the report."""
+        rows = None if self.facets is None else self.facets.lit_rows
+        return {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
+
     def channel(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int = 0
     ) -> ChannelEchoes:
@@ -168,7 +174,7 @@ class SceneEchoes:
                 facets, self.subdivision.plan, antennas, frequencies, request.gated, request.polarizations,
                 request.vertical, weights,
             )  # fmt: skip
-            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings))
+            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings | self._partly_lit))
             spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
@@ -178,7 +184,7 @@ class SceneEchoes:
                 request.budget, request.gated, request.polarizations, request.vertical, weights,
             )  # fmt: skip
             words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
-            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings
+            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self._partly_lit
             spread.append((self.gain * spreader.predicted_error, words))
             spreaders.append(spreader)
         if spread:  # relative to the norm of the facets that each adds: not more of all of them

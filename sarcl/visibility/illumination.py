@@ -114,12 +114,19 @@ class Illumination:
 
     def fraction_at(self, pulse: int) -> np.ndarray:
         """Illuminated shares at a pulse of the window, float32 (k,), 0 to 1: interpolated between viewpoints."""
+        share, later, part = self.shares_around(pulse)
+        before, after = share / np.float32(255), later / np.float32(255)
+        return np.asarray(before + part * (after - before))
+
+    def shares_around(self, pulse: int) -> tuple[np.ndarray, np.ndarray, np.float32]:
+        """Illuminated shares, uint8 (k,), at the viewpoints before and after a pulse of the window, and where between
+        these the pulse lies, 0 to 1."""
         pulse += self.window[0]
         after = int(np.searchsorted(self.viewpoints, pulse, side="right"))
         one, two = max(after - 1, 0), min(after, len(self) - 1)
         before, behind = int(self.viewpoints[one]), int(self.viewpoints[two])
         part = np.float32((pulse - before) / (behind - before)) if behind > before and pulse > before else np.float32(0)
-        return self.fraction(one) + part * (self.fraction(two) - self.fraction(one))
+        return self.share(one), self.share(two), part
 
     def spans(self) -> Iterator[Span]:
         """The window in spans, from viewpoint to viewpoint, in each of which the shares change linearly."""
