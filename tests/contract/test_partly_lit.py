@@ -166,8 +166,8 @@ def test_the_check_recomputes_lit_parts_by_the_reference():
 def test_rough_facets_send_back_the_power_of_their_lit_part():
     """At the facet's random phase: the amplitude falls as the root of the share."""
     facet = np.array([[[-1, -1, 0], [1, -1, 0], [-1, 1, 0]]], float)
-    rough = sarcl.Scene.facets(facet, material=sarcl.Material(diagram="isotropic"))
-    black = sarcl.Scene.facets(0.5 * facet + [0, 0, 0.4], reflectivity=0.0)
+    rough = sarcl.Scene.facets(facet, material=sarcl.Material(diagram="isotropic", height=0.05))
+    black = sarcl.Scene.facets(0.8 * facet + [0, 0, 0.4], reflectivity=0.0)
     way = track(sights(0.1, 0.3, n=4, arc=1e-3))
     lit, whole = (
         sarcl.echo(scene, CHIRP, way, max_edge=None, tolerance=1e-3, **WINDOW) for scene in (rough + black, rough)
