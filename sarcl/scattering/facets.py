@@ -75,10 +75,7 @@ class FacetSet:
             all_of_all = np.full(len(self), 255, np.uint8)
             yield Span(0, n_pulses, all_of_all, all_of_all)
             return
-        for span in self.illumination.spans():
-            share = self._weighed(span.share[self.kept])
-            later = share if span.later is span.share else self._weighed(span.later[self.kept])
-            yield Span(span.first, span.stop, share, later)
+        yield from self.illumination.spans(lambda share: self._weighed(share[self.kept]))
 
     def between(self, first: int, stop: int) -> FacetSet:
         """What pulses first ... stop - 1 see of them, as pulses 0 ..."""

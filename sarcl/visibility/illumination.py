@@ -128,10 +128,12 @@ class Illumination:
         part = np.float32((pulse - before) / (behind - before)) if behind > before and pulse > before else np.float32(0)
         return self.share(one), self.share(two), part
 
-    def spans(self) -> Iterator[Span]:
-        """The window in spans, from viewpoint to viewpoint, in each of which the shares change linearly."""
+    def spans(self, weigh: Callable[[np.ndarray], np.ndarray] = lambda share: share) -> Iterator[Span]:
+        """The window in spans, from viewpoint to viewpoint, in each of which weigh(shares), uint8, changes linearly."""
         for span in self._spans():
-            part = span.within(*self.window)
+            share = weigh(span.share)
+            later = share if span.later is span.share else weigh(span.later)
+            part = Span(span.first, span.stop, share, later).within(*self.window)
             if part is not None:
                 yield part
 
