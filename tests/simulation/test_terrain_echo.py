@@ -74,7 +74,8 @@ def test_horizons_and_rays_give_the_same_echoes(name, terrains):
     # horizons count facets that face away from all pulses as shadowed, and lit parts do not
     skipped = [r.report.contributions_skipped for r in (by_horizons, by_rays)]
     shadowed = [part["shadowed"] + (part["facing away"] if name == "metal" else 0) for part in skipped]
-    assert shadowed[0] == pytest.approx(shadowed[1], rel=0.03) and shadowed[0] > 0
+    # of metal, 7 facets of 4452 have a lit part that lies between their samples
+    assert shadowed[0] == pytest.approx(shadowed[1], rel=0.05 if name == "metal" else 0.03) and shadowed[0] > 0
     # samples at the edges of shadows differ (docs/theory/shadows.md): 1e-3 of the power
     difference = np.linalg.norm(by_horizons.samples - by_rays.samples) / np.linalg.norm(by_rays.samples)
     assert difference < 0.05
