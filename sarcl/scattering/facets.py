@@ -46,6 +46,7 @@ class FacetSet:
     random        complex Gaussian numbers of unit power (k,), for the incoherent echo of rough facets
     lit_parts     what pulses see of facets that others occlude; None: no facet occludes another
     lit_rows      number of each facet among the partly lit ones, -1 where every pulse sees it whole (k,)
+    sampled       facets that the illumination is of; the others count whole in it (k,); None: all
     """
 
     triangles: np.ndarray
@@ -58,6 +59,7 @@ class FacetSet:
     random: np.ndarray
     lit_parts: LitParts | None = None
     lit_rows: np.ndarray | None = None
+    sampled: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -99,6 +101,7 @@ class FacetSet:
             self.triangles[which], self.reflectivity[which], self.two_sided[which], self.material[which],
             self.materials, self.illumination, self.kept[which],
             self.random[which] if len(self.random) else self.random, lit_parts, lit_rows,
+            None if self.sampled is None else self.sampled[which],
         )  # fmt: skip
 
     def light(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> Light:
@@ -125,6 +128,8 @@ class FacetSet:
     def _weighed(self, share: np.ndarray) -> np.ndarray:
         """Amplitudes, uint8 (k,), of illuminated shares, uint8 (k,): without a coherent part the power of a facet is
         that of the share."""
+        if self.sampled is not None:
+            share = np.where(self.sampled, share, np.uint8(255))
         random = np.array([np.isinf(m.height) for m in self.materials])
         if not random.any():
             return share

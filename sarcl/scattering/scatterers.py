@@ -20,6 +20,8 @@ from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import LitParts
 from .facets import FacetSet
 
+# pairs of facet and pulse, up to which smooth facets of a terrain are clipped against it: about ten seconds
+FEW_LOOKS = 2e6
 RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
 
 
@@ -81,22 +83,27 @@ def facets_of(
     tell(2)
     illumination, lit_parts = None, None
     mirrors = np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
-    exact = mirrors if occluders is not None else np.zeros(len(keep), bool)
-    if shadows and keep.any() and (terrain or not exact[keep].all()):
+    clipped = mirrors if occluders is not None else np.zeros(len(keep), bool)
+    # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
+    by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
+    sampled = keep if by_horizons else keep & ~clipped
+    if shadows and sampled.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
-            two_sided=scene.two_sided, wanted=keep,
+            two_sided=scene.two_sided, wanted=sampled,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
-            engine="embree" if shadows == "embree" else "opencl", by_facets=~exact,
+            engine="embree" if shadows == "embree" else "opencl", by_facets=~clipped,
         )  # fmt: skip
-        left_out["shadowed"] = int((keep & illumination.dark).sum()) * n_pulses
-        keep &= ~illumination.dark
-    if shadows and occluders is not None and (keep & exact).any():
-        on = _terrain(occluders, antennas).get("on_heights", np.zeros(len(occluders.triangles), bool))
+        left_out["shadowed"] = int((sampled & illumination.dark).sum()) * n_pulses
+        keep &= ~(sampled & illumination.dark)
+    if shadows and occluders is not None and (keep & clipped).any():
+        solid = occluders.triangles
+        if by_horizons:
+            solid = solid[~_terrain(occluders, antennas).get("on_heights", np.zeros(len(solid), bool))]
         lit_parts = LitParts(
-            device, scene.triangles, occluders.triangles[~on], antennas.ends, two_sided=scene.two_sided,
-            wanted=keep & exact, max_bytes=max_bytes, margin=margin,
+            device, scene.triangles, solid, antennas.ends, two_sided=scene.two_sided, wanted=keep & clipped,
+            max_bytes=max_bytes, margin=margin,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():
@@ -115,6 +122,7 @@ def facets_of(
         triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
         illumination, np.flatnonzero(keep), random, lit_parts,
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[keep],
+        sampled[keep],
     ), left_out  # fmt: skip
 
 
