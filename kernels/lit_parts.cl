@@ -4,8 +4,8 @@
 //   L = facet less the shadows of all occluders;   integral over L = sum over its border of the signed triangles (0, a, b)
 //
 // The shadow of an occluder is a convex polygon: its part above the facet's plane, projected from the antenna onto that
-// plane. The border of L consists of the pieces of the facet's edges and of the shadows' edges that no shadow covers. Which
-// side of an edge is covered is looked at `slack` beside it, so that shadows that touch have no border between them, and of
+// plane. The border of L consists of the pieces of the facet's edges and of the shadows' edges that no shadow covers. Whether
+// an edge is covered is tested at the distance `slack` beside it, so that shadows that touch have no border between them, and of
 // equal borders that of the larger shadow counts: neither order nor chains of corners are needed.
 //
 // source    docs/theory/shadows.md; phase integral of a triangle: sarcl/scattering/physical_optics.py:triangle_mean
@@ -16,7 +16,7 @@
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
 //           WAVES     wavenumbers of a launch, 0 to 4
-//           (all in float64: edges of shadows that coincide are told apart by 1e-12 of a facet)
+// numbers   float64 throughout: float32 cannot place points at `slack`, 1e-12 of a facet's edge, beside an edge
 // reference: sarcl/reference/lit_part.py:lit_part
 
 #pragma OPENCL EXTENSION cl_khr_fp64 : enable

@@ -17,7 +17,7 @@ from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import ALL_DARK, lit
-from ..visibility.lit_parts import LitParts
+from ..visibility.lit_parts import LitParts, is_affordable
 from .facets import FacetSet
 
 # pairs of facet and pulse, up to which smooth facets of a terrain are clipped against it: about ten seconds
@@ -83,7 +83,9 @@ def facets_of(
     tell(2)
     illumination, lit_parts = None, None
     mirrors = np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
-    clipped = mirrors if occluders is not None else np.zeros(len(keep), bool)
+    clipped = np.zeros(len(keep), bool)
+    if occluders is not None and is_affordable(scene.triangles[keep & mirrors], occluders.triangles, antennas.ends):
+        clipped = mirrors
     # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
     by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
     sampled = keep if by_horizons else keep & ~clipped

@@ -15,7 +15,7 @@ from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
-from ._shadow_pairs import PAIRS_AT_ONCE, candidate_pairs
+from ._shadow_pairs import CLOSE, PAIRS_AT_ONCE, candidate_pairs
 
 KERNELS = "lit_parts.cl"
 SHADOW = 15  # numbers of a shadow, as in the kernels
@@ -28,6 +28,20 @@ SLACK = 1e-12
 # touch within the digits of float32 files, do not shadow one another
 ON_PLANE = 1e-6
 MOST_TURN = 0.5  # of the usual occluder's width, by which shadows may move within a block of pulses
+MOST_NEAR = 2e9  # facets times occluders times pulses of antennas near a scene, which test all pairs: some minutes
+
+
+def is_affordable(triangles: np.ndarray, occluders: np.ndarray, ends: list[np.ndarray]) -> bool:
+    """Whether lit parts take minutes at most: False for large scenes close to an antenna, where all pairs are tested.
+
+    Arguments as of `LitParts`.
+    """
+    if len(triangles) * len(occluders) * len(ends[0]) <= MOST_NEAR:
+        return True
+    bounds = box(occluders.reshape(-1, 3))
+    reach = (0.5 + CLOSE) * float(np.linalg.norm(bounds[1] - bounds[0]))
+    middle = bounds.mean(axis=0)
+    return all(float(np.linalg.norm(end - middle, axis=1).min()) > reach for end in ends)
 
 
 @dataclass(frozen=True, eq=False)

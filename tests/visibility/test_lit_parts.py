@@ -11,7 +11,7 @@ from helpers.lit_cases import lit_polygon
 import sarcl
 from sarcl.reference.lit_part import lit_part
 from sarcl.visibility._shadow_pairs import candidate_pairs
-from sarcl.visibility.lit_parts import LitParts
+from sarcl.visibility.lit_parts import LitParts, is_affordable
 
 WAVES = np.array([1.0, 30.0, 200.0, 400.0])  # rad/m
 TOLERANCE = 2e-7  # float64, stored in float32; also of devices that leave float64 to another one
@@ -155,6 +155,14 @@ def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
             for j, occluder in enumerate(occluders):
                 if (i, j) not in found:
                     assert lit_part(facet, occluder[None], [antenna], WAVES[:1])[0] == pytest.approx(1, abs=1e-9)
+
+
+def test_large_scenes_are_clipped_from_afar_alone(monkeypatch):
+    """Near antennas all pairs are tested: hours for 1e5 facets, which have sampled shares instead."""
+    monkeypatch.setattr("sarcl.visibility.lit_parts.MOST_NEAR", 0)
+    near, far = (np.array([[0.0, 0.0, height]]) for height in (1.0, 100.0))
+    assert not is_affordable(FACET, FACET, [near]) and not is_affordable(FACET, FACET, [far, near])
+    assert is_affordable(FACET, FACET, [far])
 
 
 def test_a_machine_without_float64_is_refused(every_device, monkeypatch):
