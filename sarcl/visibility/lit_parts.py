@@ -46,11 +46,16 @@ def is_affordable(triangles: np.ndarray, occluders: np.ndarray, ends: list[np.nd
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Pulses first ... stop - 1, and pairs (n, 2) of a partly lit facet and an occluder, in the order of facets."""
+    """Pulses first ... stop - 1, and pairs (n, 2) of a partly lit facet and an occluder, in the order of facets.
+
+    antennas  m (3,), and turn, rad: as `_pairs` takes them to find the pairs anew where `pairs` is None
+    """
 
     first: int
     stop: int
-    pairs: np.ndarray
+    antennas: list[np.ndarray]
+    turn: float
+    pairs: np.ndarray | None
 
 
 class LitParts:
@@ -85,23 +90,26 @@ class LitParts:
         self._on_plane = ON_PLANE * size
         keep = np.flatnonzero(wanted & (areas(triangles) > 0))
         solid = occluders[areas(occluders) > 0]
+        self._bounds = bounds
         self._receivers = _Receivers(keep, triangles[keep], two_sided[keep])
         self._occluders = solid
         self._blocks: list[_Block] = []
         self.dark, self.partly = np.zeros((2, len(triangles)), bool)
         if len(keep) and len(solid):
-            self._look(ends, bounds)
+            self._look(ends)
         self._rows = np.flatnonzero(self.partly[keep])
 
-    def _look(self, ends: list[np.ndarray], bounds: np.ndarray) -> None:
-        """Find blocks of pulses and the pairs of each; and which facets are dark, or partly lit."""
+    def _look(self, ends: list[np.ndarray]) -> None:
+        """Find blocks of pulses, the pairs of each within `max_bytes`, and which facets are dark or partly lit."""
+        bounds, kept = self._bounds, 0
         width = float(np.median(np.sqrt(areas(self._occluders))))
         limits = [MOST_TURN * width / max(shadow_length(bounds, end), 1e-300) for end in ends]
         blocks, viewpoints, turns = pulse_blocks(ends, bounds, limits)
         dark_pulses = np.zeros(len(self._receivers.index), np.int64)
         changing = np.zeros(len(self._receivers.index), bool)
         for (first, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
-            pairs = self._pairs([end[viewpoint] for end in ends], turn, bounds)
+            at = [end[viewpoint] for end in ends]
+            pairs = self._pairs(at, turn)
             which = np.unique(pairs[:, 0])
             here = np.zeros(len(changing), bool)
             if self._margin:  # other antennas may see what these do not
@@ -112,16 +120,21 @@ class LitParts:
                     dark_pulses[which[some]] += (share == 0).sum(axis=0)
                     here[which[some]] = (share < 1).any(axis=0)
             changing |= here
-            self._blocks.append(_Block(first, stop, pairs[here[pairs[:, 0]]]))
+            pairs = pairs[here[pairs[:, 0]]]
+            kept += pairs.nbytes
+            self._blocks.append(_Block(first, stop, at, turn, pairs if kept <= self.max_bytes else None))
         dark = dark_pulses == len(ends[0])
         self.dark[self._receivers.index], self.partly[self._receivers.index] = dark, changing & ~dark
-        lasting = self.partly[self._receivers.index]
-        self._blocks = [_Block(b.first, b.stop, b.pairs[lasting[b.pairs[:, 0]]]) for b in self._blocks]
 
-    def _pairs(self, antennas: list[np.ndarray], turn: float, bounds: np.ndarray) -> np.ndarray:
+    def _pairs_of(self, block: _Block) -> np.ndarray:
+        """The pairs of a block, of the facets that are partly lit."""
+        pairs = self._pairs(block.antennas, block.turn) if block.pairs is None else block.pairs
+        return np.asarray(pairs[self.partly[self._receivers.index[pairs[:, 0]]]])
+
+    def _pairs(self, antennas: list[np.ndarray], turn: float) -> np.ndarray:
         """Pairs of a facet and an occluder that may cast a shadow on it from pulses near one."""
         r = self._receivers
-        away = min(float(np.linalg.norm(at - np.clip(at, *bounds))) for at in antennas)
+        away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
         turn = min(turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
         cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
         # a facet is not seen from a side that is turned away from an antenna by more than directions change
@@ -154,7 +167,7 @@ class LitParts:
             here = slice(max(block.first - first, 0), min(block.stop - first, n))
             if here.start < here.stop:
                 antennas = [end[here] for end in ends]
-                for some, part_share, part_mean in self._light(self._rows, block.pairs, antennas, waves):
+                for some, part_share, part_mean in self._light(self._rows, self._pairs_of(block), antennas, waves):
                     share[here, some], mean[here, some] = part_share, part_mean
         return share, mean
 
@@ -162,8 +175,9 @@ class LitParts:
         """Facets that may cast a shadow on partly lit facet number `row`, as a pulse sees it, m (n, 3, 3)."""
         pulse += self._first
         block = next(block for block in self._blocks if block.first <= pulse < block.stop)
-        begin, end = np.searchsorted(block.pairs[:, 0], [self._rows[row], self._rows[row] + 1])
-        return np.asarray(self._occluders[block.pairs[begin:end, 1]])
+        pairs = self._pairs_of(block)
+        begin, end = np.searchsorted(pairs[:, 0], [self._rows[row], self._rows[row] + 1])
+        return np.asarray(self._occluders[pairs[begin:end, 1]])
 
     @property
     def on_plane(self) -> float:

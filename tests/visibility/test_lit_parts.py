@@ -157,6 +157,22 @@ def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
                     assert lit_part(facet, occluder[None], [antenna], WAVES[:1])[0] == pytest.approx(1, abs=1e-9)
 
 
+def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device):
+    facets = np.concatenate([soup(seed)[0] for seed in range(6)])
+    _, occluders, ends = soup(0)
+    k = len(facets)
+    found = []
+    for max_bytes in (1e8, 1.0):
+        parts = LitParts(
+            every_device, facets, occluders, ends, two_sided=np.ones(k, bool), wanted=np.ones(k, bool),
+            max_bytes=max_bytes,
+        )  # fmt: skip
+        found.append([parts.partly, parts.dark, *parts.at(0, ends, WAVES)])
+    assert found[0][0].any()
+    for one, other in zip(*found, strict=True):
+        np.testing.assert_array_equal(one, other)
+
+
 def test_large_scenes_are_clipped_from_afar_alone(monkeypatch):
     """Near antennas all pairs are tested: hours for 1e5 facets, which have sampled shares instead."""
     monkeypatch.setattr("sarcl.visibility.lit_parts.MOST_NEAR", 0)
