@@ -83,13 +83,14 @@ def coherent(scene: Scene) -> np.ndarray:
 
 def plan_facets(
     tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
-    polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, *, cut: bool = True,
-    weights: WeightError | None = None, max_bytes: float = np.inf, profiles: float = 0.0,
+    polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, cell: float = np.inf, *,
+    cut: bool = True, weights: WeightError | None = None, max_bytes: float = np.inf, profiles: float = 0.0,
     terms: float = np.inf,
 ) -> FacetPlan:  # fmt: skip
     """The cheapest plan for facets whose error is at most SHARE of `tolerance`, relative to the facets as given.
 
-    center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations;  finest  no edge may be longer, m
+    center, bandwidth  of the waveform, Hz;  vertical  (3,), of the polarisations
+    finest              no edge of a coherent facet may be longer, m;  cell  edges, m, of facets with random parts
     cut                False: facets stay as they are;  weights  errors of the antenna weights
     profiles   least error of the range profiles that cut facets are spread into
     terms      pulses times samples: with few of them and few facets, sums may be in float64; inf: never
@@ -105,11 +106,13 @@ def plan_facets(
     bounds = box(scene.triangles.reshape(-1, 3))
     distance = nearest(scene, antennas, bounds)
     weights = weights or WeightError()
-    dark = crossed(scene, mirror, top, finest, antennas, polarizations, vertical, center)
+    dark = crossed(scene, mirror, top, cell, antennas, polarizations, vertical, center)
     best: tuple[float, FacetPlan] | None = None
     exact: FacetPlan | None = None
     directions = DirectionError(scene, mirror, antennas, highest, polarizations, vertical)
     cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical, directions.steep)
+    if scene.roughness.any():
+        finest = min(finest, cell)
     least, least_rounding, edge, fine, turn = np.inf, np.inf, min(top, finest), False, 0.0
 
     def needed(gain: float, error: float) -> float:
@@ -118,7 +121,7 @@ def plan_facets(
 
     while True:
         corner, gain = TO_CORNER * edge, 1.0
-        count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(finest, 1e30))) ** 2).sum())
+        count = float(np.maximum(1.0, 1.5 * (longest / np.where(mirror, edge, min(cell, 1e30))) ** 2).sum())
         if count > most or (exact is not None and count > WORTH_FLOAT32 * exact.n_facets):
             break
         small = count * terms <= FLOAT64_TERMS and dark <= DARK
@@ -139,7 +142,7 @@ def plan_facets(
         if needed(gain, fixed) < tolerance:
             fine = True
             band = over_band(
-                scene, mirror, edge, finest, antennas, polarizations, vertical, center, bandwidth
+                scene, mirror, edge, cell, antennas, polarizations, vertical, center, bandwidth
             )  # fmt: skip
             for power, n in ((power, n) for power in band for n in range(1, MOST_NODES + 1)):
                 error = fixed + weights.with_phase(n, band[power])

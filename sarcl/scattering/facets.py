@@ -47,6 +47,7 @@ class FacetSet:
     lit_parts     what pulses see of facets that others occlude; None: no facet occludes another
     lit_rows      number of each facet among the partly lit ones, -1 where every pulse sees it whole (k,)
     sampled       facets that the illumination is of; the others count whole in it (k,); None: all
+    incoherent    rough facets whose coherent part others of the set carry (k,); None: none
     """
 
     triangles: np.ndarray
@@ -60,6 +61,7 @@ class FacetSet:
     lit_parts: LitParts | None = None
     lit_rows: np.ndarray | None = None
     sampled: np.ndarray | None = None
+    incoherent: np.ndarray | None = None
 
     def __len__(self) -> int:
         return len(self.triangles)
@@ -102,6 +104,7 @@ class FacetSet:
             self.materials, self.illumination, self.kept[which],
             self.random[which] if len(self.random) else self.random, lit_parts, lit_rows,
             None if self.sampled is None else self.sampled[which],
+            None if self.incoherent is None else self.incoherent[which],
         )  # fmt: skip
 
     def light(self, first: int, ends: list[np.ndarray], waves: np.ndarray) -> Light:
@@ -130,11 +133,13 @@ class FacetSet:
         that of the share."""
         if self.sampled is not None:
             share = np.where(self.sampled, share, np.uint8(255))
-        random = np.array([np.isinf(m.height) for m in self.materials])
+        random = np.array([np.isinf(m.height) for m in self.materials])[self.material]
+        if self.incoherent is not None:
+            random |= self.incoherent
         if not random.any():
             return share
         root = np.rint(np.sqrt(np.arange(256) * 255.0)).astype(np.uint8)
-        return np.where(random[self.material], root[share], share)
+        return np.where(random, root[share], share)
 
     @property
     def is_rough(self) -> bool:
@@ -151,6 +156,7 @@ class FacetSet:
         return FacetSet(
             self.triangles[some], self.reflectivity[some], self.two_sided[some], self.material[some], self.materials,
             None, self.kept[some], self.random[some] if len(self.random) else self.random,
+            incoherent=None if self.incoherent is None else self.incoherent[some],
         )  # fmt: skip
 
     def amplitudes(
@@ -186,6 +192,8 @@ class FacetSet:
             mean = triangle_mean(2 * np.pi * wave * phases[:, 0, 0], 2 * np.pi * wave * phases[:, 1, 0])
             if light is not None:
                 mean[:, light.index] = light.mean[0, :, first : first + step].T
+            if self.incoherent is not None:
+                mean[:, self.incoherent] = 0
             if self.is_rough:
                 q = 2 * np.pi * wave[..., None] * both
                 for i, material in enumerate(self.materials):
@@ -213,7 +221,10 @@ class FacetSet:
         factor = np.where(self.two_sided, -self.reflectivity, self.reflectivity)
         rows = [*first.T, *second.T, factor]
         if self.is_rough:
-            rows += [*roughness_planes(self.materials)[:, self.material], self.random.real, self.random.imag]
+            height, *diagram = roughness_planes(self.materials)[:, self.material]
+            if self.incoherent is not None:
+                height = np.where(self.incoherent, -height, height)  # the sign tells the kernels
+            rows += [height, *diagram, self.random.real, self.random.imag]
         if not metal:
             for f in nodes if dispersive else nodes[:1]:
                 root = self.roots(float(f))[self.material]

@@ -8,7 +8,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base import boxes, counter_rng
+from ..base import boxes
 from ..base.constants import EDGE_ON, SPEED_OF_LIGHT
 from ..base.errors import warn
 from ..model.waveform import Waveform
@@ -18,11 +18,12 @@ from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import LitParts, is_affordable
+from .facet_plan import coherent
 from .facets import FacetSet
+from .random_surface import Pieces
 
 # pairs of facet and pulse, up to which smooth facets of a terrain are clipped against it: about ten seconds
 FEW_LOOKS = 2e6
-RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
 
 
 @dataclass(frozen=True, eq=False)
@@ -54,23 +55,22 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    scene: Scene, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, seed: int, skips: set[str],
+    pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object], occluders: Scene | None = None, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
-    """Facets of a scene that is cut, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
+    """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
     occluders  the scene before it was cut, whose facets cast exact shadows; None: shadows are shares, by sampled rays
     margin     m: antennas of channels stand up to this far from these
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
-    n_pulses = len(antennas.tx)
+    scene, n_pulses = pieces.scene, len(antennas.tx)
     terrain = _terrain(scene, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = geometry.normals(scene.triangles)
     triangles = scene.triangles
-    if scene.roughness.any():
-        heights = counter_rng.gaussian(geometry.centroids(triangles), seed) * scene.roughness
-        triangles = triangles + (heights[:, None] * normals)[:, None]
+    if pieces.height.any():
+        triangles = triangles + (pieces.height[:, None] * normals)[:, None]
     centers = geometry.centroids(triangles)
     keep = np.ones(len(centers), bool)
     if "zero reflectivity" in skips:
@@ -82,7 +82,7 @@ def facets_of(
         keep &= ~away
     tell(2)
     illumination, lit_parts = None, None
-    mirrors = np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
+    mirrors = coherent(scene) & ~pieces.incoherent
     clipped = np.zeros(len(keep), bool)
     if occluders is not None and is_affordable(scene.triangles[keep & mirrors], occluders.triangles, antennas.ends):
         clipped = mirrors
@@ -114,17 +114,11 @@ def facets_of(
     tell(3)
     if not keep.any():
         return None, left_out
-    random = np.zeros(0, np.complex64)
-    if any(m.height > 0 for m in scene.materials):
-        # from the facets' own positions: order and neighbours have no influence
-        places = geometry.centroids(scene.triangles)[keep]
-        parts = [counter_rng.gaussian(places, seed, stream) for stream in RANDOM_STREAMS]
-        random = ((parts[0] + 1j * parts[1]) / np.sqrt(2)).astype(np.complex64)
     return FacetSet(
         triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
-        illumination, np.flatnonzero(keep), random, lit_parts,
+        illumination, np.flatnonzero(keep), pieces.random[keep], lit_parts,
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[keep],
-        sampled[keep],
+        sampled[keep], pieces.incoherent[keep] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
 
 
@@ -145,35 +139,20 @@ def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: PulseGeometry)
     error of the edge is then about half a cell at most, or a quarter of a facet.
     """
     typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
-    edge, _ = _half_cell(waveform, antennas, scene)
+    edge = _half_cell(waveform, antennas, scene)
     return float(np.clip(4 * edge / typical, 0.25, 8.0)) if np.isfinite(edge) else 0.25
 
 
-def resolution_edge(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> float:
-    """Half the finer of range and cross-range resolution at the scene's centre, m. ValueError where there is none."""
-    edge, standing = _half_cell(waveform, antennas, scene)
-    if standing is not None:
-        raise ValueError(
-            f"an antenna stands at the scene's centre at pulse {standing}, where there is no resolution to cut "
-            "facets to; pass max_edge=... in metres, or None"
-        )
-    if not np.isfinite(edge):
-        raise ValueError("forward scattering resolves nothing to cut facets to; pass max_edge=... in metres, or None")
-    return edge
-
-
-def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> tuple[float, int | None]:
-    """Half the finer of range and cross-range resolution at the scene's centre, m, inf where nothing is resolved; and
-    the pulse at which an antenna stands there, where nothing is resolved either."""
+def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> float:
+    """Half the finer of range and cross-range resolution at the scene's centre, m; inf where nothing is resolved."""
     look = antennas.mean_direction(scene.center)
-    standing = np.isnan(look).any(axis=1)
-    if standing.any():
-        return np.inf, int(np.argmax(standing))
+    if np.isnan(look).any():  # an antenna stands there
+        return np.inf
     along = float(np.linalg.norm(look, axis=1).max())
     turn = float(np.linalg.norm(look - look[0], axis=1).max())
     range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf
     cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
-    return min(range_cell, cross_cell) / 2, None
+    return min(range_cell, cross_cell) / 2
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:

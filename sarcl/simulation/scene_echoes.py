@@ -289,15 +289,16 @@ def prepare_scene(
     facets, held_points, mesh_warnings = None, None, dict[str, Any]()
     held_facets: tuple[TiledFacets, ...] = ()
     if subdivision is not None:
-        facet_plan, pieces = subdivision.apply(scene)
+        facet_plan, pieces = subdivision.apply(scene, request.seed)
         subdivision = replace(subdivision, plan=facet_plan)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         mesh_warnings = _warned(
-            facet_error.judge(original_scene, antennas, waveform), speckle_contrast.judge(pieces, antennas, waveform)
+            facet_error.judge(original_scene, antennas, waveform),
+            speckle_contrast.judge(pieces.cells, antennas, waveform),
         )
         request.report("scene", 1, 3)
         facets, left_out = facets_of(
-            pieces, waveform, antennas, shadows=request.shadows, seed=request.seed, skips=request.skips,
+            pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
             occluders=scene if tiled and request.shadows is True else None, margin=margin,
         )  # fmt: skip

@@ -218,19 +218,6 @@ def test_a_black_facet_leaves_the_rest_of_a_rough_scene_as_it_was(device):
     assert np.linalg.norm(alone.samples - beside.samples) <= 1e-6 * np.linalg.norm(alone.samples)
 
 
-def test_a_moving_receiver_is_enough_to_cut_facets_finely():
-    from sarcl.scattering.scatterers import resolution_edge
-
-    scene = sarcl.Scene.from_heights([-1, 1], [-1, 1], np.zeros((2, 2)))
-    still, moving = np.tile([8e3, 0, 6e3], (9, 1)), circle(n_pulses=9).positions
-    one = np.ones(9)
-    narrow = sarcl.Waveform.chirp(center=9.6e9, bandwidth=60e6, duration=1e-6)  # the cross-range cell is the finer
-    both = resolution_edge(narrow, PulseGeometry(moving, moving, one, one, one, -one, one), scene)
-    half = resolution_edge(narrow, PulseGeometry(still, moving, one, one, one, -one, one), scene)
-    # one antenna turning makes half the angle
-    assert half == pytest.approx(2 * both, rel=0.01)
-
-
 def test_facets_are_cut_below_half_a_resolution_cell():
     axis = np.array([-4.0, 4.0])
     flat = sarcl.Scene.from_heights(axis, axis, np.zeros((2, 2)))

@@ -1,0 +1,116 @@
+"""The random surface of a scene: cells that depend on nothing but the scene and the waveform, and a number for each.
+
+A rough facet sends back one random amplitude, and random heights move it along its normal. What counts as one facet is
+a cell: facets bisected at their longest edges down to about half a resolution cell in range. Neither the track nor the
+tolerance has any influence, so that two passes see one surface. Coherent parts may have to be cut more finely: the
+pieces keep the height of their cell, and the cell's random amplitude stays a facet of its own (`Pieces.incoherent`).
+
+source   docs/theory/facets.md
+"""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base import counter_rng
+from ..base.constants import SPEED_OF_LIGHT
+from ..model.waveform import Waveform
+from ..scene.material import COHERENT
+from ..scene.scene import Scene
+from ..scene.triangles import centroids, cut, edges
+from .facet_plan import MOST_FACETS, coherent
+
+RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
+ROUND = 1.05  # edges of cells may be longer by so much: not every facet a little too long is halved
+
+
+@dataclass(frozen=True, eq=False)
+class Pieces:
+    """The facets of a scene as they are added up.
+
+    scene       of the pieces, without random heights, and without points
+    cells       the scene's facets, cut where they are random
+    height      by which random heights move each piece along its normal, m (k,)
+    random      complex Gaussian numbers of unit power, complex64 (k,), of incoherent echoes; 0 where there is none
+    incoherent  pieces of which the incoherent part alone counts: others carry the coherent one (k,) bool
+    """
+
+    scene: Scene
+    cells: Scene
+    height: np.ndarray
+    random: np.ndarray
+    incoherent: np.ndarray
+
+
+def cell_edge(waveform: Waveform) -> float:
+    """Length, m, of half a resolution cell in slant range, to which random facets are cut."""
+    return SPEED_OF_LIGHT / (4 * waveform.bandwidth)
+
+
+def is_random(scene: Scene) -> np.ndarray:
+    """Facets (k,) that have an incoherent part, or a random height."""
+    return _is_rough(scene) | (scene.roughness > 0)
+
+
+def _is_rough(scene: Scene) -> np.ndarray:
+    return np.array([m.diagram not in COHERENT and m.height > 0 for m in scene.materials])[scene.material]
+
+
+def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
+    """A scene's facets, random ones cut to cells of about `cell`, m, and coherent ones to `edge`, m; inf: not at all.
+
+    MemoryError above 50 million facets.
+    """
+    triangles, of = _cut(scene.triangles, np.where(is_random(scene), ROUND * cell, np.inf))
+    cells = _with_facets(scene, triangles, of)
+    rough, places = _is_rough(cells), centroids(triangles)
+    height, random = np.zeros(len(of)), np.zeros(len(of), np.complex64)
+    some = cells.roughness > 0
+    height[some] = counter_rng.gaussian(places[some], seed) * cells.roughness[some]
+    # from the cells' own positions: order and neighbours have no influence
+    parts = [counter_rng.gaussian(places[rough], seed, stream) for stream in RANDOM_STREAMS]
+    random[rough] = (parts[0] + 1j * parts[1]) / np.sqrt(2)
+    mirror = coherent(cells)
+    triangles, of = _cut(cells.triangles, np.where(mirror, edge, np.inf))
+    if len(triangles) == len(cells.triangles):  # cutting moves facets, if it cuts any
+        return Pieces(cells, cells, height, random, np.zeros(len(height), bool))
+    divided = np.bincount(of, minlength=len(mirror)) > 1
+    alone = np.flatnonzero(divided & rough)
+    pieces = _with_facets(cells, np.concatenate([triangles, cells.triangles[alone]]), np.concatenate([of, alone]))
+    random_of = np.concatenate([np.where(divided[of], 0, random[of]), random[alone]]).astype(np.complex64)
+    incoherent = np.arange(len(random_of)) >= len(of)
+    return Pieces(pieces, cells, height[np.concatenate([of, alone])], random_of, incoherent)
+
+
+def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """Triangles bisected until no edge is longer than the `longest` of each, m (k,); and which each is a part of.
+
+    In the given order where none is cut.
+    """
+    rows = np.arange(len(triangles))
+    long = np.maximum.reduce(edges(triangles)) > longest if len(triangles) else np.zeros(0, bool)
+    if not long.any():
+        return triangles, rows
+    made = [(triangles[~long], rows[~long])]
+    for length in np.unique(longest[long]).tolist():
+        which = np.flatnonzero(long & (longest == length))
+        parts, of = cut(triangles[which], length, MOST_FACETS)
+        made.append((parts, which[of]))
+    return np.concatenate([part for part, _ in made]), np.concatenate([of for _, of in made])
+
+
+def _with_facets(scene: Scene, triangles: np.ndarray, of: np.ndarray) -> Scene:
+    """The scene without points, its facets replaced by parts of them, m (n, 3, 3); `of`: which each belongs to (n,)."""
+    if triangles is scene.triangles and not len(scene.positions):
+        return scene
+    kept = {name: getattr(scene, name)[of] for name in ("reflectivity", "roughness", "two_sided", "material")}
+    return Scene(
+        np.zeros((0, 3)),
+        np.zeros(0, np.complex128),
+        triangles,
+        materials=scene.materials,
+        heights=scene.heights,
+        **kept,
+    )
