@@ -14,12 +14,22 @@ def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.
     size  (n,), such as areas or powers: half of the draws are as likely as the size, half alike for all. Sums over the
           draws, each times the number it represents, estimate sums over all without bias.
     """
-    n = len(size)
-    if n <= most:
-        return np.arange(n), np.ones(n)
-    chance = 0.5 / n + (0.5 * size / size.sum() if size.any() else np.full(n, 0.5 / n))
-    some = random.choice(n, most, p=chance / chance.sum())
+    if len(size) <= most:
+        return np.arange(len(size)), np.ones(len(size))
+    some, chance = drawn_with_chances(size, most, random)
     return some, 1 / (most * chance[some])
+
+
+def drawn_with_chances(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+    """Indices of up to `most` of n elements, and the chance of each of the n at each draw (n,).
+
+    Of no more than `most` each is drawn once. Arguments as of `drawn`.
+    """
+    n = len(size)
+    chance = 0.5 / n + (0.5 * size / size.sum() if size.any() else np.full(n, 0.5 / n))
+    if n <= most:
+        return np.arange(n), chance
+    return random.choice(n, most, p=chance / chance.sum()), chance
 
 
 def facets_at(scene: Scene, some: np.ndarray, triangles: np.ndarray) -> FacetSet:

@@ -24,6 +24,7 @@ from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
 from ._frequency_nodes import crossed, over_band
 from .antenna_weights import MOST_NODES, WeightError
+from .facet_kinds import coherent
 
 GIGAHERTZ = 1e9  # amplitudes are divided by f in GHz, to stay clear of the smallest float32 numbers
 LADDER = 2.0 ** (1 / 2)  # ratio of the edge lengths that are tried
@@ -76,11 +77,6 @@ class FacetPlan:
         return {"facets": round(self.n_facets), "facet edges, m": self.max_edge, **sums}
 
 
-def coherent(scene: Scene) -> np.ndarray:
-    """Facets (k,) that have a coherent part, reflected as by a mirror of their size."""
-    return np.array([np.isfinite(m.height) for m in scene.materials])[scene.material]
-
-
 def plan_facets(
     tolerance: float, scene: Scene, antennas: PulseGeometry, center: float, bandwidth: float,
     polarizations: Sequence[str], vertical: np.ndarray, finest: float = np.inf, cell: float = np.inf, *,
@@ -130,7 +126,7 @@ def plan_facets(
         if mirror.any():
             turn, sharp = directions.turn(edge)
             if needed(1.0, shape if small else rounding + shape) < tolerance:
-                gain = cutting.gain(edge) if cut else 1.0
+                gain = cutting.gain(edge if cut else np.inf)
             bent = _spherical(corner, distance, highest)
             turn = max(0.0, turn - corner / max(distance - corner, 1e-300))  # what `bent` has of directions
             left = tolerance / gain * SHARE - shape - (0 if small else rounding)

@@ -17,10 +17,10 @@ import numpy as np
 from ..base import counter_rng
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.waveform import Waveform
-from ..scene.material import COHERENT
 from ..scene.scene import Scene
 from ..scene.triangles import centroids, cut, edges
-from .facet_plan import MOST_FACETS, coherent
+from . import facet_kinds
+from .facet_plan import MOST_FACETS
 
 RANDOM_STREAMS = (2, 3)  # of counter_rng.py's numbers: real and imaginary parts of the incoherent echo of rough facets
 ROUND = 1.05  # edges of cells may be longer by so much: not every facet a little too long is halved
@@ -49,30 +49,21 @@ def cell_edge(waveform: Waveform) -> float:
     return SPEED_OF_LIGHT / (4 * waveform.bandwidth)
 
 
-def is_random(scene: Scene) -> np.ndarray:
-    """Facets (k,) that have an incoherent part, or a random height."""
-    return _is_rough(scene) | (scene.roughness > 0)
-
-
-def _is_rough(scene: Scene) -> np.ndarray:
-    return np.array([m.diagram not in COHERENT and m.height > 0 for m in scene.materials])[scene.material]
-
-
 def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
     """A scene's facets, random ones cut to cells of about `cell`, m, and coherent ones to `edge`, m; inf: not at all.
 
     MemoryError above 50 million facets.
     """
-    triangles, of = _cut(scene.triangles, np.where(is_random(scene), ROUND * cell, np.inf))
+    triangles, of = _cut(scene.triangles, np.where(facet_kinds.random(scene), ROUND * cell, np.inf))
     cells = _with_facets(scene, triangles, of)
-    rough, places = _is_rough(cells), centroids(triangles)
+    rough, places = facet_kinds.rough(cells), centroids(triangles)
     height, random = np.zeros(len(of)), np.zeros(len(of), np.complex64)
     some = cells.roughness > 0
     height[some] = counter_rng.gaussian(places[some], seed) * cells.roughness[some]
     # from the cells' own positions: order and neighbours have no influence
     parts = [counter_rng.gaussian(places[rough], seed, stream) for stream in RANDOM_STREAMS]
     random[rough] = (parts[0] + 1j * parts[1]) / np.sqrt(2)
-    mirror = coherent(cells)
+    mirror = facet_kinds.coherent(cells)
     triangles, of = _cut(cells.triangles, np.where(mirror, edge, np.inf))
     if len(triangles) == len(cells.triangles):  # cutting moves facets, if it cuts any
         return Pieces(cells, cells, height, random, np.zeros(len(height), bool))

@@ -18,7 +18,7 @@ from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import LitParts, is_affordable
-from .facet_plan import coherent
+from .facet_kinds import coherent
 from .facets import FacetSet
 from .random_surface import Pieces
 

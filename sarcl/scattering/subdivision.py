@@ -11,7 +11,7 @@ from ..base.validation import number
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
-from ._cutting_error import longest_piece
+from ._facet_norm import longest_piece
 from .antenna_weights import WeightError
 from .facet_plan import FacetPlan, plan_facets
 from .random_surface import Pieces, cell_edge, pieces_of

@@ -11,7 +11,8 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.vectors import unit
 from sarcl.numerics.pulse_geometry import PulseGeometry
 from sarcl.reference import facet
-from sarcl.scattering._cutting_error import CuttingError, longest_piece
+from sarcl.scattering._cutting_error import CuttingError
+from sarcl.scattering._facet_norm import longest_piece
 from sarcl.scene.triangles import cut
 
 TONE = sarcl.Waveform.chirp(center=9.6e9, bandwidth=1e6, duration=1e-6)

@@ -46,8 +46,7 @@ def test_tolerance_max_edge_and_max_bytes_leave_the_surface_as_it_is(name, other
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_seed_names_the_surface(name):
     one, two = (
-        sarcl.echo(SURFACES[name], CHIRP, track(), tolerance=5e-2, seed=seed, **GIVEN).samples
-        for seed in (3, 4)
+        sarcl.echo(SURFACES[name], CHIRP, track(), tolerance=5e-2, seed=seed, **GIVEN).samples for seed in (3, 4)
     )
     assert np.linalg.norm(one - two) > 0.3 * np.linalg.norm(one)
 

@@ -18,7 +18,7 @@ from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scene.scene import Scene
 from ...scene.triangles import edges
-from ..facet_plan import coherent
+from ..facet_kinds import coherent, kinds
 from ._adjacency import adjacency_of, uncut
 from ._curvature import SurfaceCurvature, curvature_of
 from ._curved_echo import Sums, sums
@@ -116,12 +116,8 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> FacetErr
 
 def _curved(scene: Scene) -> tuple[Scene, SurfaceCurvature]:
     """A scene with the fewest facets for its flat parts, and the curvature of the surfaces that they approximate."""
-    j, kind = adjacency_of(scene.triangles), np.zeros(len(scene.triangles), np.int64)
-    for values in (scene.material, scene.two_sided, scene.reflectivity, scene.roughness):
-        if (values != values[0]).any():
-            names, index = np.unique(values, return_inverse=True)
-            kind = kind * len(names) + index
-    fewer = None if scene.has_random_points else uncut(scene.triangles, j, kind)
+    j = adjacency_of(scene.triangles)
+    fewer = None if scene.has_random_points else uncut(scene.triangles, j, kinds(scene))
     if fewer is not None:
         scene = replace(scene.part(fewer[1]), triangles=validation.sealed(fewer[0]))
         j = adjacency_of(scene.triangles)
