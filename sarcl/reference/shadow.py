@@ -15,7 +15,7 @@ def sample(
 ) -> np.ndarray:
     """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
 
-    By `lift` of a facet's longest edge along its normal; where it is edge-on to the viewpoint, to the side that the
+    By `lift`, m, along its normal; where it is edge-on to the viewpoint, to the side that the
     viewpoint and the `other` look at.
     """
     a = triangles[:, 0]
@@ -25,13 +25,12 @@ def sample(
     ends = (viewpoint, viewpoint if other is None else other)
     above, below = (np.einsum("ij,ij->i", normal, unit(end - a)) for end in ends)
     normal[np.where(np.abs(above) <= 2 * EDGE_ON, above + below, above) < 0] *= -1
-    length = np.linalg.norm(triangles - np.roll(triangles, 1, axis=1), axis=2).max(axis=1)
     u, v = np.asarray(places).T[:, None, :, None]
-    return (a + lift * length[:, None] * normal)[:, None] + u * b[:, None] + v * c[:, None]
+    return (a + lift * normal)[:, None] + u * b[:, None] + v * c[:, None]
 
 
 def hidden(
-    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-3,
+    triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray = CENTROID, lift: float = 1e-6,
     other: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,); other: see sample.

@@ -30,6 +30,8 @@ ROUND = 1.05  # edges of cells may be longer by so much: not every facet a littl
 class Pieces:
     """The facets of a scene as they are added up.
 
+    given       the scene that was cut
+    of          index of the given facet that each piece is a part of (k,)
     scene       of the pieces, without random heights, and without points
     cells       the scene's facets, cut where they are random
     height      by which random heights move each piece along its normal, m (k,)
@@ -37,6 +39,8 @@ class Pieces:
     incoherent  pieces of which the incoherent part alone counts: others carry the coherent one (k,) bool
     """
 
+    given: Scene
+    of: np.ndarray
     scene: Scene
     cells: Scene
     height: np.ndarray
@@ -54,10 +58,10 @@ def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
 
     MemoryError above 50 million facets.
     """
-    triangles, of = _cut(scene.triangles, np.where(facet_kinds.random(scene), ROUND * cell, np.inf))
-    cells = _with_facets(scene, triangles, of)
+    triangles, cell_of = _cut(scene.triangles, np.where(facet_kinds.random(scene), ROUND * cell, np.inf))
+    cells = _with_facets(scene, triangles, cell_of)
     rough, places = facet_kinds.rough(cells), centroids(triangles)
-    height, random = np.zeros(len(of)), np.zeros(len(of), np.complex64)
+    height, random = np.zeros(len(places)), np.zeros(len(places), np.complex64)
     some = cells.roughness > 0
     height[some] = counter_rng.gaussian(places[some], seed) * cells.roughness[some]
     # from the cells' own positions: order and neighbours have no influence
@@ -66,13 +70,14 @@ def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
     mirror = facet_kinds.coherent(cells)
     triangles, of = _cut(cells.triangles, np.where(mirror, edge, np.inf))
     if len(triangles) == len(cells.triangles):  # cutting moves facets, if it cuts any
-        return Pieces(cells, cells, height, random, np.zeros(len(height), bool))
+        return Pieces(scene, cell_of, cells, cells, height, random, np.zeros(len(height), bool))
     divided = np.bincount(of, minlength=len(mirror)) > 1
     alone = np.flatnonzero(divided & rough)
     pieces = _with_facets(cells, np.concatenate([triangles, cells.triangles[alone]]), np.concatenate([of, alone]))
     random_of = np.concatenate([np.where(divided[of], 0, random[of]), random[alone]]).astype(np.complex64)
     incoherent = np.arange(len(random_of)) >= len(of)
-    return Pieces(pieces, cells, height[np.concatenate([of, alone])], random_of, incoherent)
+    of = np.concatenate([of, alone])
+    return Pieces(scene, cell_of[of], pieces, cells, height[of], random_of, incoherent)
 
 
 def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -56,16 +56,16 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 def facets_of(
     pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, skips: set[str],
-    max_bytes: float, device: Any, tell: Callable[[int], object], occluders: Scene | None = None, margin: float = 0.0,
+    max_bytes: float, device: Any, tell: Callable[[int], object], exact: bool, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
-    occluders  the scene before it was cut, whose facets cast exact shadows; None: shadows are shares, by sampled rays
-    margin     m: antennas of channels stand up to this far from these
+    exact   lit parts of coherent facets are computed; False: all shadows are shares, by sampled rays
+    margin  m: antennas of channels stand up to this far from these
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
     scene, n_pulses = pieces.scene, len(antennas.tx)
-    terrain = _terrain(scene, antennas)
+    given, terrain = pieces.given, _terrain(pieces.given, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = geometry.normals(scene.triangles)
     triangles = scene.triangles
@@ -84,28 +84,29 @@ def facets_of(
     illumination, lit_parts = None, None
     mirrors = coherent(scene) & ~pieces.incoherent
     clipped = np.zeros(len(keep), bool)
-    if occluders is not None and is_affordable(scene.triangles[keep & mirrors], occluders.triangles, antennas.ends):
+    if shadows and exact and is_affordable(scene.triangles[keep & mirrors], given.triangles, antennas.ends):
         clipped = mirrors
     # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
     by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
     sampled = keep if by_horizons else keep & ~clipped
+    solid = given.triangles
+    if terrain:
+        solid = solid[~terrain["on_heights"]]
+        terrain["on_heights"] = terrain["on_heights"][pieces.of]
     if shadows and sampled.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
             two_sided=scene.two_sided, wanted=sampled,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
-            engine="embree" if shadows == "embree" else "opencl", by_facets=~clipped,
+            engine="embree" if shadows == "embree" else "opencl", by_facets=~clipped, occluders=solid,
         )  # fmt: skip
         left_out["shadowed"] = int((sampled & illumination.dark).sum()) * n_pulses
         keep &= ~(sampled & illumination.dark)
-    if shadows and occluders is not None and (keep & clipped).any():
-        solid = occluders.triangles
-        if by_horizons:
-            solid = solid[~_terrain(occluders, antennas).get("on_heights", np.zeros(len(solid), bool))]
+    if (keep & clipped).any():
         lit_parts = LitParts(
-            device, scene.triangles, solid, antennas.ends, two_sided=scene.two_sided, wanted=keep & clipped,
-            max_bytes=max_bytes, margin=margin,
+            device, scene.triangles, solid if by_horizons else given.triangles, antennas.ends,
+            two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():

@@ -300,7 +300,7 @@ def prepare_scene(
         facets, left_out = facets_of(
             pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
-            occluders=scene if tiled and request.shadows is True else None, margin=margin,
+            exact=tiled and request.shadows is True, margin=margin,
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
         if facets is not None and tiled and not facet_plan.is_float64:

@@ -9,7 +9,7 @@ import numpy as np
 from ..base.constants import EDGE_ON
 from ..base.vectors import dot, unit
 from ..opencl.device import Device
-from ._ray_casting import DeviceFacets, Frame
+from ._frame import DeviceFacets, Frame
 
 CHUNK = 2**18  # facets per array operation: bounds the memory on the host
 

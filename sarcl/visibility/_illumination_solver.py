@@ -10,7 +10,8 @@ from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ._aspect_blocks import scene_box
 from ._facet_samples import PROBES, SAMPLES, sample_points
-from ._ray_casting import DeviceFacets, Frame, Occluders
+from ._frame import DeviceFacets, Frame
+from ._ray_casting import Occluders
 from ._terrain_horizon import Horizons, Terrain
 
 FEW = 4096  # facets; in smaller scenes every facet gets all its samples
@@ -34,17 +35,19 @@ class IlluminationSolver:
         tolerance: float = 0.25,
         engine: str = "opencl",
         by_facets: np.ndarray | bool = True,
+        occluders: np.ndarray | None = None,
     ) -> None:
         self.device, k = device, len(triangles)
         on = np.full(k, heights is not None) if on_heights is None else on_heights
-        self.frame = frame = Frame.around(scene_box(triangles, heights))
+        solid = triangles[~on] if occluders is None else occluders
+        self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid]), heights))
         self.terrain = None if heights is None else Terrain(device, heights, frame)
         one_sided = np.broadcast_to(~np.asarray(two_sided), k)
         self.facets = DeviceFacets(device, triangles, frame, one_sided)
         self.occluders: Any = None
         self._by_facets = np.broadcast_to(np.asarray(by_facets), k)
-        if self._by_facets.any() and not on.all():
-            self.occluders = _caster(engine)(device, triangles[~on], frame)
+        if self._by_facets.any() and len(solid):
+            self.occluders = _caster(engine)(device, solid, frame)
         length = self.facets.length
         large = length > LARGE * np.quantile(length, 0.25) if k > FEW else np.ones(k, bool)
         keep = np.ones(k, bool) if wanted is None else wanted

@@ -1,8 +1,7 @@
-"""Occlusion of facets by facets, as seen from a viewpoint anywhere: rays through a tree of boxes."""
+"""Occlusion of facets by facets, as seen from a viewpoint anywhere: by cells of a view, or rays through a tree."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -11,66 +10,57 @@ from ..base.boxes import box
 from ..base.morton import interleaved
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ..scene.triangles import edges, normals
+from ._frame import STEP, DeviceFacets, Frame
+from ._light_buffer import LightBuffer, sees_from_outside
 
-# Height above a facet at which rays start, relative to its longest edge: so coplanar and touching neighbours, and
-# sheets modelled twice, do not occlude one another.
-LIFT = 1e-3
-# Least height at which rays start, and margin of boxes, relative to the scene: float32 resolves 1e-7 of it
-STEP = 1e-6
 FAR = np.float32(4)  # coordinate of boxes that fill up a node: they are empty, and outside the scene
 
 
-@dataclass(frozen=True, eq=False)
-class Frame:
-    """Coordinates of facets in float32: (x - center) unit, at most 1 for all corners; unit is a power of two, 1/m."""
-
-    center: np.ndarray
-    unit: float
-
-    @classmethod
-    def around(cls, points: np.ndarray) -> Frame:
-        """The smallest frame that holds points, m (n, 3)."""
-        corners = box(points)
-        half = float((corners[1] - corners[0]).max()) / 2
-        return cls(corners.mean(axis=0), 2.0 ** -np.ceil(np.log2(half)) if half else 1.0)
-
-    def eye(self, viewpoint: np.ndarray) -> tuple[np.float32, np.float32, np.float32, np.float32]:
-        """A viewpoint, m (3,), in the frame, and the power of two that scales its distance to about 1."""
-        at = (np.asarray(viewpoint, np.float64) - self.center) * self.unit
-        shrink = 2.0 ** -np.ceil(np.log2(max(float(np.abs(at).max()), 1.0)))
-        x, y, z = at.astype(np.float32)
-        return x, y, z, np.float32(shrink)
-
-
-class DeviceFacets:
-    """Facets on a device, m (k, 3, 3), whose illumination is computed.
-
-    frame      holds all that can occlude them too
-    one_sided  (k,) bool: not illuminated from behind
-    """
-
-    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
-        self.device, self.frame, self.size = device, frame, len(triangles)
-        self.length = np.maximum.reduce(edges(triangles))
-        a = triangles[:, 0]
-        lift = np.maximum(LIFT * self.length * frame.unit, STEP)
-        parts = (
-            (a - frame.center) * frame.unit,
-            (triangles[:, 1] - a) * frame.unit,
-            (triangles[:, 2] - a) * frame.unit,
-            normals(triangles) * lift[:, None],
-        )
-        self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
-        self.side = device.upload(one_sided.astype(np.uint8))
-
-
 class Occluders:
-    """Facets on a device, m (k, 3, 3), that occlude others: a tree of boxes with eight children each."""
+    """Facets on a device, m (k, 3, 3), that occlude others: by cells from viewpoints outside, else by a tree."""
 
     def __init__(self, device: Device, triangles: np.ndarray, frame: Frame) -> None:
         self.device, self.frame = device, frame
-        corners = ((triangles - frame.center) * frame.unit).astype(np.float32)
+        self._corners = ((triangles - frame.center) * frame.unit).astype(np.float32).reshape(-1, 9)
+        self._bounds = box(self._corners.reshape(-1, 3)).astype(np.float64)
+        self._uploaded: Any = None
+        self._tree: BoxTree | None = None
+        self._view: tuple[tuple[float, ...], LightBuffer] | None = None
+
+    def hide(
+        self, facets: DeviceFacets, index: Any, n: int, points: tuple[Any, int], viewpoint: np.ndarray,
+        other: np.ndarray, hidden: Any,
+    ) -> None:  # fmt: skip
+        """Set the bits of occluded sample points.
+
+        index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
+        other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
+               viewpoint its sample points lie
+        """
+        if sees_from_outside(self.frame, self._bounds, viewpoint):
+            self._buffer(viewpoint).hide(facets, index, n, points, other, hidden)
+            return
+        if self._tree is None:
+            self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
+        self._tree.hide(facets, index, n, points, viewpoint, other, hidden)
+
+    def _buffer(self, viewpoint: np.ndarray) -> LightBuffer:
+        """The light buffer of a viewpoint; the last one is kept."""
+        at = tuple(np.asarray(viewpoint, np.float64).tolist())
+        if self._view is None or self._view[0] != at:
+            self._view = None
+            if self._uploaded is None:
+                self._uploaded = self.device.upload(self._corners)
+            n = len(self._corners)
+            self._view = at, LightBuffer(self.device, self._uploaded, n, self._bounds, self.frame, viewpoint)
+        return self._view[1]
+
+
+class BoxTree:
+    """Facets on a device, float32 (k, 3, 3) in units of the frame: a tree of boxes with eight children each."""
+
+    def __init__(self, device: Device, corners: np.ndarray) -> None:
+        self.device = device
         order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
         # the last facet fills up the last eight
         corners = corners[np.append(order, np.repeat(order[-1:], -len(order) % 8))]
@@ -96,16 +86,11 @@ class Occluders:
         self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, other: np.ndarray,
         hidden: Any,
     ) -> None:  # fmt: skip
-        """Set the bits of occluded sample points.
-
-        index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
-        other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
-               viewpoint its sample points lie
-        """
+        """Set the bits of occluded sample points: arguments as of `Occluders.hide`."""
         kernel = self.device.kernel("ray_casting.cl", "hidden")
-        (*eye, shrink), (place, samples) = self.frame.eye(viewpoint), points
+        (*eye, shrink), (place, samples) = facets.frame.eye(viewpoint), points
         numbers = launch_numbers(
-            "ray_casting.cl", "hidden", samples=samples, eye=eye, other=self.frame.eye(other)[:3], shrink=shrink,
+            "ray_casting.cl", "hidden", samples=samples, eye=eye, other=facets.frame.eye(other)[:3], shrink=shrink,
             depth=self.depth,
         )  # fmt: skip
         buffers = facets.buffer, index, place, self.leaf, self.node, self.base, hidden

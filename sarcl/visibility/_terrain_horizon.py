@@ -9,7 +9,7 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._ray_casting import DeviceFacets, Frame
+from ._frame import DeviceFacets, Frame
 
 FINE = 2  # range lines per cell at the border of the terrain
 

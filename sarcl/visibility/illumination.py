@@ -170,6 +170,7 @@ def lit(
     max_bytes: float | None = None,
     engine: Literal["opencl", "embree"] = "opencl",
     by_facets: np.ndarray | bool = True,
+    occluders: np.ndarray | None = None,
     device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Illumination:
@@ -189,6 +190,7 @@ def lit(
                 anew each time they are asked for
     engine      "opencl", or "embree" for the rays (package embreex; single samples at edges may differ)
     by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
+    occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
     progress    called as progress(block, blocks)
 
     Raises ValueError for an antenna below the terrain. Warns with SarclWarning where nothing at all is illuminated.
@@ -198,6 +200,8 @@ def lit(
     if not isinstance(triangles, np.ndarray) or triangles.dtype != np.float64 or triangles.shape[1:] != (3, 3):
         triangles = array("triangles", triangles, np.float64, ("k", 3, 3))
     k = len(triangles)
+    if occluders is not None:
+        occluders = array("occluders", occluders, np.float64, ("n", 3, 3))
     arguments.progress(progress, "progress(block, blocks)")
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
@@ -229,7 +233,7 @@ def lit(
     slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
-        tolerance=tolerance, engine=engine, by_facets=by_facets,
+        tolerance=tolerance, engine=engine, by_facets=by_facets, occluders=occluders,
     )  # fmt: skip
 
     def look(place: int) -> np.ndarray:

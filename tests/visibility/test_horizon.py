@@ -12,7 +12,7 @@ from sarcl.reference.shadow import CENTROID, overshadowed, sample
 from sarcl.scene.terrain import above
 from sarcl.scene.triangles import areas, centroids, normals
 from sarcl.visibility._illumination_solver import IlluminationSolver
-from sarcl.visibility._ray_casting import LIFT, Frame
+from sarcl.visibility._frame import Frame
 from sarcl.visibility._terrain_horizon import Terrain
 from sarcl.visibility.illumination import lit
 
@@ -73,7 +73,7 @@ def test_horizons_equal_their_twin_away_from_edges(device, viewpoint):
     grid, viewpoint = hills(n=70, height=9.0), np.array(viewpoint)
     triangles = facets_of(grid)
     some = slice(None, None, 11)  # the twin takes its time
-    points = sample(triangles[some], viewpoint, CENTROID, LIFT)[:, 0]
+    points = sample(triangles[some], viewpoint, CENTROID, Frame.around(triangles.reshape(-1, 3)).lift)[:, 0]
     way = viewpoint / np.linalg.norm(viewpoint[:2])
     shifts = TOLERANCE["borderline"] * np.linalg.norm(viewpoint) * np.array([[0, 0, 1], [-3 * way[1], 3 * way[0], 0]])
     near = np.array([overshadowed(grid, points, viewpoint + s * shift) for s in (-1, 1) for shift in shifts])

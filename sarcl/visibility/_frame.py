@@ -1,0 +1,63 @@
+"""Facets on a device in the coordinates of a scene, float32, with the points from which light is looked for."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.boxes import box
+from ..opencl.device import Device
+from ..scene.triangles import edges, normals
+
+# Height above a facet at which rays start, relative to the scene: float32 resolves 1e-7 of it. Coplanar neighbours, and
+# sheets that are modelled twice, do not occlude one another.
+STEP = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class Frame:
+    """Coordinates of facets in float32: (x - center) unit, at most 1 for all corners; unit is a power of two, 1/m."""
+
+    center: np.ndarray
+    unit: float
+
+    @classmethod
+    def around(cls, points: np.ndarray) -> Frame:
+        """The smallest frame that holds points, m (n, 3)."""
+        corners = box(points)
+        half = float((corners[1] - corners[0]).max()) / 2
+        return cls(corners.mean(axis=0), 2.0 ** -np.ceil(np.log2(half)) if half else 1.0)
+
+    @property
+    def lift(self) -> float:
+        """Height above a facet at which rays start, m."""
+        return STEP / self.unit
+
+    def eye(self, viewpoint: np.ndarray) -> tuple[np.float32, np.float32, np.float32, np.float32]:
+        """A viewpoint, m (3,), in the frame, and the power of two that scales its distance to about 1."""
+        at = (np.asarray(viewpoint, np.float64) - self.center) * self.unit
+        shrink = 2.0 ** -np.ceil(np.log2(max(float(np.abs(at).max()), 1.0)))
+        x, y, z = at.astype(np.float32)
+        return x, y, z, np.float32(shrink)
+
+
+class DeviceFacets:
+    """Facets on a device, m (k, 3, 3), whose illumination is computed.
+
+    frame      holds all that can occlude them too
+    one_sided  (k,) bool: not illuminated from behind
+    """
+
+    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
+        self.device, self.frame, self.size = device, frame, len(triangles)
+        self.length = np.maximum.reduce(edges(triangles))
+        a = triangles[:, 0]
+        parts = (
+            (a - frame.center) * frame.unit,
+            (triangles[:, 1] - a) * frame.unit,
+            (triangles[:, 2] - a) * frame.unit,
+            normals(triangles) * STEP,
+        )
+        self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
+        self.side = device.upload(one_sided.astype(np.uint8))
