@@ -93,6 +93,7 @@ ECHO_SAMPLE = 0.03  # per sample
 ECHO_POINT, ECHO_FACET = 0.02, 0.16  # per scatterer
 
 # Spectral echoes, in us (2026-11-22).
+LIT_PART = 20.0  # per pulse, of a facet past some ten others (2026-11-26)
 SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 0.05  # per scatterer and function of aspect: amplitudes, weights of antennas
 SPECTRAL_PLANES = 0.4  # per facet: numbers for the kernel of the amplitudes
 SPECTRAL_SPREAD = 0.1  # per scatterer spread over the map

@@ -68,7 +68,7 @@ class CuttingError:
         self._triangles, self._two_sided = scene.triangles[some], scene.two_sided[some]
         self._length = np.maximum.reduce(edges(self._triangles)) if len(some) else np.zeros(0)
         self._every = len(some) == int(mirror.sum()) and len(antennas.tx) <= FEW_PULSES
-        if self._every:
+        if self._every and len(some):
             self._plane = coplanar_groups(scene, some, facet_kinds.random(scene)[some])
             self._waves = lobe_wavenumbers(center, bandwidth, self._triangles, self._plane)
         self._columns = [2 * "HV".index(name[0]) + "HV".index(name[1]) for name in polarizations]

@@ -71,7 +71,8 @@ class FacetNorm:
         self._triangles = scene.triangles[np.concatenate(group)] if group else np.zeros((0, 3, 3))
         self._group = np.repeat(np.arange(len(group)), [len(g) for g in group])
         self._length = np.maximum.reduce(edges(self._triangles)) if group else np.zeros(0)
-        self._wavenumbers = lobe_wavenumbers(center, bandwidth, self._triangles, self._group)
+        if group:
+            self._wavenumbers = lobe_wavenumbers(center, bandwidth, self._triangles, self._group)
         self._planes: np.ndarray | None = None
         self._facets: np.ndarray | None = None
         self._gains: dict[float, tuple[float, float]] = {}

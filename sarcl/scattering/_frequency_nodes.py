@@ -31,14 +31,19 @@ def over_band(
     the powers 1 and 0; [0] is not used.
 
     Facets are cut to edge, m, those that are no mirrors (k,) to finest. The error is that of the worst of four pulses,
-    in L2 over up to 96 facets: twice the sum of the Chebyshev coefficients from the n-th on.
+    in L2 over up to 96 facets: twice the sum of the Chebyshev coefficients from the n-th on. Mirrors are looked at
+    apart: the pieces of a specular one add up in phase, and so do their errors, however many rough facets there are.
     """
-    part = _sample(scene, mirror, edge, finest)
-    for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
-        found = _errors(part, antennas, pulses, polarizations, vertical, center, bandwidth)
-        if found is not None:
-            return found
-    return {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+    out = {power: [np.inf] + [0.0] * MOST_NODES for power in (1, 0)}
+    for which in (mirror, ~mirror):
+        if which.any():
+            part = _sample(scene, mirror, edge, finest, which)
+            for pulses in (PULSES, 16 * PULSES):  # more pulses where these see nothing
+                found = _errors(part, antennas, pulses, polarizations, vertical, center, bandwidth)
+                if found is not None:
+                    out = {power: np.maximum(errors, found[power]).tolist() for power, errors in out.items()}
+                    break
+    return out
 
 
 def crossed(
@@ -50,7 +55,7 @@ def crossed(
     in float32 is that of the fields in all of them."""
     if any(name[0] == name[1] for name in polarizations):
         return 1.0
-    part, asked, whole = _sample(scene, mirror, edge, finest), 0.0, 0.0
+    part, asked, whole = _sample(scene, mirror, edge, finest, np.ones(len(mirror), bool)), 0.0, 0.0
     some = [POLARIZATIONS.index(name) for name in polarizations]
     for pulse in spread_over(len(antennas.tx), 16 * PULSES):
         ends = antennas.tx[pulse], antennas.rx[pulse]
@@ -91,13 +96,14 @@ def typical_power(powers: np.ndarray) -> float:
     return float(np.sort(powers)[: len(powers) - int(BRIGHTEST * len(powers))].sum())
 
 
-def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float) -> FacetSet:
-    """Facets, each shrunk to the size of its pieces after cutting, somewhere on it.
+def _sample(scene: Scene, mirror: np.ndarray, edge: float, finest: float, which: np.ndarray) -> FacetSet:
+    """Facets, of those `which` (k,), each shrunk to the size of its pieces after cutting, somewhere on it.
 
     All count alike: large facets, which are drawn more often, are cut into more pieces.
     """
     random = np.random.default_rng(0)
-    some, _ = drawn(areas(scene.triangles), FACETS, random)
+    some = np.flatnonzero(which)
+    some = some[drawn(areas(scene.triangles[some]), FACETS, random)[0]]
     triangles = scene.triangles[some]
     shrink = np.minimum(1.0, np.where(mirror[some], edge, finest) / np.maximum.reduce(edges(triangles)))
     middle = centroids(triangles)[:, None]

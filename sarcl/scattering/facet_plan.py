@@ -19,7 +19,7 @@ from ..numerics import cost_model
 from ..numerics.polynomials import chebyshev, lagrange
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
-from ..scene.triangles import centroids, edges
+from ..scene.triangles import centroids, distances, edges
 from ._cutting_error import CuttingError
 from ._direction_error import DirectionError
 from ._frequency_nodes import crossed, over_band
@@ -107,7 +107,7 @@ def plan_facets(
     exact: FacetPlan | None = None
     directions = DirectionError(scene, mirror, antennas, highest, polarizations, vertical)
     cutting = CuttingError(scene, mirror, antennas, center, bandwidth, polarizations, vertical, directions.steep)
-    if scene.roughness.any():
+    if scene.roughness.any() or not mirror.any():
         finest = min(finest, cell)
     least, least_rounding, edge, fine, turn = np.inf, np.inf, min(top, finest), False, 0.0
 
@@ -208,7 +208,8 @@ def _at_most(
 
 
 def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
-    """Lower bound of the distance of an antenna to a facet, m: by the box of all, or by centroids if that is near."""
+    """Lower bound of the distance of an antenna to a facet, m: by the box of all, by centroids where facets are small
+    beside it, else exactly."""
     distance = antennas.distance(bounds)
     if distance > float(np.linalg.norm(bounds[1] - bounds[0])):
         return distance
@@ -217,11 +218,10 @@ def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
     tree = cKDTree(centroids(scene.triangles))
     away = min(float(tree.query(end)[0].min()) for end in antennas.ends)
     found = away - TO_CORNER * float(np.maximum.reduce(edges(scene.triangles)).max())
+    if found < away / 2:
+        found = min(float(distances(scene.triangles, at).min()) for end in antennas.ends for at in end)
     if max(found, distance) <= 0:
-        raise ValueError(
-            f"an antenna comes within {away:.3g} m of a facet that is as large; move the track away from the scene, "
-            "or cut its facets first: scene.split(max_edge)"
-        )
+        raise ValueError("an antenna stands on a facet; move the track away from the scene")
     return max(found, distance)
 
 

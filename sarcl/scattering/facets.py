@@ -133,13 +133,17 @@ class FacetSet:
         that of the share."""
         if self.sampled is not None:
             share = np.where(self.sampled, share, np.uint8(255))
-        random = np.array([np.isinf(m.height) for m in self.materials])[self.material]
-        if self.incoherent is not None:
-            random |= self.incoherent
+        random = self.is_incoherent
         if not random.any():
             return share
         root = np.rint(np.sqrt(np.arange(256) * 255.0)).astype(np.uint8)
         return np.where(random, root[share], share)
+
+    @property
+    def is_incoherent(self) -> np.ndarray:
+        """Facets (k,) that have no coherent part."""
+        out = np.array([np.isinf(m.height) for m in self.materials])[self.material]
+        return out if self.incoherent is None else out | self.incoherent
 
     @property
     def is_rough(self) -> bool:

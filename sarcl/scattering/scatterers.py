@@ -17,12 +17,12 @@ from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import ALL_DARK, lit
-from ..visibility.lit_parts import LitParts, is_affordable
+from ..visibility.lit_parts import LitParts
 from .facet_kinds import coherent
 from .facets import FacetSet
 from .random_surface import Pieces
 
-# pairs of facet and pulse, up to which smooth facets of a terrain are clipped against it: about ten seconds
+# pairs of piece and pulse, up to which rough facets, and those of a terrain, are clipped too: about ten seconds
 FEW_LOOKS = 2e6
 
 
@@ -82,10 +82,9 @@ def facets_of(
         keep &= ~away
     tell(2)
     illumination, lit_parts = None, None
-    mirrors = coherent(scene) & ~pieces.incoherent
     clipped = np.zeros(len(keep), bool)
-    if shadows and exact and is_affordable(scene.triangles[keep & mirrors], given.triangles, antennas.ends):
-        clipped = mirrors
+    if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
+        clipped |= (coherent(scene) & ~pieces.incoherent) | (int(keep.sum()) * n_pulses <= FEW_LOOKS)
     # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
     by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
     sampled = keep if by_horizons else keep & ~clipped
@@ -107,6 +106,7 @@ def facets_of(
         lit_parts = LitParts(
             device, scene.triangles, solid if by_horizons else given.triangles, antennas.ends,
             two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
+            given=given.triangles, of=pieces.of,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():

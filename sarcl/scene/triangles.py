@@ -93,6 +93,23 @@ def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.n
     return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
 
 
+def distances(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
+    """Distance of each triangle (k, 3, 3) from a point (3,), m (k,)."""
+    ahead, normal = triangles - point, _cross(triangles)
+    squared = dot(normal, normal)
+    nearest = np.full(len(triangles), np.inf)
+    inside = np.ones(len(triangles), bool)
+    for i in range(3):
+        a, b = ahead[:, i], ahead[:, (i + 1) % 3]
+        along = b - a
+        part = np.clip(-dot(a, along) / np.maximum(dot(along, along), 1e-300), 0, 1)[:, None]
+        foot = a + part * along
+        nearest = np.minimum(nearest, dot(foot, foot))
+        inside &= dot(np.cross(a, b), normal) >= 0  # the foot of the perpendicular is on the inner side of this edge
+    height = dot(ahead[:, 0], normal) ** 2 / np.maximum(squared, 1e-300)
+    return np.sqrt(np.where(inside & (squared > 0), height, nearest))
+
+
 def highest(triangles: np.ndarray, x: float, y: float) -> float | None:
     """Largest z of triangles (k, 3, 3) at (x, y); None where there is no triangle."""
     if len(triangles) == 0:

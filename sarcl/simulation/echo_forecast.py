@@ -141,12 +141,11 @@ def plan_spectral_echo(
     validation.choice("variant", variant, ("exact", "saras"))
     request = echo_request(scene, SKIPS, tolerance=tolerance, **{k: v for k, v in options.items() if k in REQUEST})
     task = spectral_task(scene, waveform, track, request, **{k: v for k, v in options.items() if k in TASK})
-    prepared, parts, error = task.planned(variant)
+    prepared, parts, direct, error = task.planned(variant)
     rows, n_samples = len(track) * len(request.polarizations), len(task.frequencies)
-    largest = max(parts, key=lambda part: part.predicted_error)
     return EchoForecast(
-        rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), task.seconds(prepared, parts),
-        float(rows) * sum(len(part.some) for part in parts), {**largest.describe(), **task.motion}, error,
+        rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), task.seconds(parts, direct),
+        float(rows) * len(prepared), {**task.describe(parts, direct), **task.motion}, error,
     )  # fmt: skip
 
 
@@ -160,7 +159,7 @@ def _spectral(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
             warnings.simplefilter(
                 "ignore", errors.SarclWarning
             )  # those of the mesh came with the pulses that were timed
-            prepared, parts, _ = task.planned("exact")
+            _, parts, direct, _ = task.planned("exact")
     except (errors.NotApplicable, errors.NothingSeen, errors.ToleranceUnreachable) as refused:
         return None, str(refused)
-    return task.seconds(prepared, parts), ""
+    return task.seconds(parts, direct), ""

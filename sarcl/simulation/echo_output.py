@@ -75,6 +75,14 @@ class EchoOutput:
             rows = block.reshape(-1, self.shape[-1])
             self.writer.samples[start * self.a_pulse : start * self.a_pulse + len(rows)] = rows
 
+    def add(self, start: int, block: np.ndarray) -> None:
+        """Add to the samples of some pulses that were kept."""
+        if self.writer is None:
+            self.whole[start : start + len(block)] += block
+        else:
+            rows = slice(start * self.a_pulse, (start + len(block)) * self.a_pulse)
+            self.writer.samples[rows] = self.writer.samples[rows] + block.reshape(-1, self.shape[-1])
+
     def keep_frequencies(self, first: int, block: np.ndarray) -> None:
         """Store the samples of all pulses at some frequencies, (n_pulses, ..., n), from index `first` on."""
         at = slice(first, first + block.shape[-1])

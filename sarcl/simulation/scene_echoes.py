@@ -117,6 +117,19 @@ class SceneEchoes:
         rows = None if self.facets is None else self.facets.lit_rows
         return {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
 
+    def partly_lit(self, antennas: PulseGeometry, waveform: Waveform) -> SceneEchoes | None:
+        """The facets alone of which some pulse sees a part past others, on the device; None where there are none."""
+        if self.facets is None or self.subdivision is None or self.facets.lit_parts is None:
+            return None
+        partly = [part for part in self.facets.split() if part.lit_parts is not None]
+        if not partly:
+            return None
+        request, plan = self.request, self.subdivision.plan
+        tiled = TiledFacets(
+            request.device, partly[0], plan, antennas, waveform, self.weights, request.polarizations, request.vertical
+        )
+        return replace(self, points=None, facets=partly[0], tiled_points=None, tiled_facets=(tiled,))
+
     def channel(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int = 0
     ) -> ChannelEchoes:
@@ -267,7 +280,7 @@ class ChannelEchoes:
 
 def prepare_scene(
     request: EchoRequest, original_scene: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry,
-    weights: AntennaWeights, bands: Iterable[Band], margin: float = 0.0, tiled: bool = True,
+    weights: AntennaWeights, bands: Iterable[Band], margin: float = 0.0, tiled: bool = True, exact: bool = True,
 ) -> SceneEchoes:  # fmt: skip
     """A scene prepared for its echoes.
 
@@ -275,6 +288,7 @@ def prepare_scene(
     bands           of all samples that will be asked for
     margin          m: elements of an array stand up to this far from the antennas
     tiled           False: no scatterers are put on the device, for callers that do not spread them into range profiles
+    exact           False: shadows on facets are shares, by sampled rays
     ToleranceUnreachable where these cannot meet the tolerance; NothingSeen where no scatterer is left.
     """
     refuse_unseen(scene, weights, waveform, antennas, request.gated, margin)
@@ -300,7 +314,7 @@ def prepare_scene(
         facets, left_out = facets_of(
             pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
-            exact=tiled and request.shadows is True, margin=margin,
+            exact=exact and request.shadows is True, margin=margin,
         )  # fmt: skip
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
         if facets is not None and tiled and not facet_plan.is_float64:

@@ -39,7 +39,7 @@ class IlluminationSolver:
     ) -> None:
         self.device, k = device, len(triangles)
         on = np.full(k, heights is not None) if on_heights is None else on_heights
-        solid = triangles[~on] if occluders is None else occluders
+        solid = triangles[~on] if occluders is None else np.reshape(occluders, (-1, 3, 3))
         self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid]), heights))
         self.terrain = None if heights is None else Terrain(device, heights, frame)
         one_sided = np.broadcast_to(~np.asarray(two_sided), k)

@@ -8,23 +8,29 @@ import numpy as np
 
 from ..base.boxes import box, corners
 from ..base.vectors import unit
+from ..scene.triangles import distances
 
 PAIRS_AT_ONCE = 2**20  # pairs tested per array operation: bounds the memory on the host
 CLOSE = 0.5  # of the scene's diagonal: antennas nearer to its middle than this beyond the scene see it at wide angles
+RIGHT = np.radians(89)
 MOST_ENTRIES = 2**23  # entries of boxes in the cells of a grid: with more, cells are made larger
 
 
 def candidate_pairs(
-    receivers: np.ndarray, occluders: np.ndarray, viewpoint: np.ndarray, turn: float, casts: Callable[..., np.ndarray]
-) -> np.ndarray:
+    receivers: np.ndarray, occluders: np.ndarray, viewpoint: np.ndarray, turn: float, reach: float,
+    casts: Callable[..., np.ndarray],
+) -> np.ndarray:  # fmt: skip
     """Pairs (n, 2) of indices of receivers and occluders that may meet on a line of sight, in the order of receivers.
 
     receivers, occluders  corners, m (k, 3, 3);  viewpoint  an antenna, m (3,)
-    turn   rad: directions of other antennas of the block differ from the viewpoint's by no more than this
-    casts  casts(pairs) -> bool (n,): which pairs are kept after an exact test
+    turn, reach  rad and m: directions of other antennas of the block differ from the viewpoint's by no more than this,
+                 and they stand no farther from it
+    casts        casts(pairs) -> bool (n,): which pairs are kept after an exact test
 
     Both are seen in perspective from the viewpoint, where boxes that overlap are found by a grid of cells. A shadow
     that falls a distance s behind its occluder moves by at most s turn across the line of sight from pulse to pulse.
+    Near the scene, or in it, boxes are those of cones of directions, which other antennas see turned by up to
+    asin(reach/distance).
     """
     if not len(receivers) or not len(occluders):
         return np.zeros((0, 2), np.int64)
@@ -33,12 +39,53 @@ def candidate_pairs(
     axis = unit(bounds.mean(axis=0) - viewpoint) if np.any(bounds.mean(axis=0) != viewpoint) else np.zeros(3)
     nearest = float(((corners(bounds) - viewpoint) @ axis).min())
     if nearest < CLOSE * diagonal:
-        return _joined(_every_pair(len(receivers), len(occluders)), casts)
+        seen, shading = (_cones(part, viewpoint, reach) for part in (receivers, occluders))
+        shading, index = _around(shading, seen[0][:, 1].min(), seen[1][:, 1].max())
+        pairs = (np.stack([pair[:, 0], index[pair[:, 1]]], axis=1) for pair in _overlapping(seen, shading))
+        return np.unique(_joined(pairs, casts), axis=0)
     sideways = np.linalg.svd(axis[None])[2][1:]
     seen, shading = (_seen(part, viewpoint, axis, sideways) for part in (receivers, occluders))
     widest = max(float(np.abs(side).max()) for boxes in (seen, shading) for side in boxes)
     margin = turn * diagonal / nearest * (1 + widest**2) + 1e-9 * diagonal / nearest
     return _joined(_overlapping((seen[0] - margin, seen[1] + margin), shading), casts)
+
+
+def _cones(triangles: np.ndarray, viewpoint: np.ndarray, reach: float) -> tuple[np.ndarray, np.ndarray]:
+    """Least and largest z, and azimuth, of directions in which antennas up to `reach`, m, from the viewpoint see
+    triangles (k, 2) each.
+
+    A cone about a triangle's corners of less than a right angle holds the triangle; of others all directions count.
+    """
+    ahead, away = triangles - viewpoint, distances(triangles, viewpoint)
+    ways = ahead / np.maximum(np.linalg.norm(ahead, axis=2, keepdims=True), 1e-300)
+    axis = ways.sum(axis=1)
+    length = np.linalg.norm(axis, axis=1)
+    axis /= np.maximum(length, 1e-300)[:, None]
+    half = np.arccos(np.clip(np.einsum("kij,kj->ki", ways, axis).min(axis=1), -1, 1))
+    known = (away > reach) & (half < RIGHT) & (length > 0)
+    half = half + np.arcsin(np.minimum(reach / np.maximum(away, 1e-300), 1)) + 1e-7
+    elevation, azimuth = np.arcsin(np.clip(axis[:, 2], -1, 1)), np.arctan2(axis[:, 1], axis[:, 0])
+    low, high = elevation - half, elevation + half
+    pole = ~known | (low <= -np.pi / 2) | (high >= np.pi / 2)
+    wide = np.where(pole, np.pi, np.arcsin(np.minimum(np.sin(half) / np.maximum(np.cos(elevation), 1e-300), 1)))
+    azimuth = np.where(pole, 0.0, azimuth)
+    z = [np.where(known, np.sin(np.clip(side, -np.pi / 2, np.pi / 2)), end) for side, end in ((low, -1.0), (high, 1.0))]
+    return np.stack([z[0], azimuth - wide], axis=1), np.stack([z[1], azimuth + wide], axis=1)
+
+
+def _around(
+    boxes: tuple[np.ndarray, np.ndarray], least: float, most: float
+) -> tuple[tuple[np.ndarray, np.ndarray], np.ndarray]:
+    """Boxes of z and azimuth, and again whole turns away where azimuths lie from `least` to `most`, rad; and the index
+    of each (n,)."""
+    low, high = boxes
+    copies = [
+        (turn, np.flatnonzero((low[:, 1] + turn <= most) & (high[:, 1] + turn >= least)))
+        for turn in (0.0, 2 * np.pi, -2 * np.pi)
+    ]
+    index = np.concatenate([some for _, some in copies])
+    shift = np.concatenate([np.full((len(some), 1), turn) for turn, some in copies]) * [0.0, 1.0]
+    return (low[index] + shift, high[index] + shift), index
 
 
 def _seen(
@@ -48,14 +95,6 @@ def _seen(
     ahead = triangles - viewpoint
     place = (ahead @ sideways.T) / (ahead @ axis)[..., None]
     return place.min(axis=1), place.max(axis=1)
-
-
-def _every_pair(n: int, m: int) -> Iterator[np.ndarray]:
-    """All pairs in blocks, as `_overlapping` yields them."""
-    step = max(1, PAIRS_AT_ONCE // m)
-    for first in range(0, n, step):
-        rows = np.arange(first, min(first + step, n))
-        yield np.stack([np.repeat(rows, m), np.tile(np.arange(m), len(rows))], axis=1)
 
 
 def _overlapping(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import copy
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 
 import numpy as np
 
@@ -15,7 +15,7 @@ from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.triangles import areas, centroids, edges, normals
 from ._aspect_blocks import pulse_blocks, shadow_length
-from ._shadow_pairs import CLOSE, PAIRS_AT_ONCE, candidate_pairs
+from ._shadow_pairs import PAIRS_AT_ONCE, candidate_pairs
 
 KERNELS = "lit_parts.cl"
 SHADOW = 15  # numbers of a shadow, as in the kernels
@@ -28,42 +28,31 @@ SLACK = 1e-12
 # touch within the digits of float32 files, do not shadow one another
 ON_PLANE = 1e-6
 MOST_TURN = 0.5  # of the usual occluder's width, by which shadows may move within a block of pulses
-MOST_NEAR = 2e9  # facets times occluders times pulses of antennas near a scene, which test all pairs: some minutes
-
-
-def is_affordable(triangles: np.ndarray, occluders: np.ndarray, ends: list[np.ndarray]) -> bool:
-    """Whether lit parts take minutes at most: False for large scenes close to an antenna, where all pairs are tested.
-
-    Arguments as of `LitParts`.
-    """
-    if len(triangles) * len(occluders) * len(ends[0]) <= MOST_NEAR:
-        return True
-    bounds = box(occluders.reshape(-1, 3))
-    reach = (0.5 + CLOSE) * float(np.linalg.norm(bounds[1] - bounds[0]))
-    middle = bounds.mean(axis=0)
-    return all(float(np.linalg.norm(end - middle, axis=1).min()) > reach for end in ends)
 
 
 @dataclass(frozen=True, eq=False)
 class _Block:
-    """Pulses first ... stop - 1, and pairs (n, 2) of a partly lit facet and an occluder, in the order of facets.
+    """Pulses first ... stop - 1, and pairs (n, 2) of a partly lit piece and an occluder, in the order of pieces.
 
-    antennas  m (3,), and turn, rad: as `_pairs` takes them to find the pairs anew where `pairs` is None
+    antennas  m (3,), turn, rad, and reach, m: as `_pairs` takes them
+    parents   pairs of a given facet that is not seen whole and an occluder;  pairs  None: to be found anew
     """
 
     first: int
     stop: int
     antennas: list[np.ndarray]
     turn: float
+    reach: float
+    parents: np.ndarray
     pairs: np.ndarray | None
 
 
 class LitParts:
-    """Facets, m (k, 3, 3), and others that occlude them, m (n, 3, 3), from antennas along a track.
+    """Pieces of facets, m (k, 3, 3), and others that occlude them, m (n, 3, 3), from antennas along a track.
 
     A device without float64 leaves this to another one on the machine; NoDeviceError where there is none.
-    dark    (k,) bool: facets of which no pulse sees anything
-    partly  (k,) bool: the other facets of which some pulse sees a part, or nothing
+    dark    (k,) bool: pieces of which no pulse sees anything
+    partly  (k,) bool: the other pieces of which some pulse sees a part, or nothing
     """
 
     def __init__(
@@ -77,63 +66,95 @@ class LitParts:
         wanted: np.ndarray,
         max_bytes: float,
         margin: float = 0.0,
+        given: np.ndarray | None = None,
+        of: np.ndarray | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
-        two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: facets whose lit part
+        two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: pieces whose lit part
         is computed;  max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
+        given  facets, m (m, 3, 3), of which the pieces are parts, and `of` which (k,): default each its own. What
+               pulses see of these is found first, and then of the pieces of those that are not seen whole
         """
         self.device, self.max_bytes, self._margin, self._first = with_float64(device), max_bytes, margin, 0
-        points = np.concatenate([triangles.reshape(-1, 3), occluders.reshape(-1, 3)])
-        bounds = box(points)
+        if given is None or of is None:
+            given, of = triangles, np.arange(len(triangles))
+        bounds = box(np.concatenate([given.reshape(-1, 3), occluders.reshape(-1, 3)]))
         self._origin = bounds.mean(axis=0)
-        size = float(np.linalg.norm(bounds[1] - bounds[0]))
-        self._on_plane = ON_PLANE * size
+        self._on_plane = ON_PLANE * float(np.linalg.norm(bounds[1] - bounds[0]))
         keep = np.flatnonzero(wanted & (areas(triangles) > 0))
-        solid = occluders[areas(occluders) > 0]
-        self._bounds = bounds
-        self._receivers = _Receivers(keep, triangles[keep], two_sided[keep])
-        self._occluders = solid
+        self._bounds, self._occluders = bounds, occluders[areas(occluders) > 0]
+        self._pieces = Receivers(keep, triangles[keep], two_sided[keep])
+        self._parent, first = np.unique(of[keep], return_index=True)
+        parents = Receivers(self._parent, given[self._parent], two_sided[keep][first])
+        self._child = np.searchsorted(self._parent, of[keep])  # the parent of each piece
+        self._cut = len(parents.index) < len(keep)
         self._blocks: list[_Block] = []
         self.dark, self.partly = np.zeros((2, len(triangles)), bool)
-        if len(keep) and len(solid):
-            self._look(ends)
+        if len(keep) and len(self._occluders):
+            self._look(parents, ends)
         self._rows = np.flatnonzero(self.partly[keep])
 
-    def _look(self, ends: list[np.ndarray]) -> None:
-        """Find blocks of pulses, the pairs of each within `max_bytes`, and which facets are dark or partly lit."""
+    def _look(self, parents: Receivers, ends: list[np.ndarray]) -> None:
+        """Find blocks of pulses, the pairs of each within `max_bytes`, and which pieces are dark or partly lit."""
         bounds, kept = self._bounds, 0
         width = float(np.median(np.sqrt(areas(self._occluders))))
         limits = [MOST_TURN * width / max(shadow_length(bounds, end), 1e-300) for end in ends]
         blocks, viewpoints, turns = pulse_blocks(ends, bounds, limits)
-        dark_pulses = np.zeros(len(self._receivers.index), np.int64)
-        changing = np.zeros(len(self._receivers.index), bool)
+        dark_pulses = np.zeros(len(self._child), np.int64)
+        changing = np.zeros(len(self._child), bool)
         for (first, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
-            at = [end[viewpoint] for end in ends]
-            pairs = self._pairs(at, turn)
-            which = np.unique(pairs[:, 0])
-            here = np.zeros(len(changing), bool)
-            if self._margin:  # other antennas may see what these do not
-                here[which] = True
-            else:
-                antennas = [end[first:stop] for end in ends]
-                for some, share, _ in self._light(which, pairs, antennas, np.zeros(0)):
-                    dark_pulses[which[some]] += (share == 0).sum(axis=0)
-                    here[which[some]] = (share < 1).any(axis=0)
+            at, antennas = [end[viewpoint] for end in ends], [end[first:stop] for end in ends]
+            reach = self._margin + max(
+                float(np.linalg.norm(end[first:stop] - end[viewpoint], axis=1).max()) for end in ends
+            )
+            pairs = self._pairs(parents, at, turn, reach, self._occluders)
+            if self._cut:
+                here, _ = self._seen(parents, pairs, antennas)
+                pairs = pairs[here[pairs[:, 0]]]
+            block = _Block(first, stop, at, turn, reach, pairs, None)
+            pairs = self._pairs_of_pieces(block)
+            here, dark = self._seen(self._pieces, pairs, antennas)
+            dark_pulses += dark
             changing |= here
             pairs = pairs[here[pairs[:, 0]]]
             kept += pairs.nbytes
-            self._blocks.append(_Block(first, stop, at, turn, pairs if kept <= self.max_bytes else None))
+            self._blocks.append(replace(block, pairs=pairs if kept <= self.max_bytes else None))
         dark = dark_pulses == len(ends[0])
-        self.dark[self._receivers.index], self.partly[self._receivers.index] = dark, changing & ~dark
+        self.dark[self._pieces.index], self.partly[self._pieces.index] = dark, changing & ~dark
+
+    def _seen(
+        self, receivers: Receivers, pairs: np.ndarray, antennas: list[np.ndarray]
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Receivers of which some pulse does not see the whole (n,) bool, and how many pulses see nothing of each."""
+        which = np.unique(pairs[:, 0])
+        here, dark = np.zeros(len(receivers.index), bool), np.zeros(len(receivers.index), np.int64)
+        if self._margin:  # other antennas may see what these do not
+            here[which] = True
+            return here, dark
+        for some, share, _ in self._light(receivers, which, pairs, antennas, np.zeros(0)):
+            dark[which[some]] = (share == 0).sum(axis=0)
+            here[which[some]] = (share < 1).any(axis=0)
+        return here, dark
 
     def _pairs_of(self, block: _Block) -> np.ndarray:
-        """The pairs of a block, of the facets that are partly lit."""
-        pairs = self._pairs(block.antennas, block.turn) if block.pairs is None else block.pairs
-        return np.asarray(pairs[self.partly[self._receivers.index[pairs[:, 0]]]])
+        """The pairs of a block, of the pieces that are partly lit."""
+        pairs = self._pairs_of_pieces(block) if block.pairs is None else block.pairs
+        return np.asarray(pairs[self.partly[self._pieces.index[pairs[:, 0]]]])
 
-    def _pairs(self, antennas: list[np.ndarray], turn: float) -> np.ndarray:
-        """Pairs of a facet and an occluder that may cast a shadow on it from pulses near one."""
-        r = self._receivers
+    def _pairs_of_pieces(self, block: _Block) -> np.ndarray:
+        """Pairs of a piece and an occluder that may shade it, among the pairs of the facets that they are parts of."""
+        if not self._cut:
+            return block.parents
+        parents = np.unique(block.parents[:, 0])
+        solid = np.unique(block.parents[:, 1])
+        some = np.flatnonzero(np.isin(self._child, parents))
+        pairs = self._pairs(self._pieces.part(some), block.antennas, block.turn, block.reach, self._occluders[solid])
+        return np.stack([some[pairs[:, 0]], solid[pairs[:, 1]]], axis=1)
+
+    def _pairs(
+        self, r: Receivers, antennas: list[np.ndarray], turn: float, reach: float, solid: np.ndarray
+    ) -> np.ndarray:
+        """Pairs of a receiver and an occluder, m (n, 3, 3), that may cast a shadow on it from pulses near one."""
         away = min(float(np.linalg.norm(at - np.clip(at, *self._bounds))) for at in antennas)
         turn = min(turn + 1e-6 + (2 * self._margin / away if away else 2.0) * (self._margin > 0), 2.0)
         cosines = [dot(r.normal, unit(at - r.center)) for at in antennas]
@@ -144,11 +165,11 @@ class LitParts:
 
         def casts(pairs: np.ndarray) -> np.ndarray:
             which = seen[pairs[:, 0]]
-            heights = ((self._occluders[pairs[:, 1]] - r.center[which, None]) * r.normal[which, None]).sum(axis=2)
+            heights = ((solid[pairs[:, 1]] - r.center[which, None]) * r.normal[which, None]).sum(axis=2)
             above, below = heights.max(axis=1) > self._on_plane, heights.min(axis=1) < -self._on_plane
             return np.asarray((front[which] & above) | (back[which] & below))
 
-        found = [candidate_pairs(r.triangles[seen], self._occluders, at, turn, casts) for at in antennas]
+        found = [candidate_pairs(r.triangles[seen], solid, at, turn, reach, casts) for at in antennas]
         pairs = found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0)
         pairs[:, 0] = seen[pairs[:, 0]]
         return pairs
@@ -167,7 +188,9 @@ class LitParts:
             here = slice(max(block.first - first, 0), min(block.stop - first, n))
             if here.start < here.stop:
                 antennas = [end[here] for end in ends]
-                for some, part_share, part_mean in self._light(self._rows, self._pairs_of(block), antennas, waves):
+                for some, part_share, part_mean in self._light(
+                    self._pieces, self._rows, self._pairs_of(block), antennas, waves
+                ):
                     share[here, some], mean[here, some] = part_share, part_mean
         return share, mean
 
@@ -191,9 +214,9 @@ class LitParts:
         return out
 
     def _light(
-        self, which: np.ndarray, pairs: np.ndarray, ends: list[np.ndarray], waves: np.ndarray
+        self, receivers: Receivers, which: np.ndarray, pairs: np.ndarray, ends: list[np.ndarray], waves: np.ndarray
     ) -> Iterator[tuple[slice, np.ndarray, np.ndarray]]:
-        """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, increasing; in parts, each with its slice.
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of `which`, increasing; in parts, each with its slice.
 
         pairs  (., 2), of these facets, in their order
         """
@@ -208,17 +231,25 @@ class LitParts:
             here = pairs[begins[some.start] : begins[some.stop], 1]
             yield (
                 some,
-                *self._computed(which[some], begins[some.start : some.stop + 1] - begins[at], here, antennas, waves),
+                *self._computed(
+                    receivers, which[some], begins[some.start : some.stop + 1] - begins[at], here, antennas, waves
+                ),
             )
             at = some.stop
 
     def _computed(
-        self, which: np.ndarray, begins: np.ndarray, occluder: np.ndarray, antennas: np.ndarray, waves: np.ndarray
+        self,
+        facets: Receivers,
+        which: np.ndarray,
+        begins: np.ndarray,
+        occluder: np.ndarray,
+        antennas: np.ndarray,
+        waves: np.ndarray,
     ) -> tuple[np.ndarray, np.ndarray]:
         """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
         device, n_pairs = self.device, max(len(occluder), 1)
         cast = device.kernel(KERNELS, "cast_shadows", ENDS=antennas.shape[1], WAVES=0)
-        receivers = device.upload(self._receivers.packed(which, self._origin, self._on_plane))
+        receivers = device.upload(facets.packed(which, self._origin, self._on_plane))
         (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
         size = pulses * ends * n_pairs
         shadows, corners = device.empty(size * SHADOW * 8), device.empty(size)
@@ -248,7 +279,7 @@ class LitParts:
 
 
 @dataclass(frozen=True, eq=False)
-class _Receivers:
+class Receivers:
     """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect."""
 
     index: np.ndarray
@@ -260,6 +291,10 @@ class _Receivers:
     def __post_init__(self) -> None:
         object.__setattr__(self, "center", centroids(self.triangles))
         object.__setattr__(self, "normal", normals(self.triangles))
+
+    def part(self, some: np.ndarray) -> Receivers:
+        """Some of them."""
+        return Receivers(self.index[some], self.triangles[some], self.two_sided[some])
 
     def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
         """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""

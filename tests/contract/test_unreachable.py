@@ -268,7 +268,7 @@ PLANTED = {
     ),
     "shadows on rough facets": (
         "sarcl.scattering.scatterers._half_cell",
-        lambda: sarcl.echo(
+        lambda: sarcl.spectral_echo(
             shapes.box((0.5, 0.4, 0.3), material=sarcl.Material(diagram="cos")), CHIRP, track(), tolerance=1e-1
         ),
     ),

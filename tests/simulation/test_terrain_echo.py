@@ -61,7 +61,8 @@ SCENES = {
 
 
 @pytest.mark.parametrize("name", SCENES)
-def test_horizons_and_rays_give_the_same_echoes(name, terrains):
+def test_horizons_and_rays_give_the_same_echoes(name, terrains, monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
     scene = SCENES[name]()
     options = {"tolerance": 1e-2, "check": False, "max_edge": 0.5}
     by_horizons = sarcl.echo(scene, WAVE, track(), **options)
@@ -106,7 +107,8 @@ def test_scenes_keep_heights_as_long_as_they_are_theirs():
     assert facets_on(made.heights, made.triangles).all() and 0.1 < (made.heights[2] - rough.heights[2]).std() < 0.3
 
 
-def test_what_is_no_longer_all_of_a_terrain_is_traced(terrains):
+def test_what_is_no_longer_all_of_a_terrain_is_traced(terrains, monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
     scene = hills(n=20)
     holed = scene.part(np.arange(len(scene.triangles)) != 7)
     shifted = replace(scene, triangles=scene.triangles + np.array([0, 0, 0.5]))
@@ -140,7 +142,8 @@ def test_other_ray_casters_are_refused():
         sarcl.echo(hills(n=4), WAVE, track(n=4), shadows="optix")
 
 
-def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found():
+def test_shadows_move_evenly_between_the_pulses_at_which_they_are_found(monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)  # of scenes too large for lit parts at every pulse
     # as a pole's shadow sweeps over the ground; the check takes the shares of every pulse
     x, n = np.linspace(-20, 20, 31), 240
     ground = sarcl.Scene.from_heights(x, x, np.zeros((31, 31))).triangles

@@ -11,8 +11,8 @@ from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import CENTROID, overshadowed, sample
 from sarcl.scene.terrain import above
 from sarcl.scene.triangles import areas, centroids, normals
-from sarcl.visibility._illumination_solver import IlluminationSolver
 from sarcl.visibility._frame import Frame
+from sarcl.visibility._illumination_solver import IlluminationSolver
 from sarcl.visibility._terrain_horizon import Terrain
 from sarcl.visibility.illumination import lit
 

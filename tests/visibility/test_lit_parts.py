@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from dataclasses import replace
-
 import numpy as np
 import pytest
 from helpers.lit_cases import lit_polygon
@@ -11,7 +9,7 @@ from helpers.lit_cases import lit_polygon
 import sarcl
 from sarcl.reference.lit_part import lit_part
 from sarcl.visibility._shadow_pairs import candidate_pairs
-from sarcl.visibility.lit_parts import LitParts, is_affordable
+from sarcl.visibility.lit_parts import LitParts
 
 WAVES = np.array([1.0, 30.0, 200.0, 400.0])  # rad/m
 TOLERANCE = 2e-7  # float64, stored in float32; also of devices that leave float64 to another one
@@ -137,7 +135,7 @@ def test_a_pole_that_passes_between_two_pulses_is_found_at_the_pulse_that_it_hid
     assert found.min() < 0.95 and (found < 1).sum() < 10
 
 
-@pytest.mark.parametrize("seed", range(6))
+@pytest.mark.parametrize("seed", range(12))
 def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
     random = np.random.default_rng(seed)
     receivers = random.uniform(-5, 5, (60, 1, 3)) + random.standard_normal((60, 3, 3)) * random.choice([0.05, 0.5])
@@ -146,9 +144,11 @@ def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
     middle *= random.choice([2.0, 20.0, 500.0]) / np.linalg.norm(middle)
     turn = 0.02
     away = max(np.linalg.norm(middle) - 12, 0)
-    others = middle + random.uniform(-1, 1, (8, 3)) * turn * away / 2
+    reach = 0.3 if seed % 2 and not away else turn * away / 2  # of antennas in the scene too
+    others = middle + random.uniform(-1, 1, (8, 3)) * reach / np.sqrt(3)
     found = {
-        tuple(pair) for pair in candidate_pairs(receivers, occluders, middle, turn, lambda p: np.ones(len(p), bool))
+        tuple(pair)
+        for pair in candidate_pairs(receivers, occluders, middle, turn, reach, lambda p: np.ones(len(p), bool))
     }
     for antenna in others:
         for i, facet in enumerate(receivers):
@@ -173,29 +173,3 @@ def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device)
         np.testing.assert_array_equal(one, other)
 
 
-def test_large_scenes_are_clipped_from_afar_alone(monkeypatch):
-    """Near antennas all pairs are tested: hours for 1e5 facets, which have sampled shares instead."""
-    monkeypatch.setattr("sarcl.visibility.lit_parts.MOST_NEAR", 0)
-    near, far = (np.array([[0.0, 0.0, height]]) for height in (1.0, 100.0))
-    assert not is_affordable(FACET, FACET, [near]) and not is_affordable(FACET, FACET, [far, near])
-    assert is_affordable(FACET, FACET, [far])
-
-
-def test_a_machine_without_float64_is_refused(every_device, monkeypatch):
-    from sarcl.opencl import choose_device
-
-    monkeypatch.setattr(choose_device, "devices", lambda: [replace(every_device.info, fp64=False)])
-    with pytest.raises(sarcl.NoDeviceError, match=r"edges of shadows need float64, which .* lacks"):
-        lit_parts(every_device.without_fp64(), FACET, FACET, [np.array([[0.0, 0.0, 9.0]])])
-
-
-def test_other_antennas_within_the_margin_see_their_own_shadows(every_device):
-    facet, occluders = FACET, shifted(-0.3, -0.3, 10.0, size=0.6)
-    track = np.array([[0.5, 0.2, 30.0], [0.6, 0.2, 30.0]])
-    parts = lit_parts(every_device, facet, occluders, [track], margin=2.0)
-    moved = track - [1.0, 1.0, 0.0]
-    share, _ = parts.at(0, [moved], WAVES)
-    assert (share < 1).all()
-    for pulse in range(2):
-        wanted = lit_part(facet[0], occluders, [moved[pulse]], WAVES, parts.on_plane)[0]
-        assert share[pulse, 0] == pytest.approx(wanted, abs=TOLERANCE)

@@ -13,8 +13,8 @@ import sarcl
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import centroids
-from sarcl.visibility._illumination_solver import IlluminationSolver
 from sarcl.visibility._frame import Frame
+from sarcl.visibility._illumination_solver import IlluminationSolver
 
 TOLERANCE = {
     "borderline": (0.0, 4.0),  # times the height at which rays start, 1e-6 of the scene: float32 places are as coarse

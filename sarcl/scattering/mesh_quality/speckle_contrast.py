@@ -35,6 +35,7 @@ GAPS = 1.1  # g that is worth a warning: the contrast may be right by chance whe
 TURNED = 1.0  # rad, rms phase of random heights, from which on phases count as random
 LONE = 1.5  # cells, extent below which a surface counts as one cell: (integral sinc^2)^2/integral sinc^4 = 1.5
 MOST_TERMS = 30  # of G_1, which is negligible beside G_0 where there are more
+SAMPLED = 100_000  # facets of a scene that are looked at
 ENOUGH = 8.0  # facets per cell that are advised: C = 0.97
 
 
@@ -85,13 +86,22 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
     look = _looks(antennas, scene.center)
     if len(scene.triangles) == 0 or look is None:
         return Speckle()
-    facing = normals(scene.triangles) @ look[len(look) // 2]
+    triangles, material, roughness, reflectivity, two_sided = (
+        getattr(scene, name) for name in ("triangles", "material", "roughness", "reflectivity", "two_sided")
+    )
+    of_each = max(1.0, len(triangles) / SAMPLED)
+    if of_each > 1:  # of large scenes some represent the others: drawn, because facets may stand in rows
+        drawn = np.random.default_rng(0).choice(len(triangles), SAMPLED, replace=False)
+        triangles, material, roughness, reflectivity, two_sided = (
+            values[drawn] for values in (triangles, material, roughness, reflectivity, two_sided)
+        )
+    facing = normals(triangles) @ look[len(look) // 2]
     turn = 4 * np.pi * waveform.center / constants.SPEED_OF_LIGHT * np.maximum(np.abs(facing), 1e-9)  # rad/m
-    height = np.array([0.0 if m.diagram in COHERENT else m.height for m in scene.materials])[scene.material]
+    height = np.array([0.0 if m.diagram in COHERENT else m.height for m in scene.materials])[material]
     rayleigh = turn * height > TURNED
-    some = rayleigh | (turn * scene.roughness > TURNED)
-    some &= (scene.reflectivity > 0) & ((facing > 0) | (scene.two_sided & (facing < 0)))
-    return _contrast(scene.triangles[some], rayleigh[some], look, waveform) if some.any() else Speckle()
+    some = rayleigh | (turn * roughness > TURNED)
+    some &= (reflectivity > 0) & ((facing > 0) | (two_sided & (facing < 0)))
+    return _contrast(triangles[some], rayleigh[some], look, waveform, of_each) if some.any() else Speckle()
 
 
 def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
@@ -100,8 +110,13 @@ def _looks(antennas: PulseGeometry, center: np.ndarray) -> np.ndarray | None:
     return look if np.linalg.norm(look[len(look) // 2]) > 1e-6 and not np.isnan(look).any() else None
 
 
-def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, waveform: Waveform) -> Speckle:
-    """Contrast of triangles, m (k, 3, 3), some with Rayleigh amplitudes (k,), for gradients look (n, 3) of the path."""
+def _contrast(
+    triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, waveform: Waveform, of_each: float
+) -> Speckle:
+    """Contrast of triangles, m (k, 3, 3), some with Rayleigh amplitudes (k,), for gradients look (n, 3) of the path.
+
+    of_each  how many facets each of them represents
+    """
     middle = look[len(look) // 2]
     along = middle / np.linalg.norm(middle)
     turn = look - look[0]
@@ -120,14 +135,14 @@ def _contrast(triangles: np.ndarray, rayleigh: np.ndarray, look: np.ndarray, wav
         gaps, per_cell = float(area @ uneven) / total, len(area) / total
         lack = 4 / 9 * float(area @ (area * ~rayleigh)) / total
     else:  # all in one cell, or in a row of cells
-        gaps, per_cell = 1.0, len(triangles) / float(resolved.prod())
+        gaps, per_cell = 1.0, of_each * len(triangles) / float(resolved.prod())
         lack = phasors * (2 / 3 if len(resolved) else 1.0) / per_cell
     cell = tuple(float(1 / length) if length else np.inf for length in np.linalg.norm(axes, axis=1))
     typical = float(np.median(np.maximum.reduce(edges(triangles))))
     finer = typical * float(np.sqrt(min(per_cell / ENOUGH, 1.0))) if phasors else typical
     return Speckle(
-        len(triangles), per_cell, float(np.sqrt(max(2 * gaps - 1 - lack, 0.0))), gaps, (cell[0], cell[1]),
-        min(min(cell) / 2, finer),
+        round(of_each * len(triangles)), per_cell, float(np.sqrt(max(2 * gaps - 1 - lack, 0.0))), gaps,
+        (cell[0], cell[1]), min(min(cell) / 2, finer),
     )  # fmt: skip
 
 

@@ -68,15 +68,19 @@ class AmplitudeSamples:
 
     def __init__(
         self, amplitudes: Amplitudes, size: np.ndarray, band: tuple[float, float],
-        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray],
+        seen: Callable[[np.ndarray, np.random.Generator], np.ndarray], kinds: np.ndarray | None = None,
     ) -> None:  # fmt: skip
         """size  (n,) of the scatterers, such as areas: large ones are drawn more often;  band  Hz, its limits
         seen    (scatterers (n,), random) -> sines (n,) at which random pulses of the track see them
+        kinds   int (n,), of scatterers whose errors are judged apart: the pieces of a specular facet add up in phase,
+                and so do their errors, however many rough ones there are; default one
         """
         self.amplitudes, self.band = amplitudes, band
         random = np.random.default_rng(0)
         alike = np.full(len(size), 1 / len(size))
         chance = 0.5 * (alike + (size / size.sum() if size.any() else alike))
+        kinds = np.zeros(len(size), np.int64) if kinds is None else np.unique(kinds, return_inverse=True)[1]
+        chance /= np.bincount(kinds, chance)[kinds]
         chance /= np.sum(chance)
         n = min(SCATTERERS, len(size))
         self.some, self.which, self.share = np.arange(n), np.resize(np.arange(n), CHECKED), np.ones(CHECKED)
@@ -84,7 +88,7 @@ class AmplitudeSamples:
             self.some = np.sort(random.choice(len(size), n, replace=False, p=chance))
             self.which = random.choice(len(size), CHECKED, p=chance)
             self.share = 1 / chance[self.which]
-        self.weight = 1 / np.sqrt(chance[self.some])
+        self.weight, self.kinds = 1 / np.sqrt(chance[self.some]), kinds[self.which]
         self.at = seen(self.which, random)
         # evenly over the band: amplitudes that grow along it err most far from a term's frequency, and a few random
         # frequencies may all lie near it. Halfway between the frequencies of terms
@@ -95,18 +99,19 @@ class AmplitudeSamples:
     def error(self, expansion: AspectExpansion) -> float:
         """Relative error of an expansion, with a margin; terms that cancel multiply the rounding of the factors."""
         factors = np.stack([expansion.factors(self.which, j) for j in range(len(expansion))], axis=-1)
-        wrong = right = apart = 0.0
+        wrong, right, apart = np.zeros((3, self.kinds.max(initial=0) + 1))
         for f, exact in zip(self.frequencies, self.exact, strict=True):
             functions = expansion.functions(self.at, f)
             guess = np.einsum("cpj,jc->cp", factors, functions)
             terms = np.einsum("cpj,jc->cp", np.abs(factors) ** 2, np.abs(functions) ** 2)
-            wrong += float((self.share[:, None] * np.abs(guess - exact) ** 2).sum())
-            right += float((self.share[:, None] * np.abs(exact) ** 2).sum())
-            apart += float((self.share[:, None] * terms).sum())
-        if not right:
+            for total, powers in ((wrong, np.abs(guess - exact) ** 2), (right, np.abs(exact) ** 2), (apart, terms)):
+                total += np.bincount(self.kinds, self.share * powers.sum(axis=1), len(total))
+        some = right > 0
+        if not some.any():
             return 0.0
+        wrong, apart = np.sqrt(wrong[some] / right[some]), np.sqrt(apart[some] / right[some])
         # rounding of terms as large as the amplitudes themselves is that of the map
-        return SAFETY * float(np.sqrt(wrong / right) + ROUNDING * max(np.sqrt(apart / right) - 1, 0))
+        return SAFETY * float((wrong + ROUNDING * np.maximum(apart - 1, 0)).max())
 
 
 def expand(samples: AmplitudeSamples, sines: tuple[float, float], tolerance: float, asked: float) -> AspectExpansion:

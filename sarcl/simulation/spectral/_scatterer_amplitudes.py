@@ -64,6 +64,7 @@ class ScattererAmplitudes:
     """Amplitudes of points or facets, weights of antennas included, seen from places on a straight track.
 
     azimuth, slant_range  m (n,);  size  (n,), by which scatterers are drawn as samples
+    kinds                 of facets (n,): 1 those without a coherent part, 0 the others; None: points
     edges                 hard edges of the beam, beyond which the amplitudes are continued; None: it has none
     """
 
@@ -75,11 +76,13 @@ class ScattererAmplitudes:
         self.part, self.weights, self.track = part, weights, track
         self.polarizations, self.vertical = tuple(polarizations), vertical
         self.shares: Shares | None = None
+        self.kinds: np.ndarray | None = None
         if isinstance(part, Points):
             self.positions, self.size = part.positions, np.abs(part.amplitudes) ** 2
             self.keeps = np.array([name[0] == name[1] for name in polarizations], np.float64)
         else:
             self.positions, self.size = centroids(part.triangles), areas(part.triangles)
+            self.kinds = part.is_incoherent.astype(np.int64)
             if part.illumination is not None and not part.illumination.full[part.kept].all():
                 self.shares = shares_of(part, track.n_pulses)
         self.azimuth, self.slant_range = track.coordinates(self.positions)

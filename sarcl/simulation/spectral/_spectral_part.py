@@ -146,7 +146,7 @@ def plan_part(
     def seen(some: np.ndarray, random: np.random.Generator) -> np.ndarray:
         return np.clip(amplitudes.sines(random.integers(0, track.n_pulses, len(some)) * track.spacing, some), low, high)
 
-    samples = AmplitudeSamples(amplitudes, amplitudes.size, band, seen)
+    samples = AmplitudeSamples(amplitudes, amplitudes.size, band, seen, amplitudes.kinds)
     if variant == "saras":
         expansion = one_function(samples, float(np.clip(0.0, *main)))
     else:

@@ -35,7 +35,7 @@ class SpectralSamples:
         held = [part.on_device(request.device, request.budget) for part in self.parts]
         request.clock.lap("map")
         maps = [one for part in self.parts for one in part.maps]
-        room = request.budget / 6 / (len(maps) * n_polarizations)
+        room = request.budget / 6 / (max(len(maps), 1) * n_polarizations)
         spectra = [
             [
                 [Scratch((one.grid.count, len(self.frequencies)), room, self.folder) for _ in range(n_polarizations)]
@@ -66,7 +66,8 @@ class SpectralSamples:
     def _at_once(self, maps: Sequence[MapPart], n_polarizations: int) -> int:
         """Frequencies per block, whose spectra, samples and factors take up to a third of the budget."""
         n_pulses = self.line.n_pulses
-        of_spectra = max(16.0 * one.grid.count + 16.0 * one.grid.n_lags for one in maps) + 16.0 * n_pulses
+        of_maps = (16.0 * one.grid.count + 16.0 * one.grid.n_lags for one in maps)
+        of_spectra = max(of_maps, default=0.0) + 16.0 * n_pulses
         bytes_per_frequency = max(of_spectra, 40.0 * n_pulses) + 8.0 * n_polarizations * n_pulses
         return int(np.clip(self.request.budget / 3 / bytes_per_frequency, 1, len(self.frequencies)))
 

@@ -24,7 +24,7 @@ from ...scene.scene import Scene
 from ..echo import Polarization, echo_request
 from ..echo_check import measure_error, seconds_to_check
 from ..echo_output import EchoOutput
-from ..scene_echoes import Progress
+from ..scene_echoes import ChannelEchoes, EchoRequest, Progress
 from ..spreading import Counts
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple
@@ -106,7 +106,7 @@ def spectral_echo(
     )  # fmt: skip
     n_pulses, n_polarizations, frequencies = len(track), len(request.polarizations), task.frequencies
     with EchoOutput((n_pulses, n_polarizations, len(frequencies)), out, request.budget, task.window) as output:
-        prepared, parts, error = task.planned(variant)
+        prepared, parts, direct, error = task.planned(variant)
         pulse = waveform.pulse_spectrum(frequencies)
         spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * prepared.weights.factor(frequencies)
         if ripple:
@@ -115,17 +115,18 @@ def spectral_echo(
         folder = None if out is None else Path(out).parent
         samples = SpectralSamples(request, parts, task.line, reference_range, frequencies, spectrum, folder)
         samples.compute(output)
+        if direct is not None:
+            _add_directly(direct, request, spectrum, output)
         measured = None
         if check if check is not None else seconds_to_check(prepared) <= QUICK_CHECK:
             measured = measure_error(prepared, task.antennas, frequencies, spectrum, output)
             request.clock.lap("check")
-        seen = sum(len(part.some) for part in parts)
+        seen = sum(len(part.some) for part in parts) + (0 if direct is None else len(direct.scene))
         counts = Counts(len(prepared) * n_pulses, 0, 0, (len(prepared) - seen) * n_pulses)
 
         def every(values: Any) -> Any:
             return values if n_polarizations == 1 or values is None else np.repeat(values, n_polarizations, axis=0)
 
-        largest = max(parts, key=lambda part: part.predicted_error)
         raw = output.finish(
             frequency=frequencies[0],
             frequency_step=task.step,
@@ -142,7 +143,7 @@ def spectral_echo(
             report=Report(
                 plan={
                     "model": "stop and go, single scattering",
-                    **largest.describe(),
+                    **task.describe(parts, direct),
                     **prepared.mesh_warnings,
                     **prepared.weights.describe(prepared.weight_error),
                     **task.motion,
@@ -158,3 +159,15 @@ def spectral_echo(
         )
     confirm_tolerance(raw=raw, instead="use echo")
     return raw
+
+
+def _add_directly(direct: ChannelEchoes, request: EchoRequest, spectrum: np.ndarray, output: EchoOutput) -> None:
+    """Add echoes that change from pulse to pulse as `echo` does; spectrum  complex (n_f,), of all samples."""
+    counts, n = Counts(), len(output)
+    pulses = max(1, int(request.budget / 8 / (8.0 * np.prod(output.shape[1:]))))
+    for start in range(0, n, pulses):
+        stop = min(start + pulses, n)
+        block = np.zeros((stop - start, *output.shape[1:]), np.complex64)
+        counts += direct.add(block, range(start, stop), counts.pairs, len(direct.scene) * n)
+        output.add(start, block * spectrum.astype(np.complex64))
+    request.clock.lap("partly lit facets")

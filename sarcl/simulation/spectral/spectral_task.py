@@ -19,9 +19,10 @@ from ...numerics import cost_model
 from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering import antenna_weights
 from ...scattering.antenna_weights import AntennaWeights
+from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import EchoRequest, SceneEchoes, parts_of, prepare_scene
+from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, parts_of, prepare_scene
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
@@ -53,24 +54,32 @@ class SpectralTask:
     window_asked: bool
     motion: dict[str, object]
 
-    def planned(self, variant: str) -> tuple[SceneEchoes, list[SpectralPart], float]:
-        """The prepared scene, plans for its points and its facets, and the predicted error of their sum."""
+    def planned(self, variant: str) -> tuple[SceneEchoes, list[SpectralPart], ChannelEchoes | None, float]:
+        """The prepared scene, plans for its points and its facets, and the predicted error of their sum.
+
+        Facets that are lit in part change from pulse to pulse: their echoes are planned as `echo` adds them; None
+        where there are none.
+        """
         request, waveform = self.request, self.waveform
         request.report("scene", 0, 3)
         prepared = prepare_scene(
-            request, self.original_scene, self.scene, waveform, self.antennas, self.weights, (), tiled=False
-        )
+            request, self.original_scene, self.scene, waveform, self.antennas, self.weights, (), tiled=False,
+            exact=variant == "exact",
+        )  # fmt: skip
+        steady, direct = prepared.facets, prepared.partly_lit(self.antennas, waveform)
+        if direct is not None and prepared.facets is not None:
+            steady = next((one for one in prepared.facets.split() if one.lit_parts is None), None)
         band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
         share = request.tolerance / parts_of(self.scene)
         straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * self.line.deviation
         parts, errors = [], []
-        for part in (prepared.points if request.same else None, prepared.facets):
+        for part in (prepared.points if request.same else None, steady):
             if part is None:
                 continue
             gain, fixed, random = 1.0, 0.0, False
-            if part is prepared.facets and prepared.subdivision is not None:
+            if isinstance(part, FacetSet) and prepared.subdivision is not None:
                 gain, fixed = prepared.subdivision.gain, prepared.subdivision.plan.predicted_error
-                random = not prepared.facets.is_mirror
+                random = not part.is_mirror
             amplitudes = ScattererAmplitudes(
                 part, prepared.weights, self.line, request.polarizations, request.vertical,
                 share if variant == "exact" else None,
@@ -80,7 +89,7 @@ class SpectralTask:
                 share / gain - fixed - straight, request.tolerance, request.device,
                 PlanningTime.of_echo(
                     self.line.n_pulses, len(amplitudes.azimuth), len(self.frequencies), len(request.polarizations),
-                    part is prepared.facets,
+                    isinstance(part, FacetSet),
                 ),
             )  # fmt: skip
             parts.append(made)
@@ -88,15 +97,28 @@ class SpectralTask:
         if self.window_asked and request.gated:
             for one in parts:
                 _check_window(one, self.line, self.antennas.reference_range, self.window)
+        channel = None
+        if direct is not None:
+            channel = direct.channel(self.antennas, waveform, self.frequencies)
+            errors.append(channel.predicted_error)
         request.clock.lap("plan")
-        return prepared, parts, float(np.sqrt(np.sum(np.square(errors))))
+        return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
 
-    def seconds(self, prepared: SceneEchoes, parts: list[SpectralPart]) -> float:
+    def describe(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> dict[str, Any]:
+        """Words of the plans: of the part with the largest error, and of partly lit facets."""
+        words = max(parts, key=lambda part: part.predicted_error).describe() if parts else {}
+        if direct is None:
+            return words
+        return {**(words or direct.plan), "partly lit facets": len(direct.scene)}
+
+    def seconds(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> float:
         """About the seconds of the whole task: those since it began, and those of the plans."""
         n_polarizations, total = len(self.request.polarizations), sum(self.request.clock.seconds.values())
+        if direct is not None:
+            total += 1e-6 * cost_model.LIT_PART * len(direct.scene) * self.line.n_pulses
         for part in parts:
             n, terms = len(part.some), len(part.expansion)
-            of_facets = part.amplitudes.part is prepared.facets
+            of_facets = isinstance(part.amplitudes.part, FacetSet)
             amplitude = cost_model.SPECTRAL_FACET if of_facets else cost_model.SPECTRAL_POINT
             total += 1e-6 * n * (terms * amplitude + cost_model.SPECTRAL_PLANES * of_facets)
             for one in part.maps:
