@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 
@@ -61,3 +62,22 @@ class DeviceFacets:
         )
         self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
         self.side = device.upload(one_sided.astype(np.uint8))
+
+
+class DevicePoints:
+    """Points on a device, m (n, 3), looked at from antennas; `up` unit vectors (n, 3) out of the ground, about."""
+
+    def __init__(self, device: Device, places: np.ndarray, frame: Frame, up: np.ndarray) -> None:
+        self.device, self.frame, self.size = device, frame, len(places)
+        rows = np.zeros((len(places), 12), np.float32)
+        rows[:, :3], rows[:, 9:] = (places - frame.center) * frame.unit, up * STEP
+        self.buffer = device.upload(rows)
+        self._index = device.upload(np.arange(len(places), dtype=np.int32))
+        self._place = device.upload(np.zeros((1, 2), np.float32)), 1
+
+    def seen(self, occluders: Any, viewpoints: list[np.ndarray]) -> np.ndarray:
+        """Points that all viewpoints, m (3,), see past `occluders` (n,) bool."""
+        hidden = self.device.zeros(8 * max(self.size, 1))
+        for at, other in zip(viewpoints, viewpoints[::-1], strict=True):
+            occluders.hide(self, self._index, self.size, self._place, at, other, hidden)
+        return self.device.download(hidden, np.empty(max(self.size, 1), np.uint64))[: self.size] & 1 == 0

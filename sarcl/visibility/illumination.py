@@ -29,6 +29,8 @@ from ._aspect_blocks import (
 )
 from ._facet_samples import SAMPLES
 from ._illumination_solver import IlluminationSolver
+from .lit_shares import facet_shares as facet_shares
+from .lit_shares import pixel_shares as pixel_shares
 
 log = logging.getLogger(__name__)
 

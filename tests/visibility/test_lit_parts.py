@@ -171,5 +171,3 @@ def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device)
     assert found[0][0].any()
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
-
-
