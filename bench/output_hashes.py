@@ -23,7 +23,7 @@ No plan depends on the clock: the planner's costs are constants in the code.
 Left out because it follows from names and comments of kernels too: the mark of the job ("job") in an image's file.
 
 Left out because no public name reaches them: devices as if they had no float64, or one lane (the tests cover these).
-Left out because not every machine has them: Gotcha files, elevation models (rasterio), embreex, dask workers.
+Left out because not every machine has them: Gotcha files, elevation models (rasterio), dask workers.
 """
 
 from __future__ import annotations

@@ -95,11 +95,11 @@ static inline int beyond(seen_place a, seen_place b, float turn, float u, float 
     return turn * apart(a, b, u_most, v_most) < 0;
 }
 
-// Cells that an occluder may be seen in, one after the other: next_cell gives the one after `cell`, -1 at the end.
+// An occluder as it is seen, and the cells from first to last that may hold it.
 typedef struct {
     seen_place a, b, c;
     float turn;
-    int u_first, u_last, v_last;
+    int u_first, u_last, v_first, v_last;
 } seen_triangle;
 
 static inline seen_triangle viewed_triangle(view_numbers given, __global const float *occluder, size_t i) {
@@ -112,6 +112,7 @@ static inline seen_triangle viewed_triangle(view_numbers given, __global const f
     out.turn = apart(a, b, c.u, c.v) < 0 ? -1.0f : 1.0f;
     out.u_first = cell_of(min(a.u, min(b.u, c.u)) - MARGIN, given.cells[0]);
     out.u_last = cell_of(max(a.u, max(b.u, c.u)) + MARGIN, given.cells[0]);
+    out.v_first = cell_of(min(a.v, min(b.v, c.v)) - MARGIN, given.cells[1]);
     out.v_last = cell_of(max(a.v, max(b.v, c.v)) + MARGIN, given.cells[1]);
     return out;
 }
@@ -127,7 +128,7 @@ __kernel void count_cells(view_numbers given, __global const float *restrict occ
     size_t i = get_global_id(0);
     seen_triangle t = viewed_triangle(given, occluder, i);
     int height = as_int(max(t.a.height, max(t.b.height, t.c.height)) + 4.0f);
-    for (int v = cell_of(min(t.a.v, min(t.b.v, t.c.v)) - MARGIN, given.cells[1]); v <= t.v_last; v++)
+    for (int v = t.v_first; v <= t.v_last; v++)
         for (int u = t.u_first; u <= t.u_last; u++)
             if (holds(t, u, v)) {
                 atomic_inc(count + (size_t)v * given.cells[0] + u);
@@ -141,7 +142,7 @@ __kernel void fill_cells(view_numbers given, __global const float *restrict occl
                          __global int *restrict entry) {
     size_t i = get_global_id(0);
     seen_triangle t = viewed_triangle(given, occluder, i);
-    for (int v = cell_of(min(t.a.v, min(t.b.v, t.c.v)) - MARGIN, given.cells[1]); v <= t.v_last; v++)
+    for (int v = t.v_first; v <= t.v_last; v++)
         for (int u = t.u_first; u <= t.u_last; u++)
             if (holds(t, u, v)) entry[atomic_inc(next + (size_t)v * given.cells[0] + u)] = i;
 }

@@ -134,12 +134,6 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
     out[i] = bits;
 }
 
-// Adds the samples that a ray caster on the host found hidden, one byte per sample.
-__kernel void join(__global const uchar *restrict found, int samples, __global ulong *restrict hidden) {
-    size_t i = get_global_id(0);
-    for (int s = 0; s < samples; s++) hidden[i] |= (ulong)found[i * samples + s] << s;
-}
-
 // Number of samples of each facet that are not hidden.
 __kernel void seen(__global const ulong *restrict hidden, int samples, __global uchar *restrict out) {
     size_t i = get_global_id(0);

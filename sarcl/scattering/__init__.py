@@ -4,33 +4,35 @@ For other folders:
 
     antenna_weight_error   errors of antenna_weights over facets, over the band and in float32
     antenna_weights        antenna gains, spreading loss and the radar's factor per scatterer
+    facet_kinds            which facets are mirrors, which are random, and which are alike
     facet_plan             subdivision and frequency nodes of facets for a tolerance
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
     pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them
-    random_surface         cells of rough facets, with a random height and amplitude each
     scatterers             from a scene to the points and facets that the kernels add
     subdivision            facets cut to the edge length of their plan
     mesh_quality/          warnings about meshes that are too coarse for their curves or for speckle
 
 For this folder alone:
 
-    _cutting_error         errors of cut facets: gain of cutting, errors that cancel between pieces
+    _cutting_error         errors of cut facets, which cancel between pieces
     _direction_error       errors of directions: cosines in float32, H and V that turn near the vertical
+    _facet_norm            norms of facets at random phases, coplanar neighbours as one: the gain of cutting
     _facet_sampling        random samples of the facets or points of a scene
     _frequency_nodes       frequencies at which amplitudes are computed
+    _random_surface        cells of rough facets, with a random height and amplitude each
     _rough_surface         scattering diagrams of rough facets (SARAS)
 """
 
 __all__ = [
     "antenna_weight_error",
     "antenna_weights",
+    "facet_kinds",
     "facet_plan",
     "facets",
     "mesh_quality",
     "physical_optics",
     "pulse_nodes",
-    "random_surface",
     "scatterers",
     "subdivision",
 ]

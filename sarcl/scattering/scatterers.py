@@ -18,9 +18,9 @@ from ..scene.scene import Scene
 from ..scene.terrain import check_above, facets_on
 from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import LitParts
+from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
-from .random_surface import Pieces
 
 # pairs of piece and pulse, up to which rough facets, and those of a terrain, are clipped too: about ten seconds
 FEW_LOOKS = 2e6
@@ -55,7 +55,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool | str, skips: set[str],
+    pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
     max_bytes: float, device: Any, tell: Callable[[int], object], exact: bool, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
@@ -98,7 +98,7 @@ def facets_of(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
             two_sided=scene.two_sided, wanted=sampled,
             tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
-            engine="embree" if shadows == "embree" else "opencl", by_facets=~clipped, occluders=solid,
+            by_facets=~clipped, occluders=solid,
         )  # fmt: skip
         left_out["shadowed"] = int((sampled & illumination.dark).sum()) * n_pulses
         keep &= ~(sampled & illumination.dark)

@@ -61,7 +61,7 @@ class EchoOptions(TypedDict, total=False):
     receive: Literal["reference", "own", "all"]
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
-    shadows: bool | Literal["embree"]
+    shadows: bool
     seed: int
     skip: bool | Collection[Skip]
     compressed: bool
@@ -89,7 +89,7 @@ def echo(
     receive: Literal["reference", "own", "all"] = "reference",
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
-    shadows: bool | Literal["embree"] = True,
+    shadows: bool = True,
     seed: int = 0,
     skip: bool | Collection[Skip] = True,
     compressed: bool = True,
@@ -122,8 +122,7 @@ def echo(
                   ("separated" only); "all": every element receives all
     antenna       sarcl.Antenna, or (transmitting, receiving), aimed by the tracks' attitude (sarcl.pointing); None: 1
     radar         sarcl.Radar: amplitudes fall with range, samples are in sqrt(W); None: |sample|^2 = RCS at any range
-    shadows       True: of every facet only the part counts that both antennas see at each pulse; "embree": its share
-                  of the area, by rays of that library (package embreex), not bit-identical on all devices
+    shadows       True: of every facet only the part counts that both antennas see at each pulse
                   (docs/theory/shadows.md; points are always seen)
     seed          of the facets' random heights (scene.roughness); the same for any device and block size
     skip          True, False or a set of reasons: "zero reflectivity", "facing away", "range window",
@@ -241,8 +240,11 @@ def echo_request(
 ) -> EchoRequest:  # fmt: skip
     """The options of `echo` that all its methods share, checked; skips  the reasons that `skip` may name."""
     seed = count("seed", seed, 0)
-    if not isinstance(shadows, (bool, np.bool_)):
-        choice("shadows", shadows, ("embree",))
+    if isinstance(shadows, str) and shadows == "embree":
+        raise ValueError(
+            "shadows is 'embree'; rays of Embree were taken out, since sarcl's own became faster and exact: give True"
+        )
+    shadows = flag("shadows", shadows)
     arguments.progress(progress)
     if isinstance(max_edge, str):
         choice("max_edge", max_edge, ("auto",))

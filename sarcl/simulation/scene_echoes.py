@@ -55,7 +55,7 @@ class EchoRequest:
     polarizations: tuple[str, ...]
     vertical: np.ndarray
     max_edge: float | str | None
-    shadows: bool | str
+    shadows: bool
     seed: int
     progress: Progress | None
     clock: Clock = field(default_factory=Clock)

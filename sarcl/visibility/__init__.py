@@ -1,18 +1,20 @@
-"""The share of each facet that both antennas see.
+"""What antennas see of facets, and of the ground.
 
 For other folders:
 
-    illumination           lit(): illuminated share of every facet, per block of pulses
+    illumination           lit(): sampled shares of facets, per block of pulses; facet_shares(), pixel_shares()
     lit_parts              LitParts: the part of each facet that is lit at every pulse, exactly
 
 For this folder alone:
 
     _aspect_blocks         blocks of pulses that share one illumination
-    _embree_rays           occlusion by facets, by rays of Embree (package embreex)
     _facet_samples         sample points on a facet
+    _frame                 facets and points on a device, in float32 coordinates of the scene
     _illumination_solver   shares of facets that given viewpoints see
+    _light_buffer          occlusion by facets, seen from a viewpoint outside: cells of a perspective view
+    _lit_shares            shares of facets at every pulse, and of pixels, for labels and masks
     _shadow_pairs          pairs of a facet and an occluder whose shadow may fall on it
-    _ray_casting           occlusion by facets, by rays through a tree of boxes
+    _ray_casting           occlusion by facets, from anywhere: by a light buffer, or rays through a tree of boxes
     _terrain_horizon       occlusion by terrain, by horizons along range lines
 """
 

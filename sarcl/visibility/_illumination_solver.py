@@ -33,7 +33,6 @@ class IlluminationSolver:
         two_sided: np.ndarray | bool = True,
         wanted: np.ndarray | None = None,
         tolerance: float = 0.25,
-        engine: str = "opencl",
         by_facets: np.ndarray | bool = True,
         occluders: np.ndarray | None = None,
     ) -> None:
@@ -47,7 +46,7 @@ class IlluminationSolver:
         self.occluders: Any = None
         self._by_facets = np.broadcast_to(np.asarray(by_facets), k)
         if self._by_facets.any() and len(solid):
-            self.occluders = _caster(engine)(device, solid, frame)
+            self.occluders = Occluders(device, solid, frame)
         length = self.facets.length
         large = length > LARGE * np.quantile(length, 0.25) if k > FEW else np.ones(k, bool)
         keep = np.ones(k, bool) if wanted is None else wanted
@@ -109,11 +108,3 @@ class IlluminationSolver:
         by_facets = self._by_facets[index]
         kinds = index[by_facets], index[~by_facets]
         return [kind[i : i + CHUNK] for kind in kinds for i in range(0, len(kind), CHUNK)]
-
-
-def _caster(engine: str) -> Any:
-    if engine != "embree":
-        return Occluders
-    from ._embree_rays import EmbreeOccluders
-
-    return EmbreeOccluders

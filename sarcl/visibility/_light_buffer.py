@@ -19,7 +19,7 @@ from ._frame import DeviceFacets, Frame
 
 KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
-CELLS = 16.0  # cells for each occluder
+CELLS, WIDEST = 2**20, 16.0  # cells, of which each occluder has 16 at most, and one at least
 FEWEST, MOST = 16, 2048  # cells along a side
 MOST_ENTRIES = 2**25  # occluders in all cells; with more, cells are made larger
 
@@ -41,7 +41,7 @@ class LightBuffer:
             eye=frame.eye(viewpoint)[:3], across=axes[0], upward=axes[1], toward=toward, distance=distance, least=least
         )  # fmt: skip
         self._planes = device.empty(64 * n)
-        side = np.sqrt(size.prod() / (CELLS * n))
+        side = np.sqrt(size.prod() / (n * float(np.clip(CELLS / n, 1.0, WIDEST))))
         while True:
             cells = np.clip(np.ceil(size / side), FEWEST, MOST).astype(int)
             self._numbers = self._fixed | {"cells": cells, "per_cell": cells / size}

@@ -5,7 +5,6 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field, replace
-from typing import Literal
 
 import numpy as np
 from numpy.typing import ArrayLike
@@ -13,7 +12,7 @@ from numpy.typing import ArrayLike
 from ..base import arguments
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
-from ..base.validation import array, choice, flags, ndim, number, sealed
+from ..base.validation import array, flags, ndim, number, sealed
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
@@ -29,8 +28,8 @@ from ._aspect_blocks import (
 )
 from ._facet_samples import SAMPLES
 from ._illumination_solver import IlluminationSolver
-from .lit_shares import facet_shares as facet_shares
-from .lit_shares import pixel_shares as pixel_shares
+from ._lit_shares import facet_shares as facet_shares
+from ._lit_shares import pixel_shares as pixel_shares
 
 log = logging.getLogger(__name__)
 
@@ -170,7 +169,6 @@ def lit(
     wanted: np.ndarray | None = None,
     tolerance: float = 0.25,
     max_bytes: float | None = None,
-    engine: Literal["opencl", "embree"] = "opencl",
     by_facets: np.ndarray | bool = True,
     occluders: np.ndarray | None = None,
     device: DeviceChoice | None = None,
@@ -190,7 +188,6 @@ def lit(
                 of median size; see docs/theory/shadows.md
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
-    engine      "opencl", or "embree" for the rays (package embreex; single samples at edges may differ)
     by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
     occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
     progress    called as progress(block, blocks)
@@ -208,7 +205,6 @@ def lit(
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
     tolerance = number("tolerance", tolerance, least=SAMPLES[-1][1])
-    choice("engine", engine, ("opencl", "embree"))
     grid = None if heights is None else heights_of(heights)
     on_heights = None if on_heights is None else _mask("on_heights", on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
@@ -235,7 +231,7 @@ def lit(
     slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
-        tolerance=tolerance, engine=engine, by_facets=by_facets, occluders=occluders,
+        tolerance=tolerance, by_facets=by_facets, occluders=occluders,
     )  # fmt: skip
 
     def look(place: int) -> np.ndarray:

@@ -78,7 +78,7 @@ def closed_form(width, height, wide, raw, some, frequencies):
     return out
 
 
-@pytest.mark.parametrize("seed", range(5))
+@pytest.mark.parametrize("seed", [0, 1, 2, 6])  # 6: the plate's two triangles have 85 times its echo
 @pytest.mark.parametrize("tolerance", [1e-1, 1e-2, 1e-3])
 def test_two_plates_are_both_less_the_shadow_of_one_on_the_other(seed, tolerance):
     """A conducting square above another: an exact closed form, whose shadow moves from pulse to pulse."""

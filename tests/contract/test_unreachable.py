@@ -266,12 +266,6 @@ PLANTED = {
         "sarcl.imaging.factorized.plan.decimated",
         lambda: sarcl.plan(SMOOTH, PLANE, tolerance=1e-2),
     ),
-    "shadows on rough facets": (
-        "sarcl.scattering.scatterers._half_cell",
-        lambda: sarcl.spectral_echo(
-            shapes.box((0.5, 0.4, 0.3), material=sarcl.Material(diagram="cos")), CHIRP, track(), tolerance=1e-1
-        ),
-    ),
     "lit parts": (
         "sarcl.visibility.lit_parts.candidate_pairs",
         lambda: sarcl.echo(shapes.box((0.5, 0.4, 0.3)), CHIRP, track(), tolerance=1e-1),

@@ -9,7 +9,9 @@ from sarcl.base.constants import SPEED_OF_LIGHT
 from sarcl.base.vectors import unit
 from sarcl.reference.lit_part import plane_axes
 from sarcl.scattering.physical_optics import scattering_matrix, triangle_integral
+from sarcl.scene.triangles import cut
 
+BELOW = 0.999  # of the height of an antenna: occluders above that are nowhere near it
 FAR = 2e6  # m: the waves are plane over scenes of a few metres
 
 
@@ -25,20 +27,28 @@ def lit_polygon(facet, occluders, antennas, on_plane=1e-9):
             heights = np.where(np.abs(occluder[:, 2]) <= on_plane, 0.0, side * occluder[:, 2])
             if heights.max() <= 0:
                 continue
-            corners = []
-            for i in range(3):
-                j = (i + 1) % 3
-                for part in (0.0, heights[i] / (heights[i] - heights[j]) if heights[i] * heights[j] < 0 else None):
-                    if part is None or (part == 0 and heights[i] < 0):
-                        continue
-                    place = occluder[i, :2] + part * (occluder[j, :2] - occluder[i, :2])
-                    height = heights[i] + part * (heights[j] - heights[i])
-                    corners.append(eye[:2] + (place - eye[:2]) * abs(eye[2]) / (abs(eye[2]) - height))
+            part = np.column_stack([occluder[:, :2], heights])
+            for sign, limit in ((1, 0.0), (-1, -BELOW * abs(eye[2]))):  # what lies beyond the antenna casts no shadow
+                part = above(part, sign, limit)
+            corners = [eye[:2] + (x[:2] - eye[:2]) * abs(eye[2]) / (abs(eye[2]) - x[2]) for x in part]
             if len(corners) > 2:
-                shadows.append(shapely.Polygon(corners).buffer(0))
+                # shadows of places near the antenna reach far beyond the facet, and GEOS loses digits
+                shadows.append(shapely.clip_by_rect(shapely.Polygon(corners).buffer(0), *lit.buffer(0.1).bounds))
         if shadows:
             lit = lit.difference(shapely.union_all(shadows, grid_size=1e-12))
     return lit
+
+
+def above(polygon, sign, limit):
+    """The part of a polygon, corners (n, 3), where sign z >= limit."""
+    out = []
+    for a, b in zip(polygon, np.roll(polygon, -1, axis=0), strict=True) if len(polygon) else ():
+        over = sign * a[2] - limit, sign * b[2] - limit
+        if over[0] >= 0:
+            out.append(a)
+        if over[0] * over[1] < 0:
+            out.append(a + over[0] / (over[0] - over[1]) * (b - a))
+    return np.array(out)
 
 
 def exact_echo(triangles, frequencies, antennas, reference_range, occluders=None, polarization="HH"):
@@ -72,3 +82,36 @@ def exact_echo(triangles, frequencies, antennas, reference_range, occluders=None
             power[i] += abs(a) ** 2
             out[i] += a * np.exp(-2j * np.pi * float((np.longdouble(f) * delay) % 1))
     return out, power
+
+
+def near_echo(triangles, two_sided, frequencies, antennas, reference_range, edge, polarization="HH"):
+    """Echo of perfect conductors near antennas, of one pulse, complex128 (n,): lit polygons cut into pieces.
+
+    two_sided  (k,) bool: others are dark from behind;  antennas  one or two, m (3,);  edge  m: pieces no longer than
+    this each have their own direction and path
+    """
+    row, column = ("HV".index(letter) for letter in polarization)
+    out = np.zeros(len(frequencies), complex)
+    ends = [antennas[0], antennas[-1]]
+    for facet, both in zip(triangles, two_sided, strict=True):
+        center, axes = facet.mean(axis=0), plane_axes(facet)
+        heights = [float((end - center) @ axes[2]) for end in ends]
+        if heights[0] * heights[1] <= 0 or (not both and heights[0] < 0):
+            continue
+        flat = [np.array(t.exterior.coords)[:3] for t in
+                shapely.constrained_delaunay_triangles(lit_polygon(facet, triangles, antennas)).geoms]  # fmt: skip
+        if not flat:
+            continue
+        solid = np.stack([center + part @ axes[:2] for part in flat])
+        pieces = cut(solid, edge, 10**7)[0]
+        places = pieces.mean(axis=1)
+        sights = [unit(end - places) for end in ends]
+        normal = np.broadcast_to(axes[2] * np.sign(heights[0]), places.shape)
+        matrix = scattering_matrix(normal, *sights, np.inf)[:, row, column]
+        path = sum(np.sqrt(((places.astype(np.longdouble) - end) ** 2).sum(axis=1)) for end in ends)
+        delay = (path - 2 * np.longdouble(reference_range)) / SPEED_OF_LIGHT
+        for i, f in enumerate(frequencies):
+            k = 2 * np.pi * f / SPEED_OF_LIGHT
+            a = k / (2 * np.sqrt(np.pi)) * matrix * triangle_integral(pieces, k * (sights[0] + sights[1]))
+            out[i] += (a * np.exp(-2j * np.pi * ((np.longdouble(f) * delay) % 1).astype(float))).sum()
+    return out

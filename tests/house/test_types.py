@@ -252,7 +252,7 @@ lazy = sarcl.PhaseHistory(
     Rows(), frequency=[9e9, 9e9], frequency_step=1e6, tx=np.zeros((2, 3)), reference_range=(7e3, 7e3), polarization="HH"
 )
 bandwidth: float = float((lazy.frequency + lazy.n_samples * lazy.frequency_step).max())
-sarcl.echo(scene, chirp, track, polarization=["HH", "HV"], skip={"range window"}, shadows="embree", device=0)
+sarcl.echo(scene, chirp, track, polarization=["HH", "HV"], skip={"range window"}, shadows=False, device=0)
 sarcl.backproject(raw, grid, beam=(0.1, (1, 0, 0)), device=["cpu", 1], mapping={"mapping": "apparent"})
 sarcl.backproject(raw, grid, out=Path("a.h5"), tile=(1, 4))
 sarcl.backproject(raw, grid, out=np.empty(grid.shape, np.complex64), skip=False).save("a.png")

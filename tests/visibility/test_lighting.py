@@ -405,7 +405,6 @@ def test_a_scene_wholly_in_shadow_is_reported():
         ({"tx": np.full((1, 3), np.nan)}, "tx.* is nan"),
         ({"rx": np.zeros((2, 3))}, r"rx has shape \(2, 3\), wanted \(1, 3\)"),
         ({"tolerance": 0.05}, "tolerance is 0.05; it must be at least 0.0625"),
-        ({"engine": "optix"}, "engine is 'optix'; choose one of 'opencl', 'embree'"),
         ({"wanted": np.ones(3, bool)}, r"wanted has shape \(3,\); wanted one for each of 8 facets"),
         ({"heights": 7}, r"heights must be \(x, y, z\)"),
         ({"heights": ([0, 1], [0, 1], np.zeros((3, 2)))}, r"heights z has shape \(3, 2\), wanted \(2, 2\)"),
@@ -421,25 +420,6 @@ def test_bad_input_is_refused(change, message):
 def test_no_facet_is_lit_too():
     none = lit(np.zeros((0, 3, 3)), circle(5))
     assert len(none) == 1 and none.share(0).shape == (0,) and (none.blocks == [0, 5]).all()
-
-
-def test_embree_sees_what_opencl_sees():
-    pytest.importorskip("embreex")
-    scene = np.concatenate(
-        [ground(50), BODIES["frustum"].triangles, BODIES["cylinder"].triangles + np.array([9, 3, 0])]
-    )
-    for viewpoint in (eye(33, 62), np.array([3.0, -8.0, 2.0])):
-        ours, theirs = (shares(scene, viewpoint, engine=e) for e in ("opencl", "embree"))
-        assert np.abs(ours - theirs).max() <= 1 / 16 and (ours != theirs).mean() < 0.01
-        assert 0.02 < (ours < 1).mean() < 0.9
-
-
-def test_embree_where_it_is_not_installed_says_what_to_do(monkeypatch):
-    import sys
-
-    monkeypatch.setitem(sys.modules, "embreex", None)
-    with pytest.raises(ImportError, match="pip install embreex"):
-        shares(ground(2), eye(0, 30), engine="embree")
 
 
 def test_facets_that_turn_towards_the_antenna_between_viewpoints_are_lit():

@@ -3,6 +3,7 @@
 For other folders:
 
     facet_error        error of flat facets against the curved surface they approximate, dB
+    facet_groups       neighbours in one plane, which are one facet to a wave
     speckle_contrast   speckle contrast that the number of facets per resolution cell allows
 
 For this folder alone:
@@ -12,4 +13,4 @@ For this folder alone:
     _curved_echo       echo of the curved surface
 """
 
-__all__ = ["facet_error", "speckle_contrast"]
+__all__ = ["facet_error", "facet_groups", "speckle_contrast"]

@@ -68,8 +68,8 @@ class Speckle:
         return [
             f"too few facets for speckle: {self.per_cell:.2g} rough ones per resolution cell of {self.cell[0]:.2g} x "
             f"{self.cell[1]:.2g} m (slant range x cross range); the intensity's standard deviation over its mean will "
-            f"be about {self.contrast:.2f}, where speckle has 1{holes}. Let echo cut them (max_edge='auto'), or "
-            f"cut them to edges of at most {self.needed:.2g} m"
+            f"be about {self.contrast:.2f}, where speckle has 1{holes}. Cut them to edges of at most "
+            f"{self.needed:.2g} m (Scene.split); echo cuts them to half a cell in range alone"
         ]
 
 

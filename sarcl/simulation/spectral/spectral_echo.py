@@ -48,7 +48,7 @@ def spectral_echo(
     array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
-    shadows: bool | Literal["embree"] = True,
+    shadows: bool = True,
     seed: int = 0,
     skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     compressed: bool = True,

@@ -122,7 +122,7 @@ def test_shadows_that_move_along_the_track(device):
     scene = ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
     track = sarcl.Trajectory.line(start=(0, -400, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=640)
     low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
-    raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, device=device)
+    raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, device=device, check=True)
     assert raw.report.measured_error <= raw.report.predicted_error <= 3e-2
     without = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, shadows=False, device=device)
     assert np.linalg.norm(raw.samples - without.samples) > 0.1 * np.linalg.norm(raw.samples)
@@ -221,3 +221,16 @@ def test_the_forecast_of_echo_says_what_this_would_take(device):
     refused = sarcl.plan_echo(points(ground=0), CHIRP, circle, **options)
     assert refused.spectral_seconds is None and "are not straight" in refused.spectral_refusal
     assert "spectral" not in str(refused)
+
+
+def test_a_box_on_rough_ground_adds_up_in_phase_and_so_do_its_errors():
+    """Averaged over both, the rough ground hid them: 11 % where 2 % were predicted."""
+    axis = np.linspace(-6, 6, 13)
+    material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
+    ground = sarcl.Scene.from_heights(8e3 + axis, axis, np.zeros((13, 13)), material=material)
+    scene = ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
+    track = sarcl.Trajectory.line(start=(0, -40, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=64)
+    low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
+    raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, shadows=False)
+    wanted = sarcl.echo(scene, low, track, tolerance=1e-3, shadows=False).samples
+    assert np.linalg.norm(raw.samples - wanted) <= raw.report.predicted_error * np.linalg.norm(wanted)
