@@ -27,6 +27,7 @@ class Hot:
                    both sides count, as they do where the machine code has other branches than these
     around         trips of the hot loop per trip of the loop around it, whose share is then counted too: an expression
     trips_around   as `trips`, of the loops inside that loop, but for the hot one
+    unrolled       contributions of a work-item where the compiler unrolls the hot loop and no other is left
     """
 
     contributions: str
@@ -36,6 +37,7 @@ class Hot:
     sides: tuple[str, ...] = ()
     around: str = ""
     trips_around: tuple[str, ...] = ()
+    unrolled: str = ""
 
 
 SIDE = 64  # instructions of the shortest side of a branch that may count for a share
@@ -81,7 +83,7 @@ HOT = {
     ("range_doppler.cl", "straighten_onto"): Hot("1", "sample", loop="kernel"),
     ("ray_casting.cl", "hidden"): Hot("1", "node of the tree and ray"),
     ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
-    ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency"),
+    ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency", unrolled="VW * NODES"),
     ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet", loop="around", trips=("1",)),
     # each item brings a scatterer; the loop inside adds those of the group up, and runs again where a window moves
     ("spread_points.cl", "spread"): Hot("VW", "pulse and scatterer", loop="around", trips=("1",)),
@@ -144,9 +146,12 @@ def cost(code: Code, hot: Hot | None, macros: dict[str, int]) -> Cost:
     """Instructions per contribution of a kernel. NotCounted where its loops are not as `hot` says."""
     loop = hot_loop(code, hot.loop if hot else "innermost")
     if loop is None:
+        n = len(code.opcodes)
+        if hot and hot.unrolled and not code.loops:
+            each = {k: float(v) for k, v in kinds(code.opcodes).items()}
+            return Cost(n, evaluated(hot.unrolled, macros), hot.unit, each, n)
         if hot:
             raise NotCounted(f"no loop of the kind {hot.loop!r} is there; found: {described(code) or 'no loop at all'}")
-        n = len(code.opcodes)
         return Cost(n, 1.0, "work-item", {k: float(v) for k, v in kinds(code.opcodes).items()}, n)
     if hot is None:
         own = code.own(loop)
