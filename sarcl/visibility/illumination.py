@@ -199,7 +199,7 @@ def lit(
     if not isinstance(triangles, np.ndarray) or triangles.dtype != np.float64 or triangles.shape[1:] != (3, 3):
         triangles = array("triangles", triangles, np.float64, ("k", 3, 3))
     k = len(triangles)
-    if occluders is not None and len(occluders):
+    if occluders is not None and getattr(occluders, "shape", None) != (0, 3, 3):
         occluders = array("occluders", occluders, np.float64, ("n", 3, 3))
     arguments.progress(progress, "progress(block, blocks)")
     if max_bytes is not None:

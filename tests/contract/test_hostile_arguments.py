@@ -59,7 +59,7 @@ FDA = {"f0": 1e10, "spacing": (0.015, 0.015), "frequency_step": (1e4, 2e4), "ret
 CALLS = {
     "lit": (
         illumination.lit, {"triangles": BOX.triangles, "tx": TRACK.positions},
-        "triangles tx rx on_heights two_sided wanted tolerance max_bytes engine device progress",
+        "triangles tx rx on_heights two_sided wanted tolerance max_bytes occluders device progress",
     ),
     "ElevationModel": (
         sarcl.ElevationModel, {"longitude": [12, 12.1], "latitude": [42, 42.1], "height": np.zeros((2, 2))}, None,
