@@ -11,7 +11,8 @@ from ._straight_track import tangent
 
 PROFILE, DRAWN = 2048, 48  # aspects, and scatterers whose gains are averaged at each
 MEASURED = 32768  # scatterers among which the energy that limits leave out is measured
-PAIRS = 1024  # of these scatterers, each with a pulse
+PAIRS = 1024  # of these scatterers, each with a pulse, that are drawn
+FEW_PAIRS = 8192  # of which all are looked at
 HALF_POWER = 0.25  # two-way power at which a one-way beam has half its power
 TRIES = 8  # limits that are tried, each leaving out less energy than the one before
 ROUNDING = 1e-6  # pulse intervals: a limit so near to a pulse is at the pulse
@@ -144,21 +145,32 @@ class _Energy:
         return float(np.sqrt(most / (least + most))) if most else 0.0
 
     def _measured(self, *runs: tuple[np.ndarray, np.ndarray]) -> tuple[float, float]:
-        """Energy at runs of pulses of each scatterer, (first, number), and its standard deviation, from PAIRS of them.
+        """Energy at runs of pulses of each scatterer, (first, number), and its standard deviation: from all pairs of
+        scatterer and pulse where these are few, else from PAIRS of them.
 
-        Half of the pairs are drawn by size, half by its square, as the energies of smooth facets are.
+        A third of the pairs are drawn by size, a third by its square, as the energies of smooth facets are, and a third
+        alike: a faint scatterer in a side lobe may send back more than a strong one in a null.
         """
         first, number = (np.concatenate(one) for one in zip(*runs, strict=True))
         size = np.tile(self.size, len(runs))
         plain = np.tile(self.weight, len(runs)) * size * number
         if not plain.any():
             return 0.0, 0.0
-        squared = plain * size
-        chance = 0.5 * (plain / plain.sum() + squared / squared.sum())
+        total = int(number.sum())
+        if total <= FEW_PAIRS:
+            at = np.repeat(np.arange(len(number)), number.astype(np.int64))
+            pulse = first[at] + np.arange(total) - (np.cumsum(number) - number)[at]
+            return float((self._powers(at, pulse) * self.weight[at % len(self.some)]).sum()), 0.0
+        squared, alike = plain * size, np.tile(self.weight, len(runs)) * number
+        chance = (plain / plain.sum() + squared / squared.sum() + alike / alike.sum()) / 3
         at = np.searchsorted(np.cumsum(chance)[:-1], self.random.random(PAIRS))
         pulse = first[at] + np.floor(self.random.random(PAIRS) * number[at])
         which = at % len(self.some)
-        some = self.some[which] if self.among is None else self.among[self.some[which]]
-        sines = self.amplitudes.sines(pulse * self.amplitudes.track.spacing, some)
-        found = self.power(some, sines) * self.weight[which] * number[at] / chance[at]
+        found = self._powers(at, pulse) * self.weight[which] * number[at] / chance[at]
         return float(found.mean()), float(found.std() / np.sqrt(PAIRS))
+
+    def _powers(self, at: np.ndarray, pulse: np.ndarray) -> np.ndarray:
+        """Of the scatterers of runs `at` (n,), each at a pulse (n,): (n,)."""
+        which = self.some[at % len(self.some)]
+        some = which if self.among is None else self.among[which]
+        return self.power(some, self.amplitudes.sines(pulse * self.amplitudes.track.spacing, some))
