@@ -2,7 +2,8 @@
 // into cells of a perspective view, and a sample is tested against those of its own cell alone.
 //
 //   bit s of hidden_i = 1 where sample s of facet i lies in some occluder's shadow: inside the three planes through the
-//   eye and an edge, and not in front of the occluder's plane, nor within BEHIND of it, before it is lifted
+//   eye and an edge, and behind the occluder's own plane by more than BEHIND. The last is tested at the sample before it
+//   is lifted off its facet, so that facets in one plane do not hide one another
 //   u = D (x.across)/(D - x.toward),  v = D (x.upward)/(D - x.toward): the perspective view, D the distance of the eye
 //
 // source    Haines and Greenberg 1986, "The light buffer: a shadow-testing accelerator"

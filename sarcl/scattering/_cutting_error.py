@@ -29,11 +29,11 @@ from ._facet_norm import (
     PIECES,
     Ends,
     FacetNorm,
+    group_sums,
     lobe_wavenumbers,
     longest_piece,
     path_beyond,
     random_pieces,
-    sums_by,
 )  # fmt: skip
 from ._facet_sampling import drawn
 from .mesh_quality.facet_groups import coplanar_groups
@@ -133,7 +133,7 @@ class CuttingError:
                 echo, finer = seen.echoes(k)
                 phase, phases = np.exp(-1j * k * path), np.exp(-1j * waves * between)
                 for values, total in ((16 / 15 * (finer - echo), wrong), (finer, right)):
-                    sums = np.stack([sums_by(plane, phase * column, len(first)) for column in values.T])
+                    sums = np.stack([group_sums(plane, phase * column, len(first)) for column in values.T])
                     total += max(float((np.abs(sums) ** 2).sum()), float((np.abs(sums @ phases) ** 2).sum()))
         return MEASURED_SAFETY * float(np.sqrt(wrong / right)) if right else None
 

@@ -18,7 +18,7 @@ from ..base.vectors import unit
 from ..scene.scene import Scene
 from ..scene.triangles import areas, bisect, centroids, cut, edges
 from . import facet_kinds
-from ._facet_sampling import drawn_with_chances
+from ._facet_sampling import draws_and_chances
 from .mesh_quality.facet_groups import coplanar_groups
 from .physical_optics import triangle_integral
 
@@ -148,42 +148,43 @@ class FacetNorm:
             q = unit(ends[0] - places) + unit(ends[1] - places)
             path = path_beyond(ends, middle[of], places - middle[of])
             for k in self._wavenumbers[self._group[of]].T:
-                made = sums_by(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
+                made = group_sums(of, triangle_integral(parts, k[:, None] * q) * np.exp(-1j * k * path), len(triangles))
                 facets += np.abs(made) ** 2
-                planes += np.abs(sums_by(self._group, made, n_planes)) ** 2
+                planes += np.abs(group_sums(self._group, made, n_planes)) ** 2
         return facets, planes
 
 
 def _sampled_planes(scene: Scene, some: np.ndarray) -> tuple[list[np.ndarray], np.ndarray]:
-    """Facets of each of up to 200 planes, drawn from facets `some`, and how many planes each stands for."""
+    """Indices of the facets of up to 200 planes, drawn from facets `some`, and the number of planes that each plane
+    represents."""
     if not len(some):
         return [], np.zeros(0)
     of = coplanar_groups(scene, some, apart=facet_kinds.random(scene)[some])
     members = np.bincount(of)
     order, first = np.argsort(of, kind="stable"), np.concatenate([[0], np.cumsum(members)])
     size = areas(scene.triangles[some])
-    chosen, chance = drawn_with_chances(size, FACETS, np.random.default_rng(0))
+    chosen, chance = draws_and_chances(size, FACETS, np.random.default_rng(0))
     longest = np.argmax(np.maximum.reduce(edges(scene.triangles[some])))
     if len(some) > FACETS:
         chosen[0] = longest
     groups: list[np.ndarray] = []
     weights: list[float] = []
-    left = MOST_MEMBERS
+    room = MOST_MEMBERS
     chance_of_plane = np.bincount(of, chance)
     taken: dict[int, int] = {}
     for facet in chosen.tolist():
         plane = int(of[facet])
         many = int(members[plane])
-        whole = many <= left or plane in taken
-        key, likely = (plane, chance_of_plane[plane]) if whole else (-1 - facet, chance[facet])
+        is_one = many <= room or plane in taken
+        key, likely = (plane, chance_of_plane[plane]) if is_one else (-1 - facet, chance[facet])
         if key in taken:
             if len(some) > FACETS:
                 weights[taken[key]] += 1 / (len(chosen) * likely)
             continue
         taken[key] = len(groups)
-        groups.append(some[order[first[plane] : first[plane + 1]]] if whole else some[[facet]])
+        groups.append(some[order[first[plane] : first[plane + 1]]] if is_one else some[[facet]])
         weights.append(1 / (len(chosen) * likely) if len(some) > FACETS else 1.0)
-        left -= many if whole else 1
+        room -= many if is_one else 1
     return groups, np.array(weights)
 
 
@@ -203,7 +204,7 @@ def path_beyond(ends: Ends, places: np.ndarray, step: np.ndarray) -> np.ndarray:
     return out
 
 
-def sums_by(of: np.ndarray, values: np.ndarray, n: int = 0) -> np.ndarray:
+def group_sums(of: np.ndarray, values: np.ndarray, n: int = 0) -> np.ndarray:
     """Sums of complex values (k,) by the groups that they belong to (n,)."""
     return np.asarray(np.bincount(of, values.real, n) + 1j * np.bincount(of, values.imag, n))
 

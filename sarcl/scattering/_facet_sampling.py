@@ -16,11 +16,11 @@ def drawn(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.
     """
     if len(size) <= most:
         return np.arange(len(size)), np.ones(len(size))
-    some, chance = drawn_with_chances(size, most, random)
+    some, chance = draws_and_chances(size, most, random)
     return some, 1 / (most * chance[some])
 
 
-def drawn_with_chances(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
+def draws_and_chances(size: np.ndarray, most: int, random: np.random.Generator) -> tuple[np.ndarray, np.ndarray]:
     """Indices of up to `most` of n elements, and the chance of each of the n at each draw (n,).
 
     Of no more than `most` each is drawn once. Arguments as of `drawn`.

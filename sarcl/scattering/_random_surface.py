@@ -30,8 +30,8 @@ ROUND = 1.05  # edges of cells may be longer by so much: not every facet a littl
 class Pieces:
     """The facets of a scene as they are added up.
 
-    given       the scene that was cut
-    of          index of the given facet that each piece is a part of (k,)
+    original    the scene that was cut
+    of          index of the original facet that each piece is a part of (k,)
     scene       of the pieces, without random heights, and without points
     cells       the scene's facets, cut where they are random
     height      by which random heights move each piece along its normal, m (k,)
@@ -39,7 +39,7 @@ class Pieces:
     incoherent  pieces of which the incoherent part alone counts: others carry the coherent one (k,) bool
     """
 
-    given: Scene
+    original: Scene
     of: np.ndarray
     scene: Scene
     cells: Scene

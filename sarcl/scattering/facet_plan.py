@@ -217,9 +217,12 @@ def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
 
     tree = cKDTree(centroids(scene.triangles))
     away = min(float(tree.query(end)[0].min()) for end in antennas.ends)
-    found = away - TO_CORNER * float(np.maximum.reduce(edges(scene.triangles)).max())
-    if found < away / 2:
-        found = min(float(distances(scene.triangles, at).min()) for end in antennas.ends for at in end)
+    reach = TO_CORNER * np.maximum.reduce(edges(scene.triangles))
+    large = reach > away / 2
+    found = away - float(reach[~large].max(initial=0.0))
+    if large.any():  # few, as a rule
+        near = scene.triangles[large]
+        found = min(found, *(float(distances(near, at).min()) for end in antennas.ends for at in end))
     if max(found, distance) <= 0:
         raise ValueError("an antenna stands on a facet; move the track away from the scene")
     return max(found, distance)

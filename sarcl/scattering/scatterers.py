@@ -65,7 +65,7 @@ def facets_of(
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
     scene, n_pulses = pieces.scene, len(antennas.tx)
-    given, terrain = pieces.given, _terrain(pieces.given, antennas)
+    original, terrain = pieces.original, _terrain(pieces.original, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = geometry.normals(scene.triangles)
     triangles = scene.triangles
@@ -88,7 +88,7 @@ def facets_of(
     # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
     by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
     sampled = keep if by_horizons else keep & ~clipped
-    solid = given.triangles
+    solid = original.triangles
     if terrain:
         solid = solid[~terrain["on_heights"]]
         terrain["on_heights"] = terrain["on_heights"][pieces.of]
@@ -104,9 +104,9 @@ def facets_of(
         keep &= ~(sampled & illumination.dark)
     if (keep & clipped).any():
         lit_parts = LitParts(
-            device, scene.triangles, solid if by_horizons else given.triangles, antennas.ends,
+            device, scene.triangles, solid if by_horizons else original.triangles, antennas.ends,
             two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
-            given=given.triangles, of=pieces.of,
+            given=original.triangles, of=pieces.of,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():

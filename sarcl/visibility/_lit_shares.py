@@ -23,6 +23,7 @@ from .lit_parts import LitParts
 
 AT_ONCE = 64  # pulses whose lit parts are computed together
 FIRST_LOOKS = 9  # pulses from which pixels are looked at first
+PER_PIXEL = 200.0  # bytes, of positions, rows of numbers on the device, and counts
 LEFT = 1e-3  # of the pixels, which may change by more than the tolerance
 
 
@@ -88,6 +89,7 @@ def pixel_shares(
     arguments.progress(progress, "progress(look, looks)")
     if not len(scene.triangles):
         raise ValueError("scene has no facets, and points cast no shadow; give it facets")
+    room(f"looks at {grid.size} pixels", PER_PIXEL * grid.size, "take rows of the grid: ImageGrid.points(grid.at(...))")
     places = grid.positions.reshape(-1, 3)
     filled = np.flatnonzero(np.isfinite(places).all(axis=1))
     opened, n = open_device(device), len(ends[0])

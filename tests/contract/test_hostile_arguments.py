@@ -61,6 +61,12 @@ CALLS = {
         illumination.lit, {"triangles": BOX.triangles, "tx": TRACK.positions},
         "triangles tx rx on_heights two_sided wanted tolerance max_bytes occluders device progress",
     ),
+    "facet_shares": (illumination.facet_shares, {"scene": BOX, "track": TRACK}, "scene track receiver device progress"),
+    "pixel_shares": (
+        illumination.pixel_shares,
+        {"scene": BOX, "grid": sarcl.ImageGrid.plane(shape=(3, 3), spacing=(1, 1)), "track": TRACK},
+        "scene grid track receiver tolerance device progress",
+    ),
     "ElevationModel": (
         sarcl.ElevationModel, {"longitude": [12, 12.1], "latitude": [42, 42.1], "height": np.zeros((2, 2))}, None,
     ),

@@ -115,11 +115,15 @@ def test_facets_seen_at_a_squint_fade_with_the_slant_range(device):
     assert off <= raw.report.predicted_error + wanted.report.predicted_error
 
 
-def test_shadows_that_move_along_the_track(device):
+def box_on_rough_ground():
     axis = np.linspace(-6, 6, 13)
     material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
     ground = sarcl.Scene.from_heights(8e3 + axis, axis, np.zeros((13, 13)), material=material)
-    scene = ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
+    return ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
+
+
+def test_shadows_that_move_along_the_track(device):
+    scene = box_on_rough_ground()
     track = sarcl.Trajectory.line(start=(0, -400, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=640)
     low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
     raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, device=device, check=True)
@@ -225,10 +229,7 @@ def test_the_forecast_of_echo_says_what_this_would_take(device):
 
 def test_a_box_on_rough_ground_adds_up_in_phase_and_so_do_its_errors():
     """Averaged over both, the rough ground hid them: 11 % where 2 % were predicted."""
-    axis = np.linspace(-6, 6, 13)
-    material = sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="cos2")
-    ground = sarcl.Scene.from_heights(8e3 + axis, axis, np.zeros((13, 13)), material=material)
-    scene = ground + sarcl.shapes.box((2, 2, 3)).on(ground, 8e3, 0)
+    scene = box_on_rough_ground()
     track = sarcl.Trajectory.line(start=(0, -40, 6e3), velocity=(0, 100, 0), prf=80, n_pulses=64)
     low = sarcl.Waveform.chirp(center=1e9, bandwidth=150e6, duration=2e-6)
     raw = sarcl.spectral_echo(scene, low, track, tolerance=3e-2, shadows=False)
