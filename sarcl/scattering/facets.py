@@ -146,6 +146,14 @@ class FacetSet:
         return out if self.incoherent is None else out | self.incoherent
 
     @property
+    def has_sampled_shadows(self) -> bool:
+        """Whether shares of facets are counted from sample points, and some are in shadow for a part of the track."""
+        if self.illumination is None:
+            return False
+        some = self.kept if self.sampled is None else self.kept[self.sampled]
+        return not bool(self.illumination.full[some].all())
+
+    @property
     def is_rough(self) -> bool:
         """Whether any material has roughness finer than a facet."""
         return any(m.height > 0 for m in self.materials)

@@ -112,10 +112,13 @@ class SceneEchoes:
         return 1.0 if self.subdivision is None else self.subdivision.gain
 
     @property
-    def _partly_lit(self) -> dict[str, int]:
-        """Number of facets of which some pulse sees a part past the others, for the report."""
+    def shadow_words(self) -> dict[str, Any]:
+        """For the report: number of facets of which some pulse sees a part past the others, and whether shadows are
+        sampled."""
         rows = None if self.facets is None else self.facets.lit_rows
-        return {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
+        words = {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
+        sampled = self.facets is not None and self.facets.has_sampled_shadows
+        return words | ({"shadow edges": "sampled, not part of the error"} if sampled else {})
 
     def partly_lit(self, antennas: PulseGeometry, waveform: Waveform) -> SceneEchoes | None:
         """The facets alone of which some pulse sees a part past others, on the device; None where there are none."""
@@ -187,7 +190,7 @@ class SceneEchoes:
                 facets, self.subdivision.plan, antennas, frequencies, request.gated, request.polarizations,
                 request.vertical, weights,
             )  # fmt: skip
-            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings | self._partly_lit))
+            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings | self.shadow_words))
             spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
@@ -197,7 +200,7 @@ class SceneEchoes:
                 request.budget, request.gated, request.polarizations, request.vertical, weights,
             )  # fmt: skip
             words = spreader.plan.describe("spread") | tiled.facet_plan.describe()
-            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self._partly_lit
+            words |= {"pulses per amplitude": spreader.pulse_nodes.spacing} | self.mesh_warnings | self.shadow_words
             spread.append((self.gain * spreader.predicted_error, words))
             spreaders.append(spreader)
         if spread:  # relative to the norm of the facets that each adds: not more of all of them

@@ -70,6 +70,7 @@ def test_horizons_and_rays_give_the_same_echoes(name, terrains, monkeypatch):
     assert terrains[0][0] is not None and terrains[1][0] is None
     boxes = 12 * 4 if "tank" in name else 0
     assert boxes <= (~terrains[0][1]).sum() < (100 * boxes or 1)
+    assert by_rays.report.plan["shadow edges"] == "sampled, not part of the error"
     shadowed = [r.report.contributions_skipped["shadowed"] for r in (by_horizons, by_rays)]
     assert shadowed[0] == pytest.approx(shadowed[1], rel=0.03) and shadowed[0] > 0
     # samples at the edges of shadows differ (docs/theory/shadows.md): 1e-3 of the power

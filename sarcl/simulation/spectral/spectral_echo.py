@@ -145,6 +145,7 @@ def spectral_echo(
                     "model": "stop and go, single scattering",
                     **task.describe(parts, direct),
                     **prepared.mesh_warnings,
+                    **prepared.shadow_words,
                     **prepared.weights.describe(prepared.weight_error),
                     **task.motion,
                 },

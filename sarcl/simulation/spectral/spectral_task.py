@@ -105,11 +105,10 @@ class SpectralTask:
         return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
 
     def describe(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> dict[str, Any]:
-        """Words of the plans: of the part with the largest error, and of partly lit facets."""
-        words = max(parts, key=lambda part: part.predicted_error).describe() if parts else {}
-        if direct is None:
-            return words
-        return {**(words or direct.plan), "partly lit facets": len(direct.scene)}
+        """Words of the plan of the part with the largest error; of partly lit facets where there is no other."""
+        if not parts and direct is not None:
+            return direct.plan
+        return max(parts, key=lambda part: part.predicted_error).describe()
 
     def seconds(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> float:
         """About the seconds of the whole task: those since it began, and those of the plans."""
