@@ -43,6 +43,15 @@ def test_tolerance_max_edge_and_max_bytes_leave_the_surface_as_it_is(name, other
     assert np.linalg.norm(one.samples - two.samples) <= asked * np.linalg.norm(two.samples)
 
 
+def test_cells_beside_their_coherent_pieces_add_the_incoherent_part_alone():
+    """Near the normal, where the coherent part is the larger one: pieces that are cells, and cells with pieces."""
+    above = sarcl.Trajectory(np.arange(4) * 1e-2, [[40.0 * i, 10.0, 4e3] for i in range(4)])
+    options = {"tolerance": 2e-2, "shadows": False, "seed": 3, **GIVEN}
+    one, two = (sarcl.echo(SURFACES["slightly rough"], CHIRP, above, max_edge=edge, **options) for edge in (0.26, 0.09))
+    assert two.report.plan["facets"] > 4 * one.report.plan["facets"]
+    assert np.linalg.norm(one.samples - two.samples) <= 4e-2 * np.linalg.norm(two.samples)
+
+
 @pytest.mark.parametrize("name", SURFACES)
 def test_the_seed_names_the_surface(name):
     one, two = (

@@ -135,17 +135,17 @@ def test_a_pole_that_passes_between_two_pulses_is_found_at_the_pulse_that_it_hid
     assert found.min() < 0.95 and (found < 1).sum() < 10
 
 
-@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("seed", range(6))
 def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
     random = np.random.default_rng(seed)
-    receivers = random.uniform(-5, 5, (60, 1, 3)) + random.standard_normal((60, 3, 3)) * random.choice([0.05, 0.5])
-    occluders = random.uniform(-5, 5, (50, 1, 3)) + random.standard_normal((50, 3, 3)) * random.choice([0.05, 2.0])
+    receivers = random.uniform(-5, 5, (24, 1, 3)) + random.standard_normal((24, 3, 3)) * random.choice([0.05, 0.5])
+    occluders = random.uniform(-5, 5, (24, 1, 3)) + random.standard_normal((24, 3, 3)) * random.choice([0.05, 2.0])
     middle = random.standard_normal(3)
     middle *= random.choice([2.0, 20.0, 500.0]) / np.linalg.norm(middle)
     turn = 0.02
     away = max(np.linalg.norm(middle) - 12, 0)
-    reach = 0.3 if seed % 2 and not away else turn * away / 2  # of antennas in the scene too
-    others = middle + random.uniform(-1, 1, (8, 3)) * reach / np.sqrt(3)
+    reach = turn * away / 2
+    others = middle + random.uniform(-1, 1, (5, 3)) * reach / np.sqrt(3)
     found = {
         tuple(pair)
         for pair in candidate_pairs(receivers, occluders, middle, turn, reach, lambda p: np.ones(len(p), bool))
@@ -155,6 +155,31 @@ def test_candidate_pairs_leave_out_no_pair_that_meets_from_any_pulse(seed):
             for j, occluder in enumerate(occluders):
                 if (i, j) not in found:
                     assert lit_part(facet, occluder[None], [antenna], WAVES[:1])[0] == pytest.approx(1, abs=1e-9)
+
+
+@pytest.mark.parametrize("reach", [0.0, 0.5])
+@pytest.mark.parametrize("seed", range(3))
+def test_candidate_pairs_hold_all_that_antennas_among_the_facets_see_behind_one_another(seed, reach):
+    """Lines of sight from 20 antennas, within `reach` of one, to the middles of facets all around."""
+    random = np.random.default_rng(seed)
+    receivers, occluders = (
+        random.uniform(-5, 5, (300, 1, 3)) + random.standard_normal((300, 3, 3)) * size for size in (0.05, 0.3)
+    )
+    middle = random.uniform(-1, 1, 3)
+    pairs = candidate_pairs(receivers, occluders, middle, 2.0, reach, lambda p: np.ones(len(p), bool))
+    found = np.zeros((300, 300), bool)
+    found[tuple(pairs.T)] = True
+    missed = crossings = 0
+    for antenna in middle + random.uniform(-1, 1, (20, 3)) * reach / np.sqrt(3):
+        ray, at = (antenna - receivers.mean(axis=1))[:, None], receivers.mean(axis=1)[:, None] - occluders[:, 0]
+        b, c = occluders[:, 1] - occluders[:, 0], occluders[:, 2] - occluders[:, 0]
+        across = np.cross(ray, c)
+        det = (across * b).sum(axis=-1)
+        u, q = (at * across).sum(axis=-1) / det, np.cross(at, b)
+        v, t = (q * ray).sum(axis=-1) / det, (q * c).sum(axis=-1) / det  # Moeller and Trumbore 1997
+        crosses = (u > 0) & (v > 0) & (u + v < 1) & (t > 0) & (t < 1)
+        crossings, missed = crossings + crosses.sum(), missed + (crosses & ~found).sum()
+    assert crossings > 300 and missed == 0 and found.mean() < 0.5
 
 
 def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device):

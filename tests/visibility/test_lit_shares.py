@@ -49,6 +49,11 @@ def test_faces_of_a_box_that_are_turned_away_are_dark_and_two_sided_ones_are_not
     assert (facet_shares(sheet, under) == 1).all()
 
 
+def test_a_plate_under_a_larger_one_is_dark_at_every_pulse():
+    shares = facet_shares(plates(width=6.0, height=0.5, wide=1.0), track(incidence=0.2))
+    assert (shares[:, :2] == 0).all() and (shares[:, 2:] == 1).all()
+
+
 def test_two_antennas_must_both_see_a_part():
     scene, looks = plates(), track(n=3)
     other = sarcl.Trajectory(looks.times, looks.positions * [-1, 1, 1])

@@ -93,6 +93,25 @@ def test_sums_of_products_are_found_with_as_many_terms():
         expand(AmplitudeSamples(unlike, np.ones(500), (9.0, 11.0), seen), (-0.1, 0.1), 1e-3, 1e-3)
 
 
+def test_errors_of_few_scatterers_of_one_kind_are_not_averaged_with_those_of_the_others():
+    """20 of 1000 that change by a fifth over the band, and the others not at all: 20 in phase are as bright as 400."""
+    kinds = (np.arange(1000) < 20).astype(int)
+
+    def amplitudes(some, sine, frequency):
+        faint = 1 - 0.2 * kinds[some, None]
+        return (faint * (1 + 0.1 * kinds[some, None] * (frequency - 10)) + 0 * np.reshape(sine, (-1, 1))).astype(
+            complex
+        )
+
+    def seen(some, random):
+        return random.uniform(-0.1, 0.1, len(some))
+
+    samples, apart = (AmplitudeSamples(amplitudes, np.ones(1000), (9.0, 11.0), seen, some) for some in (None, kinds))
+    found = expand(samples, (-0.1, 0.1), 0.08, 0.08)
+    assert len(found) == 1 and len(expand(apart, (-0.1, 0.1), 0.08, 0.08)) == 2
+    assert samples.error(found) <= 0.08 and apart.error(found) > 0.16
+
+
 @pytest.mark.parametrize("n", [200, 225, 250, 275, 300])
 def test_amplitudes_that_change_along_the_band_are_predicted(n):
     """One term is exact at one frequency, and off by more, the farther a frequency is from it."""
