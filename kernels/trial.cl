@@ -1,7 +1,7 @@
 // Trial of a device: operations that every other kernel relies on, on numbers whose results the host knows.
 //
-//   compute   exact sums and products, wide numbers, rounding, sine and cosine, path_difference with structs by pointer,
-//             a struct by value
+//   compute   exact sums and products, a sum with a product that must not be fused, wide numbers, rounding, sine and
+//             cosine, path_difference with structs by pointer, a struct by value
 //   exchange  local memory of a given size, with a barrier
 //   chains    a_k <- a_k x + y, over and over: timed
 //
@@ -42,7 +42,7 @@ static inline void put_wide(wv value, int i, __global float *out, int n) {
 //   x        (10, n)  a and b, hi then lo;  a point's x, y, z, hi parts then lo parts, m
 //   antenna  (2, N_PULSE)  hi then lo parts of the antenna's x, y, z and distance from the centre, m; the rest is not read
 //   given    a struct by value: the sum of its numbers, each times its place
-//   out      (23, n)  in the order of _trial.py:RESULTS; integers by their bits
+//   out      (25, n)  in the order of _trial.py:RESULTS; integers by their bits
 __kernel void compute(__global const float *restrict x, __global const float *restrict antenna, int n, numbers given,
                       __global float *restrict out) {
     int i = get_global_id(0);
@@ -77,6 +77,9 @@ __kernel void compute(__global const float *restrict x, __global const float *re
 #pragma unroll
     for (int k = 0; k < NUMBERS; k++) sum_of_given = fma((float)(k + 1), given.of[k], sum_of_given);
     STORE((fv)sum_of_given, i, out + 22 * n);
+    pair of_product = exact_sum(high * other, other);
+    STORE(of_product.hi, i, out + 23 * n);
+    STORE(of_product.lo, i, out + 24 * n);
 }
 
 // global size (groups times group), in groups: each work-item writes `each` numbers to local memory and reads those of

@@ -64,6 +64,8 @@ RESULTS = (
     Result("the distance of path_difference (m)", 2, 0, WIDE),
     Result("the vector of path_difference (m)", 2, 1e-7, 0),
     Result("the sum of the numbers of a struct by value", 1, 0, 0),
+    Result("the float32 sum with a product", 1, 0, 0),
+    Result("the rounding error of a float32 sum with a product", 1, 0, 0),
 )
 
 
@@ -154,8 +156,6 @@ def _given() -> tuple[np.ndarray, np.ndarray]:
 def wanted(x: np.ndarray, antenna: np.ndarray) -> list[np.ndarray]:
     """The RESULTS of the kernel `compute`, in extended precision; those whose bits must agree as float32 or int32."""
     high, other = x[0], x[2]
-    total = high + other
-    back = total - high
     product = high * other
     a, b = (x[i].astype(np.longdouble) + x[i + 1] for i in (0, 2))
     whole = np.rint(a)
@@ -164,13 +164,20 @@ def wanted(x: np.ndarray, antenna: np.ndarray) -> list[np.ndarray]:
     vector = at[:, None] - points
     distance, length = np.sqrt((vector**2).sum(axis=0)), np.sqrt((at**2).sum())
     return [
-        total, (high - (total - back)) + (other - back),
-        product, (high.astype(np.float64) * other - product).astype(np.float32),
+        *_exact_sum(high, other), product, (high.astype(np.float64) * other - product).astype(np.float32),
         a + b, a * b, a / b, np.sqrt(a),
         whole.astype(np.int64).astype(np.int32), a - whole, np.sin(angle), np.cos(angle),
         ((points**2).sum(axis=0) - 2 * at @ points) / (distance + length), distance, vector[1],
         np.full(N, np.arange(1, len(GIVEN) + 1) @ GIVEN, np.float32),
+        *_exact_sum(product, other),
     ]  # fmt: skip
+
+
+def _exact_sum(a: np.ndarray, b: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """float32 a + b, and its rounding error."""
+    total = a + b
+    back = total - a
+    return total, (a - (total - back)) + (b - back)
 
 
 def _wrong_numbers(queue: Any, kernel: Any, lanes: int) -> str:
