@@ -1,25 +1,27 @@
 // Which sample points of facets a viewpoint outside the scene sees: all lines of sight share an end, so facets are put
-// into cells of a perspective view, and a sample is tested against those of its own cell alone.
+// into cells of a perspective view, and a facet is tested against those in the cells that it is seen in.
 //
-//   bit s of hidden_i = 1 where sample s of facet i lies in some occluder's shadow: inside the three planes through the
-//   eye and an edge, and behind the occluder's own plane by more than BEHIND. The last is tested at the sample before it
-//   is lifted off its facet, so that facets in one plane do not hide one another
+//   a sample is hidden where it lies in some occluder's shadow: inside the three planes through the eye and an edge, and
+//   behind the occluder's own plane by more than BEHIND. The last is tested before samples are lifted off their facet, so
+//   that facets in one plane do not hide one another. On a line of samples each shadow is an interval: the planes'
+//   distances change linearly from d_a + v (d_c - d_a) by (1 - v)(d_b - d_a), d_a, d_b, d_c those of the corners
 //   u = D (x.across)/(D - x.toward),  v = D (x.upward)/(D - x.toward): the perspective view, D the distance of the eye
 //
 // source    Haines and Greenberg 1986, "The light buffer: a shadow-testing accelerator"
 // symbols   x         from the middle of the scene, in units of the scene, at most about 1
 //           toward    unit vector to the eye;  across, upward  unit vectors at right angles to it
-//           facet, index, place, hidden   as in ray_casting.cl
+//           facet, index, line, word   as in ray_casting.cl
 //           occluder  (n, 9) corners
-//           plane     (n, 16): normals (x, y, z) and offsets of the planes of three edges and of the occluder; a point x is
-//                     on the inner side of an edge, and on the eye's side of the occluder, where normal.x - offset >= 0
-//           first     (cells + 1): where each cell's entries begin;  entry  occluders, cell by cell
+//           plane     (n, 4, 4): x of four normals, then y, z, and their offsets, of the planes of three edges and of the
+//                     occluder; a point x is on the inner side of an edge, or behind the occluder, where normal.x - offset >= 0
+//           entry     occluders, cell by cell: number, and the first of its cells, of the least column and row
 //           top       (cells): largest x.toward of the occluders in a cell, plus 4, as the bits of a float
-// macros    none
+// macros    VW     lines of samples at once;  FP64  as in common.clh;  LINES  as in facet_points.clh
 // numbers   float32 places points within 1e-7 of the scene; samples within SIDE of an edge of a shadow count as inside it,
 //           so that facets that share an edge leave no gap
 // reference: sarcl/reference/shadow.py:hidden
 
+#include "common.clh"
 #include "facet_points.clh"
 
 #define SIDE 2e-7f
@@ -54,7 +56,7 @@ static inline float4 edge_plane(float3 a, float3 b, float3 c, float3 eye) {
 
 typedef struct {
     float eye[3], other[3], across[3], upward[3], toward[3], distance, least[2], per_cell[2];
-    int cells[2], samples;
+    int cells[2];
 } view_numbers;
 
 // global size (occluders)
@@ -64,12 +66,13 @@ __kernel void shadow_planes(view_numbers given, __global const float *restrict o
     float3 look = eye - a;
     float4 own = through(crossing(b - a, c - a), a);
     float above = inner(own.xyz, look) / sqrt(inner(look, look));
-    vstore4(edge_plane(a, b, c, eye), 4 * i, plane);
-    vstore4(edge_plane(b, c, a, eye), 4 * i + 1, plane);
-    vstore4(edge_plane(c, a, b, eye), 4 * i + 2, plane);
-    if (above < 0) own = -own;
-    if (!(fabs(above) > EDGE_ON_EYE)) own.w = -OUTSIDE;  // nothing is behind it
-    vstore4(own, 4 * i + 3, plane);
+    float4 one = edge_plane(a, b, c, eye), two = edge_plane(b, c, a, eye), three = edge_plane(c, a, b, eye);
+    if (above > 0) own = -own;
+    if (!(fabs(above) > EDGE_ON_EYE)) own.w = OUTSIDE;  // nothing is behind it
+    vstore4((float4)(one.x, two.x, three.x, own.x), 4 * i, plane);
+    vstore4((float4)(one.y, two.y, three.y, own.y), 4 * i + 1, plane);
+    vstore4((float4)(one.z, two.z, three.z, own.z), 4 * i + 2, plane);
+    vstore4((float4)(one.w, two.w, three.w, own.w), 4 * i + 3, plane);
 }
 
 typedef struct { float u, v, height; } seen_place;
@@ -83,43 +86,42 @@ static inline seen_place viewed(view_numbers given, float3 x) {
     return out;
 }
 
+#if VW == 1
+#define ANY(x) (x)
+#else
+#define ANY(x) any(x)
+#endif
+#if LINES < VW
+#define GROUPS 1
+#define LINE(g) ((fv)inverses[0])
+#else
+#define GROUPS (LINES / VW)
+#define LINE(g) LOAD(g, inverses)
+#endif
+
 #define MARGIN 1e-3f  // of a cell, by which triangles are widened: above what rounding moves them by
+
+#define CELL(u, v) ((u) << 16 | (v))
 
 static inline int cell_of(float u, int cells) { return (int)clamp(u, 0.0f, cells - 1.0f); }
 
-static inline float apart(seen_place a, seen_place b, float u, float v) { return (b.u - a.u) * (v - a.v) - (b.v - a.v) * (u - a.u); }
+// Where a triangle is seen, in cells, and its least and largest height, plus 4.
+typedef struct { float u_least, u_most, v_least, v_most, lowest, highest; } seen_box;
 
-// Whether a cell lies wholly beyond the edge from a to b of a triangle whose third corner is on the side of sign `turn`.
-static inline int beyond(seen_place a, seen_place b, float turn, float u, float v) {
-    float du = turn * (b.v - a.v), dv = -turn * (b.u - a.u);  // the largest value is at one corner of the cell
-    float u_most = du > 0 ? u - MARGIN : u + 1 + MARGIN, v_most = dv > 0 ? v - MARGIN : v + 1 + MARGIN;
-    return turn * apart(a, b, u_most, v_most) < 0;
-}
-
-// An occluder as it is seen, and the cells from first to last that may hold it.
-typedef struct {
-    seen_place a, b, c;
-    float turn;
-    int u_first, u_last, v_first, v_last;
-} seen_triangle;
-
-static inline seen_triangle viewed_triangle(view_numbers given, __global const float *occluder, size_t i) {
-    seen_triangle out;
-    seen_place a = viewed(given, corner(occluder, i, 0)), b = viewed(given, corner(occluder, i, 1));
-    seen_place c = viewed(given, corner(occluder, i, 2));
-    out.a = a;
-    out.b = b;
-    out.c = c;
-    out.turn = apart(a, b, c.u, c.v) < 0 ? -1.0f : 1.0f;
-    out.u_first = cell_of(min(a.u, min(b.u, c.u)) - MARGIN, given.cells[0]);
-    out.u_last = cell_of(max(a.u, max(b.u, c.u)) + MARGIN, given.cells[0]);
-    out.v_first = cell_of(min(a.v, min(b.v, c.v)) - MARGIN, given.cells[1]);
-    out.v_last = cell_of(max(a.v, max(b.v, c.v)) + MARGIN, given.cells[1]);
+static inline seen_box box_of(view_numbers given, float3 p, float3 q, float3 r) {
+    seen_box out;
+    seen_place a = viewed(given, p), b = viewed(given, q), c = viewed(given, r);
+    out.u_least = min(a.u, min(b.u, c.u)) - MARGIN;
+    out.u_most = max(a.u, max(b.u, c.u)) + MARGIN;
+    out.v_least = min(a.v, min(b.v, c.v)) - MARGIN;
+    out.v_most = max(a.v, max(b.v, c.v)) + MARGIN;
+    out.highest = max(a.height, max(b.height, c.height)) + 4.0f;
+    out.lowest = min(a.height, min(b.height, c.height)) + 4.0f;
     return out;
 }
 
-static inline int holds(seen_triangle t, int u, int v) {
-    return !beyond(t.a, t.b, t.turn, u, v) && !beyond(t.b, t.c, t.turn, u, v) && !beyond(t.c, t.a, t.turn, u, v);
+static inline seen_box box_of_occluder(view_numbers given, __global const float *occluder, size_t i) {
+    return box_of(given, corner(occluder, i, 0), corner(occluder, i, 1), corner(occluder, i, 2));
 }
 
 // Number of occluders in each cell, and their largest height. global size (occluders)
@@ -127,59 +129,166 @@ static inline int holds(seen_triangle t, int u, int v) {
 __kernel void count_cells(view_numbers given, __global const float *restrict occluder, __global int *restrict count,
                           __global int *restrict top) {
     size_t i = get_global_id(0);
-    seen_triangle t = viewed_triangle(given, occluder, i);
-    int height = as_int(max(t.a.height, max(t.b.height, t.c.height)) + 4.0f);
-    for (int v = t.v_first; v <= t.v_last; v++)
-        for (int u = t.u_first; u <= t.u_last; u++)
-            if (holds(t, u, v)) {
-                atomic_inc(count + (size_t)v * given.cells[0] + u);
-                atomic_max(top + (size_t)v * given.cells[0] + u, height);
-            }
+    seen_box t = box_of_occluder(given, occluder, i);
+    int height = as_int(t.highest), u_last = cell_of(t.u_most, given.cells[0]), v_last = cell_of(t.v_most, given.cells[1]);
+    for (int v = cell_of(t.v_least, given.cells[1]); v <= v_last; v++)
+        for (int u = cell_of(t.u_least, given.cells[0]); u <= u_last; u++) {
+            atomic_inc(count + (size_t)v * given.cells[0] + u);
+            atomic_max(top + (size_t)v * given.cells[0] + u, height);
+        }
 }
 
 // Occluders of each cell, in any order. global size (occluders)
 //   next  (cells): where each cell's entries begin, and after it where they end
 __kernel void fill_cells(view_numbers given, __global const float *restrict occluder, __global int *restrict next,
-                         __global int *restrict entry) {
+                         __global int2 *restrict entry) {
     size_t i = get_global_id(0);
-    seen_triangle t = viewed_triangle(given, occluder, i);
-    for (int v = t.v_first; v <= t.v_last; v++)
-        for (int u = t.u_first; u <= t.u_last; u++)
-            if (holds(t, u, v)) entry[atomic_inc(next + (size_t)v * given.cells[0] + u)] = i;
+    seen_box t = box_of_occluder(given, occluder, i);
+    int u_first = cell_of(t.u_least, given.cells[0]), v_first = cell_of(t.v_least, given.cells[1]);
+    int u_last = cell_of(t.u_most, given.cells[0]), v_last = cell_of(t.v_most, given.cells[1]);
+    int2 here = {i, CELL(u_first, v_first)};
+    for (int v = v_first; v <= v_last; v++)
+        for (int u = u_first; u <= u_last; u++) entry[atomic_inc(next + (size_t)v * given.cells[0] + u)] = here;
 }
 
-static inline float beside(__global const float *plane, int k, float3 x) {
-    float4 p = vload4(k, plane);
-    return inner(p.xyz, x) - p.w;
+// Where a line of samples crosses a plane: at slope/(1 - v) + offset, in samples; the part above it (side 1), or below
+// (side -1), is on the plane's inner side. side 0: the plane is parallel to the lines, and v at most `offset` on its inner
+// side, or at least `offset` (slope -1)
+typedef struct {
+    float slope, offset;
+    int side;
+} crossed_plane;
+
+// a, b, c: distances of the facet's corners;  least  on the inner side
+static inline crossed_plane crossing_of(float a, float b, float c, float least) {
+    crossed_plane out;
+    float rise = b - a, along = c - a, start = least - a;
+    out.side = rise > 0 ? 1 : rise < 0 ? -1 : 0;
+    if (out.side) {  // (start - v along)/((1 - v) rise), and v/(1 - v) = 1/(1 - v) - 1
+        float per_rise = PER_LINE / rise;
+        out.offset = along * per_rise;
+        out.slope = start * per_rise - out.offset;
+    } else {
+        out.slope = along < 0 ? 1.0f : -1.0f;
+        out.offset = along != 0 ? start / along : start <= 0 ? -1.0f : 2.0f;
+    }
+    return out;
+}
+
+// The part of lines of samples that an occluder shades so far, in samples: from low to high.
+typedef struct { fv low, high; } interval;
+
+// inverse: 1/(1 - v) of the lines
+static inline void cut_interval(interval *part, crossed_plane plane, fv inverse) {
+    if (plane.side == 0) {
+        fv v = 1 - 1 / inverse;
+        part->high = plane.slope * v <= plane.slope * plane.offset ? part->high : (fv)-1;
+        return;
+    }
+    fv at = plane.slope * inverse + plane.offset;
+    if (plane.side > 0)
+        part->low = at > part->low ? at : part->low;
+    else
+        part->high = at < part->high ? at : part->high;
+}
+
+// Bits of the samples of an interval; none where it is empty.
+static inline iv samples_in(interval part) {
+    iv first = nearest_int(part.low < PER_LINE ? part.low : (fv)PER_LINE), last = nearest_int(part.high > 0 ? part.high : (fv)0);
+    return ((iv)-1 << (first & 31)) & ~((iv)-2 << ((last - 1) & 31)) & (first - last) >> 31;
+}
+
+// Distances of a point from four planes.
+static inline float4 distances(__global const float *plane, float3 x) {
+    return vload4(0, plane) * x.x + vload4(1, plane) * x.y + vload4(2, plane) * x.z - vload4(3, plane);
+}
+
+static inline int any_below(float4 d, float4 least) {
+    int4 below = d < least;
+    return (below.x | below.y | below.z | below.w) != 0;
 }
 
 // Sets the bits of samples in shadow. global size (facets)
-//   end  (cells): where each cell's entries end
+//   inverses  (LINES): 1/(1 - v) of the lines;  end  (cells): where each cell's entries end
 __kernel void shaded(view_numbers given, __global const float *restrict facet, __global const int *restrict index,
-                     __global const float2 *restrict place, __global const float *restrict plane,
-                     __global const int *restrict end, __global const int *restrict top, __global const int *restrict entry,
-                     __global ulong *restrict out) {
+                     __global const float *restrict inverses, __global const float *restrict plane,
+                     __global const int *restrict end, __global const int *restrict top, __global const int2 *restrict entry,
+                     __global int *restrict word) {
     size_t i = get_global_id(0);
+    word += i * LINES;
+    if (all_hidden(word)) return;
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
-    ulong bits = out[i];
-    for (int s = 0; s < given.samples; s++) {
-        if (bits >> s & 1) continue;
-        float2 at = place[s];
-        float3 x = lifted(f, at, eye, other);
-        float3 own = {f[0] + at.x * f[3] + at.y * f[6], f[1] + at.x * f[4] + at.y * f[7], f[2] + at.x * f[5] + at.y * f[8]};
-        seen_place seen = viewed(given, x);
-        if (!(seen.u >= -MARGIN && seen.v >= -MARGIN && seen.u <= given.cells[0] + MARGIN && seen.v <= given.cells[1] + MARGIN))
-            continue;  // beside all occluders
-        int cell = cell_of(seen.v, given.cells[1]) * given.cells[0] + cell_of(seen.u, given.cells[0]);
-        if (seen.height + 4.0f >= as_float(top[cell])) continue;
-        for (int k = cell ? end[cell - 1] : 0; k < end[cell]; k++) {
-            __global const float *p = plane + 16 * (size_t)entry[k];
-            if (beside(p, 3, own) < -BEHIND && beside(p, 0, x) >= -SIDE && beside(p, 1, x) >= -SIDE && beside(p, 2, x) >= -SIDE) {
-                bits |= 1UL << s;
-                break;
+    float3 corner = {f[0], f[1], f[2]}, p = lifted(f, (float2)(0), vload3(0, given.eye), vload3(0, given.other));
+    float3 q = p + (float3)(f[3], f[4], f[5]), r = p + (float3)(f[6], f[7], f[8]), lift = p - corner;
+    seen_box t = box_of(given, p, q, r);
+    if (!(t.u_most >= 0 && t.v_most >= 0 && t.u_least <= given.cells[0] && t.v_least <= given.cells[1])) return;  // beside all
+    // distances from which on a sample is in shadow, a corner of the facet not in the light, and a corner in deep shadow
+    const float4 least = {-SIDE, -SIDE, -SIDE, BEHIND}, touching = {-SIDE, -SIDE, -SIDE, -BEHIND};
+    const float4 deep = {SIDE, SIDE, SIDE, BEHIND};
+    int changed = 0, dark = 0, corners = 0, shaded = 0;
+    iv bits[GROUPS];
+#pragma unroll
+    for (int g = 0; g < GROUPS; g++) bits[g] = 0;
+    int u_first = cell_of(t.u_least, given.cells[0]), u_last = cell_of(t.u_most, given.cells[0]);
+    int v_first = cell_of(t.v_least, given.cells[1]), v_last = cell_of(t.v_most, given.cells[1]);
+    for (int v = v_first; v <= v_last && !dark; v++)
+        for (int u = u_first; u <= u_last && !dark; u++) {
+            int cell = v * given.cells[0] + u;
+            if (t.lowest >= as_float(top[cell])) continue;
+            for (int k = cell ? end[cell - 1] : 0; k < end[cell] && !dark; k++) {
+                int at = entry[k].x, of = entry[k].y;
+                // of the cells that hold both, the first counts
+                if (u != max(u_first, of >> 16) || v != max(v_first, of & 0xFFFF)) continue;
+                __global const float *o = plane + 16 * (size_t)at;
+                // the occluder's own plane lies behind the facet before it is lifted
+                float4 d_a = distances(o, p), d_b = distances(o, q), d_c = distances(o, r);
+                float drop = o[3] * lift.x + o[7] * lift.y + o[11] * lift.z;
+                d_a.w -= drop;
+                d_b.w -= drop;
+                d_c.w -= drop;
+                if (any_below(max(d_a, max(d_b, d_c)), least)) continue;
+                changed = 1;
+                int unlit = !any_below(d_a, touching) | !any_below(d_b, touching) << 1 | !any_below(d_c, touching) << 2;
+                corners |= unlit;
+                dark = unlit == 7;
+                shaded |= !any_below(d_a, deep) | !any_below(d_b, deep) | !any_below(d_c, deep);
+                if (dark) break;
+                crossed_plane one = crossing_of(d_a.x, d_b.x, d_c.x, -SIDE), two = crossing_of(d_a.y, d_b.y, d_c.y, -SIDE);
+                crossed_plane three = crossing_of(d_a.z, d_b.z, d_c.z, -SIDE), own = crossing_of(d_a.w, d_b.w, d_c.w, BEHIND);
+                iv all = -1;
+#pragma unroll
+                for (int g = 0; g < GROUPS; g++) {
+                    fv inverse = LINE(g);
+                    interval part = {0, PER_LINE};
+                    cut_interval(&part, one, inverse);
+                    cut_interval(&part, two, inverse);
+                    cut_interval(&part, three, inverse);
+                    cut_interval(&part, own, inverse);
+                    bits[g] |= samples_in(part);
+                    all &= bits[g];
+                }
+                dark = corners == 7 && !ANY(all != (iv)-1);
             }
         }
+    if (!changed) return;
+#if LINES > 1
+    // slivers that no line of samples meets: a facet with a shaded corner is not whole, and with one that is lit not dark
+    iv either = 0, both = -1, one = LINE(0) == inverses[0] ? (iv)1 : (iv)0;
+#pragma unroll
+    for (int g = 0; g < GROUPS; g++) {
+        either |= bits[g];
+        both &= bits[g];
     }
-    out[i] = bits;
+    if (!dark && shaded && !ANY(either != (iv)0)) bits[0] |= one;
+    if (!dark && !ANY(both != (iv)-1)) bits[0] &= ~one;
+#endif
+#pragma unroll
+    for (int g = 0; g < GROUPS; g++) {
+        iv hidden = dark ? (iv)-1 : bits[g];
+#if LINES < VW
+        word[0] |= hidden.s0;
+#else
+        STORE(LOAD(g, word) | hidden, g, word);
+#endif
+    }
 }

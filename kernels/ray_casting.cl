@@ -1,20 +1,20 @@
 // Which sample points of facets a viewpoint sees: rays through a tree of boxes.
 //
-//   bit s of hidden_i = 1 where some facet crosses the line from sample s of facet i to the eye
+//   a sample is hidden where some facet crosses the line from it to the eye; one ray decides on `step` samples
 //
 // source    ray and triangle: Woop, Benthin and Wald 2013 (watertight: facets that share an edge leave no gap), here
 //           without its division: with d = eye - p and A, B, C the corners seen from p, sheared so that d is the axis,
 //           U = Cx By - Cy Bx, ... have one sign, and the crossing at p + t d has t = (U Az + V Bz + W Cz)/(det dz)
 // symbols   facet     (n, 12), see facet_points.clh; the lift keeps a facet, its coplanar neighbours and its twin from hiding it
-//           index     facets to test, (size,); place (samples,) barycentric coordinates
+//           index     facets to test, (size,); line (LINES,) places of the lines of samples;  word  as in facet_points.clh
 //           eye       the antenna, in units of the scene; shrink  a power of two that makes eye - p about one
 //           other     the other antenna, as facet_points.clh takes it
 //           leaf      (n/8, 3, 3, 8): corners of eight facets, by corner and axis
 //           node      (., 2, 3, 8): lower and upper sides of the boxes of eight children; level l starts at base[l]
-//           side      1: the facet turned away from the eye is dark; 0: both sides are seen;  slack  rad, by which a
-//                     facet must be turned away from the eye at least to count as turned away
+//           kind      bits: 1: the facet turned away from the eye is dark;  2: ALL_SAMPLES
+//           slack     rad, by which a facet must be turned away from the eye at least to count as turned away
 //           d, z      eye - p times `shrink`, and the axis of its largest component; A, B, C are sheared along it
-// macros    none
+// macros    LINES  as in facet_points.clh
 // reference: sarcl/reference/shadow.py:hidden
 
 #include "facet_points.clh"
@@ -104,40 +104,57 @@ typedef struct {
 
 // Facets turned away start with every sample hidden, the others with none (fresh 1) or as they are (fresh 0).
 __kernel void face(face_numbers given, __global const float *restrict facet, __global const int *restrict index,
-                   __global const uchar *restrict side, __global ulong *restrict hidden) {
+                   __global const uchar *restrict kind, __global int *restrict word) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 ahead = vload3(0, given.eye) - (float3)(f[0], f[1], f[2]);
     float above = f[9] * ahead.x + f[10] * ahead.y + f[11] * ahead.z;
     float lift = f[9] * f[9] + f[10] * f[10] + f[11] * f[11];
     float far = ahead.x * ahead.x + ahead.y * ahead.y + ahead.z * ahead.z;
-    int away = side[index[i]] && above < 0 && above * above > given.slack * given.slack * lift * far;
-    hidden[i] = away ? ~0UL : given.fresh ? 0UL : hidden[i];
+    int away = (kind[index[i]] & 1) && above < 0 && above * above > given.slack * given.slack * lift * far;
+    word += i * LINES;
+    for (int l = 0; l < LINES; l++) word[l] = away ? -1 : given.fresh ? 0 : word[l];
 }
 
 typedef struct {
     float eye[3], other[3], shrink;
-    int samples, depth;
+    int step, depth;
 } hidden_numbers;
 
 __kernel void hidden(hidden_numbers given, __global const float *restrict facet, __global const int *restrict index,
-                     __global const float2 *restrict place, __global const float *restrict leaf,
-                     __global const float *restrict node, __constant const int *restrict base,
-                     __global ulong *restrict out) {
+                     __global const uchar *restrict kind, __global const float *restrict line,
+                     __global const float *restrict leaf, __global const float *restrict node,
+                     __constant const int *restrict base, __global int *restrict word) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
-    ulong bits = out[i];
-    for (int s = 0; s < given.samples; s++)
-        if (!(bits >> s & 1) && blocked(leaf, node, base, given.depth, lifted(f, place[s], eye, other), eye, given.shrink))
-            bits |= 1UL << s;
-    out[i] = bits;
+    int dark = 0;
+    word += i * LINES;
+    if (all_hidden(word)) return;
+    if (!(kind[index[i]] & ALL_SAMPLES)) {
+        for (int k = 0; k < PROBES; k++)
+            dark += blocked(leaf, node, base, given.depth, lifted(f, probe_at(k), eye, other), eye, given.shrink);
+        if (dark == 0) return;
+    }
+    for (int l = 0; l < LINES; l++) {
+        int bits = dark == PROBES ? -1 : word[l];
+        for (int k = 0; k < PER_LINE; k += given.step) {
+            int some = some_samples(k, given.step);
+            if ((bits & some) == some) continue;
+            float3 p = lifted(f, sample_at(line[l], k + 0.5f * (given.step - 1)), eye, other);
+            if (blocked(leaf, node, base, given.depth, p, eye, given.shrink)) bits |= some;
+        }
+        word[l] = bits;
+    }
 }
 
-// Number of samples of each facet that are not hidden.
-__kernel void seen(__global const ulong *restrict hidden, int samples, __global uchar *restrict out) {
+// Numbers of samples of each facet that are not hidden, on lines 0, 3, 4, 7, 8 ... and on 1, 2, 5, 6, 9 ...
+//   out  (n, 2)
+__kernel void seen(__global const int *restrict word, __global ushort *restrict out) {
     size_t i = get_global_id(0);
-    int dark = 0;
-    for (int s = 0; s < samples; s++) dark += hidden[i] >> s & 1;
-    out[i] = samples - dark;
+    int count[2] = {0, 0};
+#pragma unroll
+    for (int l = 0; l < LINES; l++) count[((l + 1) >> 1) & 1] += popcount((uint)~word[i * LINES + l]);
+    out[2 * i] = count[0];
+    out[2 * i + 1] = count[1];
 }

@@ -14,8 +14,8 @@
 //           per_across  grid lines per unit across: the first guess of an interval
 //           table     H (lines, columns)
 //           sector    4 x 8 numbers and 4 x 8 integers: outwards along +x, -x, +y, -y; see sarcl/visibility/_terrain_horizon.py
-//           place     (samples,) barycentric coordinates;  index  facets to test;  hidden  bit s of entry i: sample s of facet i
-// macros    none
+//           index, kind, line, word   as in ray_casting.cl; one line of sight decides on `step` samples
+// macros    LINES  as in facet_points.clh
 // reference: sarcl/reference/shadow.py:overshadowed
 
 #include "facet_points.clh"
@@ -163,23 +163,37 @@ static inline int behind(float3 p, float3 eye, __global const float *grid_x, __g
 }
 
 typedef struct {
-    int samples, nx, ny;
+    int step, nx, ny;
     float eye[3], other[3], per_x, per_y;
 } horizon_numbers;
 
 __kernel void horizon(horizon_numbers given, __global const float *restrict facet, __global const int *restrict index,
-                      __global const float2 *restrict place, __global const float *restrict x,
-                      __global const float *restrict y, __global const float *restrict z_rows,
-                      __global const float *restrict z_columns, __global const float *restrict number,
-                      __global const int *restrict whole, __global const float *restrict table,
-                      __global ulong *restrict hidden) {
+                      __global const uchar *restrict kind, __global const float *restrict line,
+                      __global const float *restrict x, __global const float *restrict y,
+                      __global const float *restrict z_rows, __global const float *restrict z_columns,
+                      __global const float *restrict number, __global const int *restrict whole,
+                      __global const float *restrict table, __global int *restrict word) {
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
-    ulong bits = hidden[i];
-    for (int s = 0; s < given.samples; s++)
-        if (!(bits >> s & 1) && behind(lifted(f, place[s], eye, other), eye, x, y, z_rows, z_columns, given.nx, given.ny,
-                                       given.per_x, given.per_y, number, whole, table))
-            bits |= 1UL << s;
-    hidden[i] = bits;
+    int dark = 0;
+    word += i * LINES;
+    if (all_hidden(word)) return;
+    if (!(kind[index[i]] & ALL_SAMPLES)) {
+        for (int k = 0; k < PROBES; k++)
+            dark += behind(lifted(f, probe_at(k), eye, other), eye, x, y, z_rows, z_columns, given.nx, given.ny,
+                           given.per_x, given.per_y, number, whole, table);
+        if (dark == 0) return;
+    }
+    for (int l = 0; l < LINES; l++) {
+        int bits = dark == PROBES ? -1 : word[l];
+        for (int k = 0; k < PER_LINE; k += given.step) {
+            int some = some_samples(k, given.step);
+            if ((bits & some) == some) continue;
+            float3 p = lifted(f, sample_at(line[l], k + 0.5f * (given.step - 1)), eye, other);
+            if (behind(p, eye, x, y, z_rows, z_columns, given.nx, given.ny, given.per_x, given.per_y, number, whole, table))
+                bits |= some;
+        }
+        word[l] = bits;
+    }
 }

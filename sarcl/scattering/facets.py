@@ -11,7 +11,7 @@ from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
 from ..scene.triangles import centroids, normals
-from ..visibility.illumination import Illumination, Span
+from ..visibility.illumination import Illumination, Span, shares_of
 from ..visibility.lit_parts import LitParts
 
 AT_ONCE = 100_000  # amplitudes computed per block
@@ -79,7 +79,7 @@ class FacetSet:
             all_of_all = np.full(len(self), 255, np.uint8)
             yield Span(0, n_pulses, all_of_all, all_of_all)
             return
-        yield from self.illumination.spans(lambda share: self._weighed(share[self.kept]))
+        yield from self.illumination.spans(lambda level: self._weighed(level[self.kept]))
 
     def between(self, first: int, stop: int) -> FacetSet:
         """What pulses first ... stop - 1 see of them, as pulses 0 ..."""
@@ -124,20 +124,17 @@ class FacetSet:
         there are lit parts."""
         if self.illumination is None:
             return np.ones(len(self))
-        *shares, part = self.illumination.shares_around(pulse)
-        before, after = (self._weighed(share[self.kept]) / np.float32(255) for share in shares)
+        *levels, part = self.illumination.levels_around(pulse)
+        before, after = (self._weighed(level[self.kept]) / np.float32(255) for level in levels)
         return np.asarray(before + part * (after - before))
 
-    def _weighed(self, share: np.ndarray) -> np.ndarray:
-        """Amplitudes, uint8 (k,), of illuminated shares, uint8 (k,): without a coherent part the power of a facet is
-        that of the share."""
+    def _weighed(self, level: np.ndarray) -> np.ndarray:
+        """Amplitudes, uint8 (k,), of illuminated shares whose roots are given, uint8 (k,): without a coherent part the
+        power of a facet is that of the share."""
         if self.sampled is not None:
-            share = np.where(self.sampled, share, np.uint8(255))
+            level = np.where(self.sampled, level, np.uint8(255))
         random = self.is_incoherent
-        if not random.any():
-            return share
-        root = np.rint(np.sqrt(np.arange(256) * 255.0)).astype(np.uint8)
-        return np.where(random, root[share], share)
+        return level if random.all() else np.where(random, level, shares_of(level))
 
     @property
     def is_incoherent(self) -> np.ndarray:
@@ -152,6 +149,12 @@ class FacetSet:
             return False
         some = self.kept if self.sampled is None else self.kept[self.sampled]
         return not bool(self.illumination.full[some].all())
+
+    @property
+    def samples_incoherent_alone(self) -> bool:
+        """Whether shares are counted on facets without a coherent part alone, of which their root is the amplitude."""
+        sampled = np.ones(len(self), bool) if self.sampled is None else self.sampled
+        return self.illumination is not None and not bool((sampled & ~self.is_incoherent).any())
 
     @property
     def is_rough(self) -> bool:

@@ -9,13 +9,13 @@ from typing import Any
 import numpy as np
 
 from ..base import boxes
-from ..base.constants import EDGE_ON, SPEED_OF_LIGHT
+from ..base.constants import EDGE_ON
 from ..base.errors import warn
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import check_above, facets_on
+from ..scene.terrain import check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import LitParts
 from ._random_surface import Pieces
@@ -24,6 +24,9 @@ from .facets import FacetSet
 
 # pairs of piece and pulse, up to which rough facets, and those of a terrain, are clipped too: about ten seconds
 FEW_LOOKS = 2e6
+# Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
+# accuracy of amplitudes
+FINEST = 0.25, 4.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -56,11 +59,13 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 def facets_of(
     pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
-    max_bytes: float, device: Any, tell: Callable[[int], object], exact: bool, margin: float = 0.0,
+    max_bytes: float, device: Any, tell: Callable[[int], object], exact: bool, sampled: bool, accuracy: float,
+    margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
-    exact   lit parts of coherent facets are computed; False: all shadows are shares, by sampled rays
+    exact   lit parts of coherent facets are computed; False: all shadows are shares, from samples
+    sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
     margin  m: antennas of channels stand up to this far from these
     tell is called with 2 when facets are culled, and with 3 when they are illuminated.
     """
@@ -84,24 +89,30 @@ def facets_of(
     illumination, lit_parts = None, None
     clipped = np.zeros(len(keep), bool)
     if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
-        clipped |= (coherent(scene) & ~pieces.incoherent) | (int(keep.sum()) * n_pulses <= FEW_LOOKS)
+        clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
     # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
     by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
-    sampled = keep if by_horizons else keep & ~clipped
+    by_samples = keep if by_horizons else keep & ~clipped
     solid = original.triangles
+    ground: tuple[np.ndarray, np.ndarray] | None = None
     if terrain:
-        solid = solid[~terrain["on_heights"]]
-        terrain["on_heights"] = terrain["on_heights"][pieces.of]
-    if shadows and sampled.any():
+        on_pieces = terrain["on_heights"][pieces.of]
+        floor, solid = solid[terrain["on_heights"]], solid[~terrain["on_heights"]]
+        if by_horizons:
+            terrain["on_heights"] = on_pieces
+        else:  # exactly: by its facets, where it may hide anything
+            ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
+            terrain = {}
+    if shadows and by_samples.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
-            two_sided=scene.two_sided, wanted=sampled,
-            tolerance=_shadow_tolerance(scene, waveform, antennas), max_bytes=max_bytes, device=device,
-            by_facets=~clipped, occluders=solid,
+            two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
+            accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
+            by_facets=~clipped, occluders=solid, ground=ground, device=device,
         )  # fmt: skip
-        left_out["shadowed"] = int((sampled & illumination.dark).sum()) * n_pulses
-        keep &= ~(sampled & illumination.dark)
+        left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
+        keep &= ~(by_samples & illumination.dark)
     if (keep & clipped).any():
         lit_parts = LitParts(
             device, scene.triangles, solid if by_horizons else original.triangles, antennas.ends,
@@ -119,7 +130,7 @@ def facets_of(
         triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
         illumination, np.flatnonzero(keep), pieces.random[keep], lit_parts,
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[keep],
-        sampled[keep], pieces.incoherent[keep] if pieces.incoherent.any() else None,
+        by_samples[keep], pieces.incoherent[keep] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
 
 
@@ -133,27 +144,12 @@ def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
     return {"heights": scene.heights, "on_heights": on}
 
 
-def _shadow_tolerance(scene: Scene, waveform: Waveform, antennas: PulseGeometry) -> float:
-    """Tolerance of a facet's illuminated share: a quarter, or more where facets are small beside a resolution cell.
-
-    The bound on how far a shadow's edge moves (docs/theory/shadows.md) is several times the actual shift: the
-    error of the edge is then about half a cell at most, or a quarter of a facet.
-    """
-    typical = float(np.median(np.maximum.reduce(geometry.edges(scene.triangles))))
-    edge = _half_cell(waveform, antennas, scene)
-    return float(np.clip(4 * edge / typical, 0.25, 8.0)) if np.isfinite(edge) else 0.25
-
-
-def _half_cell(waveform: Waveform, antennas: PulseGeometry, scene: Scene) -> float:
-    """Half the finer of range and cross-range resolution at the scene's centre, m; inf where nothing is resolved."""
-    look = antennas.mean_direction(scene.center)
-    if np.isnan(look).any():  # an antenna stands there
-        return np.inf
-    along = float(np.linalg.norm(look, axis=1).max())
-    turn = float(np.linalg.norm(look - look[0], axis=1).max())
-    range_cell = SPEED_OF_LIGHT / (2 * waveform.bandwidth * along) if along else np.inf
-    cross_cell = SPEED_OF_LIGHT / (2 * waveform.center * turn) if turn else np.inf
-    return min(range_cell, cross_cell) / 2
+def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
+    """Whether so many pieces of incoherent facets, cut to a cell's edge, m, are seen by pulses that shadows on them are
+    counted in samples."""
+    rough = ~coherent(scene)
+    pieces = np.maximum(2 * geometry.areas(scene.triangles[rough]) / cell**2, 1.0)
+    return float(pieces.sum()) * n_pulses > FEW_LOOKS
 
 
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:

@@ -12,7 +12,8 @@ from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene.scene import Scene
 from ._facet_norm import longest_piece
-from ._random_surface import Pieces, cell_edge, pieces_of
+from ._random_surface import Pieces, pieces_of
+from ._random_surface import cell_edge as cell_edge
 from .antenna_weights import WeightError
 from .facet_plan import FacetPlan, plan_facets
 

@@ -132,6 +132,37 @@ def check_above(name: str, grid: Heights, ends: np.ndarray) -> None:
         )
 
 
+def steepest(grid: Heights) -> float:
+    """Largest slope of a terrain, m per m."""
+    x, y, z = grid
+    along, up = np.diff(z, axis=1) / np.diff(x), np.diff(z, axis=0) / np.diff(y)[:, None]
+    # of the two triangles of each cell, as Scene.from_heights cuts it
+    squares = along[:-1] ** 2 + up[:, 1:] ** 2, along[1:] ** 2 + up[:, :-1] ** 2
+    return float(np.sqrt(max(square.max() for square in squares)))
+
+
+def clear_of(grid: Heights, triangles: np.ndarray, on: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
+    """True (k,) for facets, m (k, 3, 3), that a terrain hides from no antenna, m (n, 3) each.
+
+    Lines of sight climb more steeply than the terrain anywhere, and the facets lie `on` it (k,), or so far above it
+    that it cannot rise above them between their corners.
+    """
+    x, y, z = grid
+    slope, corners = steepest(grid), triangles.reshape(-1, 3)
+    low, high = np.minimum(corners.min(axis=0)[:2], [x[0], y[0]]), np.maximum(corners.max(axis=0)[:2], [x[-1], y[-1]])
+    top = max(float(corners[:, 2].max()), float(z.max()))
+    for end in ends:
+        away = np.linalg.norm(np.maximum(np.abs(end[:, :2] - low), np.abs(end[:, :2] - high)), axis=1)
+        if not (end[:, 2] - top > slope * away).all():
+            return np.zeros(len(triangles), bool)
+    out = np.array(on)
+    rest = np.flatnonzero(~out)
+    longest = np.maximum.reduce(geometry.edges(triangles[rest]))
+    heights = above(grid, triangles[rest].reshape(-1, 3)).reshape(-1, 3)
+    out[rest] = heights.min(axis=1) >= slope * longest
+    return out
+
+
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
     """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it.
 

@@ -187,8 +187,8 @@ class FacetSpreader:
         if self.pulse_nodes.spacing > 1:  # a facet outside the window at a node may be inside at a pulse beside it
             _, node_constants, n_nodes = self._constants(at, False)
         axes, node_axes = (device.upload(self.weights.packed_axes(rows)) for rows in (np.arange(start, stop), at))
-        seen = device.upload(span.share[held.order])
-        later = seen if span.later is span.share else device.upload(span.later[held.order])
+        seen = device.upload(span.level[held.order])
+        later = seen if span.later is span.level else device.upload(span.later[held.order])
         moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
         parts = device.upload(self._parts(start, stop)) if self.partly else moments
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)

@@ -22,8 +22,8 @@ from ..scattering.antenna_weights import AntennaWeights, WeightError
 from ..scattering.facet_plan import MOST_FACETS
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
-from ..scattering.scatterers import Points, facets_of, points_of
-from ..scattering.subdivision import Subdivision, plan_cut
+from ..scattering.scatterers import Points, facets_of, points_of, samples_shadows
+from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
 from ..scene.scene import Scene
 from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
@@ -36,6 +36,7 @@ LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 # Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
 UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
+SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
 Progress = Callable[[str, int, int], None]
 
@@ -87,6 +88,7 @@ class SceneEchoes:
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
+    shadow_error           of shadows that are counted in samples, relative to the norm of the facets
     """
 
     request: EchoRequest
@@ -100,6 +102,7 @@ class SceneEchoes:
     skipped: dict[str, int]
     mesh_warnings: dict[str, Any]
     error_budget: float
+    shadow_error: float
     n_pulses: int
 
     def __len__(self) -> int:
@@ -117,8 +120,11 @@ class SceneEchoes:
         sampled."""
         rows = None if self.facets is None else self.facets.lit_rows
         words = {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
-        sampled = self.facets is not None and self.facets.has_sampled_shadows
-        return words | ({"shadow edges": "sampled, not part of the error"} if sampled else {})
+        if self.facets is None or not self.facets.has_sampled_shadows:
+            return words
+        known = self.facets.samples_incoherent_alone
+        error = f"{self.shadow_error:.1e}" if known else "not part of the error"
+        return words | {"shadow edges": f"sampled, {error}"}
 
     def partly_lit(self, antennas: PulseGeometry, waveform: Waveform) -> SceneEchoes | None:
         """The facets alone of which some pulse sees a part past others, on the device; None where there are none."""
@@ -131,7 +137,7 @@ class SceneEchoes:
         tiled = TiledFacets(
             request.device, partly[0], plan, antennas, waveform, self.weights, request.polarizations, request.vertical
         )
-        return replace(self, points=None, facets=partly[0], tiled_points=None, tiled_facets=(tiled,))
+        return replace(self, points=None, facets=partly[0], tiled_points=None, tiled_facets=(tiled,), shadow_error=0.0)
 
     def channel(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int = 0
@@ -209,7 +215,7 @@ class SceneEchoes:
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(
             self, antennas, weights, frequencies, plan, nodes, tuple(spreaders),
-            float(np.sqrt(sum(error**2 for error, _ in parts))),
+            float(np.sqrt(sum(error**2 for error, _ in parts) + self.shadow_error**2)),
             {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})},
         )  # fmt: skip
 
@@ -296,14 +302,14 @@ def prepare_scene(
     """
     refuse_unseen(scene, weights, waveform, antennas, request.gated, margin)
     device, vertical = request.device, request.vertical
-    error_budget = request.tolerance / parts_of(scene)
+    error_budget = share_of(request, scene, waveform, antennas, request.tolerance)
     weight_error = error_of_weights(weights, scene, waveform, request.polarizations, vertical)
     bands = tuple(dict.fromkeys(bands))
     subdivision = _plan(request, scene, waveform, antennas, weight_error, bands)
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
     points, skipped = points_of(scene, request.skips, len(antennas))
-    facets, held_points, mesh_warnings = None, None, dict[str, Any]()
+    facets, held_points, mesh_warnings, shadow_error = None, None, dict[str, Any](), 0.0
     held_facets: tuple[TiledFacets, ...] = ()
     if subdivision is not None:
         facet_plan, pieces = subdivision.apply(scene, request.seed)
@@ -317,8 +323,10 @@ def prepare_scene(
         facets, left_out = facets_of(
             pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
             max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
-            exact=exact and request.shadows is True, margin=margin,
+            exact=exact and request.shadows, sampled=_samples_shadows(request, scene, waveform, antennas),
+            accuracy=SHADOWS * request.tolerance / parts_of(scene), margin=margin,
         )  # fmt: skip
+        shadow_error = _shadow_error(request, scene, facets)
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
         if facets is not None and tiled and not facet_plan.is_float64:
             held_facets = tuple(
@@ -341,7 +349,7 @@ def prepare_scene(
     request.clock.lap("scene")
     prepared = SceneEchoes(
         request, weights, weight_error, subdivision, points, facets, held_points, held_facets, skipped, mesh_warnings,
-        error_budget, len(antennas),
+        error_budget, shadow_error, len(antennas),
     )  # fmt: skip
     prepared.check_plans(antennas, bands)
     return prepared
@@ -371,6 +379,32 @@ def parts_of(scene: Scene) -> float:
     return float(np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1))
 
 
+def share_of(
+    request: EchoRequest, scene: Scene, waveform: Waveform, antennas: PulseGeometry, tolerance: float
+) -> float:
+    """The share of a tolerance that points have, and facets, beside that of shadows that are counted in samples."""
+    left = np.sqrt(1 - SHADOWS**2) if _samples_shadows(request, scene, waveform, antennas) else 1.0
+    return float(tolerance * left / parts_of(scene))
+
+
+def _samples_shadows(request: EchoRequest, scene: Scene, waveform: Waveform, antennas: PulseGeometry) -> bool:
+    cell = np.inf if request.max_edge is None else cell_edge(waveform)
+    return request.shadows and bool(len(scene.triangles)) and samples_shadows(scene, cell, len(antennas))
+
+
+def _shadow_error(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> float:
+    """Error of shadows on rough facets that are counted in samples. ToleranceUnreachable where it exceeds its share."""
+    if facets is None or not facets.samples_incoherent_alone or facets.illumination is None:
+        return 0.0
+    error = facets.illumination.error
+    least = error * parts_of(scene) / SHADOWS
+    if least > request.tolerance:
+        raise ToleranceUnreachable(
+            request.tolerance, 1.01 * least, "shadow edges on rough facets, counted in samples at single pulses"
+        )
+    return error
+
+
 def plan_scene(
     request: EchoRequest, scene: Scene, waveform: Waveform, antennas: PulseGeometry, weight_error: WeightError,
     bands: Iterable[Band], tolerance: float, max_edge: float | str | None,
@@ -379,7 +413,7 @@ def plan_scene(
 
     ToleranceUnreachable where gains, facets, or samples of one of `bands` exceed their shares of it.
     """
-    share, made = tolerance / parts_of(scene), None
+    share, made = share_of(request, scene, waveform, antennas, tolerance), None
     weight_error.check(share)
     if len(scene.triangles):
         terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf

@@ -10,9 +10,11 @@ from ..base.boxes import box
 from ..base.vectors import dot
 from ..scene.triangles import areas, edges, normals
 
-STRIDE = 16  # blocks from one viewpoint to the next, before refinement
-UNEVEN = 0.25  # of a facet: larger differences from a linear change count; above the error of counting samples
-LEFT = 4e-4  # of the sum of squared shares (0.02 of their norm): largest sum of squared differences that is left
+STRIDE = 128  # blocks from one viewpoint to the next, before refinement
+# Mean square of what is left between viewpoints once the one halfway is added, over the square of the difference found
+# there: 8/15 of a parabola's mean, a half of which is left where shares begin or end to change within the half
+SETTLED = 0.45
+MISSED = 0.25  # of the limit: changes of facets that are left out
 
 
 def shadow_length(bounds: np.ndarray, antennas: np.ndarray) -> float:
@@ -86,36 +88,60 @@ def pulse_blocks(
     return np.array(blocks, np.int64), np.array(viewpoints, np.int64), np.array(turns)
 
 
-def refine_viewpoints(look: Callable[[int], np.ndarray], at: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
-    """Viewpoints between which shares change linearly, as increasing indices into `at`, pulses (n,), with the shares.
+Base = tuple[int, np.ndarray, np.ndarray]  # see refine_viewpoints
+Difference = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray | None], float]
 
-    look(index) returns the shares, uint8 (k,), at a viewpoint. Every 16th viewpoint and the last are taken. Between two
-    of them, the one halfway is compared with linear interpolation: where differences above a quarter hold more than
-    0.04 % of the sum of squared shares, both halves are refined in the same way.
+
+def refine_viewpoints(
+    look: Callable[[int, Base | None], np.ndarray], at: np.ndarray, difference: Difference, limit: float
+) -> Iterator[tuple[int, np.ndarray, float]]:
+    """Viewpoints between which levels change linearly, as increasing indices into `at`, pulses (n,).
+
+    look(index, base)  the levels, uint8 (k,), at a viewpoint; those of facets that `base` leaves out are as there: its
+                 index, its levels, and the facets (k,) bool to be looked at
+    difference(found, first, last, part, which)  square of the difference between levels of facets `which` (k,) bool,
+                 None for all, and what lies at `part`, 0 to 1, between those of two viewpoints around it
+    limit        mean square of differences that is left
+
+    Every 128th viewpoint and the last are taken. Between two of them, the one halfway is compared with linear
+    interpolation: where more than the limit would be left, both halves are refined in the same way. Facets that three
+    looks all see whole, or dark, are looked at again in the halves' middles; where these hardly differ either, they are
+    left out from there on. Yields the index, the levels, and the mean square of differences from the viewpoint before.
     """
 
-    def between(a: int, first: np.ndarray, b: int, last: np.ndarray) -> Iterator[tuple[int, np.ndarray]]:
+    def between(
+        a: int, first: np.ndarray, b: int, last: np.ndarray, left: float, base: Base | None, changing: np.ndarray | None
+    ) -> Iterator[tuple[int, np.ndarray, float]]:
         if b - a < 2:
+            pulses = at[b] - at[a]
+            yield b, last, left * float(pulses - 1) / float(pulses)
             return
         middle = (a + b) // 2
-        found = look(middle)
-        part = np.float32((at[middle] - at[a]) / (at[b] - at[a]))
-        off = np.abs(found - (first + part * (last - first.astype(np.float32))))
-        wrong = off[off > UNEVEN * 255]
-        enough = float(wrong @ wrong) <= LEFT * float(np.square(found, dtype=np.float32).sum())
-        if not enough:
-            yield from between(a, first, middle, found)
-        yield middle, found
-        if not enough:
-            yield from between(middle, found, b, last)
+        found = look(middle, base)
+        part = float((at[middle] - at[a]) / (at[b] - at[a]))
+        left = SETTLED * difference(found, first, last, part, None)
+        if left <= limit:
+            yield middle, found, left
+            yield b, last, left
+            return
+        halves = [(a, first, middle, found), (middle, found, b, last)]
+        bases: list[Base | None] = [base, base]
+        if base is None:
+            moves = (found != first) | (found != last) | ((found != 0) & (found != 255))
+            if changing is not None:
+                moves |= changing
+                if difference(found, first, last, part, ~changing) <= MISSED * limit:
+                    bases = [(start, levels, moves) for start, levels, *_ in halves]
+            changing = moves
+        for half, known in zip(halves, bases, strict=True):
+            yield from between(*half, left, known, changing)
 
-    held, share = 0, look(0)
-    yield held, share
+    held, levels = 0, look(0, None)
+    yield held, levels, 0.0
     for place in np.unique(np.append(np.arange(STRIDE, len(at), STRIDE), len(at) - 1)).tolist()[len(at) == 1 :]:
-        end = look(place)
-        yield from between(held, share, place, end)
-        yield place, end
-        held, share = place, end
+        end = look(place, None)
+        yield from between(held, levels, place, end, 0.0, None, None)
+        held, levels = place, end
 
 
 def blocks_around(viewpoints: np.ndarray, n_pulses: int) -> np.ndarray:

@@ -1,26 +1,51 @@
-"""Sample points of facets, which represent equal parts of a triangle; and probes at its corners."""
+"""Sample points of facets, on lines parallel to an edge: each stands for as much area as the others."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
+from typing import Any
+
 import numpy as np
 
-# Number of sample points of a facet, and the largest error of its illuminated share behind a straight shadow edge.
-SAMPLES = ((1, 5 / 9), (4, 0.31), (16, 0.14), (64, 1 / 16))
+from ..opencl.device import Device
 
-# Corners and centre: a shadow with a straight edge that covers part of a triangle covers some of its corners, not all.
-PROBES = np.array([[0.01, 0.01], [0.98, 0.01], [0.01, 0.98], [1 / 3, 1 / 3]], np.float32)
+FEWEST_LINES, MOST_LINES, PER_LINE = (
+    16,
+    256,
+    32,
+)  # lines of a facet, and samples on each, as in kernels/facet_points.clh
+
+
+def line_places(n: int) -> np.ndarray:
+    """Places v of n lines that fill a facet evenly, (n,)."""
+    return np.asarray(1 - np.sqrt(1 - (np.arange(n) + 0.5) / n))
 
 
 def sample_points(n: int) -> np.ndarray:
-    """Barycentric coordinates of n sample points, float32 (n, 2): each for an equal part of the triangle.
+    """Barycentric coordinates of the samples on n lines, line by line (32 n, 2)."""
+    v = np.repeat(line_places(n), PER_LINE)
+    return np.stack([(1 - v) * np.tile((np.arange(PER_LINE) + 0.5) / PER_LINE, n), v], axis=1)
 
-    The R2 sequence (Roberts 2018) on a square, folded to the triangle (Heitz 2019). Of some 20000 offsets of the
-    sequence this one has the smallest error of shares behind straight edges: see SAMPLES.
+
+@dataclass(frozen=True, eq=False)
+class SampleLines:
+    """Lines of samples on a device: places v, and 1/(1 - v), float32 (count,).
+
+    step  samples that one line of sight decides on, where they are looked along one by one: all 32 of a point
     """
-    if n == 1:
-        return np.full((1, 2), 1 / 3, np.float32)
-    plastic = 1.32471795724474602596
-    square = (np.array([0.845, 0.658]) + np.arange(n)[:, None] * [1 / plastic, 1 / plastic**2]) % 1
-    half = square.min(axis=1) / 2
-    low = square.argmin(axis=1)[:, None] == [0, 1]
-    return np.where(low, half[:, None], square - half[:, None]).astype(np.float32)
+
+    places: Any
+    inverses: Any
+    count: int
+    step: int = 1
+
+    @classmethod
+    def of_facets(cls, device: Device, n: int) -> SampleLines:
+        """n lines of facets: 16, 32, 64, 128 or 256."""
+        v = line_places(n)
+        return cls(device.upload(v.astype(np.float32)), device.upload((1 / (1 - v)).astype(np.float32)), n)
+
+    @classmethod
+    def of_points(cls, device: Device) -> SampleLines:
+        """Of points: one line of sight each."""
+        return cls(device.upload(np.zeros(1, np.float32)), device.upload(np.ones(1, np.float32)), 1, PER_LINE)

@@ -10,10 +10,15 @@ import numpy as np
 from ..base.boxes import box
 from ..opencl.device import Device
 from ..scene.triangles import edges, normals
+from ._facet_samples import SampleLines
 
 # Height above a facet at which rays start, relative to the scene: float32 resolves 1e-7 of it. Coplanar neighbours, and
 # sheets that are modelled twice, do not occlude one another.
 STEP = 1e-6
+ONE_SIDED, ALL_SAMPLES = 1, 2  # bits of a facet's kind, as in the kernels
+FEW = 4096  # facets; in smaller scenes every facet gets all its samples
+# times the lower quartile of the edges: a shadow may fall wholly between the probes of facets longer than this
+LARGE = 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -52,7 +57,8 @@ class DeviceFacets:
 
     def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, one_sided: np.ndarray) -> None:
         self.device, self.frame, self.size = device, frame, len(triangles)
-        self.length = np.maximum.reduce(edges(triangles))
+        length = np.maximum.reduce(edges(triangles))
+        large = length > LARGE * np.quantile(length, 0.25) if len(length) > FEW else np.ones(len(length), bool)
         a = triangles[:, 0]
         parts = (
             (a - frame.center) * frame.unit,
@@ -61,7 +67,7 @@ class DeviceFacets:
             normals(triangles) * STEP,
         )
         self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
-        self.side = device.upload(one_sided.astype(np.uint8))
+        self.kind = device.upload((ONE_SIDED * one_sided + ALL_SAMPLES * large).astype(np.uint8))
 
 
 class DevicePoints:
@@ -69,15 +75,16 @@ class DevicePoints:
 
     def __init__(self, device: Device, places: np.ndarray, frame: Frame, up: np.ndarray) -> None:
         self.device, self.frame, self.size = device, frame, len(places)
-        rows = np.zeros((len(places), 12), np.float32)
-        rows[:, :3], rows[:, 9:] = (places - frame.center) * frame.unit, up * STEP
+        rows = np.zeros((max(len(places), 1), 12), np.float32)
+        rows[: len(places), :3], rows[: len(places), 9:] = (places - frame.center) * frame.unit, up * STEP
         self.buffer = device.upload(rows)
-        self._index = device.upload(np.arange(len(places), dtype=np.int32))
-        self._place = device.upload(np.zeros((1, 2), np.float32)), 1
+        self.kind = device.upload(np.full(len(rows), ALL_SAMPLES, np.uint8))
+        self._index = device.upload(np.arange(len(rows), dtype=np.int32))
+        self._line = SampleLines.of_points(device)
 
     def seen(self, occluders: Any, viewpoints: list[np.ndarray]) -> np.ndarray:
         """Points that all viewpoints, m (3,), see past `occluders` (n,) bool."""
-        hidden = self.device.zeros(8 * max(self.size, 1))
+        words = self.device.zeros(4 * max(self.size, 1))
         for at, other in zip(viewpoints, viewpoints[::-1], strict=True):
-            occluders.hide(self, self._index, self.size, self._place, at, other, hidden)
-        return self.device.download(hidden, np.empty(max(self.size, 1), np.uint64))[: self.size] & 1 == 0
+            occluders.hide(self, self._index, self.size, self._line, at, other, words)
+        return self.device.download(words, np.empty(max(self.size, 1), np.uint32))[: self.size] == 0

@@ -1,7 +1,8 @@
-"""Shares of facets that given viewpoints see: sample points on facets, tested for occlusion by facets and terrain."""
+"""Shares of facets that given viewpoints see: samples on lines, tested for occlusion by facets and terrain."""
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import Any
 
 import numpy as np
@@ -9,15 +10,36 @@ import numpy as np
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ._aspect_blocks import scene_box
-from ._facet_samples import PROBES, SAMPLES, sample_points
+from ._facet_samples import FEWEST_LINES, MOST_LINES, PER_LINE, SampleLines
 from ._frame import DeviceFacets, Frame
 from ._ray_casting import Occluders
-from ._terrain_horizon import Horizons, Terrain
+from ._terrain_horizon import Terrain
 
-FEW = 4096  # facets; in smaller scenes every facet gets all its samples
-# times the lower quartile of the edges: a shadow may fall wholly between the probes of facets longer than this
-LARGE = 4
-CHUNK = 2**22  # facets per call of the kernels: bounds the memory
+CHUNK = 2**16  # facets per call of the kernels: bounds the memory
+
+
+@dataclass(frozen=True, eq=False)
+class Look:
+    """What viewpoints see of facets.
+
+    levels   amplitudes, roots of the shares, uint8 (k,): 255 of a whole facet, 0 where not wanted
+    partly   the facets that are partly seen (n,), and `halves`, numbers of their samples that are seen on even and on
+             odd lines (n, 2), of `samples` on each of the two
+    """
+
+    levels: np.ndarray
+    partly: np.ndarray
+    halves: np.ndarray
+    samples: int
+
+    def spread(self, weights: np.ndarray) -> float:
+        """Sum of weights (k,) times the squares of the errors of the levels, as shares are counted in samples.
+
+        A quarter of what the halves of the lines differ by, for each facet: errors of the mean of both are half of the
+        difference where those of the halves are independent, and an eighth were found behind edges of wide shadows.
+        """
+        even, odd = np.sqrt(self.halves / self.samples).T
+        return float(weights[self.partly] @ ((even - odd) / 4) ** 2)
 
 
 class IlluminationSolver:
@@ -32,79 +54,87 @@ class IlluminationSolver:
         on_heights: np.ndarray | None = None,
         two_sided: np.ndarray | bool = True,
         wanted: np.ndarray | None = None,
-        tolerance: float = 0.25,
         by_facets: np.ndarray | bool = True,
         occluders: np.ndarray | None = None,
+        ground: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         self.device, k = device, len(triangles)
         on = np.full(k, heights is not None) if on_heights is None else on_heights
         solid = triangles[~on] if occluders is None else np.reshape(occluders, (-1, 3, 3))
-        self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid]), heights))
-        self.terrain = None if heights is None else Terrain(device, heights, frame)
-        one_sided = np.broadcast_to(~np.asarray(two_sided), k)
-        self.facets = DeviceFacets(device, triangles, frame, one_sided)
-        self.occluders: Any = None
-        self._by_facets = np.broadcast_to(np.asarray(by_facets), k)
-        if self._by_facets.any() and len(solid):
-            self.occluders = Occluders(device, solid, frame)
-        length = self.facets.length
-        large = length > LARGE * np.quantile(length, 0.25) if k > FEW else np.ones(k, bool)
+        floor, over = (np.zeros((0, 3, 3)), np.zeros(k, bool)) if ground is None else ground
+        self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid, floor]), heights))
+        self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
+        by_facets = np.broadcast_to(np.asarray(by_facets), k)
         keep = np.ones(k, bool) if wanted is None else wanted
-        points = sample_points(next(n for n, error in SAMPLES if error <= tolerance))
-        self.n_samples = len(points)
-        self._samples = (device.upload(points), len(points))
-        self._probes = (device.upload(PROBES), len(PROBES))
-        if self.n_samples <= len(PROBES):
-            large = np.ones(k, bool)
-        self._large, self._small = np.flatnonzero(keep & large), np.flatnonzero(keep & ~large)
+        hiders: list[tuple[Any, np.ndarray]] = []  # each with the facets that it may hide
+        if heights is not None:
+            hiders.append((Terrain(device, heights, frame), np.ones(k, bool)))
+        for facets, hidden in ((solid, by_facets), (floor, over)):
+            n = int((keep & hidden).sum())
+            if n and len(facets):
+                hiders.append((Occluders(device, facets, frame, n), hidden))
+        # facets in parts that share what may hide them
+        kind = sum(hidden * 2**i for i, (_, hidden) in enumerate(hiders)) + np.zeros(k, np.int64)
+        self._parts: list[tuple[np.ndarray, list[Any]]] = []
+        for number in np.unique(kind[keep]).tolist():
+            some = np.flatnonzero(keep & (kind == number))
+            hiding = [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1]
+            self._parts += [(some[i : i + CHUNK], hiding) for i in range(0, len(some), CHUNK)]
+        self._few = SampleLines.of_facets(device, FEWEST_LINES)
+        self._more = self._few
+
+    def take_lines(self, n: int) -> None:
+        """Take samples on n lines, 16 to 256, of facets that are partly seen on 16."""
+        self._more = SampleLines.of_facets(self.device, min(n, MOST_LINES))
 
     def share(self, viewpoints: list[np.ndarray], slack: float = 0.0) -> np.ndarray:
-        """Shares of facets that all viewpoints, m (3,), see: uint8 (k,), 255 for a whole facet, 0 where not wanted.
+        """Shares of facets that all viewpoints, m (3,), see: uint8 (k,), 255 for a whole facet, 0 where not wanted."""
+        return np.rint(self.look(viewpoints, slack).levels.astype(np.float32) ** 2 / 255).astype(np.uint8)
+
+    def look(self, viewpoints: list[np.ndarray], slack: float = 0.0, some: np.ndarray | None = None) -> Look:
+        """What all viewpoints, m (3,), see.
 
         slack  rad; a one-sided facet counts as back-facing where it is turned away by more than this
+        some   (k,) bool: facets that some antenna near sees partly; the others are not looked at
         """
-        out = np.zeros(len(self.facets.length), np.uint8)
-        horizons = [None if self.terrain is None else self.terrain.sweep(v) for v in viewpoints]
-        partly = [self._large]
-        for part in self._chunks(self._small):
-            seen = self._count(part, self._probes, viewpoints, horizons, slack)
-            out[part] = np.where(seen == len(PROBES), 255, 0)
-            partly.append(part[(seen > 0) & (seen < len(PROBES))])
-        for part in self._chunks(np.concatenate(partly)):
-            seen = self._count(part, self._samples, viewpoints, horizons, slack)
-            out[part] = np.rint(seen * (255 / self.n_samples))
-        return out
+        levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
+        most = self._more.count * PER_LINE // 2
+        for index, hiders in self._parts:
+            if some is not None:
+                index = index[some[index]]
+            elif self._more is not self._few:
+                total = self._count(index, hiders, self._few, viewpoints, slack).sum(axis=1, dtype=np.int32)
+                levels[index[total == PER_LINE * self._few.count]] = 255
+                index = index[(total > 0) & (total < PER_LINE * self._few.count)]
+            seen = self._count(index, hiders, self._more, viewpoints, slack)
+            total = seen.sum(axis=1, dtype=np.int32)
+            levels[index] = np.rint(255 * np.sqrt(total / np.float32(2 * most)))
+            between = (total > 0) & (total < 2 * most)
+            partly.append(index[between])
+            halves.append(seen[between])
+        none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
+        return Look(levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most)
 
     def _count(
-        self, index: np.ndarray, points: tuple[Any, int], viewpoints: list[np.ndarray],
-        horizons: list[Horizons | None], slack: float,
-    ) -> np.ndarray:  # fmt: skip
-        """Number of sample points of each facet in `index` that all viewpoints see, uint8 (n,).
-
-        index   facets that are all occluded by facets, or all by the terrain alone
-        points  buffer of barycentric coordinates, and their number
-        """
+        self, index: np.ndarray, hiders: list[Any], lines: SampleLines, viewpoints: list[np.ndarray], slack: float
+    ) -> np.ndarray:
+        """Numbers of samples of facets `index` that all viewpoints see, on even and on odd lines, uint16 (n, 2)."""
         device, n = self.device, len(index)
         if n == 0:
-            return np.zeros(0, np.uint8)
-        which, hidden = device.upload(index.astype(np.int32)), device.empty(8 * n)
-        face = device.kernel("ray_casting.cl", "face")
+            return np.zeros((0, 2), np.uint16)
+        which, seen, words = (
+            device.upload(index.astype(np.int32)),
+            device.empty(4 * n),
+            device.empty(4 * lines.count * n),
+        )
+        face, count = (device.kernel("ray_casting.cl", name, LINES=lines.count) for name in ("face", "seen"))
         for first, viewpoint in enumerate(viewpoints):
             numbers = launch_numbers(
                 "ray_casting.cl", "face", eye=self.frame.eye(viewpoint)[:3], slack=slack, fresh=first == 0
             )
-            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.side, hidden)
-        for viewpoint, other, horizon in zip(viewpoints, viewpoints[::-1], horizons, strict=True):
-            if horizon is not None:
-                horizon.hide(self.facets, which, n, points, other, hidden)
-            if self.occluders is not None and self._by_facets[index[0]]:
-                self.occluders.hide(self.facets, which, n, points, viewpoint, other, hidden)
-        seen = device.empty(n)
-        device.run(device.kernel("ray_casting.cl", "seen"), (n,), None, hidden, points[1], seen)
-        return device.download(seen, np.empty(n, np.uint8))
-
-    def _chunks(self, index: np.ndarray) -> list[np.ndarray]:
-        """Facets in parts that `_count` takes."""
-        by_facets = self._by_facets[index]
-        kinds = index[by_facets], index[~by_facets]
-        return [kind[i : i + CHUNK] for kind in kinds for i in range(0, len(kind), CHUNK)]
+            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.kind, words)
+        for viewpoint, other in zip(viewpoints, viewpoints[::-1], strict=True):
+            for hider in hiders:
+                hider.hide(self.facets, which, n, lines, viewpoint, other, words)
+        device.run(count, (n,), None, words, seen)
+        return device.download(seen, np.empty((n, 2), np.uint16))

@@ -1,7 +1,7 @@
 """Occlusion of facets by facets, as seen from one viewpoint outside the scene: cells of a perspective view.
 
-All lines of sight end at the viewpoint. Each occluder stands in the cells that it is seen in, and a sample point is
-tested against the occluders of its own cell.
+All lines of sight end at the viewpoint. Each occluder stands in the cells that it is seen in, and a facet is tested
+against the occluders of its own cells.
 
 source   Haines and Greenberg 1986, "The light buffer: a shadow-testing accelerator"
 """
@@ -15,7 +15,8 @@ import numpy as np
 from ..base.boxes import corners as corners_of_box
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._frame import DeviceFacets, Frame
+from ._facet_samples import SampleLines
+from ._frame import DeviceFacets, DevicePoints, Frame
 
 KERNELS = "light_buffer.cl"
 NEAREST = 1.5  # radii of the scene, from its middle: viewpoints nearer than this see it at angles too wide for a plane
@@ -53,20 +54,23 @@ class LightBuffer:
                 break
             side *= 2
         begins = np.concatenate([[0], ends[:-1]]).astype(np.int32)
-        self._end, self._entries = device.copied(begins), device.empty(4 * max(int(ends[-1]), 1))
+        self._end, self._entries = device.copied(begins), device.empty(8 * max(int(ends[-1]), 1))
         self._run("fill_cells", n, occluders, self._end, self._entries)
         self._run("shadow_planes", n, occluders, self._planes)
 
     def hide(
-        self, facets: DeviceFacets, index: Any, n: int, points: tuple[Any, int], other: np.ndarray, hidden: Any
+        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, other: np.ndarray, words: Any
     ) -> None:
-        """Set the bits of occluded sample points: arguments as of `Occluders.hide`."""
-        buffers = facets.buffer, index, points[0], self._planes, self._end, self._top, self._entries, hidden
-        self._run("shaded", n, *buffers, other=facets.frame.eye(other)[:3], samples=points[1])
+        """Set the bits of occluded samples: arguments as of `Occluders.hide`."""
+        kernel = self.device.kernel(KERNELS, "shaded", LINES=lines.count)
+        numbers = launch_numbers(KERNELS, "view", other=facets.frame.eye(other)[:3], **self._numbers)
+        self.device.run(
+            kernel, (n,), None, numbers, facets.buffer, index, lines.inverses, self._planes, self._end, self._top,
+            self._entries, words,
+        )  # fmt: skip
 
-    def _run(self, kernel: str, n: int, *buffers: Any, **others: Any) -> None:
-        given: dict[str, Any] = {"other": np.zeros(3), "samples": 0} | self._numbers | others
-        numbers = launch_numbers(KERNELS, "view", **given)
+    def _run(self, kernel: str, n: int, *buffers: Any) -> None:
+        numbers = launch_numbers(KERNELS, "view", other=np.zeros(3), **self._numbers)
         self.device.run(self.device.kernel(KERNELS, kernel), (n,), None, numbers, *buffers)
 
 

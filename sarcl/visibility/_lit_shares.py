@@ -96,7 +96,7 @@ def pixel_shares(
     frame = Frame.around(np.concatenate([scene.triangles.reshape(-1, 3), box(places[filled])]))
     middle = sum(end.mean(axis=0) for end in ends) / len(ends)
     points = DevicePoints(opened, places[filled], frame, unit(middle - places[filled]))
-    occluders = Occluders(opened, scene.triangles, frame)
+    occluders = Occluders(opened, scene.triangles, frame, len(filled))
     seen, looked = np.zeros(len(filled)), np.zeros(0, np.int64)
     before, looks = None, min(FIRST_LOOKS, n)
     while True:

@@ -10,50 +10,57 @@ from ..base.boxes import box
 from ..base.morton import interleaved
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._frame import STEP, DeviceFacets, Frame
+from ._facet_samples import SampleLines
+from ._frame import STEP, DeviceFacets, DevicePoints, Frame
 from ._light_buffer import LightBuffer, sees_from_outside
 
+RAY_STEP = 8  # samples that a ray decides on
+FEW = 100  # occluders of each facet, from which on rays through a tree take less time than to put them into cells
 FAR = np.float32(4)  # coordinate of boxes that fill up a node: they are empty, and outside the scene
 
 
 class Occluders:
-    """Facets on a device, m (k, 3, 3), that occlude others: by cells from viewpoints outside, else by a tree."""
+    """Facets on a device, m (k, 3, 3), that occlude others: by cells from viewpoints outside, else by a tree.
 
-    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame) -> None:
-        self.device, self.frame = device, frame
+    n  of the others; where they are few, a tree that serves every viewpoint takes less time than cells of each
+    """
+
+    def __init__(self, device: Device, triangles: np.ndarray, frame: Frame, n: int) -> None:
+        self.device, self.frame, self._few = device, frame, FEW * n < len(triangles)
         self._corners = ((triangles - frame.center) * frame.unit).astype(np.float32).reshape(-1, 9)
         self._bounds = box(self._corners.reshape(-1, 3)).astype(np.float64)
         self._uploaded: Any = None
         self._tree: BoxTree | None = None
-        self._view: tuple[tuple[float, ...], LightBuffer] | None = None
+        self._views: list[tuple[np.ndarray, LightBuffer]] = []
 
     def hide(
-        self, facets: DeviceFacets, index: Any, n: int, points: tuple[Any, int], viewpoint: np.ndarray,
-        other: np.ndarray, hidden: Any,
+        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
+        other: np.ndarray, words: Any,
     ) -> None:  # fmt: skip
-        """Set the bits of occluded sample points.
+        """Set the bits of occluded samples.
 
-        index (n,) int32: facets;  points  (buffer, number) of sample points;  hidden (n,) uint64, a bit per point
+        index  (n,) int32: facets;  words  uint32 (n, lines.count), a bit per sample
         other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
                viewpoint its sample points lie
         """
-        if sees_from_outside(self.frame, self._bounds, viewpoint):
-            self._buffer(viewpoint).hide(facets, index, n, points, other, hidden)
+        if not self._few and sees_from_outside(self.frame, self._bounds, viewpoint):
+            self._buffer(viewpoint).hide(facets, index, n, lines, other, words)
             return
         if self._tree is None:
             self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
-        self._tree.hide(facets, index, n, points, viewpoint, other, hidden)
+        self._tree.hide(facets, index, n, lines, viewpoint, other, words)
 
     def _buffer(self, viewpoint: np.ndarray) -> LightBuffer:
-        """The light buffer of a viewpoint; the last one is kept."""
-        at = tuple(np.asarray(viewpoint, np.float64).tolist())
-        if self._view is None or self._view[0] != at:
-            self._view = None
-            if self._uploaded is None:
-                self._uploaded = self.device.upload(self._corners)
-            n = len(self._corners)
-            self._view = at, LightBuffer(self.device, self._uploaded, n, self._bounds, self.frame, viewpoint)
-        return self._view[1]
+        """The light buffer of a viewpoint; the last two are kept."""
+        for at, known in self._views:
+            if np.array_equal(at, viewpoint):
+                return known
+        self._views = self._views[-1:]
+        if self._uploaded is None:
+            self._uploaded = self.device.upload(self._corners)
+        made = LightBuffer(self.device, self._uploaded, len(self._corners), self._bounds, self.frame, viewpoint)
+        self._views.append((np.array(viewpoint, np.float64), made))
+        return made
 
 
 class BoxTree:
@@ -83,17 +90,17 @@ class BoxTree:
         self.base = device.upload(base.astype(np.int32))
 
     def hide(
-        self, facets: DeviceFacets, index: Any, n: int, points: Any, viewpoint: np.ndarray, other: np.ndarray,
-        hidden: Any,
+        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
+        other: np.ndarray, words: Any,
     ) -> None:  # fmt: skip
-        """Set the bits of occluded sample points: arguments as of `Occluders.hide`."""
-        kernel = self.device.kernel("ray_casting.cl", "hidden")
-        (*eye, shrink), (place, samples) = facets.frame.eye(viewpoint), points
+        """Set the bits of occluded samples: arguments as of `Occluders.hide`."""
+        kernel = self.device.kernel("ray_casting.cl", "hidden", LINES=lines.count)
+        *eye, shrink = facets.frame.eye(viewpoint)
         numbers = launch_numbers(
-            "ray_casting.cl", "hidden", samples=samples, eye=eye, other=facets.frame.eye(other)[:3], shrink=shrink,
-            depth=self.depth,
+            "ray_casting.cl", "hidden", step=max(lines.step, RAY_STEP), eye=eye,
+            other=facets.frame.eye(other)[:3], shrink=shrink, depth=self.depth,
         )  # fmt: skip
-        buffers = facets.buffer, index, place, self.leaf, self.node, self.base, hidden
+        buffers = facets.buffer, index, facets.kind, lines.places, self.leaf, self.node, self.base, words
         self.device.run(kernel, (n,), None, numbers, *buffers)
 
 

@@ -9,9 +9,11 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._frame import DeviceFacets, Frame
+from ._facet_samples import SampleLines
+from ._frame import DeviceFacets, DevicePoints, Frame
 
 FINE = 2  # range lines per cell at the border of the terrain
+SIGHT_STEP = 4  # samples that a line of sight decides on
 
 
 class Terrain:
@@ -25,6 +27,19 @@ class Terrain:
         self.x, self.y = (device.upload(a.astype(np.float32)) for a in self.axes)
         z = z.astype(np.float32)
         self.z_rows, self.z_columns = device.upload(z), device.upload(z.T)
+        self._swept: list[Horizons] = []
+
+    def hide(
+        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
+        other: np.ndarray, words: Any,
+    ) -> None:  # fmt: skip
+        """Set the bits of occluded samples: arguments as of `_ray_casting.Occluders.hide`. The
+        horizons of the last two viewpoints are kept."""
+        known = [swept for swept in self._swept if np.array_equal(swept.viewpoint, viewpoint)]
+        if not known:
+            known = [self.sweep(viewpoint)]
+            self._swept = [*self._swept[-1:], *known]
+        known[0].hide(facets, index, n, lines, other, words)
 
     def sweep(self, viewpoint: np.ndarray) -> Horizons:
         """Horizons along range lines around a viewpoint, m (3,)."""
@@ -65,18 +80,20 @@ class Horizons:
     table: Any
     held: list[Any]
 
-    def hide(self, facets: DeviceFacets, index: Any, n: int, points: Any, other: np.ndarray, hidden: Any) -> None:
-        """Set the bits of occluded sample points: arguments as of `_ray_casting.Occluders.hide`."""
+    def hide(
+        self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, other: np.ndarray, words: Any
+    ) -> None:
+        """Set the bits of occluded samples: arguments as of `_ray_casting.Occluders.hide`."""
         t = self.terrain
-        kernel = t.device.kernel("terrain_horizon.cl", "horizon")
-        place, samples = points
+        kernel = t.device.kernel("terrain_horizon.cl", "horizon", LINES=lines.count)
         numbers = launch_numbers(
-            "terrain_horizon.cl", "horizon", samples=samples, nx=len(t.axes[0]), ny=len(t.axes[1]), per_x=t.per[0],
-            per_y=t.per[1], eye=t.frame.eye(self.viewpoint)[:3], other=t.frame.eye(other)[:3],
+            "terrain_horizon.cl", "horizon", step=max(lines.step, SIGHT_STEP), nx=len(t.axes[0]),
+            ny=len(t.axes[1]), per_x=t.per[0], per_y=t.per[1], eye=t.frame.eye(self.viewpoint)[:3],
+            other=t.frame.eye(other)[:3],
         )  # fmt: skip
         t.device.run(
-            kernel, (n,), None, numbers, facets.buffer, index, place, t.x, t.y, t.z_rows, t.z_columns, self.number,
-            self.whole, self.table, hidden,
+            kernel, (n,), None, numbers, facets.buffer, index, facets.kind, lines.places, t.x, t.y, t.z_rows,
+            t.z_columns, self.number, self.whole, self.table, words,
         )  # fmt: skip
 
 

@@ -1,4 +1,8 @@
-"""The share of each facet that both antennas see, along a track: back faces, terrain horizons, occlusion by facets."""
+"""The share of each facet that both antennas see, along a track: back faces, terrain horizons, occlusion by facets.
+
+Shares are kept as levels, uint8: roots of shares, 255 of a whole facet. These are the amplitudes of rough facets, and
+what is interpolated between pulses.
+"""
 
 from __future__ import annotations
 
@@ -17,8 +21,10 @@ from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
 from ..scene.terrain import check_above, heights_of
+from ..scene.triangles import areas
 from ._aspect_blocks import (
     STRIDE,
+    Base,
     blocks_around,
     projected_width,
     pulse_blocks,
@@ -26,12 +32,15 @@ from ._aspect_blocks import (
     scene_box,
     shadow_length,
 )
-from ._facet_samples import SAMPLES
-from ._illumination_solver import IlluminationSolver
+from ._facet_samples import FEWEST_LINES, MOST_LINES
+from ._illumination_solver import IlluminationSolver, Look
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
 
 log = logging.getLogger(__name__)
+
+SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
+ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
 
 ALL_DARK = (
     "the whole scene is in shadow: no facet faces the antennas with nothing in between; check the side the track is "
@@ -41,19 +50,19 @@ ALL_DARK = (
 
 @dataclass(frozen=True, eq=False)
 class Span:
-    """Pulses first ... stop - 1, and illuminated shares, uint8 (k,), at pulse `first` and at pulse `stop`.
+    """Pulses first ... stop - 1, and levels, uint8 (k,), at pulse `first` and at pulse `stop`.
 
-    The shares change linearly in between; where they are constant, `later` is `share` itself.
+    The levels change linearly in between; where they are constant, `later` is `level` itself.
     """
 
     first: int
     stop: int
-    share: np.ndarray
+    level: np.ndarray
     later: np.ndarray
 
     def moments(self, pulses: np.ndarray) -> np.ndarray:
-        """Position of pulses (n,) between first, 0, and stop, 1; 0 where the shares are constant."""
-        if self.later is self.share:
+        """Position of pulses (n,) between first, 0, and stop, 1; 0 where the levels are constant."""
+        if self.later is self.level:
             return np.zeros(len(pulses), np.float32)
         return ((pulses - self.first) / np.float32(self.stop - self.first)).astype(np.float32)
 
@@ -62,12 +71,17 @@ class Span:
         begin, end = max(self.first, first), min(self.stop, stop)
         if begin >= end:
             return None
-        shares = [self.share, self.later]
-        if self.later is not self.share and (begin, end) != (self.first, self.stop):
-            change = self.later - self.share.astype(np.float32)
+        levels = [self.level, self.later]
+        if self.later is not self.level and (begin, end) != (self.first, self.stop):
+            change = self.later - self.level.astype(np.float32)
             moments = self.moments(np.array([begin, end])).tolist()
-            shares = [np.rint(self.share + np.float32(moment) * change).astype(np.uint8) for moment in moments]
-        return Span(begin - first, end - first, *shares)
+            levels = [np.rint(self.level + np.float32(moment) * change).astype(np.uint8) for moment in moments]
+        return Span(begin - first, end - first, *levels)
+
+
+def shares_of(level: np.ndarray) -> np.ndarray:
+    """Shares, uint8, of levels, uint8: 255 of a whole facet."""
+    return np.rint(np.square(level, dtype=np.float32) / 255).astype(np.uint8)
 
 
 @dataclass(frozen=True, eq=False)
@@ -81,6 +95,8 @@ class Illumination:
     dark_facets number of wanted facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
+    error       estimated error of the amplitudes, roots of the shares, relative to their norm: samples, and looks at
+                some pulses alone
     """
 
     blocks: np.ndarray
@@ -89,6 +105,7 @@ class Illumination:
     full: np.ndarray
     dark_facets: np.ndarray
     window: tuple[int, int]
+    error: float
     _usual: np.ndarray = field(repr=False)
     _changes: list[tuple[np.ndarray, np.ndarray]] = field(repr=False)
     _look: Callable[[int], np.ndarray] = field(repr=False)
@@ -96,8 +113,8 @@ class Illumination:
     def __len__(self) -> int:
         return len(self.blocks)
 
-    def share(self, block: int) -> np.ndarray:
-        """Illuminated shares in a block, uint8 (k,): 255 is a whole facet. Stored, or computed anew (max_bytes)."""
+    def level(self, block: int) -> np.ndarray:
+        """Roots of illuminated shares in a block, uint8 (k,). Stored, or computed anew (max_bytes)."""
         arguments.checked_index("block", "the blocks", block, (len(self),))
         if not isinstance(block, (int, np.integer)):
             raise IndexError(f"block is {block!r:.60}; give a whole number from {-len(self)} to {len(self) - 1}")
@@ -109,45 +126,50 @@ class Illumination:
         out[index] = value
         return out
 
+    def share(self, block: int) -> np.ndarray:
+        """Illuminated shares in a block, uint8 (k,): 255 is a whole facet."""
+        return shares_of(self.level(block))
+
     def fraction(self, block: int) -> np.ndarray:
         """Illuminated shares in a block, float32 (k,), 0 to 1."""
-        return self.share(block) / np.float32(255)
+        return np.asarray((self.level(block) / np.float32(255)) ** 2)
 
     def fraction_at(self, pulse: int) -> np.ndarray:
-        """Illuminated shares at a pulse of the window, float32 (k,), 0 to 1: interpolated between viewpoints."""
-        share, later, part = self.shares_around(pulse)
-        before, after = share / np.float32(255), later / np.float32(255)
-        return np.asarray(before + part * (after - before))
+        """Illuminated shares at a pulse of the window, float32 (k,), 0 to 1: their roots interpolated between
+        viewpoints."""
+        level, later, part = self.levels_around(pulse)
+        before, after = level / np.float32(255), later / np.float32(255)
+        return np.asarray((before + part * (after - before)) ** 2)
 
-    def shares_around(self, pulse: int) -> tuple[np.ndarray, np.ndarray, np.float32]:
-        """Illuminated shares, uint8 (k,), at the viewpoints before and after a pulse of the window, and where between
-        these the pulse lies, 0 to 1."""
+    def levels_around(self, pulse: int) -> tuple[np.ndarray, np.ndarray, np.float32]:
+        """Levels, uint8 (k,), at the viewpoints before and after a pulse of the window, and where between these the
+        pulse lies, 0 to 1."""
         pulse += self.window[0]
         after = int(np.searchsorted(self.viewpoints, pulse, side="right"))
         one, two = max(after - 1, 0), min(after, len(self) - 1)
         before, behind = int(self.viewpoints[one]), int(self.viewpoints[two])
         part = np.float32((pulse - before) / (behind - before)) if behind > before and pulse > before else np.float32(0)
-        return self.share(one), self.share(two), part
+        return self.level(one), self.level(two), part
 
-    def spans(self, weigh: Callable[[np.ndarray], np.ndarray] = lambda share: share) -> Iterator[Span]:
-        """The window in spans, from viewpoint to viewpoint, in each of which weigh(shares), uint8, changes linearly."""
+    def spans(self, weigh: Callable[[np.ndarray], np.ndarray] = lambda level: level) -> Iterator[Span]:
+        """The window in spans, from viewpoint to viewpoint, in each of which weigh(levels), uint8, changes linearly."""
         for span in self._spans():
-            share = weigh(span.share)
-            later = share if span.later is span.share else weigh(span.later)
-            part = Span(span.first, span.stop, share, later).within(*self.window)
+            level = weigh(span.level)
+            later = level if span.later is span.level else weigh(span.later)
+            part = Span(span.first, span.stop, level, later).within(*self.window)
             if part is not None:
                 yield part
 
     def _spans(self) -> Iterator[Span]:
-        n, held, start = int(self.blocks[-1, 1]), self.share(0), 0
+        n, held, start = int(self.blocks[-1, 1]), self.level(0), 0
         at = self.viewpoints.tolist()
         for i in range(1, len(self)):
-            share = self.share(i)
-            if not np.array_equal(share, held):
+            level = self.level(i)
+            if not np.array_equal(level, held):
                 if start < at[i - 1]:  # constant up to there
                     yield Span(start, at[i - 1], held, held)
-                yield Span(at[i - 1], at[i], held, share)
-                held, start = share, at[i]
+                yield Span(at[i - 1], at[i], held, level)
+                held, start = level, at[i]
         yield Span(start, n, held, held)
 
     def between(self, first: int, stop: int) -> Illumination:
@@ -168,9 +190,12 @@ def lit(
     two_sided: np.ndarray | bool = True,
     wanted: np.ndarray | None = None,
     tolerance: float = 0.25,
+    accuracy: float = 0.02,
+    weights: np.ndarray | None = None,
     max_bytes: float | None = None,
     by_facets: np.ndarray | bool = True,
     occluders: np.ndarray | None = None,
+    ground: tuple[np.ndarray, np.ndarray] | None = None,
     device: DeviceChoice | None = None,
     progress: Callable[[int, int], None] | None = None,
 ) -> Illumination:
@@ -183,13 +208,16 @@ def lit(
                 them. The other facets occlude by rays, from both sides
     two_sided   (k,) bool or one for all: the other facets are not illuminated where they face away from an antenna
     wanted      (k,) bool: facets whose share is computed; the others only occlude, their share is 0
-    tolerance   largest error of a facet's share behind a straight shadow edge (1/16 or more; from 5/9 on a facet
-                counts by its centroid alone), and again the largest error between the pulses of a block, for the facet
-                of median size; see docs/theory/shadows.md
+    tolerance   largest change of a share between the pulses of a block, for the facet of median size: shares are
+                computed at one pulse of a block at most
+    accuracy    error of the amplitudes, roots of the shares, relative to their norm: more samples and pulses are taken
+                until it is met, or there are no more; `error` says what was met. See docs/theory/shadows.md
+    weights     powers of the facets (k,) in that norm; default their areas
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
     by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
     occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
+    ground      m (n, 3, 3), and (k,) bool: what occludes too, but those of the facets alone
     progress    called as progress(block, blocks)
 
     Raises ValueError for an antenna below the terrain. Warns with SarclWarning where nothing at all is illuminated.
@@ -204,9 +232,9 @@ def lit(
     arguments.progress(progress, "progress(block, blocks)")
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
-    tolerance = number("tolerance", tolerance, least=SAMPLES[-1][1])
+    tolerance, accuracy = number("tolerance", tolerance, above=0), number("accuracy", accuracy, above=0)
     grid = None if heights is None else heights_of(heights)
-    on_heights = None if on_heights is None else _mask("on_heights", on_heights, k)
+    on_heights = _mask("on_heights", grid is not None if on_heights is None else on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
     two_sided, by_facets = _mask("two_sided", two_sided, k), _mask("by_facets", by_facets, k)
     if grid is not None:
@@ -218,8 +246,8 @@ def lit(
     if k == 0:
         nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
-        return Illumination(whole, first, none, none, first, (0, len(tx)), nothing, [], lambda block: nothing)
-    bounds = scene_box(triangles, grid)
+        return Illumination(whole, first, none, none, first, (0, len(tx)), 0.0, nothing, [], lambda block: nothing)
+    bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
     # from all facets: which of them are wanted must not move the blocks
     limits = [
         tolerance * projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
@@ -231,41 +259,151 @@ def lit(
     slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
-        tolerance=tolerance, by_facets=by_facets, occluders=occluders,
+        by_facets=by_facets, occluders=occluders, ground=ground,
+    )  # fmt: skip
+    power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
+    judge = _Judge(power * (1.0 if wanted is None else wanted))
+    places = [end[offered] for end in ends]
+    lines = judge.lines(_Looks(solver, places, slack).whole(len(offered) // 2), SAMPLING * accuracy)
+    while True:
+        solver.take_lines(lines)
+        judge = _Judge(judge.weights)
+        found = _look_along(_Looks(solver, places, slack), offered, judge, accuracy, max_bytes, progress)
+        viewpoints = offered[found.chosen]
+        error = judge.error(viewpoints, found.left)
+        if error <= accuracy or judge.sampling <= SAMPLING * accuracy or lines >= MOST_LINES:
+            break
+        lines *= 4
+    blocks = blocks_around(viewpoints, len(tx))
+    n_wanted = k if wanted is None else int(np.sum(wanted))
+    if not found.ever.any() and n_wanted:
+        warn(ALL_DARK)
+    log.info("%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - found.ever.sum(), k)
+    return Illumination(
+        sealed(blocks), sealed(viewpoints), sealed(~found.ever), sealed(found.always),
+        sealed(n_wanted - np.array(found.seen, np.int64)), (0, len(tx)), error,
+        sealed(found.usual), found.changes, lambda block: found.looks.again(found.chosen[block]),
     )  # fmt: skip
 
-    def look(place: int) -> np.ndarray:
-        return solver.share([e[offered[place]] for e in ends], slack=float(slack[place]))
 
-    n_wanted = k if wanted is None else int(np.sum(wanted))
-    chosen: list[int] = []
-    dark: list[int] = []
-    kept = 0
-    changes: list[tuple[np.ndarray, np.ndarray]] = []
-    usual, ever, always = np.zeros(k, np.uint8), np.zeros(k, bool), np.ones(k, bool)
-    for place, shares in refine_viewpoints(look, offered):
-        if not chosen:
-            usual = shares
-        if kept <= max_bytes and len(changes) == len(chosen):
-            index = np.flatnonzero(shares != usual).astype(np.int32)
+@dataclass(eq=False)
+class _Found:
+    """What was found along a track: indices of the viewpoints that were offered, the mean square of differences up to
+    each, numbers of facets seen, levels at the first and what changes from there, and facets (k,) ever and always
+    seen."""
+
+    looks: _Looks
+    chosen: list[int]
+    left: list[float]
+    seen: list[int]
+    usual: np.ndarray
+    changes: list[tuple[np.ndarray, np.ndarray]]
+    ever: np.ndarray
+    always: np.ndarray
+
+
+def _look_along(
+    looks: _Looks, offered: np.ndarray, judge: _Judge, accuracy: float, max_bytes: float,
+    progress: Callable[[int, int], None] | None,
+) -> _Found:  # fmt: skip
+    """Levels at as many of the pulses offered (n,) as an accuracy asks for; changes are kept up to `max_bytes`."""
+    k, kept = looks.solver.facets.size, 0
+    found = _Found(looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool))
+
+    def look(place: int, base: Base | None) -> np.ndarray:
+        seen = looks.at(place, base)
+        judge.note(seen)
+        return seen.levels
+
+    limit = (1 - SAMPLING**2) * accuracy**2
+    for place, levels, left in refine_viewpoints(look, offered, judge.difference, limit):
+        if not found.chosen:
+            found.usual = levels
+        if kept <= max_bytes and len(found.changes) == len(found.chosen):
+            index = np.flatnonzero(levels != found.usual).astype(np.int32)
             kept += 5 * len(index)
             if kept <= max_bytes:
-                changes.append((index, shares[index]))
-        chosen.append(place)
-        dark.append(n_wanted - int(np.count_nonzero(shares)))
-        ever |= shares > 0
-        always &= shares == 255
+                found.changes.append((index, levels[index]))
+        found.chosen.append(place)
+        found.left.append(left)
+        found.seen.append(int(np.count_nonzero(levels)))
+        found.ever |= levels > 0
+        found.always &= levels == 255
         if progress:
             progress(place + 1, len(offered))
-    viewpoints = offered[chosen]
-    blocks = blocks_around(viewpoints, len(tx))
-    if not ever.any() and n_wanted:
-        warn(ALL_DARK)
-    log.info("%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - ever.sum(), k)
-    return Illumination(
-        sealed(blocks), sealed(viewpoints), sealed(~ever), sealed(always), sealed(np.array(dark, np.int64)),
-        (0, len(tx)), sealed(usual), changes, lambda block: look(chosen[block]),
-    )  # fmt: skip
+    return found
+
+
+class _Looks:
+    """What antennas at some places, m (n, 3) each, see; slack  rad (n,), of facets that face away."""
+
+    def __init__(self, solver: IlluminationSolver, ends: list[np.ndarray], slack: np.ndarray) -> None:
+        self.solver, self.ends, self.slack = solver, ends, slack
+        self._bases: dict[int, tuple[int, np.ndarray]] = {}
+
+    def whole(self, place: int, some: np.ndarray | None = None) -> Look:
+        """A look at facets `some` (k,) bool; None: at all."""
+        return self.solver.look([end[place] for end in self.ends], float(self.slack[place]), some)
+
+    def at(self, place: int, base: Base | None) -> Look:
+        """A look; where it has a base, place, levels and facets to look at, the levels of all others are as there."""
+        if base is None:
+            return self.whole(place)
+        self._bases[place] = base[0], np.packbits(base[2])
+        seen = self.whole(place, base[2])
+        return replace(seen, levels=np.where(base[2], seen.levels, base[1]))
+
+    def again(self, place: int) -> np.ndarray:
+        """The levels of a look that was taken."""
+        if place not in self._bases:
+            return self.whole(place).levels
+        at, packed = self._bases[place]
+        some = np.unpackbits(packed, count=self.solver.facets.size).astype(bool)
+        return np.where(some, self.whole(place, some).levels, self.whole(at).levels)
+
+
+class _Judge:
+    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares."""
+
+    def __init__(self, weights: np.ndarray) -> None:
+        self.weights, self._whole = weights, 0.0
+        self._sampling: list[float] = []
+
+    def _relative(self, off: float) -> float:
+        """off over the sum of squares of the last look that was noted."""
+        return off / self._whole if self._whole else 0.0
+
+    @property
+    def sampling(self) -> float:
+        """Root of the mean square of the sampling errors that were noted."""
+        return float(np.sqrt(np.mean(self._sampling)))
+
+    def lines(self, look: Look, limit: float) -> int:
+        """Lines of samples with which errors stay below a limit: those of straight edges fall as lines become more."""
+        self.note(look)
+        error = self.sampling
+        return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
+
+    def note(self, look: Look) -> None:
+        """Note the sampling error of a look."""
+        self._whole = float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2
+        rounded = ROUNDED * float(self.weights[look.partly].sum())
+        self._sampling.append(self._relative(look.spread(self.weights) + rounded))
+
+    def difference(
+        self, found: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, which: np.ndarray | None
+    ) -> float:
+        """As `refine_viewpoints` asks for it; `found` was noted last."""
+        moves = (found != first) | (found != last)
+        some = np.flatnonzero(moves if which is None else moves & which)
+        a, b, c = (levels[some].astype(np.float64) / 255 for levels in (found, first, last))
+        return self._relative(float(self.weights[some] @ (a - b * (1 - part) - c * part) ** 2))
+
+    def error(self, viewpoints: np.ndarray, left: list[float]) -> float:
+        """Root of the mean square over the track: sampling at each look, and `left` up to each look."""
+        steps = np.diff(viewpoints, prepend=viewpoints[0])
+        motion = float(steps @ left) / max(float(steps.sum()), 1.0)
+        return float(np.sqrt(self.sampling**2 + motion))
 
 
 def _mask(name: str, given: np.ndarray | bool, k: int) -> np.ndarray:

@@ -147,7 +147,7 @@ def terrain() -> Errors:
     grid = (axis, axis, np.random.default_rng(0).standard_normal((7, 7)))
     triangles = sarcl.Scene.from_heights(*grid).triangles
     horizons, rays = (
-        IlluminationSolver(open_device(), triangles, heights=heights, tolerance=0.25, two_sided=False)
+        IlluminationSolver(open_device(), triangles, heights=heights, two_sided=False)
         .share([np.array([40.0, -60.0, 15.0])]).astype(float) / 255
         for heights in (grid, None)
     )  # fmt: skip

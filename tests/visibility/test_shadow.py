@@ -8,13 +8,12 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
+from helpers.seen_facets import seen_centroids
 
 import sarcl
-from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import centroids
 from sarcl.visibility._frame import Frame
-from sarcl.visibility._illumination_solver import IlluminationSolver
 
 TOLERANCE = {
     "borderline": (0.0, 4.0),  # times the height at which rays start, 1e-6 of the scene: float32 places are as coarse
@@ -29,7 +28,7 @@ def direction(azimuth_deg, incidence_deg):
 
 def visible(triangles, viewpoint, *, device):
     """Whether nothing occludes the centroid of each facet."""
-    return IlluminationSolver(open_device(device), triangles, tolerance=1.0).share([viewpoint]) > 0
+    return seen_centroids(device, triangles, viewpoint)
 
 
 def disagreements(triangles, viewpoint, device):

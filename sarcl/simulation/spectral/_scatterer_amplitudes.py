@@ -47,14 +47,14 @@ class Shares:
 def shares_of(facets: FacetSet, n_pulses: int) -> Shares:
     """Illuminated shares of facets along a track."""
     spans = list(facets.spans(n_pulses))
-    first = spans[0].share
+    first = spans[0].level
     changes = np.zeros(len(facets), bool)
     for span in spans:
-        changes |= (span.share != first) | (span.later != first)
+        changes |= (span.level != first) | (span.later != first)
     changing = np.flatnonzero(changes)
     knots, values = [], []
     for span in spans:
-        for pulse, share in ((span.first, span.share), (span.stop - 1e-6, span.later)):
+        for pulse, share in ((span.first, span.level), (span.stop - 1e-6, span.later)):
             knots.append(float(pulse))
             values.append(share[changing] / 255)
     return Shares(first / 255, changing, np.array(knots), np.stack(values, axis=1))

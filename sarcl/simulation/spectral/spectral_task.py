@@ -22,7 +22,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, parts_of, prepare_scene
+from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
@@ -70,7 +70,7 @@ class SpectralTask:
         if direct is not None and prepared.facets is not None:
             steady = next((one for one in prepared.facets.split() if one.lit_parts is None), None)
         band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-        share = request.tolerance / parts_of(self.scene)
+        share = share_of(request, self.scene, waveform, self.antennas, request.tolerance)
         straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * self.line.deviation
         parts, errors = [], []
         for part in (prepared.points if request.same else None, steady):
@@ -101,6 +101,7 @@ class SpectralTask:
         if direct is not None:
             channel = direct.channel(self.antennas, waveform, self.frequencies)
             errors.append(channel.predicted_error)
+        errors.append(prepared.shadow_error)
         request.clock.lap("plan")
         return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
 
