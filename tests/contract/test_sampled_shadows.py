@@ -1,0 +1,98 @@
+"""Echoes of many rough facets, whose shadows are counted in samples from some pulses, against lit parts at all of them."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+import trimesh
+
+import sarcl
+from sarcl.scattering import scatterers
+
+pytestmark = pytest.mark.filterwarnings("ignore:too few facets for speckle:sarcl.SarclWarning")
+
+ROUGH = sarcl.Material(diagram="cos")
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
+PULSES = 12
+
+
+def box(size, at):
+    x, y = at
+    return sarcl.Scene.facets(trimesh.creation.box(size).triangles + [x, y, size[2] / 2], material=ROUGH)
+
+
+def hills():
+    axis = np.linspace(-8, 8, 9)
+    heights = 0.6 * np.random.default_rng(0).standard_normal((9, 9))
+    return sarcl.Scene.from_heights(axis, axis, heights, material=ROUGH)
+
+
+def field():
+    return sarcl.Scene.facets(sarcl.shapes.plate((16, 16)).triangles, material=ROUGH)
+
+
+def gentle():
+    axis = np.linspace(-8, 8, 9)
+    return sarcl.Scene.from_heights(axis, axis, 0.1 * np.sin(axis) * np.cos(axis[:, None]), material=ROUGH)
+
+
+HOUSE = (4.0, 5.0, 3.0)
+SCENES = {
+    "house": lambda: field() + box(HOUSE, (0, 0)),
+    "poles": lambda: field() + box((0.02, 0.02, 3), (1, 2)) + box((0.02, 0.02, 3), (-3, 1)) + box((0.05, 0.05, 3), (2, -4)),
+    "hills": lambda: hills() + box(HOUSE, (0, 0)),
+    "gentle hills": lambda: gentle() + box(HOUSE, (0, 0)),
+}
+
+
+def circle(radius=7e3, height=5e3, start=0.3, arc=0.03):
+    return sarcl.Trajectory.circle(radius=radius, height=height, start=start, arc=arc, n_pulses=PULSES)
+
+
+TRACKS = {
+    "arc": (circle(), None),
+    "wide": (circle(arc=0.6), None),
+    "bistatic": (circle(), circle(start=1.0)),
+    "near": (circle(25.0, 18.0), None),
+}
+
+
+def echo(scene, track, monkeypatch, few, tolerance, **options):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", few)
+    tx, receiver = track
+    window = {"range_window": (-15, 15), "reference": scene.center}
+    return sarcl.echo(scene, CHIRP, tx, receiver=receiver, tolerance=tolerance, seed=3, **window, **options)
+
+
+@pytest.mark.parametrize("track", TRACKS)
+@pytest.mark.parametrize("name", SCENES)
+def test_sampled_shadows_meet_the_tolerance(name, track, monkeypatch):
+    scene = SCENES[name]()
+    wanted = echo(scene, TRACKS[track], monkeypatch, np.inf, 3e-4)
+    assert "shadow edges" not in wanted.report.plan
+    for tolerance in (1e-1, 1e-2):
+        raw = echo(scene, TRACKS[track], monkeypatch, 0, tolerance)
+        assert raw.report.plan["shadow edges"].startswith("sampled, ")
+        error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
+        assert 0 < error <= raw.report.predicted_error <= tolerance
+
+
+def test_more_lines_of_samples_and_pulses_are_taken_for_a_smaller_tolerance(monkeypatch):
+    scene, track = SCENES["house"](), TRACKS["arc"]
+    wanted, raw = (echo(scene, track, monkeypatch, few, 1e-3) for few in (np.inf, 0))
+    error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
+    assert error <= 1.7e-3  # those of both
+
+
+def test_a_tolerance_that_samples_cannot_meet_is_refused_with_the_best(monkeypatch):
+    scene, track = SCENES["hills"](), TRACKS["bistatic"]
+    with pytest.raises(sarcl.ToleranceUnreachable, match="shadow edges on rough facets") as refused:
+        echo(scene, track, monkeypatch, 0, 3e-5, max_edge=1.0)
+    best = refused.value.best
+    assert echo(scene, track, monkeypatch, 0, best, max_edge=1.0).report.predicted_error <= best
+
+
+def test_little_memory_for_shares_changes_nothing(monkeypatch):
+    scene, track = SCENES["house"](), TRACKS["wide"]
+    much, little = (echo(scene, track, monkeypatch, 0, 1e-2, max_bytes=size) for size in (1e9, 2e7))
+    assert np.linalg.norm(much.samples - little.samples) <= 1e-6 * np.linalg.norm(much.samples)
