@@ -70,9 +70,11 @@ def test_the_command_line_refuses_them(asked, tmp_path, monkeypatch, capsys):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["raw.h5", "s.toml"]
 
 
-def test_a_share_of_lit_facets_may_be_coarse_but_not_exact():
-    """The tolerance of `illumination.lit` is the error of a share: 0.5 is half a facet, and 1/16 the least there is."""
+def test_shares_take_no_tolerance_or_accuracy_of_zero():
     facet = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
-    assert (sarcl.illumination.lit(facet, np.array([[0, 0, 5.0]]), tolerance=0.5).share(0) == 255).all()
-    with pytest.raises(ValueError, match=r"tolerance is 1e-12; it must be at least 0\.0625"):
-        sarcl.illumination.lit(facet, np.array([[0, 0, 5.0]]), tolerance=1e-12)
+    assert (
+        sarcl.illumination.lit(facet, np.array([[0, 0, 5.0]]), tolerance=1e-12, accuracy=1e-12).share(0) == 255
+    ).all()
+    for name in ("tolerance", "accuracy"):
+        with pytest.raises(ValueError, match=f"{name} is 0"):
+            sarcl.illumination.lit(facet, antenna, **{name: 0.0})

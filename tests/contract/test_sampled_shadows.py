@@ -1,4 +1,4 @@
-"""Echoes of many rough facets, whose shadows are counted in samples from some pulses, against lit parts at all of them."""
+"""Echoes of many rough facets, whose shadows are counted in samples from some pulses, against lit parts at all."""
 
 from __future__ import annotations
 
@@ -18,7 +18,7 @@ PULSES = 12
 
 def box(size, at):
     x, y = at
-    return sarcl.Scene.facets(trimesh.creation.box(size).triangles + [x, y, size[2] / 2], material=ROUGH)
+    return sarcl.Scene.facets(trimesh.creation.box(size).triangles + np.array([x, y, size[2] / 2]), material=ROUGH)
 
 
 def hills():
@@ -36,10 +36,12 @@ def gentle():
     return sarcl.Scene.from_heights(axis, axis, 0.1 * np.sin(axis) * np.cos(axis[:, None]), material=ROUGH)
 
 
-HOUSE = (4.0, 5.0, 3.0)
+HOUSE, POLE = (4.0, 5.0, 3.0), (0.02, 0.02, 3.0)
 SCENES = {
     "house": lambda: field() + box(HOUSE, (0, 0)),
-    "poles": lambda: field() + box((0.02, 0.02, 3), (1, 2)) + box((0.02, 0.02, 3), (-3, 1)) + box((0.05, 0.05, 3), (2, -4)),
+    "poles": lambda: (
+        field() + box((0.02, 0.02, 3), (1, 2)) + box((0.02, 0.02, 3), (-3, 1)) + box((0.05, 0.05, 3), (2, -4))
+    ),
     "hills": lambda: hills() + box(HOUSE, (0, 0)),
     "gentle hills": lambda: gentle() + box(HOUSE, (0, 0)),
 }

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 import numpy as np
 import pytest
-from helpers.seen_facets import seen_centroids
+from helpers.lit_cases import seen_centroids
 from scipy.ndimage import gaussian_filter
 
 import sarcl
@@ -40,8 +40,7 @@ def horizon_and_rays(grid, viewpoint, device=None):
     """Lit shares by horizons and by ray casting, and the cosine of incidence."""
     triangles, opened = facets_of(grid), open_device(device)
     shares = [
-        IlluminationSolver(opened, triangles, heights=h, two_sided=False).share([viewpoint]) / 255
-        for h in (grid, None)
+        IlluminationSolver(opened, triangles, heights=h, two_sided=False).share([viewpoint]) / 255 for h in (grid, None)
     ]
     way = viewpoint - centroids(triangles)
     return *shares, np.einsum("ij,ij->i", normals(triangles), way) / np.linalg.norm(way, axis=1)
@@ -100,9 +99,7 @@ def test_a_ridge_shadows_the_ground_up_to_where_the_line_over_its_top_ends(turne
     if turned:
         eye = eye[[1, 0, 2]]
     triangles = facets_of(grid)
-    share = (
-        IlluminationSolver(open_device(), triangles, heights=grid, two_sided=False).share([eye]) / 255
-    )
+    share = IlluminationSolver(open_device(), triangles, heights=grid, two_sided=False).share([eye]) / 255
     place = centroids(triangles)[:, :: -1 if turned else 1][:, 1 if turned else 0] * -side  # outwards from the centre
     end = g * high / (high - h) - 80.0
     assert 100 * h / high > 15 and end == pytest.approx(32.5)
@@ -114,9 +111,7 @@ def test_a_ring_wall_shadows_a_ring_around_the_point_under_the_radar(device):
     h, high, radius = 10.0, 50.0, 40.0
     grid = walled(lambda x, y: np.where(np.abs(np.hypot(x, y) - radius) < 1.0, h, 0.0))
     triangles = facets_of(grid)
-    share = IlluminationSolver(device, triangles, heights=grid, two_sided=False).share(
-        [np.array([0, 0, high])]
-    )
+    share = IlluminationSolver(device, triangles, heights=grid, two_sided=False).share([np.array([0, 0, high])])
     away = np.hypot(*centroids(triangles)[:, :2].T)
     assert (share[(away > radius + 2.6) & (away < radius * high / (high - h) - 2)] == 0).all()
     assert (share[(away < radius - 2.6) | (away > radius * high / (high - h) + 2)] == 255).all()

@@ -219,11 +219,7 @@ def test_a_large_facet_among_fine_ones_holds_a_whole_shadow():
     plate = np.array([[[-10.0, -10, 0], [10, -10, 0], [-10, 10, 0]]])
     lid = ground(60, 6.0) + np.array([-6.0, 0.0, 3.0])
     share = shares(np.concatenate([plate, lid]), [-6.0, 0, 1e7])
-    assert (
-        len(lid) > _frame.FEW
-        and share[0] == pytest.approx(1 - 36 / 200, abs=1 / 16)
-        and (share[1:] == 1).all()
-    )
+    assert len(lid) > _frame.FEW and share[0] == pytest.approx(1 - 36 / 200, abs=1 / 16) and (share[1:] == 1).all()
 
 
 def circle(n, radius=7e3, height=7e3, arc=2 * np.pi):

@@ -8,7 +8,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 import trimesh
-from helpers.seen_facets import seen_centroids
+from helpers.lit_cases import seen_centroids
 
 import sarcl
 from sarcl.reference.shadow import hidden
