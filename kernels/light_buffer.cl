@@ -91,11 +91,17 @@ static inline seen_place viewed(view_numbers given, float3 x) {
 #else
 #define ANY(x) any(x)
 #endif
+// lines of a work-item: as many as their bits fit into registers
+#if VW == 1 && LINES > 16
+#define ITEM_LINES 16
+#else
+#define ITEM_LINES LINES
+#endif
 #if LINES < VW
 #define GROUPS 1
 #define LINE(g) ((fv)inverses[0])
 #else
-#define GROUPS (LINES / VW)
+#define GROUPS (ITEM_LINES / VW)
 #define LINE(g) LOAD(g, inverses)
 #endif
 
@@ -208,7 +214,7 @@ static inline int any_below(float4 d, float4 least) {
     return (below.x | below.y | below.z | below.w) != 0;
 }
 
-// Sets the bits of samples in shadow. global size (facets)
+// Sets the bits of samples in shadow. global size (facets, LINES / ITEM_LINES)
 //   inverses  (LINES): 1/(1 - v) of the lines;  end  (cells): where each cell's entries end
 __kernel void shaded(view_numbers given, __global const float *restrict facet, __global const int *restrict index,
                      __global const float *restrict inverses, __global const float *restrict plane,
@@ -217,6 +223,8 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
     size_t i = get_global_id(0);
     word += i * LINES;
     if (all_hidden(word)) return;
+    word += get_global_id(1) * ITEM_LINES;
+    inverses += get_global_id(1) * ITEM_LINES;
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 corner = {f[0], f[1], f[2]}, p = lifted(f, (float2)(0), vload3(0, given.eye), vload3(0, given.other));
     float3 q = p + (float3)(f[3], f[4], f[5]), r = p + (float3)(f[6], f[7], f[8]), lift = p - corner;

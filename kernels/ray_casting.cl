@@ -103,6 +103,7 @@ typedef struct {
 } face_numbers;
 
 // Facets turned away start with every sample hidden, the others with none (fresh 1) or as they are (fresh 0).
+// global size (facets, LINES)
 __kernel void face(face_numbers given, __global const float *restrict facet, __global const int *restrict index,
                    __global const uchar *restrict kind, __global int *restrict word) {
     size_t i = get_global_id(0);
@@ -112,8 +113,8 @@ __kernel void face(face_numbers given, __global const float *restrict facet, __g
     float lift = f[9] * f[9] + f[10] * f[10] + f[11] * f[11];
     float far = ahead.x * ahead.x + ahead.y * ahead.y + ahead.z * ahead.z;
     int away = (kind[index[i]] & 1) && above < 0 && above * above > given.slack * given.slack * lift * far;
-    word += i * LINES;
-    for (int l = 0; l < LINES; l++) word[l] = away ? -1 : given.fresh ? 0 : word[l];
+    word += i * LINES + get_global_id(1);
+    *word = away ? -1 : given.fresh ? 0 : *word;
 }
 
 typedef struct {
@@ -128,23 +129,24 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
-    int dark = 0;
+    int dark = 0, probed = !(kind[index[i]] & ALL_SAMPLES);
     word += i * LINES;
     if (all_hidden(word)) return;
-    if (!(kind[index[i]] & ALL_SAMPLES)) {
-        for (int k = 0; k < PROBES; k++)
-            dark += blocked(leaf, node, base, given.depth, lifted(f, probe_at(k), eye, other), eye, given.shrink);
-        if (dark == 0) return;
-    }
-    for (int l = 0; l < LINES; l++) {
-        int bits = dark == PROBES ? -1 : word[l];
-        for (int k = 0; k < PER_LINE; k += given.step) {
-            int some = some_samples(k, given.step);
-            if ((bits & some) == some) continue;
-            float3 p = lifted(f, sample_at(line[l], k + 0.5f * (given.step - 1)), eye, other);
-            if (blocked(leaf, node, base, given.depth, p, eye, given.shrink)) bits |= some;
+    for (int s = probed ? -PROBES : 0; s < LINES * PER_LINE; s += s < 0 ? 1 : given.step) {
+        if (s == 0 && probed && dark == 0) return;
+        int l = max(s, 0) / PER_LINE, bit = max(s, 0) % PER_LINE, some = some_samples(bit, given.step);
+        if (s == 0 && dark == PROBES) {
+            for (int k = 0; k < LINES; k++) word[k] = -1;
+            return;
         }
-        word[l] = bits;
+        if (s >= 0 && (word[l] & some) == some) continue;
+        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line[l], bit + 0.5f * (given.step - 1));
+        float3 p = lifted(f, at, eye, other);
+        if (!blocked(leaf, node, base, given.depth, p, eye, given.shrink)) continue;
+        if (s < 0)
+            dark++;
+        else
+            word[l] |= some;
     }
 }
 
@@ -152,9 +154,12 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
 //   out  (n, 2)
 __kernel void seen(__global const int *restrict word, __global ushort *restrict out) {
     size_t i = get_global_id(0);
-    int count[2] = {0, 0};
-#pragma unroll
-    for (int l = 0; l < LINES; l++) count[((l + 1) >> 1) & 1] += popcount((uint)~word[i * LINES + l]);
-    out[2 * i] = count[0];
-    out[2 * i + 1] = count[1];
+    int one = 0, two = 0;
+    for (int l = 0; l < LINES; l++) {
+        int n = popcount((uint)~word[i * LINES + l]), odd = ((l + 1) >> 1) & 1;
+        one += odd ? 0 : n;
+        two += odd ? n : 0;
+    }
+    out[2 * i] = one;
+    out[2 * i + 1] = two;
 }

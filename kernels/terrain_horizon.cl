@@ -176,24 +176,23 @@ __kernel void horizon(horizon_numbers given, __global const float *restrict face
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
-    int dark = 0;
+    int dark = 0, probed = !(kind[index[i]] & ALL_SAMPLES);
     word += i * LINES;
     if (all_hidden(word)) return;
-    if (!(kind[index[i]] & ALL_SAMPLES)) {
-        for (int k = 0; k < PROBES; k++)
-            dark += behind(lifted(f, probe_at(k), eye, other), eye, x, y, z_rows, z_columns, given.nx, given.ny,
-                           given.per_x, given.per_y, number, whole, table);
-        if (dark == 0) return;
-    }
-    for (int l = 0; l < LINES; l++) {
-        int bits = dark == PROBES ? -1 : word[l];
-        for (int k = 0; k < PER_LINE; k += given.step) {
-            int some = some_samples(k, given.step);
-            if ((bits & some) == some) continue;
-            float3 p = lifted(f, sample_at(line[l], k + 0.5f * (given.step - 1)), eye, other);
-            if (behind(p, eye, x, y, z_rows, z_columns, given.nx, given.ny, given.per_x, given.per_y, number, whole, table))
-                bits |= some;
+    for (int s = probed ? -PROBES : 0; s < LINES * PER_LINE; s += s < 0 ? 1 : given.step) {
+        if (s == 0 && probed && dark == 0) return;
+        int l = max(s, 0) / PER_LINE, bit = max(s, 0) % PER_LINE, some = some_samples(bit, given.step);
+        if (s == 0 && dark == PROBES) {
+            for (int k = 0; k < LINES; k++) word[k] = -1;
+            return;
         }
-        word[l] = bits;
+        if (s >= 0 && (word[l] & some) == some) continue;
+        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line[l], bit + 0.5f * (given.step - 1));
+        float3 p = lifted(f, at, eye, other);
+        if (!behind(p, eye, x, y, z_rows, z_columns, given.nx, given.ny, given.per_x, given.per_y, number, whole, table)) continue;
+        if (s < 0)
+            dark++;
+        else
+            word[l] |= some;
     }
 }

@@ -64,8 +64,9 @@ class LightBuffer:
         """Set the bits of occluded samples: arguments as of `Occluders.hide`."""
         kernel = self.device.kernel(KERNELS, "shaded", LINES=lines.count)
         numbers = launch_numbers(KERNELS, "view", other=facets.frame.eye(other)[:3], **self._numbers)
+        items = max(lines.count // 16, 1) if self.device.info.vector_width == 1 else 1  # ITEM_LINES of the kernel
         self.device.run(
-            kernel, (n,), None, numbers, facets.buffer, index, lines.inverses, self._planes, self._end, self._top,
+            kernel, (n, items), None, numbers, facets.buffer, index, lines.inverses, self._planes, self._end, self._top,
             self._entries, words,
         )  # fmt: skip
 

@@ -72,9 +72,8 @@ def test_the_command_line_refuses_them(asked, tmp_path, monkeypatch, capsys):
 
 def test_shares_take_no_tolerance_or_accuracy_of_zero():
     facet = np.array([[[0, 0, 0], [1, 0, 0], [0, 1, 0]]], float)
-    assert (
-        sarcl.illumination.lit(facet, np.array([[0, 0, 5.0]]), tolerance=1e-12, accuracy=1e-12).share(0) == 255
-    ).all()
+    antenna = np.array([[0, 0, 5.0]])
+    assert (sarcl.illumination.lit(facet, antenna, tolerance=1e-12, accuracy=1e-12).share(0) == 255).all()
     for name in ("tolerance", "accuracy"):
         with pytest.raises(ValueError, match=f"{name} is 0"):
             sarcl.illumination.lit(facet, antenna, **{name: 0.0})
