@@ -287,8 +287,9 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
         either |= bits[g];
         both &= bits[g];
     }
-    if (!dark && shaded && !ANY(either != (iv)0)) bits[0] |= one;
-    if (!dark && !ANY(both != (iv)-1)) bits[0] &= ~one;
+    int sliver = !dark && get_global_id(1) == 0;
+    if (sliver && shaded && !ANY(either != (iv)0)) bits[0] |= one;
+    if (sliver && !ANY(both != (iv)-1)) bits[0] &= ~one;
 #endif
 #pragma unroll
     for (int g = 0; g < GROUPS; g++) {

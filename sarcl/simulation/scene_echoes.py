@@ -396,12 +396,12 @@ def _shadow_error(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
     """Error of shadows on rough facets that are counted in samples. ToleranceUnreachable where it exceeds its share."""
     if facets is None or not facets.samples_incoherent_alone or facets.illumination is None:
         return 0.0
-    error = facets.illumination.error
-    least = error * parts_of(scene) / SHADOWS
-    if least > request.tolerance:
+    share, error = SHADOWS / parts_of(scene), facets.illumination.error
+    if error > share * request.tolerance:
         raise ToleranceUnreachable(
-            request.tolerance, 1.01 * least, "shadow edges on rough facets, counted in samples at single pulses"
-        )
+            request.tolerance, 1.05 * facets.illumination.reached / share,
+            "shadow edges on rough facets, counted in samples at single pulses",
+        )  # fmt: skip
     return error
 
 

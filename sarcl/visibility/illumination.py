@@ -97,6 +97,7 @@ class Illumination:
                 whole track
     error       estimated error of the amplitudes, roots of the shares, relative to their norm: samples, and looks at
                 some pulses alone
+    reached     accuracy that can be asked for, where the error is larger than what was
     """
 
     blocks: np.ndarray
@@ -106,6 +107,7 @@ class Illumination:
     dark_facets: np.ndarray
     window: tuple[int, int]
     error: float
+    reached: float
     _usual: np.ndarray = field(repr=False)
     _changes: list[tuple[np.ndarray, np.ndarray]] = field(repr=False)
     _look: Callable[[int], np.ndarray] = field(repr=False)
@@ -209,7 +211,7 @@ def lit(
     two_sided   (k,) bool or one for all: the other facets are not illuminated where they face away from an antenna
     wanted      (k,) bool: facets whose share is computed; the others only occlude, their share is 0
     tolerance   largest change of a share between the pulses of a block, for the facet of median size: shares are
-                computed at one pulse of a block at most
+                computed at one pulse of a block at most; blocks become shorter where the accuracy asks for it
     accuracy    error of the amplitudes, roots of the shares, relative to their norm: more samples and pulses are taken
                 until it is met, or there are no more; `error` says what was met. See docs/theory/shadows.md
     weights     powers of the facets (k,) in that norm; default their areas
@@ -246,34 +248,44 @@ def lit(
     if k == 0:
         nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
-        return Illumination(whole, first, none, none, first, (0, len(tx)), 0.0, nothing, [], lambda block: nothing)
+        return Illumination(whole, first, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing)
     bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
-    # from all facets: which of them are wanted must not move the blocks
-    limits = [
-        tolerance * projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
-    ]
-    _, offered, turns = pulse_blocks(ends, bounds, limits)
-    # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one of
-    # two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
-    edge_on = 0.0 if rx is None else 2 * EDGE_ON
-    slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
         by_facets=by_facets, occluders=occluders, ground=ground,
     )  # fmt: skip
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     judge = _Judge(power * (1.0 if wanted is None else wanted))
-    places = [end[offered] for end in ends]
-    lines = judge.lines(_Looks(solver, places, slack).whole(len(offered) // 2), SAMPLING * accuracy)
+    lines, finer = 0, 1.0
     while True:
+        # from all facets: which of them are wanted must not move the blocks
+        limits = [
+            finer * tolerance * projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300)
+            for e in ends
+        ]
+        _, offered, turns = pulse_blocks(ends, bounds, limits)
+        # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
+        # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
+        edge_on = 0.0 if rx is None else 2 * EDGE_ON
+        slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
+        looks = _Looks(solver, [end[offered] for end in ends], slack)
+        lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
         solver.take_lines(lines)
         judge = _Judge(judge.weights)
-        found = _look_along(_Looks(solver, places, slack), offered, judge, accuracy, max_bytes, progress)
+        found = _look_along(looks, offered, judge, accuracy, max_bytes, progress)
         viewpoints = offered[found.chosen]
-        error = judge.error(viewpoints, found.left)
-        if error <= accuracy or judge.sampling <= SAMPLING * accuracy or lines >= MOST_LINES:
+        motion = judge.motion(viewpoints, found.left)
+        error = float(np.hypot(judge.sampling, motion))
+        # the accuracy that could be asked for: each part has its share of it
+        reached = max(judge.sampling / SAMPLING, motion / np.sqrt(1 - SAMPLING**2))
+        if error <= accuracy:
             break
-        lines *= 4
+        if motion > np.sqrt(1 - SAMPLING**2) * accuracy and len(offered) < len(tx):
+            finer /= 4
+        elif judge.sampling > SAMPLING * accuracy and lines < MOST_LINES:
+            lines *= 4
+        else:
+            break
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
     if not found.ever.any() and n_wanted:
@@ -281,7 +293,7 @@ def lit(
     log.info("%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - found.ever.sum(), k)
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~found.ever), sealed(found.always),
-        sealed(n_wanted - np.array(found.seen, np.int64)), (0, len(tx)), error,
+        sealed(n_wanted - np.array(found.seen, np.int64)), (0, len(tx)), error, float(reached),
         sealed(found.usual), found.changes, lambda block: found.looks.again(found.chosen[block]),
     )  # fmt: skip
 
@@ -399,11 +411,10 @@ class _Judge:
         a, b, c = (levels[some].astype(np.float64) / 255 for levels in (found, first, last))
         return self._relative(float(self.weights[some] @ (a - b * (1 - part) - c * part) ** 2))
 
-    def error(self, viewpoints: np.ndarray, left: list[float]) -> float:
-        """Root of the mean square over the track: sampling at each look, and `left` up to each look."""
+    def motion(self, viewpoints: np.ndarray, left: list[float]) -> float:
+        """Root of the mean square over the track of the differences `left` up to each viewpoint."""
         steps = np.diff(viewpoints, prepend=viewpoints[0])
-        motion = float(steps @ left) / max(float(steps.sum()), 1.0)
-        return float(np.sqrt(self.sampling**2 + motion))
+        return float(np.sqrt(float(steps @ left) / max(float(steps.sum()), 1.0)))
 
 
 def _mask(name: str, given: np.ndarray | bool, k: int) -> np.ndarray:

@@ -287,17 +287,18 @@ def total_turn(tx):
 def test_a_sweeping_poles_shadow_is_right_at_every_pulse_within_the_bound(tolerance):
     scene, tx = np.concatenate([ground(30, 24), pole()]), circle(700, arc=0.5)
     light = IlluminationSolver(open_device(), scene, two_sided=False)
-    blocks = lit(scene, tx, two_sided=False, tolerance=tolerance, accuracy=1e-9)  # all blocks are looked at
+    bounds = box(scene.reshape(-1, 3))
+    typical, way = projected_width(scene, tx[350]), shadow_length(bounds, tx)
+    blocks, viewpoints, _ = pulse_blocks([tx], bounds, [tolerance * typical / way])
     assert len(blocks) > 5
-    typical, way = projected_width(scene, tx[350]), shadow_length(box(scene.reshape(-1, 3)), tx)
     u = tx[350] / np.linalg.norm(tx[350])
     own = areas(scene) * np.abs(normals(scene) @ u) / np.linalg.norm(scene - np.roll(scene, 1, 1), axis=2).max(axis=1)
     floor = np.arange(len(scene)) < 1800
     worst = 0.0
     for pulse in range(0, 700, 23):
-        block = block_at(blocks, pulse)
-        assert blocks.blocks[block, 0] <= pulse < blocks.blocks[block, 1]
-        moved = np.abs(light.share([tx[pulse]]) / 255.0 - light.share([tx[blocks.viewpoints[block]]]) / 255.0)
+        block = int(np.searchsorted(blocks[:, 0], pulse, side="right")) - 1
+        assert blocks[block, 0] <= pulse < blocks[block, 1]
+        moved = np.abs(light.share([tx[pulse]]) / 255.0 - light.share([tx[viewpoints[block]]]) / 255.0)
         # two samplings, and two edges of a shadow narrower than a facet
         assert (moved[floor] <= 2 * tolerance * typical / own[floor] + 2 / 16).all()
         worst = max(worst, moved[floor].max())
