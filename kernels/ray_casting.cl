@@ -103,7 +103,6 @@ typedef struct {
 } face_numbers;
 
 // Facets turned away start with every sample hidden, the others with none (fresh 1) or as they are (fresh 0).
-// global size (facets, LINES)
 __kernel void face(face_numbers given, __global const float *restrict facet, __global const int *restrict index,
                    __global const uchar *restrict kind, __global int *restrict word) {
     size_t i = get_global_id(0);
@@ -113,8 +112,9 @@ __kernel void face(face_numbers given, __global const float *restrict facet, __g
     float lift = f[9] * f[9] + f[10] * f[10] + f[11] * f[11];
     float far = ahead.x * ahead.x + ahead.y * ahead.y + ahead.z * ahead.z;
     int away = (kind[index[i]] & 1) && above < 0 && above * above > given.slack * given.slack * lift * far;
-    word += i * LINES + get_global_id(1);
-    *word = away ? -1 : given.fresh ? 0 : *word;
+    word += i * LINES;
+    if (!away && !given.fresh) return;
+    for (int l = 0; l < LINES; l++) word[l] = away ? -1 : 0;
 }
 
 typedef struct {

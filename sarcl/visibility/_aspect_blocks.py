@@ -14,6 +14,7 @@ STRIDE = 128  # blocks from one viewpoint to the next, before refinement
 # Mean square of what is left between viewpoints once the one halfway is added, over the square of the difference found
 # there: 8/15 of a parabola's mean, a half of which is left where shares begin or end to change within the half
 SETTLED = 0.45
+DRAWN, FEW = 8, 2**15  # one in so many facets is looked at to learn whether they change, but not fewer
 MISSED = 0.25  # of the limit: changes of facets that are left out
 
 
@@ -104,9 +105,10 @@ def refine_viewpoints(
     limit        mean square of differences that is left
 
     Every 128th viewpoint and the last are taken. Between two of them, the one halfway is compared with linear
-    interpolation: where more than the limit would be left, both halves are refined in the same way. Facets that three
-    looks all see whole, or dark, are looked at again in the halves' middles; where these hardly differ either, they are
-    left out from there on. Yields the index, the levels, and the mean square of differences from the viewpoint before.
+    interpolation: where more than the limit would be left, both halves are refined in the same way. Of the facets that
+    three looks all see whole, or dark, an eighth is looked at in the halves' middles; where these hardly change, all of
+    them are left out from there on. Yields the index, the levels, and the mean square of differences from the viewpoint
+    before.
     """
 
     def between(
@@ -117,24 +119,28 @@ def refine_viewpoints(
             yield b, last, left * float(pulses - 1) / float(pulses)
             return
         middle = (a + b) // 2
-        found = look(middle, base)
         part = float((at[middle] - at[a]) / (at[b] - at[a]))
+        found: np.ndarray | None = None
+        if base is None and changing is not None:
+            # do facets change that three looks around saw whole, or dark? Some of them tell
+            drawn = _some_of(~changing)
+            tried = look(middle, (a, first, changing | drawn))
+            times = float(np.count_nonzero(~changing)) / max(float(np.count_nonzero(drawn)), 1.0)
+            if times * difference(tried, first, last, part, drawn) <= MISSED * limit:
+                base, found = (a, first, changing | (tried != first)), tried
+        if found is None:
+            found = look(middle, base)
         left = SETTLED * difference(found, first, last, part, None)
         if left <= limit:
             yield middle, found, left
             yield b, last, left
             return
         halves = [(a, first, middle, found), (middle, found, b, last)]
-        bases: list[Base | None] = [base, base]
+        moves = None
         if base is None:
             moves = (found != first) | (found != last) | ((found != 0) & (found != 255))
-            if changing is not None:
-                moves |= changing
-                if difference(found, first, last, part, ~changing) <= MISSED * limit:
-                    bases = [(start, levels, moves) for start, levels, *_ in halves]
-            changing = moves
-        for half, known in zip(halves, bases, strict=True):
-            yield from between(*half, left, known, changing)
+        for half in halves:
+            yield from between(*half, left, base, moves)
 
     held, levels = 0, look(0, None)
     yield held, levels, 0.0
@@ -142,6 +148,14 @@ def refine_viewpoints(
         end = look(place, None)
         yield from between(held, levels, place, end, 0.0, None, None)
         held, levels = place, end
+
+
+def _some_of(facets: np.ndarray) -> np.ndarray:
+    """One in DRAWN of facets (k,) bool, drawn by their numbers; all of them where they are few."""
+    if np.count_nonzero(facets) < FEW:
+        return facets
+    number = np.arange(len(facets), dtype=np.uint32) * np.uint32(2654435761)  # Knuth: multiplicative hashing
+    return np.asarray(facets & (number < 2**32 // DRAWN))
 
 
 def blocks_around(viewpoints: np.ndarray, n_pulses: int) -> np.ndarray:

@@ -132,7 +132,7 @@ class IlluminationSolver:
             numbers = launch_numbers(
                 "ray_casting.cl", "face", eye=self.frame.eye(viewpoint)[:3], slack=slack, fresh=first == 0
             )
-            device.run(face, (n, lines.count), None, numbers, self.facets.buffer, which, self.facets.kind, words)
+            device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.kind, words)
         for viewpoint, other in zip(viewpoints, viewpoints[::-1], strict=True):
             for hider in hiders:
                 hider.hide(self.facets, which, n, lines, viewpoint, other, words)

@@ -360,6 +360,7 @@ class _Looks:
     def at(self, place: int, base: Base | None) -> Look:
         """A look; where it has a base, place, levels and facets to look at, the levels of all others are as there."""
         if base is None:
+            self._bases.pop(place, None)
             return self.whole(place)
         self._bases[place] = base[0], np.packbits(base[2])
         seen = self.whole(place, base[2])
