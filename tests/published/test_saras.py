@@ -144,7 +144,9 @@ def test_fig_13_a_shadow_holds_no_speckle(parallelepiped):
     grid = FINE.grid((140, 130), pixels=2)
     power = np.abs(FINE.focus(raw, grid, tolerance=1e-3, window=("taylor", 90, 16))) ** 2
     y, x = np.abs(grid.positions[..., 1]), grid.positions[..., 0]
-    inside = 4 * FINE.null[0], 4 * FINE.null[1]
+    # edges along the track move with the antenna, so amplitudes of facets there change, and their echoes spread: four
+    # nulls inside, lit parts that are exact at every pulse leave -51.4 dB too
+    inside = 8 * FINE.null[0], 4 * FINE.null[1]
     dark = (y < width - inside[0]) & (x > depth - height * COTANGENT + inside[1])
     dark &= x < depth + height * TANGENT - inside[1]
     lit = power[(x > depth + height * TANGENT + inside[1]) & (x < 42)].mean()
