@@ -38,6 +38,7 @@ UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
 SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
+UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 Progress = Callable[[str, int, int], None]
 
 
@@ -122,9 +123,9 @@ class SceneEchoes:
         words = {} if rows is None or not (rows >= 0).any() else {"partly lit facets": int((rows >= 0).sum())}
         if self.facets is None or not self.facets.has_sampled_shadows:
             return words
-        known = self.facets.samples_incoherent_alone
-        error = f"{self.shadow_error:.1e}" if known else "not part of the error"
-        return words | {"shadow edges": f"sampled, {error}"}
+        if not self.facets.samples_incoherent_alone:
+            return words | UNKNOWN_SHADOWS
+        return words | {"shadow edges": f"sampled, {self.shadow_error:.1e}"}
 
     def partly_lit(self, antennas: PulseGeometry, waveform: Waveform) -> SceneEchoes | None:
         """The facets alone of which some pulse sees a part past others, on the device; None where there are none."""

@@ -112,42 +112,48 @@ def refine_viewpoints(
     """
 
     def between(
-        a: int, first: np.ndarray, b: int, last: np.ndarray, left: float, base: Base | None, changing: np.ndarray | None
+        a: int,
+        first: np.ndarray,
+        b: int,
+        last: np.ndarray,
+        residual: float,
+        base: Base | None,
+        changing: np.ndarray | None,
     ) -> Iterator[tuple[int, np.ndarray, float]]:
         if b - a < 2:
             pulses = at[b] - at[a]
-            yield b, last, left * float(pulses - 1) / float(pulses)
+            yield b, last, residual * float(pulses - 1) / float(pulses)
             return
         middle = (a + b) // 2
         part = float((at[middle] - at[a]) / (at[b] - at[a]))
-        found: np.ndarray | None = None
+        halfway: np.ndarray | None = None
         if base is None and changing is not None:
             # do facets change that three looks around saw whole, or dark? Some of them tell
             drawn = _some_of(~changing)
             tried = look(middle, (a, first, changing | drawn))
             times = float(np.count_nonzero(~changing)) / max(float(np.count_nonzero(drawn)), 1.0)
             if times * difference(tried, first, last, part, drawn) <= MISSED * limit:
-                base, found = (a, first, changing | (tried != first)), tried
-        if found is None:
-            found = look(middle, base)
-        left = SETTLED * difference(found, first, last, part, None)
-        if left <= limit:
-            yield middle, found, left
-            yield b, last, left
+                base, halfway = (a, first, changing | (tried != first)), tried
+        if halfway is None:
+            halfway = look(middle, base)
+        residual = SETTLED * difference(halfway, first, last, part, None)
+        if residual <= limit:
+            yield middle, halfway, residual
+            yield b, last, residual
             return
-        halves = [(a, first, middle, found), (middle, found, b, last)]
+        halves = [(a, first, middle, halfway), (middle, halfway, b, last)]
         moves = None
         if base is None:
-            moves = (found != first) | (found != last) | ((found != 0) & (found != 255))
+            moves = (halfway != first) | (halfway != last) | ((halfway != 0) & (halfway != 255))
         for half in halves:
-            yield from between(*half, left, base, moves)
+            yield from between(*half, residual, base, moves)
 
-    held, levels = 0, look(0, None)
-    yield held, levels, 0.0
+    start, levels = 0, look(0, None)
+    yield start, levels, 0.0
     for place in np.unique(np.append(np.arange(STRIDE, len(at), STRIDE), len(at) - 1)).tolist()[len(at) == 1 :]:
         end = look(place, None)
-        yield from between(held, levels, place, end, 0.0, None, None)
-        held, levels = place, end
+        yield from between(start, levels, place, end, 0.0, None, None)
+        start, levels = place, end
 
 
 def _some_of(facets: np.ndarray) -> np.ndarray:

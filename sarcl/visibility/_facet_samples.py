@@ -1,4 +1,4 @@
-"""Sample points of facets, on lines parallel to an edge: each stands for as much area as the others."""
+"""Sample points of facets, on lines parallel to an edge: each represents an equal part of the area."""
 
 from __future__ import annotations
 

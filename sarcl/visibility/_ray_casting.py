@@ -58,9 +58,9 @@ class Occluders:
         self._views = self._views[-1:]
         if self._uploaded is None:
             self._uploaded = self.device.upload(self._corners)
-        made = LightBuffer(self.device, self._uploaded, len(self._corners), self._bounds, self.frame, viewpoint)
-        self._views.append((np.array(viewpoint, np.float64), made))
-        return made
+        buffer = LightBuffer(self.device, self._uploaded, len(self._corners), self._bounds, self.frame, viewpoint)
+        self._views.append((np.array(viewpoint, np.float64), buffer))
+        return buffer
 
 
 class BoxTree:

@@ -239,6 +239,12 @@ def lit(
     on_heights = _mask("on_heights", grid is not None if on_heights is None else on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
     two_sided, by_facets = _mask("two_sided", two_sided, k), _mask("by_facets", by_facets, k)
+    if weights is not None:
+        weights = array("weights", weights, np.float64, (k,)) if k else np.zeros(0)
+        if weights.min(initial=0.0) < 0:
+            raise ValueError(f"weights[{weights.argmin()}] is {weights.min():g}; give powers, 0 or more")
+    if ground is not None:
+        ground = array("ground[0]", ground[0], np.float64, ("n", 3, 3)), _mask("ground[1]", ground[1], k)
     if grid is not None:
         for name, end in zip(("tx", "rx"), ends, strict=False):
             check_above(name, grid, end)
@@ -272,9 +278,9 @@ def lit(
         lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
         solver.take_lines(lines)
         judge = _Judge(judge.weights)
-        found = _look_along(looks, offered, judge, accuracy, max_bytes, progress)
-        viewpoints = offered[found.chosen]
-        motion = judge.motion(viewpoints, found.left)
+        course = _look_along(looks, offered, judge, accuracy, max_bytes, progress)
+        viewpoints = offered[course.chosen]
+        motion = judge.motion(viewpoints, course.left)
         error = float(np.hypot(judge.sampling, motion))
         # the accuracy that could be asked for: each part has its share of it
         reached = max(judge.sampling / SAMPLING, motion / np.sqrt(1 - SAMPLING**2))
@@ -288,20 +294,22 @@ def lit(
             break
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
-    if not found.ever.any() and n_wanted:
+    if not course.ever.any() and n_wanted:
         warn(ALL_DARK)
-    log.info("%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - found.ever.sum(), k)
+    log.info(
+        "%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - course.ever.sum(), k
+    )
     return Illumination(
-        sealed(blocks), sealed(viewpoints), sealed(~found.ever), sealed(found.always),
-        sealed(n_wanted - np.array(found.seen, np.int64)), (0, len(tx)), error, float(reached),
-        sealed(found.usual), found.changes, lambda block: found.looks.again(found.chosen[block]),
+        sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always),
+        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
+        sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
 
 
 @dataclass(eq=False)
-class _Found:
-    """What was found along a track: indices of the viewpoints that were offered, the mean square of differences up to
-    each, numbers of facets seen, levels at the first and what changes from there, and facets (k,) ever and always
+class _Course:
+    """Levels along a track: indices of viewpoints among those offered, the mean square of differences up to each, the
+    number of facets that each sees, levels at the first and changes from these, and facets (k,) ever and always
     seen."""
 
     looks: _Looks
@@ -317,10 +325,10 @@ class _Found:
 def _look_along(
     looks: _Looks, offered: np.ndarray, judge: _Judge, accuracy: float, max_bytes: float,
     progress: Callable[[int, int], None] | None,
-) -> _Found:  # fmt: skip
+) -> _Course:  # fmt: skip
     """Levels at as many of the pulses offered (n,) as an accuracy asks for; changes are kept up to `max_bytes`."""
     k, kept = looks.solver.facets.size, 0
-    found = _Found(looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool))
+    course = _Course(looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool))
 
     def look(place: int, base: Base | None) -> np.ndarray:
         seen = looks.at(place, base)
@@ -329,21 +337,21 @@ def _look_along(
 
     limit = (1 - SAMPLING**2) * accuracy**2
     for place, levels, left in refine_viewpoints(look, offered, judge.difference, limit):
-        if not found.chosen:
-            found.usual = levels
-        if kept <= max_bytes and len(found.changes) == len(found.chosen):
-            index = np.flatnonzero(levels != found.usual).astype(np.int32)
+        if not course.chosen:
+            course.usual = levels
+        if kept <= max_bytes and len(course.changes) == len(course.chosen):
+            index = np.flatnonzero(levels != course.usual).astype(np.int32)
             kept += 5 * len(index)
             if kept <= max_bytes:
-                found.changes.append((index, levels[index]))
-        found.chosen.append(place)
-        found.left.append(left)
-        found.seen.append(int(np.count_nonzero(levels)))
-        found.ever |= levels > 0
-        found.always &= levels == 255
+                course.changes.append((index, levels[index]))
+        course.chosen.append(place)
+        course.left.append(left)
+        course.seen.append(int(np.count_nonzero(levels)))
+        course.ever |= levels > 0
+        course.always &= levels == 255
         if progress:
             progress(place + 1, len(offered))
-    return found
+    return course
 
 
 class _Looks:
@@ -404,12 +412,12 @@ class _Judge:
         self._sampling.append(self._relative(look.spread(self.weights) + rounded))
 
     def difference(
-        self, found: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, which: np.ndarray | None
+        self, halfway: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, which: np.ndarray | None
     ) -> float:
-        """As `refine_viewpoints` asks for it; `found` was noted last."""
-        moves = (found != first) | (found != last)
+        """As `refine_viewpoints` asks for it; `halfway` was noted last."""
+        moves = (halfway != first) | (halfway != last)
         some = np.flatnonzero(moves if which is None else moves & which)
-        a, b, c = (levels[some].astype(np.float64) / 255 for levels in (found, first, last))
+        a, b, c = (levels[some].astype(np.float64) / 255 for levels in (halfway, first, last))
         return self._relative(float(self.weights[some] @ (a - b * (1 - part) - c * part) ** 2))
 
     def motion(self, viewpoints: np.ndarray, left: list[float]) -> float:

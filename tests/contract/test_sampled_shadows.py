@@ -98,3 +98,12 @@ def test_little_memory_for_shares_changes_nothing(monkeypatch):
     scene, track = SCENES["house"](), TRACKS["wide"]
     much, little = (echo(scene, track, monkeypatch, 0, 1e-2, max_bytes=size) for size in (1e9, 2e7))
     assert np.linalg.norm(much.samples - little.samples) <= 1e-6 * np.linalg.norm(much.samples)
+
+
+def test_spectral_echoes_say_that_sampled_shadows_are_not_part_of_the_error(monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    line = sarcl.Trajectory.line(start=(6e3, -30, 5e3), velocity=(0, 100, 0), prf=100.0, n_pulses=60)
+    scene = SCENES["house"]()
+    window = {"range_window": (-15, 15), "reference": scene.center}
+    raw = sarcl.spectral_echo(scene, CHIRP, line, tolerance=1e-1, seed=3, **window)
+    assert raw.report.plan["shadow edges"] == "sampled, not part of the error"

@@ -24,7 +24,7 @@ from ...scene.scene import Scene
 from ..echo import Polarization, echo_request
 from ..echo_check import measure_error, seconds_to_check
 from ..echo_output import EchoOutput
-from ..scene_echoes import ChannelEchoes, EchoRequest, Progress
+from ..scene_echoes import UNKNOWN_SHADOWS, ChannelEchoes, EchoRequest, Progress
 from ..spreading import Counts
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple
@@ -146,6 +146,8 @@ def spectral_echo(
                     **task.describe(parts, direct),
                     **prepared.mesh_warnings,
                     **prepared.shadow_words,
+                    # aspects are interpolated as if amplitudes changed slowly: what shares add to that is not measured
+                    **(UNKNOWN_SHADOWS if "shadow edges" in prepared.shadow_words else {}),
                     **prepared.weights.describe(prepared.weight_error),
                     **task.motion,
                 },

@@ -101,7 +101,6 @@ class SpectralTask:
         if direct is not None:
             channel = direct.channel(self.antennas, waveform, self.frequencies)
             errors.append(channel.predicted_error)
-        errors.append(prepared.shadow_error)
         request.clock.lap("plan")
         return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
 
