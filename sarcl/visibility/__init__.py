@@ -11,6 +11,7 @@ For this folder alone:
     _facet_samples         sample points on a facet
     _frame                 facets and points on a device, in float32 coordinates of the scene
     _illumination_solver   shares of facets that given viewpoints see
+    _levels_along_track    levels at as many pulses as an accuracy asks for
     _light_buffer          occlusion by facets, seen from a viewpoint outside: cells of a perspective view
     _lit_shares            shares of facets at every pulse, and of pixels, for labels and masks
     _shadow_pairs          pairs of a facet and an occluder whose shadow may fall on it

@@ -1,0 +1,135 @@
+"""Levels, roots of shares, at as many pulses of a track as an accuracy asks for, and what their errors are."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from ._aspect_blocks import Base, refine_viewpoints
+from ._facet_samples import FEWEST_LINES
+from ._illumination_solver import IlluminationSolver, Look
+
+SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
+ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
+
+
+@dataclass(eq=False)
+class Course:
+    """Levels along a track: indices of viewpoints among those offered, the mean square of differences up to each, the
+    number of facets that each sees, levels at the first and changes from these, and facets (k,) ever and always
+    seen."""
+
+    looks: Looks
+    chosen: list[int]
+    left: list[float]
+    seen: list[int]
+    usual: np.ndarray
+    changes: list[tuple[np.ndarray, np.ndarray]]
+    ever: np.ndarray
+    always: np.ndarray
+
+
+def look_along(
+    looks: Looks, offered: np.ndarray, judge: Judge, accuracy: float, max_bytes: float,
+    progress: Callable[[int, int], None] | None,
+) -> Course:  # fmt: skip
+    """Levels at as many of the pulses offered (n,) as an accuracy asks for; changes are kept up to `max_bytes`."""
+    k, kept = looks.solver.facets.size, 0
+    course = Course(looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool))
+
+    def look(place: int, base: Base | None) -> np.ndarray:
+        seen = looks.at(place, base)
+        judge.note(seen)
+        return seen.levels
+
+    limit = (1 - SAMPLING**2) * accuracy**2
+    for place, levels, left in refine_viewpoints(look, offered, judge.difference, limit):
+        if not course.chosen:
+            course.usual = levels
+        if kept <= max_bytes and len(course.changes) == len(course.chosen):
+            index = np.flatnonzero(levels != course.usual).astype(np.int32)
+            kept += 5 * len(index)
+            if kept <= max_bytes:
+                course.changes.append((index, levels[index]))
+        course.chosen.append(place)
+        course.left.append(left)
+        course.seen.append(int(np.count_nonzero(levels)))
+        course.ever |= levels > 0
+        course.always &= levels == 255
+        if progress:
+            progress(place + 1, len(offered))
+    return course
+
+
+class Looks:
+    """What antennas at some places, m (n, 3) each, see; slack  rad (n,), of facets that face away."""
+
+    def __init__(self, solver: IlluminationSolver, ends: list[np.ndarray], slack: np.ndarray) -> None:
+        self.solver, self.ends, self.slack = solver, ends, slack
+        self._bases: dict[int, tuple[int, np.ndarray]] = {}
+
+    def whole(self, place: int, some: np.ndarray | None = None) -> Look:
+        """A look at facets `some` (k,) bool; None: at all."""
+        return self.solver.look([end[place] for end in self.ends], float(self.slack[place]), some)
+
+    def at(self, place: int, base: Base | None) -> Look:
+        """A look; where it has a base, place, levels and facets to look at, the levels of all others are as there."""
+        if base is None:
+            self._bases.pop(place, None)
+            return self.whole(place)
+        self._bases[place] = base[0], np.packbits(base[2])
+        seen = self.whole(place, base[2])
+        return replace(seen, levels=np.where(base[2], seen.levels, base[1]))
+
+    def again(self, place: int) -> np.ndarray:
+        """The levels of a look that was taken."""
+        if place not in self._bases:
+            return self.whole(place).levels
+        at, packed = self._bases[place]
+        some = np.unpackbits(packed, count=self.solver.facets.size).astype(bool)
+        return np.where(some, self.whole(place, some).levels, self.whole(at).levels)
+
+
+class Judge:
+    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares."""
+
+    def __init__(self, weights: np.ndarray) -> None:
+        self.weights, self._whole = weights, 0.0
+        self._sampling: list[float] = []
+
+    def _relative(self, off: float) -> float:
+        """off over the sum of squares of the last look that was noted."""
+        return off / self._whole if self._whole else 0.0
+
+    @property
+    def sampling(self) -> float:
+        """Root of the mean square of the sampling errors that were noted."""
+        return float(np.sqrt(np.mean(self._sampling)))
+
+    def lines(self, look: Look, limit: float) -> int:
+        """Lines of samples with which errors stay below a limit: those of straight edges fall as lines become more."""
+        self.note(look)
+        error = self.sampling
+        return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
+
+    def note(self, look: Look) -> None:
+        """Note the sampling error of a look."""
+        self._whole = float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2
+        rounded = ROUNDED * float(self.weights[look.partly].sum())
+        self._sampling.append(self._relative(look.spread(self.weights) + rounded))
+
+    def difference(
+        self, halfway: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, which: np.ndarray | None
+    ) -> float:
+        """As `refine_viewpoints` asks for it; `halfway` was noted last."""
+        moves = (halfway != first) | (halfway != last)
+        some = np.flatnonzero(moves if which is None else moves & which)
+        a, b, c = (levels[some].astype(np.float64) / 255 for levels in (halfway, first, last))
+        return self._relative(float(self.weights[some] @ (a - b * (1 - part) - c * part) ** 2))
+
+    def motion(self, viewpoints: np.ndarray, left: list[float]) -> float:
+        """Root of the mean square over the track of the differences `left` up to each viewpoint."""
+        steps = np.diff(viewpoints, prepend=viewpoints[0])
+        return float(np.sqrt(float(steps @ left) / max(float(steps.sum()), 1.0)))
