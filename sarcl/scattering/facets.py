@@ -95,10 +95,23 @@ class FacetSet:
         if self.lit_parts is None or self.lit_rows is None:
             return [self]
         steady = self.lit_rows < 0
-        parts = (self._some(steady, None, None), self._some(~steady, self.lit_parts, self.lit_rows[~steady]))
-        return [part for part in parts if len(part)]
+        return [part for part in (self._some(steady), self._some(~steady)) if len(part)]
 
-    def _some(self, which: np.ndarray, lit_parts: LitParts | None, lit_rows: np.ndarray | None) -> FacetSet:
+    def steady(self) -> tuple[FacetSet | None, FacetSet | None]:
+        """The facets of which all pulses see the same share, and the others; None: there are none."""
+        changing = np.zeros(len(self), bool)
+        if self.lit_rows is not None:
+            changing |= self.lit_rows >= 0
+        if self.illumination is not None:
+            changing |= self.illumination.changing[self.kept] & (True if self.sampled is None else self.sampled)
+        if not changing.any():
+            return self, None
+        return None if changing.all() else self._some(~changing), self._some(changing)
+
+    def _some(self, which: np.ndarray) -> FacetSet:
+        lit_parts, lit_rows = self.lit_parts, None if self.lit_rows is None else self.lit_rows[which]
+        if lit_rows is not None and not (lit_rows >= 0).any():
+            lit_parts = lit_rows = None
         return FacetSet(
             self.triangles[which], self.reflectivity[which], self.two_sided[which], self.material[which],
             self.materials, self.illumination, self.kept[which],

@@ -127,18 +127,23 @@ class SceneEchoes:
             return words | UNKNOWN_SHADOWS
         return words | {"shadow edges": f"sampled, {self.shadow_error:.1e}"}
 
-    def partly_lit(self, antennas: PulseGeometry, waveform: Waveform) -> SceneEchoes | None:
-        """The facets alone of which some pulse sees a part past others, on the device; None where there are none."""
-        if self.facets is None or self.subdivision is None or self.facets.lit_parts is None:
-            return None
-        partly = [part for part in self.facets.split() if part.lit_parts is not None]
-        if not partly:
-            return None
+    def by_light(self, antennas: PulseGeometry, waveform: Waveform) -> tuple[FacetSet | None, SceneEchoes | None]:
+        """The facets of which all pulses see the same share; and the others alone, on the device. None: there are
+        none."""
+        if self.facets is None or self.subdivision is None:
+            return None, None
+        steady, changing = self.facets.steady()
+        if changing is None:
+            return steady, None
         request, plan = self.request, self.subdivision.plan
-        tiled = TiledFacets(
-            request.device, partly[0], plan, antennas, waveform, self.weights, request.polarizations, request.vertical
+        tiled = tuple(
+            TiledFacets(
+                request.device, part, plan, antennas, waveform, self.weights, request.polarizations, request.vertical
+            )
+            for part in changing.split()
         )
-        return replace(self, points=None, facets=partly[0], tiled_points=None, tiled_facets=(tiled,), shadow_error=0.0)
+        alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_error=0.0)
+        return steady, alone
 
     def channel(
         self, antennas: PulseGeometry, waveform: Waveform, frequencies: np.ndarray, first: int = 0

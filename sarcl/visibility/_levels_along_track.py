@@ -18,8 +18,8 @@ ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
 @dataclass(eq=False)
 class Course:
     """Levels along a track: indices of viewpoints among those offered, the mean square of differences up to each, the
-    number of facets that each sees, levels at the first and changes from these, and facets (k,) ever and always
-    seen."""
+    number of facets that each sees, levels at the first and changes from these, and facets (k,) bool: ever seen, always
+    seen whole, and those whose levels change."""
 
     looks: Looks
     chosen: list[int]
@@ -29,6 +29,7 @@ class Course:
     changes: list[tuple[np.ndarray, np.ndarray]]
     ever: np.ndarray
     always: np.ndarray
+    changing: np.ndarray
 
 
 def look_along(
@@ -37,7 +38,9 @@ def look_along(
 ) -> Course:  # fmt: skip
     """Levels at as many of the pulses offered (n,) as an accuracy asks for; changes are kept up to `max_bytes`."""
     k, kept = looks.solver.facets.size, 0
-    course = Course(looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool))
+    course = Course(
+        looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool), np.zeros(k, bool)
+    )
 
     def look(place: int, base: Base | None) -> np.ndarray:
         seen = looks.at(place, base)
@@ -58,6 +61,7 @@ def look_along(
         course.seen.append(int(np.count_nonzero(levels)))
         course.ever |= levels > 0
         course.always &= levels == 255
+        course.changing |= levels != course.usual
         if progress:
             progress(place + 1, len(offered))
     return course

@@ -81,6 +81,7 @@ class Illumination:
     viewpoints  pulse at which the shares of each block were computed (n_blocks,)
     dark        (k,) bool: facets of which nothing is illuminated at any viewpoint
     full        (k,) bool: facets that are wholly illuminated at every viewpoint
+    changing    (k,) bool: facets whose shares are not the same at every viewpoint
     dark_facets number of wanted facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
@@ -93,6 +94,7 @@ class Illumination:
     viewpoints: np.ndarray
     dark: np.ndarray
     full: np.ndarray
+    changing: np.ndarray
     dark_facets: np.ndarray
     window: tuple[int, int]
     error: float
@@ -243,7 +245,7 @@ def lit(
     if k == 0:
         nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
-        return Illumination(whole, first, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing)
+        return Illumination(whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing)
     bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
@@ -290,7 +292,7 @@ def lit(
     )
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always),
-        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
+        sealed(course.changing), sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
 

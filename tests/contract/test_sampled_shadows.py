@@ -100,10 +100,27 @@ def test_little_memory_for_shares_changes_nothing(monkeypatch):
     assert np.linalg.norm(much.samples - little.samples) <= 1e-6 * np.linalg.norm(much.samples)
 
 
-def test_spectral_echoes_say_that_sampled_shadows_are_not_part_of_the_error(monkeypatch):
-    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
-    line = sarcl.Trajectory.line(start=(6e3, -30, 5e3), velocity=(0, 100, 0), prf=100.0, n_pulses=60)
-    scene = SCENES["house"]()
+LINE = sarcl.Trajectory.line(start=(6e3, -30, 5e3), velocity=(0, 100, 0), prf=100.0, n_pulses=60)
+
+
+def spectral(scene, tolerance, **options):
     window = {"range_window": (-15, 15), "reference": scene.center}
-    raw = sarcl.spectral_echo(scene, CHIRP, line, tolerance=1e-1, seed=3, **window)
+    return sarcl.spectral_echo(scene, CHIRP, LINE, tolerance=tolerance, seed=3, **window, **options)
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_spectral_echoes_with_sampled_shadows_meet_the_tolerance(name, monkeypatch):
+    scene = SCENES[name]()
+    wanted = echo(scene, (LINE, None), monkeypatch, np.inf, 3e-4)
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    for tolerance in (1e-1, 1e-2):
+        raw = spectral(scene, tolerance)
+        assert raw.report.plan["shadow edges"].startswith("sampled, ")
+        error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
+        assert 0 < error <= raw.report.predicted_error <= tolerance
+
+
+def test_the_variant_saras_says_that_sampled_shadows_are_not_part_of_the_error(monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    raw = spectral(SCENES["house"](), 0.3, variant="saras")
     assert raw.report.plan["shadow edges"] == "sampled, not part of the error"

@@ -146,8 +146,8 @@ def spectral_echo(
                     **task.describe(parts, direct),
                     **prepared.mesh_warnings,
                     **prepared.shadow_words,
-                    # aspects are interpolated as if amplitudes changed slowly: what shares add to that is not measured
-                    **(UNKNOWN_SHADOWS if "shadow edges" in prepared.shadow_words else {}),
+                    # here aspects are interpolated as if shares changed slowly: what that adds is not known
+                    **(UNKNOWN_SHADOWS if variant == "saras" and "shadow edges" in prepared.shadow_words else {}),
                     **prepared.weights.describe(prepared.weight_error),
                     **task.motion,
                 },
@@ -173,4 +173,4 @@ def _add_directly(direct: ChannelEchoes, request: EchoRequest, spectrum: np.ndar
         block = np.zeros((stop - start, *output.shape[1:]), np.complex64)
         counts += direct.add(block, range(start, stop), counts.pairs, len(direct.scene) * n)
         output.add(start, block * spectrum.astype(np.complex64))
-    request.clock.lap("partly lit facets")
+    request.clock.lap("facets with shadows")

@@ -57,8 +57,8 @@ class SpectralTask:
     def planned(self, variant: str) -> tuple[SceneEchoes, list[SpectralPart], ChannelEchoes | None, float]:
         """The prepared scene, plans for its points and its facets, and the predicted error of their sum.
 
-        Facets that are lit in part change from pulse to pulse: their echoes are planned as `echo` adds them; None
-        where there are none.
+        Facets of which pulses see different parts are added as `echo` does: their echoes are planned so; None where
+        there are none, and for the variant "saras", whose shares of them change as slowly as amplitudes.
         """
         request, waveform = self.request, self.waveform
         request.report("scene", 0, 3)
@@ -66,9 +66,9 @@ class SpectralTask:
             request, self.original_scene, self.scene, waveform, self.antennas, self.weights, (), tiled=False,
             exact=variant == "exact",
         )  # fmt: skip
-        steady, direct = prepared.facets, prepared.partly_lit(self.antennas, waveform)
-        if direct is not None and prepared.facets is not None:
-            steady = next((one for one in prepared.facets.split() if one.lit_parts is None), None)
+        steady, direct = prepared.facets, None
+        if variant == "exact":
+            steady, direct = prepared.by_light(self.antennas, waveform)
         band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
         share = share_of(request, self.scene, waveform, self.antennas, request.tolerance)
         straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * self.line.deviation
@@ -101,11 +101,13 @@ class SpectralTask:
         if direct is not None:
             channel = direct.channel(self.antennas, waveform, self.frequencies)
             errors.append(channel.predicted_error)
+        errors.append(prepared.shadow_error)
         request.clock.lap("plan")
         return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
 
     def describe(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> dict[str, Any]:
-        """Words of the plan of the part with the largest error; of partly lit facets where there is no other."""
+        """Words of the plan of the part with the largest error; of facets added as `echo` does where there is no
+        other."""
         if not parts and direct is not None:
             return direct.plan
         return max(parts, key=lambda part: part.predicted_error).describe()
@@ -114,7 +116,9 @@ class SpectralTask:
         """About the seconds of the whole task: those since it began, and those of the plans."""
         n_polarizations, total = len(self.request.polarizations), sum(self.request.clock.seconds.values())
         if direct is not None:
-            total += 1e-6 * cost_model.LIT_PART * len(direct.scene) * self.line.n_pulses
+            partly = direct.scene.shadow_words.get("partly lit facets", 0)
+            each = cost_model.LIT_PART * partly + cost_model.ECHO_FACET * len(direct.scene)
+            total += 1e-6 * each * self.line.n_pulses
         for part in parts:
             n, terms = len(part.some), len(part.expansion)
             of_facets = isinstance(part.amplitudes.part, FacetSet)
