@@ -1,7 +1,8 @@
 // Echoes of planar facets by physical optics: amplitudes at some pulses, spread into the range profiles of all.
 //
 //   g_pm[i] = sum_k a_k(p, f_m) exp(-j 2 pi kappa_p delta_p(x_k)) w(i - sigma_p delta_p(x_k)),   x_k centroids
-//   a_k(p)  = sum_q c_pq a_k(q),   q pulses near p that amplitudes are computed at (pulse nodes), c Lagrange's weights
+//   a_k(p)  = r_k(p) sum_q c_pq a_k(q),   q pulses near p that amplitudes are computed at (pulse nodes), c Lagrange's weights,
+//             r the root of the share that pulse p sees, or that share: what changes faster than amplitudes
 //   s_p(f)  = f^e sum_m L_m(f) (FFT of g_pm over the kernel's transform), on the host;   L_m(f) Lagrange's polynomials
 //
 // source    sarcl/scattering/physical_optics.py; amplitudes interpolated between NODES frequencies f_m and between pulse nodes
@@ -17,6 +18,7 @@
 //           METAL      1: every facet is a perfect conductor
 //           DISPERSIVE 1: the materials' 1/sqrt(eps) differ from f_m to f_m; 0: those of f_0 serve all
 //           ROUGH, DIAGRAM_*  see facet_planes.clh
+//           SHADED     1: pulses see shares of facets; 0: all of every facet
 //           PARTLY     1: lit parts of the facets, at every pulse node, stand in place of whole ones (lit_parts.cl)
 //           TILE       facets per tile, a multiple of VW
 //           GROUPED    1: work-groups of 64 items: each shares the facets of a tile, or adds a row up in local memory, TILE a
@@ -69,8 +71,6 @@ typedef struct {
 //   offsets    (2, 3, n_tiles TILE)   as in backproject.cl
 //   facets   (planes, n_tiles TILE)   edges from the first corner to the second and third, m; reflectivity, negative where
 //            two-sided; ROUGH: six more, see rough_mean; 1/sqrt(eps) re, im, for every f_m where DISPERSIVE
-//   seen, later (n_tiles TILE)        share of each facet that both antennas see, 0 ... 255, at two moments
-//   moments  (pulse nodes)            where between these two a pulse node lies: 0 at the one, 1 at the other, or beyond
 //   parts    (pulse nodes, 1 + 2 NODES, n_tiles TILE)   where PARTLY: share of the area, and mean re, im at each f_m
 //   nodes    (3, NODES)               f_m/c, cycles/m; k/(2 sqrt(pi) f^e); f_m over the patterns' frequency
 //   up       (6)                      vertical, and the axis that replaces it for vectors along it
@@ -80,9 +80,8 @@ typedef struct {
 //   marks    (pulse nodes, tiles of this call, TILE)                       FRONT, BRIGHT
 __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const float *restrict constants,
                                __global const float *restrict offsets, __global const float *restrict facets,
-                               __global const uchar *restrict seen, __global const uchar *restrict later,
-                               __global const float *restrict moments, __global const float *restrict parts,
-                               __global const float *restrict nodes, __global const float *restrict up, __global const float *restrict patterns,
+                               __global const float *restrict parts, __global const float *restrict nodes,
+                               __global const float *restrict up, __global const float *restrict patterns,
                                __global const float *restrict axes, __global const float *restrict reach,
                                __global const float *restrict radius, __global float *restrict out,
                                __global uchar *restrict marks) {
@@ -103,13 +102,7 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
     for (int i = get_global_id(0) % ITEMS; i < TILE / VW; i += ITEMS) {
         size_t at = (size_t)k * (TILE / VW) + i, node_vector = here * (TILE / VW) + i;
         __global float *out_i = AMPLITUDES(out, here, i);
-        float share[VW], is_front[VW], is_bright[VW];
-#pragma unroll
-        for (int l = 0; l < VW; l++) {
-            float now = seen[at * VW + l];
-            share[l] = unseen ? 0.0f : fma(moments[q], later[at * VW + l] - now, now) * (1.0f / 255.0f);
-        }
-
+        float is_front[VW], is_bright[VW];
         offset x = load_offset(offsets, at, given.n_offsets);
         triple edge_1 = load_triple(facets + F_EDGE * (size_t)given.n_offsets, at, given.n_offsets);
         triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)given.n_offsets, at, given.n_offsets);
@@ -127,7 +120,7 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
         iv front = t_dot(normal, u_t) > 0;
         rx_range = tx_range;
 #endif
-        fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * LOAD(0, share), root_of_share = (fv)1.0f;
+        fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)(unseen ? 0.0f : 0.5f) * twice_area, root_of_share = (fv)1.0f;
 #if PARTLY
         __global const float *part = parts + (size_t)q * (1 + 2 * NODES) * given.n_offsets;
         fv part_share = LOAD(at, part);
@@ -200,6 +193,24 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
     }
 }
 
+#if SHADED
+// r of the facets of vector `at`, 0 to 1.
+static inline fv level_at(__global const uchar *levels, __global const int *moment, float between, size_t at, int n_offsets) {
+    __global const uchar *one = levels + (size_t)moment[0] * n_offsets + at * VW;
+    __global const uchar *two = levels + (size_t)moment[1] * n_offsets + at * VW;
+    float out[VW];
+#pragma unroll
+    for (int l = 0; l < VW; l++) {
+        float now = one[l];
+        out[l] = fma(between, two[l] - now, now) * (1.0f / 255.0f);
+    }
+    return LOAD(0, out);
+}
+#define IS_LIT(l) (lit[l] > 0)
+#else
+#define IS_LIT(l) 1
+#endif
+
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
 } spread_facets_numbers;
@@ -210,6 +221,8 @@ typedef struct {
 //   amplitudes, marks   of the tiles first ... first + n_here - 1, as facet_amplitudes leaves them
 //   pulse_nodes (n_used, 2)           first of the PULSE_NODES nodes of a pulse, and the nearest
 //   shares   (n_used, PULSE_NODES)    weights of these nodes
+//   levels   (moments, n_tiles TILE)  r of each facet, 0 ... 255, at some moments
+//   moments  (n_used, 2)              those around a pulse, and  between (n_used)  where it lies, 0 at the one, 1 at the other
 //   axes (n_used, 18), reach, radius  see gains.clh
 //   last     facets in the last tile; the rest of it is blank
 //   flush    tiles added in float32 before they join the compensated total
@@ -220,9 +233,11 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                             __global const float *restrict constants, __global const float *restrict tile,
                             __global const float *restrict offsets, __global const float *restrict amplitudes,
                             __global const uchar *restrict marks, __global const int *restrict pulse_nodes,
-                            __global const float *restrict shares, __global const float *restrict axes,
-                            __global const float *restrict reach, __global const float *restrict radius,
-                            __global const float *restrict table, __global float *rows, __global int *restrict done) {
+                            __global const float *restrict shares, __global const uchar *restrict levels,
+                            __global const int *restrict moments, __global const float *restrict between,
+                            __global const float *restrict axes, __global const float *restrict reach,
+                            __global const float *restrict radius, __global const float *restrict table, __global float *rows,
+                            __global int *restrict done) {
 #if GROUPED
     __local row_window window;
     int p = get_global_id(0) / ITEMS, item = get_local_id(0), start = -1;
@@ -260,6 +275,12 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
             if (state == CROSSING) inside = keep_inside(c, &where);
             float is_inside[VW];
             STORE(inside, 0, is_inside);
+#if SHADED
+            fv level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
+            inside *= level;
+            float lit[VW];
+            STORE(level, 0, lit);
+#endif
             int any_mark = 0;
 #pragma unroll
             for (int l = 0; l < VW; l++) {
@@ -267,7 +288,7 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                 inside_count += counts;
                 front_count += counts && (marks[at_nearest * VW + l] & FRONT);
 #pragma unroll
-                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
+                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts && IS_LIT(l) ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
             }
 #if !GROUPED
             if (!(any_mark & BRIGHT)) continue;

@@ -21,8 +21,8 @@ from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
 from ..scene.triangles import centroids
-from ..visibility.illumination import Span
 from ._kernel_images import sample_patches
+from ._pulse_levels import PulseLevels
 from .spreading import GROUP, Band, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 KERNELS = "spread_facets.cl"
@@ -95,6 +95,7 @@ class FacetSpreader:
         self.basis = facet_plan.basis(frequencies).astype(np.float32)
         self._upload(vertical, tolerance)
         self.at_once, self.tiles_at_once = self._blocks(budget)
+        self.levels_at_once = max(2, int(budget / 8 / len(self.tiles.order)))
 
     def _upload(self, vertical: np.ndarray, tolerance: float) -> None:
         """Kernels, and what all blocks of pulses share on the device."""
@@ -110,6 +111,7 @@ class FacetSpreader:
             "PULSE_NODES": self.pulse_nodes.order,
             "GROUPED": int(self.grouped),
             "PARTLY": int(self.partly),
+            "SHADED": int(self.facets.illumination is not None),
             **{name: int(name in self.made) for name in POLARIZATIONS},
             **(diagram_macros() if self.facets.is_rough else {}),
         }
@@ -157,8 +159,9 @@ class FacetSpreader:
         """
         clock.lap("scene")
         counts, first = Counts(), pulses[0]
-        for start, stop, span in self._pulse_blocks(first, pulses[-1] + 1):
-            rows, found = self._profiles(start, stop, span)
+        for levels in self._pulse_blocks(first, pulses[-1] + 1):
+            start, stop = levels.start, levels.stop
+            rows, found = self._profiles(levels)
             clock.lap("echo")
             spectra = self.spectra_of.of(rows, self.splits, (stop - start) * self.channels)
             spectra = spectra.reshape(stop - start, len(self.made), len(self.basis), self.n_samples)
@@ -171,15 +174,25 @@ class FacetSpreader:
             on_progress(counts.pairs)
         return counts
 
-    def _pulse_blocks(self, first: int, end: int) -> Iterator[tuple[int, int, Span]]:
-        """(start, stop, span they lie in) of blocks of pulses that keep to the budget."""
+    def _pulse_blocks(self, first: int, end: int) -> Iterator[PulseLevels]:
+        """Blocks of pulses that keep to the budget, and their levels."""
+        made: PulseLevels | None = None
         for span in self.facets.spans(len(self.antennas)):
-            for start in range(max(span.first, first), min(span.stop, end), self.at_once):
-                yield start, min(start + self.at_once, span.stop, end), span
+            at, stop = max(span.first, first), min(span.stop, end)
+            while at < stop:
+                if made is None:
+                    made = PulseLevels(at)
+                at = made.extend(span, min(stop, made.start + self.at_once))
+                if made.stop - made.start == self.at_once or len(made.levels) >= self.levels_at_once:
+                    yield made
+                    made = None
+        if made is not None:
+            yield made
 
-    def _profiles(self, start: int, stop: int, span: Span) -> tuple[Any, np.ndarray]:
-        """Range profiles of pulses start ... stop - 1 on the device, as `SpreadSamples.of` takes them, and counts of
-        pairs (3,): inside the window, of these from the front, and outside the beam."""
+    def _profiles(self, levels: PulseLevels) -> tuple[Any, np.ndarray]:
+        """Range profiles of a block of pulses on the device, as `SpreadSamples.of` takes them, and counts of pairs
+        (3,): inside the window, of these from the front, and outside the beam."""
+        start, stop = levels.start, levels.stop
         device, held, tiles, used = self.device, self.tiles, self.tiles.tiles, stop - start
         at, which, shares = self.pulse_nodes.of(start, stop)
         pulse, constants, n = self._constants(np.arange(start, stop), self.gated)
@@ -187,10 +200,10 @@ class FacetSpreader:
         if self.pulse_nodes.spacing > 1:  # a facet outside the window at a node may be inside at a pulse beside it
             _, node_constants, n_nodes = self._constants(at, False)
         axes, node_axes = (device.upload(self.weights.packed_axes(rows)) for rows in (np.arange(start, stop), at))
-        seen = device.upload(span.level[held.order])
-        later = seen if span.later is span.level else device.upload(span.later[held.order])
-        moments, which_here, shares_here = (device.upload(a) for a in (span.moments(at), which, shares))
-        parts = device.upload(self._parts(start, stop)) if self.partly else moments
+        which_here, shares_here = device.upload(which), device.upload(shares)
+        seen = device.upload(np.stack([level[held.order] for level in levels.levels]))
+        moments, between = device.upload(levels.moments), device.upload(levels.between)
+        parts = device.upload(self._parts(start, stop)) if self.partly else between
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
         n_offsets, each, ends = tiles.offsets.shape[1], 1, (1, 1) if device.is_cpu else None
@@ -206,8 +219,8 @@ class FacetSpreader:
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
                 ),
-                node_constants, held.offsets, held.planes, seen, later, moments, parts, self.nodes, self.up,
-                self.patterns, node_axes, self.reach, held.radius, made, marks,
+                node_constants, held.offsets, held.planes, parts, self.nodes, self.up, self.patterns, node_axes,
+                self.reach, held.radius, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (each * used, self.splits), ends,
@@ -216,8 +229,8 @@ class FacetSpreader:
                     first=first, n_here=here, last=held.last, flush=self.flush, stride=self.stride,
                     origin=self.stride // 2,
                 ),
-                pulse, constants, held.references, held.offsets, made, marks, which_here, shares_here, axes,
-                self.reach, held.radius, self.table, rows, done, steps=here / self.splits,
+                pulse, constants, held.references, held.offsets, made, marks, which_here, shares_here, seen,
+                moments, between, axes, self.reach, held.radius, self.table, rows, done, steps=here / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)

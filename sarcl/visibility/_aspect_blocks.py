@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
-
 import numpy as np
 
 from ..base.boxes import box
@@ -11,11 +9,6 @@ from ..base.vectors import dot
 from ..scene.triangles import areas, edges, normals
 
 STRIDE = 128  # blocks from one viewpoint to the next, before refinement
-# Mean square of what is left between viewpoints once the one halfway is added, over the square of the difference found
-# there: 8/15 of a parabola's mean, a half of which is left where shares begin or end to change within the half
-SETTLED = 0.45
-DRAWN, FEW = 8, 2**15  # one in so many facets is looked at to learn whether they change, but not fewer
-MISSED = 0.25  # of the limit: changes of facets that are left out
 
 
 def shadow_length(bounds: np.ndarray, antennas: np.ndarray) -> float:
@@ -87,81 +80,6 @@ def pulse_blocks(
         turns.append(max(turn(i, np.arange(first, last + 1), viewpoint).max() for i in range(len(ends))))
         first = last + 1
     return np.array(blocks, np.int64), np.array(viewpoints, np.int64), np.array(turns)
-
-
-Base = tuple[int, np.ndarray, np.ndarray]  # see refine_viewpoints
-Difference = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray | None], float]
-
-
-def refine_viewpoints(
-    look: Callable[[int, Base | None], np.ndarray], at: np.ndarray, difference: Difference, limit: float
-) -> Iterator[tuple[int, np.ndarray, float]]:
-    """Viewpoints between which levels change linearly, as increasing indices into `at`, pulses (n,).
-
-    look(index, base)  the levels, uint8 (k,), at a viewpoint; those of facets that `base` leaves out are as there: its
-                 index, its levels, and the facets (k,) bool to be looked at
-    difference(found, first, last, part, which)  square of the difference between levels of facets `which` (k,) bool,
-                 None for all, and what lies at `part`, 0 to 1, between those of two viewpoints around it
-    limit        mean square of differences that is left
-
-    Every 128th viewpoint and the last are taken. Between two of them, the one halfway is compared with linear
-    interpolation: where more than the limit would be left, both halves are refined in the same way. Of the facets that
-    three looks all see whole, or dark, an eighth is looked at in the halves' middles; where these hardly change, all of
-    them are left out from there on. Yields the index, the levels, and the mean square of differences from the viewpoint
-    before.
-    """
-
-    def between(
-        a: int,
-        first: np.ndarray,
-        b: int,
-        last: np.ndarray,
-        residual: float,
-        base: Base | None,
-        changing: np.ndarray | None,
-    ) -> Iterator[tuple[int, np.ndarray, float]]:
-        if b - a < 2:
-            pulses = at[b] - at[a]
-            yield b, last, residual * float(pulses - 1) / float(pulses)
-            return
-        middle = (a + b) // 2
-        part = float((at[middle] - at[a]) / (at[b] - at[a]))
-        halfway: np.ndarray | None = None
-        if base is None and changing is not None:
-            # do facets change that three looks around saw whole, or dark? Some of them tell
-            drawn = _some_of(~changing)
-            tried = look(middle, (a, first, changing | drawn))
-            times = float(np.count_nonzero(~changing)) / max(float(np.count_nonzero(drawn)), 1.0)
-            if times * difference(tried, first, last, part, drawn) <= MISSED * limit:
-                base, halfway = (a, first, changing | (tried != first)), tried
-        if halfway is None:
-            halfway = look(middle, base)
-        residual = SETTLED * difference(halfway, first, last, part, None)
-        if residual <= limit:
-            yield middle, halfway, residual
-            yield b, last, residual
-            return
-        halves = [(a, first, middle, halfway), (middle, halfway, b, last)]
-        moves = None
-        if base is None:
-            moves = (halfway != first) | (halfway != last) | ((halfway != 0) & (halfway != 255))
-        for half in halves:
-            yield from between(*half, residual, base, moves)
-
-    start, levels = 0, look(0, None)
-    yield start, levels, 0.0
-    for place in np.unique(np.append(np.arange(STRIDE, len(at), STRIDE), len(at) - 1)).tolist()[len(at) == 1 :]:
-        end = look(place, None)
-        yield from between(start, levels, place, end, 0.0, None, None)
-        start, levels = place, end
-
-
-def _some_of(facets: np.ndarray) -> np.ndarray:
-    """One in DRAWN of facets (k,) bool, drawn by their numbers; all of them where they are few."""
-    if np.count_nonzero(facets) < FEW:
-        return facets
-    number = np.arange(len(facets), dtype=np.uint32) * np.uint32(2654435761)  # Knuth: multiplicative hashing
-    return np.asarray(facets & (number < 2**32 // DRAWN))
 
 
 def blocks_around(viewpoints: np.ndarray, n_pulses: int) -> np.ndarray:

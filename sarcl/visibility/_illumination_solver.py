@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import dataclass
 from typing import Any
 
@@ -75,11 +76,10 @@ class IlluminationSolver:
                 hiders.append((Occluders(device, facets, frame, n), hidden))
         # facets in parts that share what may hide them
         kind = sum(hidden * 2**i for i, (_, hidden) in enumerate(hiders)) + np.zeros(k, np.int64)
-        self._parts: list[tuple[np.ndarray, list[Any]]] = []
-        for number in np.unique(kind[keep]).tolist():
-            some = np.flatnonzero(keep & (kind == number))
-            hiding = [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1]
-            self._parts += [(some[i : i + CHUNK], hiding) for i in range(0, len(some), CHUNK)]
+        self._parts = [
+            (np.flatnonzero(keep & (kind == number)), [hider for i, (hider, _) in enumerate(hiders) if number >> i & 1])
+            for number in np.unique(kind[keep]).tolist()
+        ]
         self._few = SampleLines.of_facets(device, FEWEST_LINES)
         self._more = self._few
 
@@ -99,10 +99,8 @@ class IlluminationSolver:
         """
         levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
         most = self._more.count * PER_LINE // 2
-        for index, hiders in self._parts:
-            if some is not None:
-                index = index[some[index]]
-            elif self._more is not self._few:
+        for index, hiders in self._chunks(some):
+            if some is None and self._more is not self._few:
                 total = self._count(index, hiders, self._few, viewpoints, slack).sum(axis=1, dtype=np.int32)
                 levels[index[total == PER_LINE * self._few.count]] = 255
                 index = index[(total > 0) & (total < PER_LINE * self._few.count)]
@@ -114,6 +112,14 @@ class IlluminationSolver:
             halves.append(seen[between])
         none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
         return Look(levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most)
+
+    def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Any]]]:
+        """Numbers of the facets to be looked at, of those in `some` (k,) bool alone, with what may hide them."""
+        for index, hiders in self._parts:
+            if some is not None:
+                index = index[some[index]]
+            for i in range(0, len(index), CHUNK):
+                yield index[i : i + CHUNK], hiders
 
     def _count(
         self, index: np.ndarray, hiders: list[Any], lines: SampleLines, viewpoints: list[np.ndarray], slack: float

@@ -7,11 +7,15 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from ._aspect_blocks import Base, refine_viewpoints
 from ._facet_samples import FEWEST_LINES
 from ._illumination_solver import IlluminationSolver, Look
+from ._viewpoints import Base, between_levels, refine_viewpoints
 
 SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
+# Of the square of the accuracy: what both errors may take while those of samples are not known of all pulses, and the
+# least that is left to looks at some pulses alone
+MARGIN, LEAST = 0.95, 0.1
+RECENT = 2 * 7 + 2  # levels that are kept where they do not all fit: of the looks between which one lies, and theirs
 ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
 
 
@@ -44,11 +48,13 @@ def look_along(
 
     def look(place: int, base: Base | None) -> np.ndarray:
         seen = looks.at(place, base)
-        judge.note(seen)
+        judge.note(seen, whole=base is None)
         return seen.levels
 
-    limit = (1 - SAMPLING**2) * accuracy**2
-    for place, levels, left in refine_viewpoints(look, offered, judge.difference, limit):
+    def limit() -> float:
+        return max(MARGIN * accuracy**2 - judge.sampling**2, LEAST * accuracy**2)
+
+    for place, levels, left in refine_viewpoints(look, offered, judge.squares, limit):
         if not course.chosen:
             course.usual = levels
         if kept <= max_bytes and len(course.changes) == len(course.chosen):
@@ -72,28 +78,37 @@ class Looks:
 
     def __init__(self, solver: IlluminationSolver, ends: list[np.ndarray], slack: np.ndarray) -> None:
         self.solver, self.ends, self.slack = solver, ends, slack
-        self._bases: dict[int, tuple[int, np.ndarray]] = {}
+        self._bases: dict[int, tuple[int, int, float, np.ndarray]] = {}
+        self._recent: dict[int, np.ndarray] = {}
 
     def whole(self, place: int, some: np.ndarray | None = None) -> Look:
         """A look at facets `some` (k,) bool; None: at all."""
         return self.solver.look([end[place] for end in self.ends], float(self.slack[place]), some)
 
     def at(self, place: int, base: Base | None) -> Look:
-        """A look; where it has a base, place, levels and facets to look at, the levels of all others are as there."""
+        """A look; at some facets alone where it has a base."""
         if base is None:
             self._bases.pop(place, None)
             return self.whole(place)
-        self._bases[place] = base[0], np.packbits(base[2])
-        seen = self.whole(place, base[2])
-        return replace(seen, levels=np.where(base[2], seen.levels, base[1]))
+        self._bases[place] = base.before, base.after, base.part, np.packbits(base.some)
+        seen = self.whole(place, base.some)
+        return replace(seen, levels=np.where(base.some, seen.levels, base.even))
 
     def again(self, place: int) -> np.ndarray:
         """The levels of a look that was taken."""
-        if place not in self._bases:
-            return self.whole(place).levels
-        at, packed = self._bases[place]
-        some = np.unpackbits(packed, count=self.solver.facets.size).astype(bool)
-        return np.where(some, self.whole(place, some).levels, self.whole(at).levels)
+        if place in self._recent:
+            return self._recent[place]
+        if place in self._bases:
+            before, after, part, packed = self._bases[place]
+            some = np.unpackbits(packed, count=self.solver.facets.size).astype(bool)
+            even = between_levels(self.again(before), self.again(after), part)
+            levels = np.where(some, self.whole(place, some).levels, even)
+        else:
+            levels = self.whole(place).levels
+        while len(self._recent) >= RECENT:
+            self._recent.pop(next(iter(self._recent)))
+        self._recent[place] = levels
+        return levels
 
 
 class Judge:
@@ -118,20 +133,20 @@ class Judge:
         error = self.sampling
         return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
 
-    def note(self, look: Look) -> None:
-        """Note the sampling error of a look."""
+    def note(self, look: Look, whole: bool = True) -> None:
+        """Note the sampling error of a whole look; and the sum to which differences are relative."""
         self._whole = float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2
-        rounded = ROUNDED * float(self.weights[look.partly].sum())
-        self._sampling.append(self._relative(look.spread(self.weights) + rounded))
+        if whole:
+            rounded = ROUNDED * float(self.weights[look.partly].sum())
+            self._sampling.append(self._relative(look.spread(self.weights) + rounded))
 
-    def difference(
-        self, halfway: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, which: np.ndarray | None
-    ) -> float:
-        """As `refine_viewpoints` asks for it; `halfway` was noted last."""
-        moves = (halfway != first) | (halfway != last)
-        some = np.flatnonzero(moves if which is None else moves & which)
+    def squares(
+        self, halfway: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, some: np.ndarray
+    ) -> np.ndarray:
+        """As `refine_viewpoints` asks for them; `halfway` was noted last."""
         a, b, c = (levels[some].astype(np.float64) / 255 for levels in (halfway, first, last))
-        return self._relative(float(self.weights[some] @ (a - b * (1 - part) - c * part) ** 2))
+        off = self.weights[some] * (a - b * (1 - part) - c * part) ** 2
+        return np.asarray(off / self._whole if self._whole else 0 * off)
 
     def motion(self, viewpoints: np.ndarray, left: list[float]) -> float:
         """Root of the mean square over the track of the differences `left` up to each viewpoint."""

@@ -146,9 +146,11 @@ class Illumination:
 
     def spans(self, weigh: Callable[[np.ndarray], np.ndarray] = lambda level: level) -> Iterator[Span]:
         """The window in spans, from viewpoint to viewpoint, in each of which weigh(levels), uint8, changes linearly."""
+        known: tuple[np.ndarray, np.ndarray] | None = None  # levels, and what they weigh
         for span in self._spans():
-            level = weigh(span.level)
+            level = known[1] if known and known[0] is span.level else weigh(span.level)
             later = level if span.later is span.level else weigh(span.later)
+            known = span.later, later
             part = Span(span.first, span.stop, level, later).within(*self.window)
             if part is not None:
                 yield part
@@ -245,7 +247,9 @@ def lit(
     if k == 0:
         nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
-        return Illumination(whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing)
+        return Illumination(
+            whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing
+        )
     bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
@@ -291,8 +295,8 @@ def lit(
         "%d pulses in %d blocks; %d of %d facets never illuminated", len(tx), len(blocks), k - course.ever.sum(), k
     )
     return Illumination(
-        sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always),
-        sealed(course.changing), sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
+        sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always), sealed(course.changing),
+        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
 

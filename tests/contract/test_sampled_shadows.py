@@ -100,6 +100,13 @@ def test_little_memory_for_shares_changes_nothing(monkeypatch):
     assert np.linalg.norm(much.samples - little.samples) <= 1e-6 * np.linalg.norm(much.samples)
 
 
+def test_levels_change_from_pulse_to_pulse_between_viewpoints(monkeypatch):
+    """The check adds the levels of each pulse: they are not the steps of viewpoints, of which there are fewer."""
+    scene, track = SCENES["house"](), sarcl.Trajectory.circle(radius=7e3, height=5e3, start=0.3, arc=0.03, n_pulses=200)
+    report = echo(scene, (track, None), monkeypatch, 0, 1e-2, check=True).report
+    assert 0 < report.measured_error < 0.3 * report.predicted_error
+
+
 LINE = sarcl.Trajectory.line(start=(6e3, -30, 5e3), velocity=(0, 100, 0), prf=100.0, n_pulses=60)
 
 

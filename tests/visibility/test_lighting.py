@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from itertools import pairwise
+
 import numpy as np
 import pytest
 import trimesh
@@ -14,9 +16,10 @@ from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import areas, centroids, normals
 from sarcl.visibility import _frame, _illumination_solver
-from sarcl.visibility._aspect_blocks import projected_width, pulse_blocks, refine_viewpoints, shadow_length
+from sarcl.visibility._aspect_blocks import projected_width, pulse_blocks, shadow_length
 from sarcl.visibility._facet_samples import PER_LINE, sample_points
 from sarcl.visibility._illumination_solver import IlluminationSolver
+from sarcl.visibility._viewpoints import refine_viewpoints
 from sarcl.visibility.illumination import lit
 
 TOLERANCE = {
@@ -330,22 +333,36 @@ def test_shares_change_evenly_between_the_pulses_looked_from():
     assert (still.first, still.stop) == (0, 1) and still.later is still.level
 
 
-def looked_at(levels, at, limit):
-    """Viewpoints, those that were looked at whole, and the mean squares left, of levels (n, k) at pulses (n,)."""
-    whole, most = [], 255.0**2 * levels.shape[1]
+def refined(levels, at, limit):
+    """What refine_viewpoints finds of levels (n, k) at pulses (n,), the viewpoints that were looked at whole, and the
+    shares of facets that the others were looked at for."""
+    whole, seen, made, most = [], [0.0], {}, 255.0**2 * levels.shape[1]
 
     def look(place, base):
         if base is None:
             whole.append(place)
+            made.pop(place, None)
             return levels[place]
-        return np.where(base[2], levels[place], base[1])
+        seen.append(base.some.mean())
+        assert (np.abs(base.even - between_two(base.before, base.after, place)) <= 0.5).all()
+        made[place] = np.where(base.some, levels[place], base.even)
+        return made[place]
 
-    def difference(found, first, last, part, which):
-        off = found - (first + part * (last - first.astype(float)))
-        return float((off**2 * (1 if which is None else which)).sum()) / most
+    def between_two(a, b, place):
+        one, two = (made.get(at, levels[at]).astype(float) for at in (a, b))
+        return one + (two - one) * (at[place] - at[a]) / (at[b] - at[a])
 
-    found = list(refine_viewpoints(look, at, difference, limit))
+    def squares(found, first, last, part, some):
+        return (found[some] - (first[some] + part * (last[some] - first[some].astype(float)))) ** 2 / most
+
+    found = list(refine_viewpoints(look, at, squares, lambda: limit))
     assert [place for place, *_ in found] == sorted({place for place, *_ in found})
+    return found, whole, seen
+
+
+def looked_at(levels, at, limit):
+    """Viewpoints, those that were looked at whole, and the mean squares left."""
+    found, whole, _ = refined(levels, at, limit)
     return [place for place, *_ in found], whole, [left for *_, left in found]
 
 
@@ -373,6 +390,29 @@ def test_facets_that_change_between_looks_alone_are_not_left_out():
     assert len(places) == 257 and len(whole) > 60
     step = np.diff(places, prepend=0)
     assert np.sqrt(step @ left / 256) < 0.05
+
+
+def crossed_by_edges(pulses, n, seed, width):
+    """Levels (pulses, n) of facets that the edge of a shadow crosses at some time, in `width` pulses."""
+    random = np.random.default_rng(seed)
+    start = random.uniform(-pulses, pulses, n)
+    share = np.clip((np.arange(pulses)[:, None] - start) / width, 0, 1)
+    return np.rint(255 * np.sqrt(np.where(random.random(n) < 0.5, share, 1 - share))).astype(np.uint8)
+
+
+@pytest.mark.parametrize("width", [2, 12, 60])
+@pytest.mark.parametrize("limit", [1e-4, 1e-5])
+def test_facets_that_change_evenly_are_left_out_within_the_limit(width, limit):
+    levels = crossed_by_edges(257, 30_000, 1, width)
+    found, whole, seen = refined(levels, np.arange(257), limit)
+    places = [place for place, *_ in found]
+    true, off = levels.astype(float), 0.0
+    for (a, first, _), (b, last, _) in pairwise(found):
+        part = (np.arange(a, b)[:, None] - a) / (b - a)
+        off += (((1 - part) * first + part * last - true[a:b]) ** 2).sum()
+    assert off / (257 * 30_000 * 255.0**2) <= 1.5 * limit + 1 / (12 * 255.0**2)
+    assert len(whole) < len(places) or len(places) == 257
+    assert min(seen) < 0.4
 
 
 def test_lighting_distinguishes_dark_full_and_changing_facets(device):

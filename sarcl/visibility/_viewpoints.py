@@ -1,0 +1,156 @@
+"""At which pulses shares are looked at: as many as an error of levels between them asks for, and of which facets."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+
+import numpy as np
+
+from ._aspect_blocks import STRIDE
+
+# Mean square of what is left between viewpoints once the one halfway is added, over the square of the difference found
+# there: 8/15 of a parabola's mean, a half of which is left where shares begin or end to change within the half
+SETTLED = 0.45
+# Of the limit: what facets may differ by, from linear changes, once they are not looked at any more
+LEFT_OUT = 0.5
+MOST = 3.0  # limits that one interval may take up, where others left so much less
+DRAWN, FEW = 8, 2**13  # one in so many facets is looked at to learn whether they may be left out, but not fewer
+
+
+@dataclass(frozen=True, eq=False)
+class Base:
+    """A look at some facets, (k,) bool. Levels of the others, `even`, uint8 (k,), lie at `part`, 0 to 1, between
+    those of the viewpoints `before` and `after`."""
+
+    before: int
+    after: int
+    part: float
+    some: np.ndarray
+    even: np.ndarray
+
+
+Look = Callable[[int, Base | None], np.ndarray]
+Squares = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
+
+
+def refine_viewpoints(
+    look: Look, at: np.ndarray, squares: Squares, limit: Callable[[], float]
+) -> Iterator[tuple[int, np.ndarray, float]]:
+    """Viewpoints between which levels change linearly, as increasing indices into `at`, pulses (n,).
+
+    look(index, base)  the levels, uint8 (k,), at a viewpoint; of some facets alone where there is a base
+    squares(found, first, last, part, some)  of differences of the levels of facets `some` (n,) from what lies at `part`
+                 between those of two viewpoints around it (n,)
+    limit()      mean square of differences that is left, on the average of all pulses
+
+    Every 128th viewpoint and the last are taken. Between two of them, the one halfway is compared with linear
+    interpolation: where more than the limit would be left, both halves are refined in the same way. Facets with the
+    smallest differences are left out from there on: an eighth of them is looked at once more, in the halves' middles,
+    and if these differ, all are. Yields the index, the levels, and the mean square of differences from the viewpoint
+    before.
+    """
+    refined, start, levels = _Refinement(look, at, squares, limit), 0, look(0, None)
+    yield start, levels, 0.0
+    for place in np.unique(np.append(np.arange(STRIDE, len(at), STRIDE), len(at) - 1)).tolist()[len(at) == 1 :]:
+        end = look(place, None)
+        yield from refined.between(start, levels, place, end, _Which(None, None, 0.0), 0.0)
+        start, levels = place, end
+
+
+@dataclass(frozen=True, eq=False)
+class _Which:
+    """Facets (k,) bool to be looked at, and those of which an eighth is; None: all, none.
+
+    settled  mean square of the differences of those that were left out before
+    """
+
+    kept: np.ndarray | None
+    doubtful: np.ndarray | None
+    settled: float
+
+
+@dataclass(eq=False)
+class _Refinement:
+    """`saved` is what was left below the limit so far, times pulses: later intervals may exceed the limit by it."""
+
+    look: Look
+    at: np.ndarray
+    squares: Squares
+    limit: Callable[[], float]
+    saved: float = 0.0
+
+    def between(
+        self, a: int, first: np.ndarray, b: int, last: np.ndarray, which: _Which, left: float
+    ) -> Iterator[tuple[int, np.ndarray, float]]:
+        """Viewpoints after a, up to b, with levels `first` and `last`, between which `left` is left."""
+        at = self.at
+        pulses = float(at[b] - at[a])
+        if b - a < 2:
+            left *= (pulses - 1) / pulses
+            self.saved += (self.limit() - left) * pulses
+            yield b, last, left
+            return
+        middle = (a + b) // 2
+        part = float((at[middle] - at[a]) / (at[b] - at[a]))
+        halfway, which = self._halfway(a, first, b, last, middle, part, which)
+        moves = (halfway != first) | (halfway != last)
+        some = np.flatnonzero(moves if which.kept is None else moves & which.kept)
+        off = SETTLED * self.squares(halfway, first, last, part, some)
+        left = float(off.sum()) + which.settled
+        if left <= min(self.limit() + max(self.saved, 0.0) / pulses, MOST * self.limit()):
+            self.saved += (self.limit() - left) * pulses
+            yield middle, halfway, left
+            yield b, last, left
+            return
+        below = _Which(moves | (halfway % 255 != 0), ~moves & (halfway % 255 == 0), 0.0)
+        if which.kept is not None:
+            below = self._smaller(which.kept, which.settled, some, off)
+        yield from self.between(a, first, middle, halfway, below, left)
+        yield from self.between(middle, halfway, b, last, below, left)
+
+    def _halfway(
+        self, a: int, first: np.ndarray, b: int, last: np.ndarray, middle: int, part: float, which: _Which
+    ) -> tuple[np.ndarray, _Which]:
+        """The levels in the middle, and the facets that were looked at for them."""
+        if which.kept is None or which.doubtful is None:
+            return self.look(middle, None), which
+        even = between_levels(first, last, part)
+        drawn = _some_of(which.doubtful)
+        found = self.look(middle, Base(a, b, part, which.kept | drawn, even))
+        some = np.flatnonzero(drawn)
+        off = self.squares(found, first, last, part, some)
+        times = float(np.count_nonzero(which.doubtful)) / max(len(some), 1)
+        settled = which.settled + times * float(off.sum())
+        if settled <= LEFT_OUT * self.limit():
+            kept = which.kept.copy()
+            kept[some[off > 0]] = True
+            return found, _Which(kept, None, settled)
+        kept = which.kept | which.doubtful
+        everything = bool(kept.all())
+        found = self.look(middle, None if everything else Base(a, b, part, kept, even))
+        return found, _Which(None if everything else kept, None, which.settled)
+
+    def _smaller(self, of: np.ndarray, settled: float, some: np.ndarray, off: np.ndarray) -> _Which:
+        """Of facets (k,) bool without those whose differences are the smallest: `off` of facets `some`, 0 of others."""
+        room = (LEFT_OUT * self.limit() - settled) / 2
+        order = np.argsort(off)
+        kept = np.zeros(len(of), bool)
+        kept[some[order[np.searchsorted(np.cumsum(off[order]), room, side="right") :]]] = True
+        return _Which(kept, of & ~kept, settled)
+
+
+def between_levels(first: np.ndarray, last: np.ndarray, part: float) -> np.ndarray:
+    """Levels, uint8 (k,), at `part`, 0 to 1, between two."""
+    out = first.copy()
+    some = np.flatnonzero(first != last)
+    out[some] = np.rint(first[some] + np.float32(part) * (last[some].astype(np.float32) - first[some]))
+    return out
+
+
+def _some_of(facets: np.ndarray) -> np.ndarray:
+    """One in DRAWN of facets (k,) bool, drawn by their numbers; all of them where they are few."""
+    if np.count_nonzero(facets) < FEW:
+        return facets
+    number = np.arange(len(facets), dtype=np.uint32) * np.uint32(2654435761)  # Knuth: multiplicative hashing
+    return np.asarray(facets & (number < 2**32 // DRAWN))
