@@ -8,6 +8,7 @@ For other folders:
 For this folder alone:
 
     _aspect_blocks         blocks of pulses that share one illumination
+    _box_tree              a tree of boxes over facets, for rays
     _facet_samples         sample points on a facet
     _frame                 facets and points on a device, in float32 coordinates of the scene
     _illumination_solver   shares of facets that given viewpoints see
