@@ -23,6 +23,7 @@ For other folders:
     polar_format   the image of plane waves
     quality        a point response by brute force
     range_doppler  reading of a profile along the range migration
+    rays           the first facet on a ray, and whether any lies between two points
     shadow         which samples of facets are hidden
     spectral_echo  spectrum of a reflectivity map, and the steps of its grid
     transposition  what comes before and after an FFT of columns
@@ -47,6 +48,7 @@ __all__ = [
     "polar_format",
     "quality",
     "range_doppler",
+    "rays",
     "shadow",
     "spectral_echo",
     "transposition",
