@@ -4,6 +4,7 @@ For other folders:
 
     illumination           lit(): sampled shares of facets, per block of pulses; facet_shares(), pixel_shares()
     lit_parts              LitParts: the part of each facet that is lit at every pulse, exactly
+    rays                   SceneRays: the first facet on each ray, and whether any lies between two points
 
 For this folder alone:
 
@@ -20,4 +21,4 @@ For this folder alone:
     _terrain_horizon       occlusion by terrain, by horizons along range lines
 """
 
-__all__ = ["illumination", "lit_parts"]
+__all__ = ["illumination", "lit_parts", "rays"]

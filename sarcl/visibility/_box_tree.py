@@ -17,13 +17,17 @@ FAR = np.float32(4)  # coordinate of boxes that fill up a node: they are empty, 
 
 
 class BoxTree:
-    """Facets on a device, float32 (k, 3, 3) in units of the frame: a tree of boxes with eight children each."""
+    """Facets on a device, float32 (k, 3, 3) in units of the frame: a tree of boxes with eight children each.
+
+    order  (n,) int64: which of the facets stands at each place of the leaves, eight in each
+    """
 
     def __init__(self, device: Device, corners: np.ndarray) -> None:
         self.device = device
         order = np.argsort(_curve(corners.mean(axis=1)), kind="stable")
         # the last facet fills up the last eight
-        corners = corners[np.append(order, np.repeat(order[-1:], -len(order) % 8))]
+        self.order = np.append(order, np.repeat(order[-1:], -len(order) % 8))
+        corners = corners[self.order]
         leaf = np.ascontiguousarray(corners.reshape(-1, 8, 3, 3).transpose(0, 2, 3, 1))
         low = leaf.min(axis=(1, 3)) - np.float32(2 * STEP)
         high = leaf.max(axis=(1, 3)) + np.float32(2 * STEP)
