@@ -82,6 +82,8 @@ HOT = {
     ("nufft2d.cl", "spread"): Hot("1", "sample and tile of the grid", loop="barrier", trips=("64",)),
     ("range_doppler.cl", "straighten_onto"): Hot("1", "sample", loop="kernel"),
     ("ray_casting.cl", "hidden"): Hot("1", "node of the tree and ray"),
+    ("rays.cl", "any_hit"): Hot("1", "node of the tree and ray"),
+    ("rays.cl", "nearest"): Hot("1", "node of the tree and ray"),
     ("spectral_echo.cl", "spread"): Hot("1", "scatterer and tile of the grid", loop="barrier", trips=("64",)),
     ("spread_facets.cl", "facet_amplitudes"): Hot("VW", "pulse node, facet and frequency", unrolled="VW * NODES"),
     ("spread_facets.cl", "spread_facets"): Hot("VW", "pulse and facet", loop="around", trips=("1",)),

@@ -16,6 +16,8 @@ import output_hashes
 
 import sarcl
 from sarcl import shapes
+from sarcl.opencl.choose_device import open_device
+from sarcl.visibility.rays import SceneRays
 
 # Tasks of output_hashes.py: those that use no device, run others' plans again, or cannot do with numbers of paper.
 LEFT_OUT = (
@@ -110,12 +112,20 @@ def shares(place: str) -> Any:
     return sarcl.illumination.lit(scene.triangles, antenna, tolerance=0.1, **terrain)
 
 
+def rays() -> Any:
+    """Rays between the facets of a sphere."""
+    scene = SceneRays(open_device(), shapes.sphere(1.0, facets=320).triangles)
+    ends = np.ones((16, 3))
+    return scene.nearest(-ends, ends), scene.any_hit(-ends, ends)
+
+
 OWN: dict[str, Callable[[], Any]] = {
     **{f"shares {place}": partial(shares, place) for place in ("outside", "near", "terrain")},
     **{
         f"{'listed ' * listed}spaceborne {name}": partial(spaceborne, float(name), listed)
         for listed, name in itertools.product((False, True), ("1e-3", "3e-5"))
     },
+    "rays": rays,
     "range_doppler": lambda: range_doppler(1e-2),
     "spectral_echo": lambda: spectral(1e-2),
     "spectral_echo rough": lambda: spectral(1e-2, roughness=0.01),
