@@ -18,6 +18,7 @@ For this folder alone:
     _facet_spreading   facets to range profiles
     _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
+    _pulse_levels      what consecutive pulses see of facets, as the kernel reads it
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """
 

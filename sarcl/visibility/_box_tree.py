@@ -13,7 +13,7 @@ from ._facet_samples import SampleLines
 from ._frame import STEP, DeviceFacets, DevicePoints
 
 RAY_STEP = 8  # samples that a ray decides on
-FAR = np.float32(4)  # coordinate of boxes that fill up a node: they are empty, and outside the scene
+FAR = np.float32(1e30)  # coordinate of boxes that fill up a node: no line reaches them
 
 
 class BoxTree:
