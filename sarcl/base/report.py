@@ -3,10 +3,27 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
-from dataclasses import dataclass, field
+from collections.abc import Iterable, Mapping
+from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
+
+
+@dataclass(frozen=True)
+class ErrorTerm:
+    """A part of a predicted error: relative, like the whole; the parts' squares add up to its square.
+
+    remedy  what makes it smaller
+    """
+
+    name: str
+    value: float
+    remedy: str
+
+
+def root_sum_square(terms: Iterable[ErrorTerm]) -> float:
+    """Root of the sum of the squares of terms."""
+    return math.sqrt(sum(term.value**2 for term in terms))
 
 
 @dataclass(frozen=True, eq=False)
@@ -24,6 +41,8 @@ class Report:
     seed                   of the random numbers, or None
     model_error            predicted relative L2 error of the model itself, which no tolerance bounds: of the grid of
                            `fullwave_echo`; None where the model has no error of its own, or none was predicted
+    error_terms            parts of predicted_error, whose squares add up to its square: of `echo` and `spectral_echo`;
+                           empty for other functions
     """
 
     plan: Mapping[str, object] = field(default_factory=dict)
@@ -36,8 +55,11 @@ class Report:
     device: str = ""
     seed: int | None = None
     model_error: float | None = None
+    error_terms: tuple[ErrorTerm, ...] = ()
 
     def __post_init__(self) -> None:
+        terms = tuple(ErrorTerm(**term) if isinstance(term, Mapping) else term for term in self.error_terms)
+        object.__setattr__(self, "error_terms", terms)
         for name in ("plan", "contributions_skipped", "seconds"):
             object.__setattr__(self, name, MappingProxyType(dict(getattr(self, name))))
 
@@ -52,6 +74,7 @@ class Report:
     def to_dict(self) -> dict[str, Any]:
         """The report as plain numbers and strings, ready for JSON."""
         plain = {k: getattr(self, k) for k in self.__dataclass_fields__}
+        plain["error_terms"] = tuple(asdict(term) for term in self.error_terms)
         return {k: dict(v) if isinstance(v, MappingProxyType) else v for k, v in plain.items()}
 
     def __str__(self) -> str:
@@ -59,6 +82,8 @@ class Report:
         lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
         lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
+        if len(self.error_terms) > 1:
+            lines.append("of which    " + ", ".join(f"{term.name} {term.value:.1e}" for term in self.error_terms))
         if self.model_error is not None:
             lines.append(f"model       {self.model_error:.1e} predicted for the model itself")
         if self.predicted_error > 0:

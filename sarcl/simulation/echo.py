@@ -222,6 +222,7 @@ def echo(
                 plan=channel.plan | motion,
                 tolerance=request.tolerance,
                 predicted_error=channel.predicted_error,
+                error_terms=channel.error_terms,
                 measured_error=measured,
                 **prepared.counted(counts),
                 seconds=request.clock.seconds,

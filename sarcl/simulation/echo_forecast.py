@@ -12,6 +12,7 @@ import numpy as np
 
 from ..arrays.channels import channels_of, is_single, sampling
 from ..base import errors, validation
+from ..base.report import ErrorTerm, root_sum_square
 from ..base.text import duration, size_text
 from ..io import sarcl_hdf5
 from ..model.antenna_array import AntennaArray
@@ -43,6 +44,7 @@ class EchoForecast:
     plan               as in the report;  predicted_error  bound of the relative error
     spectral_seconds   about the seconds of `spectral_echo` with these arguments, None where it refuses them
     spectral_refusal   why it does, else empty
+    error_terms        parts of predicted_error, whose squares add up to its square
     """
 
     n_rows: int
@@ -54,6 +56,7 @@ class EchoForecast:
     predicted_error: float
     spectral_seconds: float | None = None
     spectral_refusal: str = ""
+    error_terms: tuple[ErrorTerm, ...] = ()
 
     def __str__(self) -> str:
         text = f"{self.n_rows} rows of {self.n_samples} samples: {size_text(self.bytes)}, "
@@ -126,7 +129,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     return EchoForecast(
         rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), longer + slope * (len(track) - more),
         raw.report.contributions_done / more * len(track), dict(raw.report.plan) | motion, raw.report.predicted_error,
-        *_spectral(scene, waveform, whole, options),
+        *_spectral(scene, waveform, whole, options), error_terms=raw.report.error_terms,
     )  # fmt: skip
 
 
@@ -141,11 +144,12 @@ def plan_spectral_echo(
     validation.choice("variant", variant, ("exact", "saras"))
     request = echo_request(scene, SKIPS, tolerance=tolerance, **{k: v for k, v in options.items() if k in REQUEST})
     task = spectral_task(scene, waveform, track, request, **{k: v for k, v in options.items() if k in TASK})
-    prepared, parts, direct, error = task.planned(variant)
+    prepared, parts, direct, terms = task.planned(variant)
     rows, n_samples = len(track) * len(request.polarizations), len(task.frequencies)
     return EchoForecast(
         rows, n_samples, rows * (8.0 * n_samples + sarcl_hdf5.ROW_BYTES), task.seconds(parts, direct),
-        float(rows) * len(prepared), {**task.describe(parts, direct), **task.motion}, error,
+        float(rows) * len(prepared), {**task.describe(parts, direct), **task.motion}, root_sum_square(terms),
+        error_terms=terms,
     )  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
+from ..base.report import ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
 from ..base.tolerances import reachable
 from ..model.waveform import Waveform
@@ -38,6 +39,7 @@ UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
 SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
+SMALLER = "a smaller tolerance"  # makes an error term smaller
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 Progress = Callable[[str, int, int], None]
 
@@ -89,7 +91,7 @@ class SceneEchoes:
     skipped                pairs of scatterer and pulse that were left out: reason -> count
     mesh_warnings          what a report says of meshes that are too coarse
     error_budget           the share of the tolerance that points have, and facets
-    shadow_error           of shadows that are counted in samples, relative to the norm of the facets
+    shadow_terms           errors of shadows that are counted in samples, relative to the norm of the facets
     """
 
     request: EchoRequest
@@ -103,7 +105,7 @@ class SceneEchoes:
     skipped: dict[str, int]
     mesh_warnings: dict[str, Any]
     error_budget: float
-    shadow_error: float
+    shadow_terms: tuple[ErrorTerm, ...]
     n_pulses: int
 
     def __len__(self) -> int:
@@ -125,7 +127,7 @@ class SceneEchoes:
             return words
         if not self.facets.samples_incoherent_alone:
             return words | UNKNOWN_SHADOWS
-        return words | {"shadow edges": f"sampled, {self.shadow_error:.1e}"}
+        return words | {"shadow edges": f"sampled, {root_sum_square(self.shadow_terms):.1e}"}
 
     def by_light(self, antennas: PulseGeometry, waveform: Waveform) -> tuple[FacetSet | None, SceneEchoes | None]:
         """The facets of which all pulses see the same share; and the others alone, on the device. None: there are
@@ -142,7 +144,7 @@ class SceneEchoes:
             )
             for part in changing.split()
         )
-        alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_error=0.0)
+        alone = replace(self, points=None, facets=changing, tiled_points=None, tiled_facets=tiled, shadow_terms=())
         return steady, alone
 
     def channel(
@@ -188,21 +190,23 @@ class SceneEchoes:
     ) -> ChannelEchoes:
         request = self.request
         weights = self.weights.at(antennas, slice(first, first + len(antennas)))
-        plan, nodes, parts = None, np.zeros(0), []
+        plan, nodes = None, np.zeros(0)
+        parts: list[tuple[ErrorTerm, dict[str, Any]]] = []
         spreaders: list[FacetSpreader | ExactFacets] = []
         stop = first + len(antennas)
         if self.points is not None and self.tiled_points is not None and request.same:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
             plan, error = self._plan_points(self.tiled_points, antennas, band)
-            parts.append((plan.predicted_error + error, plan.describe("spread")))
+            parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER), plan.describe("spread")))
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
             exact = ExactFacets(
                 facets, self.subdivision.plan, antennas, frequencies, request.gated, request.polarizations,
                 request.vertical, weights,
             )  # fmt: skip
-            parts.append((self.gain * exact.predicted_error, exact.describe() | self.mesh_warnings | self.shadow_words))
+            words = exact.describe() | self.mesh_warnings | self.shadow_words
+            parts.append((ErrorTerm("facets", self.gain * exact.predicted_error, SMALLER), words))
             spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
@@ -216,12 +220,12 @@ class SceneEchoes:
             spread.append((self.gain * spreader.predicted_error, words))
             spreaders.append(spreader)
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
-            parts.append((max(error for error, _ in spread), spread[0][1]))
-        chosen = max(parts, key=lambda part: part[0])[1] if parts else {}
+            parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER), spread[0][1]))
+        chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(
             self, antennas, weights, frequencies, plan, nodes, tuple(spreaders),
-            float(np.sqrt(sum(error**2 for error, _ in parts) + self.shadow_error**2)),
+            (*(term for term, _ in parts), *self.shadow_terms),
             {**model, **chosen, **(self.weights.describe(self.weight_error) if parts else {})},
         )  # fmt: skip
 
@@ -254,7 +258,7 @@ class ChannelEchoes:
 
     weights          as the channel's antennas see the scatterers;  frequencies  Hz, of its samples
     point_plan       with gains at `nodes`, Hz, None where there are no points;  spreaders  of facets
-    predicted_error  relative, of the channel;  plan  in words, of its part with the largest error
+    error_terms      relative, of the channel;  plan  in words, of its part with the largest error
     """
 
     scene: SceneEchoes
@@ -264,8 +268,13 @@ class ChannelEchoes:
     point_plan: Plan | None
     nodes: np.ndarray
     spreaders: tuple[FacetSpreader | ExactFacets, ...]
-    predicted_error: float
+    error_terms: tuple[ErrorTerm, ...]
     plan: dict[str, Any]
+
+    @property
+    def predicted_error(self) -> float:
+        """Relative error of the channel."""
+        return root_sum_square(self.error_terms)
 
     def add(self, samples: np.ndarray, pulses: Sequence[int], done: int, total: int) -> Counts:
         """Add sum_k a_k exp(-j 2 pi f (tau_k - tau_ref)) to samples (n, n_polarizations, n_samples), zeros so far.
@@ -315,7 +324,8 @@ def prepare_scene(
     if "out of beam" in request.skips:
         weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
     points, skipped = points_of(scene, request.skips, len(antennas))
-    facets, held_points, mesh_warnings, shadow_error = None, None, dict[str, Any](), 0.0
+    facets, held_points, mesh_warnings = None, None, dict[str, Any]()
+    shadow_terms: tuple[ErrorTerm, ...] = ()
     held_facets: tuple[TiledFacets, ...] = ()
     if subdivision is not None:
         facet_plan, pieces = subdivision.apply(scene, request.seed)
@@ -332,7 +342,7 @@ def prepare_scene(
             exact=exact and request.shadows, sampled=_samples_shadows(request, scene, waveform, antennas),
             accuracy=SHADOWS * request.tolerance / parts_of(scene), margin=margin,
         )  # fmt: skip
-        shadow_error = _shadow_error(request, scene, facets)
+        shadow_terms = _shadow_terms(request, scene, facets)
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
         if facets is not None and tiled and not facet_plan.is_float64:
             held_facets = tuple(
@@ -355,7 +365,7 @@ def prepare_scene(
     request.clock.lap("scene")
     prepared = SceneEchoes(
         request, weights, weight_error, subdivision, points, facets, held_points, held_facets, skipped, mesh_warnings,
-        error_budget, shadow_error, len(antennas),
+        error_budget, shadow_terms, len(antennas),
     )  # fmt: skip
     prepared.check_plans(antennas, bands)
     return prepared
@@ -398,17 +408,22 @@ def _samples_shadows(request: EchoRequest, scene: Scene, waveform: Waveform, ant
     return request.shadows and bool(len(scene.triangles)) and samples_shadows(scene, cell, len(antennas))
 
 
-def _shadow_error(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> float:
-    """Error of shadows on rough facets that are counted in samples. ToleranceUnreachable where it exceeds its share."""
+def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> tuple[ErrorTerm, ...]:
+    """Errors of shadows on rough facets that are counted in samples. ToleranceUnreachable where they exceed their
+    share."""
     if facets is None or not facets.samples_incoherent_alone or facets.illumination is None:
-        return 0.0
-    share, error = SHADOWS / parts_of(scene), facets.illumination.error
-    if error > share * request.tolerance:
+        return ()
+    share, light = SHADOWS / parts_of(scene), facets.illumination
+    if light.error > share * request.tolerance:
         raise ToleranceUnreachable(
-            request.tolerance, 1.05 * facets.illumination.reached / share,
+            request.tolerance, 1.05 * light.reached / share,
             "shadow edges on rough facets, counted in samples at single pulses",
         )  # fmt: skip
-    return error
+    remedy = "a smaller tolerance: it asks for "
+    return (
+        ErrorTerm("shadow edges", light.sampling, remedy + "more samples of each facet"),
+        ErrorTerm("motion of shadows", light.motion, remedy + "more viewpoints along the track"),
+    )
 
 
 def plan_scene(

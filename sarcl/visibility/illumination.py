@@ -85,8 +85,8 @@ class Illumination:
     dark_facets number of wanted facets of which nothing is illuminated, per block (n_blocks,)
     window      (first, stop): pulses that `spans` and `fraction_at` count from `first`; all other members are of the
                 whole track
-    error       estimated error of the amplitudes, roots of the shares, relative to their norm: samples, and looks at
-                some pulses alone
+    sampling    estimated error of the amplitudes, roots of the shares, relative to their norm: shares from samples
+    motion      the same of levels between viewpoints
     reached     accuracy that can be asked for, where the error is larger than what was
     """
 
@@ -97,7 +97,8 @@ class Illumination:
     changing: np.ndarray
     dark_facets: np.ndarray
     window: tuple[int, int]
-    error: float
+    sampling: float
+    motion: float
     reached: float
     _usual: np.ndarray = field(repr=False)
     _changes: list[tuple[np.ndarray, np.ndarray]] = field(repr=False)
@@ -105,6 +106,11 @@ class Illumination:
 
     def __len__(self) -> int:
         return len(self.blocks)
+
+    @property
+    def error(self) -> float:
+        """Both estimated errors of the amplitudes together, relative to their norm."""
+        return float(np.hypot(self.sampling, self.motion))
 
     def level(self, block: int) -> np.ndarray:
         """Roots of illuminated shares in a block, uint8 (k,). Stored, or computed anew (max_bytes)."""
@@ -248,7 +254,7 @@ def lit(
         nothing, none = np.zeros(0, np.uint8), np.zeros(0, bool)
         whole, first = np.array([[0, len(tx)]]), np.zeros(1, np.int64)
         return Illumination(
-            whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, nothing, [], lambda block: nothing
+            whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, 0.0, nothing, [], lambda block: nothing
         )
     bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
     solver = IlluminationSolver(
@@ -296,7 +302,7 @@ def lit(
     )
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always), sealed(course.changing),
-        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), error, float(reached),
+        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), judge.sampling, motion, float(reached),
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
 

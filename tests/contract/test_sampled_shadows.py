@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import pickle
+
 import numpy as np
 import pytest
 import trimesh
@@ -77,6 +79,29 @@ def test_sampled_shadows_meet_the_tolerance(name, track, monkeypatch):
         assert raw.report.plan["shadow edges"].startswith("sampled, ")
         error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
         assert 0 < error <= raw.report.predicted_error <= tolerance
+
+
+def terms_of(report):
+    terms = {term.name: term.value for term in report.error_terms}
+    assert np.sqrt(sum(value**2 for value in terms.values())) == pytest.approx(report.predicted_error, rel=1e-12)
+    assert min(terms.values()) > 0 and all(term.remedy for term in report.error_terms)
+    return terms
+
+
+def test_terms_of_the_error_name_shadows(monkeypatch, tmp_path):
+    scene = SCENES["house"]() + sarcl.Scene.points([[0, 0, 9.0]], [1e-6])
+    raw = echo(scene, TRACKS["arc"], monkeypatch, 0, 1e-2)
+    terms = terms_of(raw.report)
+    assert set(terms) == {"points", "facets", "shadow edges", "motion of shadows"}
+    assert f"shadow edges {terms['shadow edges']:.1e}, motion of shadows" in str(raw.report)
+    raw.save(tmp_path / "raw.h5")
+    assert sarcl.read(tmp_path / "raw.h5").report.error_terms == raw.report.error_terms
+    assert pickle.loads(pickle.dumps(raw.report)).error_terms == raw.report.error_terms
+    assert set(terms_of(echo(scene, TRACKS["arc"], monkeypatch, np.inf, 1e-2).report)) == {"points", "facets"}
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    pulse_by_pulse = {"facets added pulse by pulse", "shadow edges", "motion of shadows"}
+    assert pulse_by_pulse < set(terms_of(spectral(SCENES["house"](), 1e-2).report))
+    assert not sarcl.Report().error_terms
 
 
 def test_more_lines_of_samples_and_pulses_are_taken_for_a_smaller_tolerance(monkeypatch):

@@ -135,6 +135,9 @@ def test_facets_between_places():
     )
     assert raw.report.contributions_done < each.report.contributions_done / 8
     assert np.linalg.norm(np.asarray(raw.samples) - each.samples) <= 1e-2 * np.linalg.norm(each.samples)
+    terms = {term.name: term.value for term in raw.report.error_terms}
+    assert set(terms) == {"points", "interpolation between channels"}
+    assert np.sqrt(sum(value**2 for value in terms.values())) == pytest.approx(raw.report.predicted_error)
     assert raw.report.measured_error <= raw.report.predicted_error <= 1e-2
     elsewhere = sarcl.Trajectory(track.times, track.positions + np.array([0.0, 2e3, 0]))
     apart = sarcl.echo(scene, TONE, track, receiver=elsewhere, array=line(9), reference=(0, 0, 0), tolerance=1e-2)

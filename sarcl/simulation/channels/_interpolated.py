@@ -15,11 +15,12 @@ import numpy as np
 from ...arrays.channels import Channel
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.report import ErrorTerm, root_sum_square
 from ...base.vectors import unit
 from ...numerics import cost_model
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import SceneEchoes, band_of
+from ..scene_echoes import SMALLER, SceneEchoes, band_of
 from ..spreading import Band
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples
@@ -178,7 +179,12 @@ class InterpolatedChannels:
                 lengths = shared[0][here], shared[1][here]
             self._add(scene, channel, now, echoes[:, :, here], samples[here], *lengths)
         scene.request.clock.lap("channels")
-        return replace(added, predicted_error=self.error + self.growth * added.predicted_error)
+        grown = tuple(replace(term, value=self.growth * term.value) for term in added.error_terms)
+        at_positions = root_sum_square(grown)
+        both = self.error + at_positions  # these two add up themselves, not their squares
+        remaining = float(np.sqrt(both**2 - at_positions**2))
+        more = ErrorTerm("interpolation between channels", remaining, SMALLER)
+        return replace(added, error_terms=(*grown, more))
 
     def _rx_lengths(self, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths, m, from rx (n, m, 3) to the scene's centre, in extended precision, and to the reference point."""

@@ -8,6 +8,7 @@ from typing import Any
 import numpy as np
 
 from ...arrays.channels import Channel, Sampling
+from ...base.report import ErrorTerm, root_sum_square
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
 from ..scene_echoes import SceneEchoes, band_of
@@ -83,14 +84,19 @@ class ChannelLayout:
 
 @dataclass(frozen=True)
 class Added:
-    """Echoes that were added to samples: their largest predicted error, the plan of the last channel, counts."""
+    """Echoes that were added to samples: terms of the largest predicted error, the plan of the last channel, counts."""
 
-    predicted_error: float = 0.0
+    error_terms: tuple[ErrorTerm, ...] = ()
     plan: dict[str, Any] = field(default_factory=dict)
     counts: Counts = field(default_factory=Counts)
 
+    @property
+    def predicted_error(self) -> float:
+        """The largest of all channels."""
+        return root_sum_square(self.error_terms)
+
     def __add__(self, other: Added) -> Added:
-        worst = max(self.predicted_error, other.predicted_error)
+        worst = max(self.error_terms, other.error_terms, key=root_sum_square)
         return Added(worst, other.plan or self.plan, self.counts + other.counts)
 
 
@@ -154,4 +160,4 @@ def echoes_of(
     out = np.zeros((n, len(scene.request.polarizations), len(frequencies)), np.complex64)
     channel = scene.channel(geometry, band, frequencies, first)
     counts = channel.add(out, range(n), done, total)
-    return out, Added(channel.predicted_error, channel.plan, counts)
+    return out, Added(channel.error_terms, channel.plan, counts)

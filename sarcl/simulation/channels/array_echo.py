@@ -88,8 +88,8 @@ def array_echo(
             **rows.fields(waveform.center, grid, track, receiver or track),
             waveform=waveform, array=array, compressed=compressed,
             report=Report(
-                plan=how, tolerance=request.tolerance, predicted_error=added.predicted_error, measured_error=measured,
-                **counted,
+                plan=how, tolerance=request.tolerance, predicted_error=added.predicted_error,
+                error_terms=added.error_terms, measured_error=measured, **counted,
                 seconds=request.clock.seconds, device=request.device.info.name, seed=request.seed,
             ),
         )  # fmt: skip

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ...base.errors import confirm_tolerance
-from ...base.report import Report
+from ...base.report import Report, root_sum_square
 from ...base.types import PathLike
 from ...base.validation import choice, flag, instance
 from ...model.antenna import Antenna
@@ -106,7 +106,7 @@ def spectral_echo(
     )  # fmt: skip
     n_pulses, n_polarizations, frequencies = len(track), len(request.polarizations), task.frequencies
     with EchoOutput((n_pulses, n_polarizations, len(frequencies)), out, request.budget, task.window) as output:
-        prepared, parts, direct, error = task.planned(variant)
+        prepared, parts, direct, terms = task.planned(variant)
         pulse = waveform.pulse_spectrum(frequencies)
         spectrum = (np.abs(pulse) ** 2 if compressed else pulse) * prepared.weights.factor(frequencies)
         if ripple:
@@ -152,7 +152,8 @@ def spectral_echo(
                     **task.motion,
                 },
                 tolerance=request.tolerance,
-                predicted_error=error,
+                predicted_error=root_sum_square(terms),
+                error_terms=terms,
                 measured_error=measured,
                 **prepared.counted(counts),
                 seconds=request.clock.seconds,

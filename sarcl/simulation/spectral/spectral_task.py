@@ -10,6 +10,7 @@ import numpy as np
 from ...arrays.channels import is_single
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
+from ...base.report import ErrorTerm
 from ...base.validation import array as numbers
 from ...base.validation import instance
 from ...model.antenna_array import AntennaArray
@@ -22,7 +23,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
+from ..scene_echoes import SMALLER, ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
@@ -54,8 +55,10 @@ class SpectralTask:
     window_asked: bool
     motion: dict[str, object]
 
-    def planned(self, variant: str) -> tuple[SceneEchoes, list[SpectralPart], ChannelEchoes | None, float]:
-        """The prepared scene, plans for its points and its facets, and the predicted error of their sum.
+    def planned(
+        self, variant: str
+    ) -> tuple[SceneEchoes, list[SpectralPart], ChannelEchoes | None, tuple[ErrorTerm, ...]]:
+        """The prepared scene, plans for its points and its facets, and the terms of the error of their sum.
 
         Facets of which pulses see different parts are added as `echo` does: their echoes are planned so; None where
         there are none, and for the variant "saras", whose shares of them change as slowly as amplitudes.
@@ -72,7 +75,7 @@ class SpectralTask:
         band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
         share = share_of(request, self.scene, waveform, self.antennas, request.tolerance)
         straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * self.line.deviation
-        parts, errors = [], []
+        parts, terms = [], list(prepared.shadow_terms)
         for part in (prepared.points if request.same else None, steady):
             if part is None:
                 continue
@@ -93,17 +96,17 @@ class SpectralTask:
                 ),
             )  # fmt: skip
             parts.append(made)
-            errors.append(gain * (made.predicted_error + fixed + straight))
+            name = "facets" if isinstance(part, FacetSet) else "points"
+            terms.append(ErrorTerm(name, gain * (made.predicted_error + fixed + straight), SMALLER))
         if self.window_asked and request.gated:
             for one in parts:
                 _check_window(one, self.line, self.antennas.reference_range, self.window)
         channel = None
         if direct is not None:
             channel = direct.channel(self.antennas, waveform, self.frequencies)
-            errors.append(channel.predicted_error)
-        errors.append(prepared.shadow_error)
+            terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER))
         request.clock.lap("plan")
-        return prepared, parts, channel, float(np.sqrt(np.sum(np.square(errors))))
+        return prepared, parts, channel, tuple(terms)
 
     def describe(self, parts: list[SpectralPart], direct: ChannelEchoes | None) -> dict[str, Any]:
         """Words of the plan of the part with the largest error; of facets added as `echo` does where there is no
