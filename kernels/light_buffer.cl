@@ -100,9 +100,11 @@ static inline seen_place viewed(view_numbers given, float3 x) {
 #if LINES < VW
 #define GROUPS 1
 #define LINE(g) ((fv)inverses[0])
+#define SHIFT(g) ((fv)inverses[LINES])
 #else
 #define GROUPS (ITEM_LINES / VW)
 #define LINE(g) LOAD(g, inverses)
+#define SHIFT(g) LOAD(g, inverses + LINES)
 #endif
 
 #define MARGIN 1e-3f  // of a cell, by which triangles are widened: above what rounding moves them by
@@ -198,9 +200,10 @@ static inline void cut_interval(interval *part, crossed_plane plane, fv inverse)
         part->high = at < part->high ? at : part->high;
 }
 
-// Bits of the samples of an interval; none where it is empty.
-static inline iv samples_in(interval part) {
-    iv first = nearest_int(part.low < PER_LINE ? part.low : (fv)PER_LINE), last = nearest_int(part.high > 0 ? part.high : (fv)0);
+// Bits of the samples of an interval, on lines whose samples are shifted; none where it is empty.
+static inline iv samples_in(interval part, fv shift) {
+    iv first = nearest_int((part.low < PER_LINE ? part.low : (fv)PER_LINE) - shift);
+    iv last = nearest_int((part.high > 0 ? part.high : (fv)0) - shift);
     return ((iv)-1 << (first & 31)) & ~((iv)-2 << ((last - 1) & 31)) & (first - last) >> 31;
 }
 
@@ -215,7 +218,7 @@ static inline int any_below(float4 d, float4 least) {
 }
 
 // Sets the bits of samples in shadow. global size (facets, LINES / ITEM_LINES)
-//   inverses  (LINES): 1/(1 - v) of the lines;  end  (cells): where each cell's entries end
+//   inverses  (2, LINES): 1/(1 - v) of the lines, and shifts of their samples;  end  (cells): where each cell's entries end
 __kernel void shaded(view_numbers given, __global const float *restrict facet, __global const int *restrict index,
                      __global const float *restrict inverses, __global const float *restrict plane,
                      __global const int *restrict end, __global const int *restrict top, __global const int2 *restrict entry,
@@ -226,7 +229,9 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
     word += get_global_id(1) * ITEM_LINES;
     inverses += get_global_id(1) * ITEM_LINES;
     __global const float *f = facet + 12 * (size_t)index[i];
-    float3 corner = {f[0], f[1], f[2]}, p = lifted(f, (float2)(0), vload3(0, given.eye), vload3(0, given.other));
+    float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
+    if (is_behind(f, eye, other)) return;
+    float3 corner = {f[0], f[1], f[2]}, p = lifted(f, (float2)(0), eye, other);
     float3 q = p + (float3)(f[3], f[4], f[5]), r = p + (float3)(f[6], f[7], f[8]), lift = p - corner;
     seen_box t = box_of(given, p, q, r);
     if (!(t.u_most >= 0 && t.v_most >= 0 && t.u_least <= given.cells[0] && t.v_least <= given.cells[1])) return;  // beside all
@@ -272,7 +277,7 @@ __kernel void shaded(view_numbers given, __global const float *restrict facet, _
                     cut_interval(&part, two, inverse);
                     cut_interval(&part, three, inverse);
                     cut_interval(&part, own, inverse);
-                    bits[g] |= samples_in(part);
+                    bits[g] |= samples_in(part, SHIFT(g));
                     all &= bits[g];
                 }
                 dark = corners == 7 && !ANY(all != (iv)-1);

@@ -50,7 +50,7 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
     int dark = 0, probed = !(kind[index[i]] & ALL_SAMPLES);
     word += i * LINES;
-    if (all_hidden(word)) return;
+    if (is_behind(f, eye, other) || all_hidden(word)) return;
     for (int s = probed ? -PROBES : 0; s < LINES * PER_LINE; s += s < 0 ? 1 : given.step) {
         if (s == 0 && probed && dark == 0) return;
         int l = max(s, 0) / PER_LINE, bit = max(s, 0) % PER_LINE, some = some_samples(bit, given.step);
@@ -59,7 +59,7 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
             return;
         }
         if (s >= 0 && (word[l] & some) == some) continue;
-        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line[l], bit + 0.5f * (given.step - 1));
+        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line, l, bit, given.step);
         float3 p = lifted(f, at, eye, other);
         if (!blocked(leaf, node, base, given.depth, p, eye, given.shrink)) continue;
         if (s < 0)

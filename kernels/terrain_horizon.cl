@@ -178,7 +178,7 @@ __kernel void horizon(horizon_numbers given, __global const float *restrict face
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
     int dark = 0, probed = !(kind[index[i]] & ALL_SAMPLES);
     word += i * LINES;
-    if (all_hidden(word)) return;
+    if (is_behind(f, eye, other) || all_hidden(word)) return;
     for (int s = probed ? -PROBES : 0; s < LINES * PER_LINE; s += s < 0 ? 1 : given.step) {
         if (s == 0 && probed && dark == 0) return;
         int l = max(s, 0) / PER_LINE, bit = max(s, 0) % PER_LINE, some = some_samples(bit, given.step);
@@ -187,7 +187,7 @@ __kernel void horizon(horizon_numbers given, __global const float *restrict face
             return;
         }
         if (s >= 0 && (word[l] & some) == some) continue;
-        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line[l], bit + 0.5f * (given.step - 1));
+        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line, l, bit, given.step);
         float3 p = lifted(f, at, eye, other);
         if (!behind(p, eye, x, y, z_rows, z_columns, given.nx, given.ny, given.per_x, given.per_y, number, whole, table)) continue;
         if (s < 0)

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.constants import EDGE_ON
 from ..base.vectors import unit
 
 CENTROID = np.array([[1 / 3, 1 / 3]])
@@ -13,20 +12,25 @@ CENTROID = np.array([[1 / 3, 1 / 3]])
 def sample(
     triangles: np.ndarray, viewpoint: np.ndarray, places: np.ndarray, lift: float, other: np.ndarray | None = None
 ) -> np.ndarray:
-    """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted towards a viewpoint, m (3,).
-
-    By `lift`, m, along its normal; where it is edge-on to the viewpoint, to the side that the
-    viewpoint and the `other` look at.
+    """Points (k, n, 3) at barycentric coordinates (n, 2) of facets, m (k, 3, 3), lifted by `lift`, m, along the normal,
+    to the side that a viewpoint and the `other`, m (3,), look at.
     """
     a = triangles[:, 0]
-    b, c = triangles[:, 1] - a, triangles[:, 2] - a
-    normal = np.cross(b, c)
-    normal /= np.linalg.norm(normal, axis=1, keepdims=True)
-    ends = (viewpoint, viewpoint if other is None else other)
-    above, below = (np.einsum("ij,ij->i", normal, unit(end - a)) for end in ends)
-    normal[np.where(np.abs(above) <= 2 * EDGE_ON, above + below, above) < 0] *= -1
+    normal = _facing(triangles, viewpoint, other)[0]
     u, v = np.asarray(places).T[:, None, :, None]
-    return (a + lift * normal)[:, None] + u * b[:, None] + v * c[:, None]
+    return (a + lift * normal)[:, None] + u * (triangles[:, 1] - a)[:, None] + v * (triangles[:, 2] - a)[:, None]
+
+
+def _facing(
+    triangles: np.ndarray, viewpoint: np.ndarray, other: np.ndarray | None
+) -> tuple[np.ndarray, np.ndarray]:
+    """Unit normals (k, 3) to the side that two viewpoints look at, and the first one's sine of elevation over it."""
+    a = triangles[:, 0]
+    normal = unit(np.cross(triangles[:, 1] - a, triangles[:, 2] - a))
+    ends = (viewpoint, viewpoint if other is None else other)
+    above, two = (np.einsum("ij,ij->i", normal, unit(end - a)) for end in ends)
+    side = np.where(above + two < 0, -1.0, 1.0)
+    return normal * side[:, None], above * side
 
 
 def hidden(
@@ -34,6 +38,7 @@ def hidden(
     other: np.ndarray | None = None,
 ) -> np.ndarray:  # fmt: skip
     """True (k, n) where a facet, m (k, 3, 3), crosses the line from a sample to `viewpoint`, m (3,); other: see sample.
+    False where the viewpoint is behind the side that both look at.
 
     Source: Moeller and Trumbore 1997.
     """
@@ -52,7 +57,7 @@ def hidden(
             v = (q @ ray) / det
             t = np.einsum("ij,ij->i", c, q) / det
             out[i] = ((u >= 0) & (v >= 0) & (u + v <= 1) & (t > 0) & (t <= 1)).any()
-    return out
+    return out & (_facing(triangles, viewpoint, other)[1] > 1e-6)[:, None]
 
 
 def overshadowed(

@@ -9,11 +9,8 @@ import numpy as np
 
 from ..opencl.device import Device
 
-FEWEST_LINES, MOST_LINES, PER_LINE = (
-    16,
-    256,
-    32,
-)  # lines of a facet, and samples on each, as in kernels/facet_points.clh
+FEWEST_LINES, MOST_LINES = 16, 256  # of a facet
+PER_LINE = 32  # samples, as in kernels/facet_points.clh
 
 
 def line_places(n: int) -> np.ndarray:
@@ -21,15 +18,22 @@ def line_places(n: int) -> np.ndarray:
     return np.asarray(1 - np.sqrt(1 - (np.arange(n) + 0.5) / n))
 
 
+def line_shifts(n: int) -> np.ndarray:
+    """By how many samples those of n lines lie off the middle, -0.45 to 0.45 (n,): multiples of the golden ratio, which
+    fill this evenly for any n (Weyl's sequence)."""
+    return np.asarray(0.9 * (np.arange(n) * (np.sqrt(5) - 1) / 2 % 1 - 0.5))
+
+
 def sample_points(n: int) -> np.ndarray:
     """Barycentric coordinates of the samples on n lines, line by line (32 n, 2)."""
     v = np.repeat(line_places(n), PER_LINE)
-    return np.stack([(1 - v) * np.tile((np.arange(PER_LINE) + 0.5) / PER_LINE, n), v], axis=1)
+    along = (np.arange(PER_LINE) + 0.5 + line_shifts(n)[:, None]) / PER_LINE
+    return np.stack([(1 - v) * along.ravel(), v], axis=1)
 
 
 @dataclass(frozen=True, eq=False)
 class SampleLines:
-    """Lines of samples on a device: places v, and 1/(1 - v), float32 (count,).
+    """Lines of samples on a device: places v, and 1/(1 - v), both with the shifts, float32 (2, count).
 
     step  samples that one line of sight decides on, where they are looked along one by one: all 32 of a point
     """
@@ -42,10 +46,12 @@ class SampleLines:
     @classmethod
     def of_facets(cls, device: Device, n: int) -> SampleLines:
         """n lines of facets: 16, 32, 64, 128 or 256."""
-        v = line_places(n)
-        return cls(device.upload(v.astype(np.float32)), device.upload((1 / (1 - v)).astype(np.float32)), n)
+        v, shifts = line_places(n), line_shifts(n)
+        places, inverses = (np.stack([row, shifts]).astype(np.float32) for row in (v, 1 / (1 - v)))
+        return cls(device.upload(places), device.upload(inverses), n)
 
     @classmethod
     def of_points(cls, device: Device) -> SampleLines:
         """Of points: one line of sight each."""
-        return cls(device.upload(np.zeros(1, np.float32)), device.upload(np.ones(1, np.float32)), 1, PER_LINE)
+        places, inverses = (np.array([[v], [0.0]], np.float32) for v in (0, 1))
+        return cls(device.upload(places), device.upload(inverses), 1, PER_LINE)

@@ -100,11 +100,17 @@ class IlluminationSolver:
         levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
         most = self._more.count * PER_LINE // 2
         for index, hiders in self._chunks(some):
+            both = list(range(len(viewpoints)))
             if some is None and self._more is not self._few:
-                total = self._count(index, hiders, self._few, viewpoints, slack).sum(axis=1, dtype=np.int32)
-                levels[index[total == PER_LINE * self._few.count]] = 255
-                index = index[(total > 0) & (total < PER_LINE * self._few.count)]
-            seen = self._count(index, hiders, self._more, viewpoints, slack)
+                # by each antenna: facets that both see a little of are not dark because few samples say so
+                each = [
+                    self._count(index, hiders, self._few, viewpoints, [i], slack).sum(axis=1, dtype=np.int32)
+                    for i in both
+                ]
+                whole = np.min(each, axis=0) == PER_LINE * self._few.count
+                levels[index[whole]] = 255
+                index = index[(np.min(each, axis=0) > 0) & ~whole]
+            seen = self._count(index, hiders, self._more, viewpoints, both, slack)
             total = seen.sum(axis=1, dtype=np.int32)
             levels[index] = np.rint(255 * np.sqrt(total / np.float32(2 * most)))
             between = (total > 0) & (total < 2 * most)
@@ -122,9 +128,11 @@ class IlluminationSolver:
                 yield index[i : i + CHUNK], hiders
 
     def _count(
-        self, index: np.ndarray, hiders: list[Any], lines: SampleLines, viewpoints: list[np.ndarray], slack: float
-    ) -> np.ndarray:
-        """Numbers of samples of facets `index` that all viewpoints see, on even and on odd lines, uint16 (n, 2)."""
+        self, index: np.ndarray, hiders: list[Any], lines: SampleLines, viewpoints: list[np.ndarray], of: list[int],
+        slack: float,
+    ) -> np.ndarray:  # fmt: skip
+        """Numbers of samples of facets `index` that viewpoints number `of` see, on even and on odd lines, uint16
+        (n, 2)."""
         device, n = self.device, len(index)
         if n == 0:
             return np.zeros((0, 2), np.uint16)
@@ -134,13 +142,13 @@ class IlluminationSolver:
             device.empty(4 * lines.count * n),
         )
         face, count = (device.kernel("ray_casting.cl", name, LINES=lines.count) for name in ("face", "seen"))
-        for first, viewpoint in enumerate(viewpoints):
+        for i in of:
             numbers = launch_numbers(
-                "ray_casting.cl", "face", eye=self.frame.eye(viewpoint)[:3], slack=slack, fresh=first == 0
+                "ray_casting.cl", "face", eye=self.frame.eye(viewpoints[i])[:3], slack=slack, fresh=i == of[0]
             )
             device.run(face, (n,), None, numbers, self.facets.buffer, which, self.facets.kind, words)
-        for viewpoint, other in zip(viewpoints, viewpoints[::-1], strict=True):
+        for i in of:
             for hider in hiders:
-                hider.hide(self.facets, which, n, lines, viewpoint, other, words)
+                hider.hide(self.facets, which, n, lines, viewpoints[i], viewpoints[-1 - i], words)
         device.run(count, (n,), None, words, seen)
         return device.download(seen, np.empty((n, 2), np.uint16))

@@ -174,6 +174,17 @@ def test_shares_are_those_of_the_reference_in_a_soup(device):
         assert found == pytest.approx(np.sqrt(wanted), abs=0.13 if inside else 0.51 / 255)
 
 
+def test_from_near_too_an_edge_across_all_lines_falls_between_their_samples(device):
+    """A shadow that covers the same part of every line: four rays on each of 16 lines tell it to 1/32."""
+    facet = np.array([[0.0, 0, 0], [1, 0, 0], [0, 1, 0]])
+    for seen in np.linspace(0.04, 0.96, 24):
+        way = np.array([seen, -1.0]) / np.hypot(seen, 1)
+        begin, end = np.array([0, 1.0]) - 9 * way, np.array([0, 1.0]) + 9 * way
+        screen = np.pad([begin, end, begin + end + 9], ((0, 0), (0, 1)), constant_values=1e-4)
+        share = shares(np.stack([facet, screen]), [0.3, 0.3, 2.0], device)[0]
+        assert share == pytest.approx(seen, abs=1 / 32)
+
+
 def test_a_viewpoint_in_a_room_sees_its_walls_but_not_behind_a_partition(device):
     walls = trimesh.creation.box((10, 10, 10)).subdivide().subdivide().triangles
     partition = np.array([[[2.0, -4.9, -4.9], [2, 4.9, -4.9], [2, 0, 4.9]]])
