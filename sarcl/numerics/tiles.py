@@ -9,6 +9,8 @@ import numpy as np
 from ..base import float_pairs
 from ..base.morton import morton_order
 
+BLOCK = 2**15  # points that are put into tiles together
+
 
 @dataclass(frozen=True, eq=False)
 class Tiles:
@@ -57,12 +59,16 @@ def tile_points(
     order = morton_order(positions) if order is None else order
     n_tiles = -(-len(order) // per_tile)
     order = np.concatenate([order, np.repeat(order[-1:], n_tiles * per_tile - len(order))])
-    # coordinate by coordinate: reductions along an axis of three, or across one, are slow
-    local = np.empty((3, n_tiles, per_tile))
-    np.subtract(positions[order].T, center[:, None], out=local.reshape(3, -1))
-    references = (local.min(axis=2) + local.max(axis=2)) / 2
-    offsets = local - references[:, :, None]
-    radius = np.sqrt((offsets**2).sum(axis=0).max(axis=1))
-    packed = float_pairs.wide(offsets.reshape(3, -1)).reshape(6, -1)
-    references = np.ascontiguousarray(references.T)
+    references, radius = np.empty((n_tiles, 3)), np.empty(n_tiles)
+    packed = np.empty((6, len(order)), np.float32)
+    step = max(BLOCK // per_tile, 1)
+    for first in range(0, n_tiles, step):  # so few at a time stay in the processor's cache
+        some = slice(first, min(first + step, n_tiles))
+        points = slice(some.start * per_tile, some.stop * per_tile)
+        # coordinate by coordinate: reductions along an axis of three, or across one, are slow
+        local = (positions[order[points]].T - center[:, None]).reshape(3, -1, per_tile)
+        middle = (local.min(axis=2) + local.max(axis=2)) / 2
+        local -= middle[:, :, None]
+        references[some], radius[some] = middle.T, np.sqrt((local**2).sum(axis=0).max(axis=1))
+        packed[:, points] = float_pairs.wide(local.reshape(3, -1)).reshape(6, -1)
     return Tiles(per_tile, references, radius, packed, shared=False), order

@@ -21,9 +21,7 @@ def sample(
     return (a + lift * normal)[:, None] + u * (triangles[:, 1] - a)[:, None] + v * (triangles[:, 2] - a)[:, None]
 
 
-def _facing(
-    triangles: np.ndarray, viewpoint: np.ndarray, other: np.ndarray | None
-) -> tuple[np.ndarray, np.ndarray]:
+def _facing(triangles: np.ndarray, viewpoint: np.ndarray, other: np.ndarray | None) -> tuple[np.ndarray, np.ndarray]:
     """Unit normals (k, 3) to the side that two viewpoints look at, and the first one's sine of elevation over it."""
     a = triangles[:, 0]
     normal = unit(np.cross(triangles[:, 1] - a, triangles[:, 2] - a))

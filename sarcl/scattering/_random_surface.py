@@ -89,6 +89,8 @@ def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.nda
     long = np.maximum.reduce(edges(triangles)) > longest if len(triangles) else np.zeros(0, bool)
     if not long.any():
         return triangles, rows
+    if long.all() and np.ptp(longest) == 0:
+        return cut(triangles, float(longest[0]), MOST_FACETS)
     made = [(triangles[~long], rows[~long])]
     for length in np.unique(longest[long]).tolist():
         which = np.flatnonzero(long & (longest == length))

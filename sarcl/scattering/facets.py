@@ -10,7 +10,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
-from ..scene.triangles import centroids, normals
+from ..scene.triangles import BLOCK, centroids, edges, normals
 from ..visibility.illumination import Illumination, Span, shares_of
 from ..visibility.lit_parts import LitParts
 
@@ -244,20 +244,30 @@ class FacetSet:
 
     def planes(self, order: np.ndarray, nodes: np.ndarray, metal: bool, dispersive: bool) -> np.ndarray:
         """Rows of numbers as kernels/spread_facets.cl reads them, float32, in `order`; repeats at its end are blank."""
-        corners = _from_widest_angle(self.triangles)
-        first, second = (corners[:, i] - corners[:, 0] for i in (1, 2))
-        factor = np.where(self.two_sided, -self.reflectivity, self.reflectivity)
-        rows = [*first.T, *second.T, factor]
-        if self.is_rough:
-            height, *diagram = roughness_planes(self.materials)[:, self.material]
-            if self.incoherent is not None:
-                height = np.where(self.incoherent, -height, height)  # the sign tells the kernels
-            rows += [height, *diagram, self.random.real, self.random.imag]
-        if not metal:
-            for f in nodes if dispersive else nodes[:1]:
-                root = self.roots(float(f))[self.material]
-                rows += [root.real, root.imag]
-        out = np.stack(rows)[:, order].astype(np.float32)
+        roots = [] if metal else [self.roots(float(f)) for f in (nodes if dispersive else nodes[:1])]
+        n = 7 + 6 * self.is_rough + 2 * len(roots)
+        out = np.empty((n, len(order)), np.float32)
+        rough = roughness_planes(self.materials) if self.is_rough else np.zeros((4, 0))
+        for first in range(0, len(order), BLOCK):  # so few at a time stay in the processor's cache
+            some = order[first : first + BLOCK]
+            rows = iter(out[:, first : first + BLOCK])
+
+            def put(*values: np.ndarray, rows: Iterator[np.ndarray] = rows) -> None:
+                for value in values:
+                    next(rows)[:] = value
+
+            corners = _from_widest_angle(self.triangles[some])
+            for i in (1, 2):
+                put(*(corners[:, i] - corners[:, 0]).T)
+            put(np.where(self.two_sided[some], -self.reflectivity[some], self.reflectivity[some]))
+            material = self.material[some]
+            if self.is_rough:
+                height, *diagram = rough[:, material]
+                if self.incoherent is not None:
+                    height = np.where(self.incoherent[some], -height, height)  # the sign tells the kernels
+                put(height, *diagram, self.random[some].real, self.random[some].imag)
+            for root in roots:
+                put(root[material].real, root[material].imag)
         out[:6, len(self) :] = 0
         return out
 
@@ -282,6 +292,7 @@ def vertical_axes(up: np.ndarray) -> np.ndarray:
 def _from_widest_angle(triangles: np.ndarray) -> np.ndarray:
     """Triangles, m (k, 3, 3), from the corner opposite the longest edge on: needles have normals that float32 resolves
     if one of the two edges is the short one."""
-    lengths = np.linalg.norm(np.roll(triangles, -1, axis=1) - np.roll(triangles, -2, axis=1), axis=2)
-    at = (lengths.argmax(axis=1)[:, None] + np.arange(3)) % 3
-    return np.take_along_axis(triangles, at[:, :, None], axis=1)
+    first = 3 * np.arange(len(triangles))
+    start = edges(triangles).argmax(axis=0) + 2  # edge i joins corners i and i + 1
+    corners = triangles.reshape(-1, 3)
+    return np.stack([corners[first + (start + i) % 3] for i in range(3)], axis=1)

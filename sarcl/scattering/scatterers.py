@@ -126,11 +126,12 @@ def facets_of(
     tell(3)
     if not keep.any():
         return None, left_out
+    some = slice(None) if keep.all() else keep  # no copies where all are kept
     return FacetSet(
-        triangles[keep], scene.reflectivity[keep], scene.two_sided[keep], scene.material[keep], scene.materials,
-        illumination, np.flatnonzero(keep), pieces.random[keep], lit_parts,
-        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[keep],
-        by_samples[keep], pieces.incoherent[keep] if pieces.incoherent.any() else None,
+        triangles[some], scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials,
+        illumination, np.flatnonzero(keep), pieces.random[some], lit_parts,
+        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[some],
+        by_samples[some], pieces.incoherent[some] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from ..base import validation
 from ..base.vectors import dot
 
 MOST_TURN = 1e12  # rad, of a rotation: float64 resolves 1e-4 rad there
+BLOCK = 2**15  # triangles that are cut together
 FARTHEST = 1e70  # m, of corners: the square of an area stays finite
 
 
@@ -65,20 +66,21 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
     # no facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory
     if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
         raise MemoryError(too_many)
-    row = np.arange(len(triangles))
-    done: list[tuple[np.ndarray, np.ndarray]] = []
-    n_done = 0
-    while len(triangles):
-        lengths = edges(triangles)
-        long = np.maximum.reduce(lengths) > max_edge
-        done.append((triangles[~long], row[~long]))
-        n_done += len(done[-1][0])
-        if n_done + 2 * long.sum() > max_facets:
-            raise MemoryError(too_many)
-        triangles = np.concatenate(bisect(triangles[long], lengths[:, long]))
-        row = np.tile(row[long], 2)
-    triangles, row = (np.concatenate(a) for a in zip(*done, strict=True))
-    return triangles, row
+    parts, rows, n = [triangles[:0]], [np.zeros(0, np.int64)], 0
+    for first in range(0, len(triangles), BLOCK):  # so few at a time stay in the processor's cache
+        some = triangles[first : first + BLOCK]
+        row = np.arange(first, first + len(some))
+        while len(some):
+            lengths = edges(some)
+            long = np.maximum.reduce(lengths) > max_edge
+            parts.append(some[~long])
+            rows.append(row[~long])
+            n += len(parts[-1])
+            if n + 2 * long.sum() > max_facets:
+                raise MemoryError(too_many)
+            some = np.concatenate(bisect(some[long], lengths[:, long]))
+            row = np.tile(row[long], 2)
+    return np.concatenate(parts), np.concatenate(rows)
 
 
 def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
@@ -87,10 +89,15 @@ def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.n
     The cut of an edge depends on its ends alone, so triangles that share it stay joined.
     """
     start = lengths.argmax(axis=0)
-    row = np.arange(len(start))
-    a, b, c = (triangles[row, (start + i) % 3] for i in range(3))
+    first = 3 * np.arange(len(start))
+    corners = triangles.reshape(-1, 3)
+    a, b, c = (corners[first + (start + i) % 3] for i in range(3))
+    one, two = np.empty_like(triangles), np.empty_like(triangles)
     middle = (a + b) / 2
-    return np.stack([a, middle, c], axis=1), np.stack([middle, b, c], axis=1)
+    for half, places in ((one, (a, middle, c)), (two, (middle, b, c))):
+        for i, place in enumerate(places):
+            half[:, i] = place
+    return one, two
 
 
 def distances(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
