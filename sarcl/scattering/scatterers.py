@@ -59,15 +59,16 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 def facets_of(
     pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
-    max_bytes: float, device: Any, tell: Callable[[int], object], exact: bool, sampled: bool, accuracy: float,
-    margin: float = 0.0,
+    max_bytes: float, device: Any, progress: Callable[[str, int, int], object], exact: bool, sampled: bool,
+    accuracy: float, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
     """Facets of a scene, displaced, culled and illuminated, and counts of pairs left out: reason -> count.
 
     exact   lit parts of coherent facets are computed; False: all shadows are shares, from samples
     sampled, accuracy  shadows on incoherent facets are shares; with this error relative to the norm of these facets
     margin  m: antennas of channels stand up to this far from these
-    tell is called with 2 when facets are culled, and with 3 when they are illuminated.
+    progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
+              they are illuminated, progress("scene", 3, 3) then
     """
     scene, n_pulses = pieces.scene, len(antennas.tx)
     original, terrain = pieces.original, _terrain(pieces.original, antennas)
@@ -85,8 +86,12 @@ def facets_of(
         away = keep & ~scene.two_sided & faces_away(centers, normals, antennas)
         left_out["facing away"] = int(away.sum()) * n_pulses
         keep &= ~away
-    tell(2)
+    progress("scene", 2, 3)
     illumination, lit_parts = None, None
+
+    def of_shadows(done: int, total: int) -> None:
+        progress("shadows", done, total)
+
     clipped = np.zeros(len(keep), bool)
     if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
         clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
@@ -110,6 +115,7 @@ def facets_of(
             two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
             accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
             by_facets=~clipped, occluders=solid, ground=ground, device=device,
+            progress=of_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
@@ -117,13 +123,13 @@ def facets_of(
         lit_parts = LitParts(
             device, scene.triangles, solid if by_horizons else original.triangles, antennas.ends,
             two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
-            given=original.triangles, of=pieces.of,
+            given=original.triangles, of=pieces.of, progress=of_shadows,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():
             warn(ALL_DARK)
         keep &= ~lit_parts.dark
-    tell(3)
+    progress("scene", 3, 3)
     if not keep.any():
         return None, left_out
     some = slice(None) if keep.all() else keep  # no copies where all are kept

@@ -338,7 +338,7 @@ def prepare_scene(
         request.report("scene", 1, 3)
         facets, left_out = facets_of(
             pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
-            max_bytes=request.budget / 4, device=device, tell=lambda n: request.report("scene", n, 3),
+            max_bytes=request.budget / 4, device=device, progress=request.report,
             exact=exact and request.shadows, sampled=_samples_shadows(request, scene, waveform, antennas),
             accuracy=SHADOWS * request.tolerance / parts_of(scene), margin=margin,
         )  # fmt: skip

@@ -69,7 +69,7 @@ def look_along(
         course.always &= levels == 255
         course.changing |= levels != course.usual
         if progress:
-            progress(place + 1, len(offered))
+            progress(int(offered[place]) + 1, int(offered[-1]) + 1)
     return course
 
 

@@ -219,7 +219,7 @@ def lit(
     by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
     occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
     ground      m (n, 3, 3), and (k,) bool: what occludes too, but those of the facets alone
-    progress    called as progress(block, blocks)
+    progress    called as progress(pulse, pulses), of those that are looked from
 
     Raises ValueError for an antenna below the terrain. Warns with SarclWarning where nothing at all is illuminated.
     """
@@ -230,7 +230,7 @@ def lit(
     k = len(triangles)
     if occluders is not None and getattr(occluders, "shape", None) != (0, 3, 3):
         occluders = array("occluders", occluders, np.float64, ("n", 3, 3))
-    arguments.progress(progress, "progress(block, blocks)")
+    arguments.progress(progress, "progress(pulse, pulses)")
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
     tolerance, accuracy = number("tolerance", tolerance, above=0), number("accuracy", accuracy, above=0)

@@ -3,7 +3,7 @@
 from __future__ import annotations
 
 import copy
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -68,12 +68,14 @@ class LitParts:
         margin: float = 0.0,
         given: np.ndarray | None = None,
         of: np.ndarray | None = None,
+        progress: Callable[[int, int], object] | None = None,
     ) -> None:
         """ends  positions of the transmitter, and of a receiver elsewhere, m (n_pulses, 3) each
         two_sided  (k,) bool: the others are left out where they face away;  wanted  (k,) bool: pieces whose lit part
         is computed;  max_bytes  on the device;  margin  m: antennas asked for later stand up to this far from `ends`
         given  facets, m (m, 3, 3), of which the pieces are parts, and `of` which (k,): default each its own. What
                pulses see of these is found first, and then of the pieces of those that are not seen whole
+        progress  called as progress(pulse, pulses)
         """
         self.device, self.max_bytes, self._margin, self._first = with_float64(device), max_bytes, margin, 0
         if given is None or of is None:
@@ -91,10 +93,10 @@ class LitParts:
         self._blocks: list[_Block] = []
         self.dark, self.partly = np.zeros((2, len(triangles)), bool)
         if len(keep) and len(self._occluders):
-            self._look(parents, ends)
+            self._look(parents, ends, progress)
         self._rows = np.flatnonzero(self.partly[keep])
 
-    def _look(self, parents: Receivers, ends: list[np.ndarray]) -> None:
+    def _look(self, parents: Receivers, ends: list[np.ndarray], progress: Callable[[int, int], object] | None) -> None:
         """Find blocks of pulses, the pairs of each within `max_bytes`, and which pieces are dark or partly lit."""
         bounds, kept = self._bounds, 0
         width = float(np.median(np.sqrt(areas(self._occluders))))
@@ -119,6 +121,8 @@ class LitParts:
             pairs = pairs[here[pairs[:, 0]]]
             kept += pairs.nbytes
             self._blocks.append(replace(block, pairs=pairs if kept <= self.max_bytes else None))
+            if progress:
+                progress(stop, len(ends[0]))
         dark = dark_pulses == len(ends[0])
         self.dark[self._pieces.index], self.partly[self._pieces.index] = dark, changing & ~dark
 

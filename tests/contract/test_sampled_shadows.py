@@ -115,6 +115,16 @@ def test_terms_of_the_error_name_shadows(monkeypatch, tmp_path):
     assert not sarcl.Report().error_terms
 
 
+@pytest.mark.parametrize("few", [0, np.inf])
+def test_progress_tells_which_pulses_are_done(few, monkeypatch):
+    said = []
+    echo(SCENES["house"](), TRACKS["wide"], monkeypatch, few, 1e-1, progress=lambda *a: said.append(a))
+    shadows = [done for stage, done, total in said if stage == "shadows" and total == PULSES]
+    assert len(shadows) > 1 and shadows == sorted(shadows) and shadows[-1] == PULSES
+    stages = [stage for stage, *_ in said]
+    assert stages.index("shadows") > stages.index("scene") and said[-1][0] == "echo"
+
+
 def test_more_lines_of_samples_and_pulses_are_taken_for_a_smaller_tolerance(monkeypatch):
     scene, track = SCENES["house"](), TRACKS["arc"]
     wanted, raw = (echo(scene, track, monkeypatch, few, 1e-3) for few in (np.inf, 0))
