@@ -192,7 +192,7 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                         __global float *restrict share, __global float *restrict mean) {
     size_t pulse = get_global_id(1), at = pulse * get_global_size(0) + get_global_id(0);
     __global const double *r = receivers + RECEIVER * get_global_id(0);
-    int begin = first[get_global_id(0)], stop = first[get_global_id(0) + 1], dark = 0;
+    int begin = first[get_global_id(0)], stop = first[get_global_id(0) + 1], dark = 0, shaded = 0;
     double qx = 0, qy = 0, area = 0, sums[2 * WAVES + 1];
     for (int e = 0; e < ENDS; e++) {
         __global const double *antenna = antennas + 3 * (pulse * ENDS + e);
@@ -200,8 +200,13 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
         double ways = (ENDS == 1 ? 2.0 : 1.0) / sqrt(dx * dx + dy * dy + dz * dz);
         qx += ways * (dx * r[3] + dy * r[4] + dz * r[5]);
         qy += ways * (dx * r[6] + dy * r[7] + dz * r[8]);
-        for (int i = begin; i < stop; i++) dark |= corners[(pulse * ENDS + e) * given.n_pairs + i] == COVERS;
+        for (int i = begin; i < stop; i++) {
+            int n = corners[(pulse * ENDS + e) * given.n_pairs + i];
+            shaded |= n;
+            dark |= n == COVERS;
+        }
     }
+    if (!shaded) stop = begin;  // the facet's own edges are left
 #pragma unroll
     for (int m = 0; m < 2 * WAVES; m++) sums[m] = 0;
     // edges of the facet, and then of each shadow

@@ -27,7 +27,7 @@ SLACK = 1e-12
 # Corners nearer to a facet's plane than this, relative to the scene's diagonal, lie in it: sheets that coincide, or
 # touch within the digits of float32 files, do not shadow one another
 ON_PLANE = 1e-6
-MOST_TURN = 0.5  # of the usual occluder's width, by which shadows may move within a block of pulses
+MOST_TURN = 0.25  # of the usual occluder's width, by which shadows may move within a block of pulses
 
 
 @dataclass(frozen=True, eq=False)
@@ -167,14 +167,30 @@ class LitParts:
         back = r.two_sided & np.all([c < 2 * turn for c in cosines], axis=0)
         seen = np.flatnonzero(front | back)
 
-        def casts(pairs: np.ndarray) -> np.ndarray:
-            which = seen[pairs[:, 0]]
-            heights = ((solid[pairs[:, 1]] - r.center[which, None]) * r.normal[which, None]).sum(axis=2)
-            above, below = heights.max(axis=1) > self._on_plane, heights.min(axis=1) < -self._on_plane
-            return np.asarray((front[which] & above) | (back[which] & below))
+        def found(at: np.ndarray) -> np.ndarray:
+            ahead = at - r.center
+            distance = np.sqrt(dot(ahead, ahead))
+            look = ahead / distance[:, None]
+            corners = r.triangles - r.center[:, None]
+            radius = np.sqrt((corners**2).sum(axis=2).max(axis=1))
+            nearest = np.einsum("kij,kj->ki", corners, look).min(axis=1)
+            # by what a direction to the antenna differs from `look`, anywhere on the facet and at any pulse
+            astray = turn + radius / np.maximum(distance - radius, 1e-300)
 
-        found = [candidate_pairs(r.triangles[seen], solid, at, turn, reach, casts) for at in antennas]
-        pairs = found[0] if len(found) == 1 else np.unique(np.concatenate(found), axis=0)
+            def casts(pairs: np.ndarray) -> np.ndarray:
+                which = seen[pairs[:, 0]]
+                places = solid[pairs[:, 1]] - r.center[which, None]
+                heights = (places * r.normal[which, None]).sum(axis=2)
+                above, below = heights.max(axis=1) > self._on_plane, heights.min(axis=1) < -self._on_plane
+                furthest = np.sqrt((places**2).sum(axis=2).max(axis=1)) + radius[which]
+                ahead = (places * look[which, None]).sum(axis=2).max(axis=1) - nearest[which]
+                ahead += furthest * astray[which]  # no shadow falls towards the antenna
+                return np.asarray(((front[which] & above) | (back[which] & below)) & (ahead > 0))
+
+            return candidate_pairs(r.triangles[seen], solid, at, turn, reach, casts)
+
+        found_of = [found(at) for at in antennas]
+        pairs = found_of[0] if len(found_of) == 1 else np.unique(np.concatenate(found_of), axis=0)
         pairs[:, 0] = seen[pairs[:, 0]]
         return pairs
 
