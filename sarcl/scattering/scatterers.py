@@ -22,7 +22,7 @@ from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
 
-# pairs of piece and pulse, up to which rough facets, and those of a terrain, are clipped too: about ten seconds
+# pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
 FEW_LOOKS = 2e6
 # Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
 # accuracy of amplitudes
@@ -95,33 +95,26 @@ def facets_of(
     clipped = np.zeros(len(keep), bool)
     if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
         clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
-    # of large smooth terrains the horizons are shares too: clipping every facet would take minutes
-    by_horizons = bool(terrain) and int((keep & clipped).sum()) * n_pulses > FEW_LOOKS
-    by_samples = keep if by_horizons else keep & ~clipped
+    by_samples = keep & ~clipped
     solid = original.triangles
     ground: tuple[np.ndarray, np.ndarray] | None = None
-    if terrain:
+    if terrain:  # by its facets, where it may hide anything
         on_pieces = terrain["on_heights"][pieces.of]
         floor, solid = solid[terrain["on_heights"]], solid[~terrain["on_heights"]]
-        if by_horizons:
-            terrain["on_heights"] = on_pieces
-        else:  # exactly: by its facets, where it may hide anything
-            ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
-            terrain = {}
+        ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
     if shadows and by_samples.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
-            scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx, **terrain,
+            scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
             two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
             accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
-            by_facets=~clipped, occluders=solid, ground=ground, device=device,
-            progress=of_shadows,
+            occluders=solid, ground=ground, device=device, progress=of_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
     if (keep & clipped).any():
         lit_parts = LitParts(
-            device, scene.triangles, solid if by_horizons else original.triangles, antennas.ends,
+            device, scene.triangles, original.triangles, antennas.ends,
             two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
             given=original.triangles, of=pieces.of, progress=of_shadows,
         )  # fmt: skip

@@ -55,7 +55,6 @@ class IlluminationSolver:
         on_heights: np.ndarray | None = None,
         two_sided: np.ndarray | bool = True,
         wanted: np.ndarray | None = None,
-        by_facets: np.ndarray | bool = True,
         occluders: np.ndarray | None = None,
         ground: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
@@ -65,12 +64,11 @@ class IlluminationSolver:
         floor, over = (np.zeros((0, 3, 3)), np.zeros(k, bool)) if ground is None else ground
         self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid, floor]), heights))
         self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
-        by_facets = np.broadcast_to(np.asarray(by_facets), k)
         keep = np.ones(k, bool) if wanted is None else wanted
         hiders: list[tuple[Any, np.ndarray]] = []  # each with the facets that it may hide
         if heights is not None:
             hiders.append((Terrain(device, heights, frame), np.ones(k, bool)))
-        for facets, hidden in ((solid, by_facets), (floor, over)):
+        for facets, hidden in ((solid, np.ones(k, bool)), (floor, over)):
             n = int((keep & hidden).sum())
             if n and len(facets):
                 hiders.append((Occluders(device, facets, frame, n), hidden))

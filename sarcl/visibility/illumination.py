@@ -194,7 +194,6 @@ def lit(
     accuracy: float = 0.02,
     weights: np.ndarray | None = None,
     max_bytes: float | None = None,
-    by_facets: np.ndarray | bool = True,
     occluders: np.ndarray | None = None,
     ground: tuple[np.ndarray, np.ndarray] | None = None,
     device: DeviceChoice | None = None,
@@ -216,7 +215,6 @@ def lit(
     weights     powers of the facets (k,) in that norm; default their areas
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
-    by_facets   (k,) bool or one for all: the other facets are occluded by the terrain alone
     occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
     ground      m (n, 3, 3), and (k,) bool: what occludes too, but those of the facets alone
     progress    called as progress(pulse, pulses), of those that are looked from
@@ -237,7 +235,7 @@ def lit(
     grid = None if heights is None else heights_of(heights)
     on_heights = _mask("on_heights", grid is not None if on_heights is None else on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
-    two_sided, by_facets = _mask("two_sided", two_sided, k), _mask("by_facets", by_facets, k)
+    two_sided = _mask("two_sided", two_sided, k)
     if weights is not None:
         weights = array("weights", weights, np.float64, (k,)) if k else np.zeros(0)
         if weights.min(initial=0.0) < 0:
@@ -259,7 +257,7 @@ def lit(
     bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
     solver = IlluminationSolver(
         opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
-        by_facets=by_facets, occluders=occluders, ground=ground,
+        occluders=occluders, ground=ground,
     )  # fmt: skip
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     judge = Judge(power * (1.0 if wanted is None else wanted))

@@ -92,15 +92,14 @@ def test_terrain_below_every_line_of_sight_hides_what_stands_under_it_alone(monk
     assert 0 < over.sum() < 0.1 * len(over) and asked[1]["ground"] is None
 
 
-def test_large_smooth_terrain_takes_horizons_and_says_so(terrains, monkeypatch):
+def test_large_smooth_terrain_is_clipped_like_a_small_one(terrains, monkeypatch):
+    """By shares from horizons its echoes were 22 to 30 % off."""
     scene = hills(material=sarcl.Material(eps_r=4.0))
     exact = sarcl.echo(scene, WAVE, track(n=2), **OPTIONS)
     monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
     raw = sarcl.echo(scene, WAVE, track(n=2), **OPTIONS)
-    assert len(terrains) == 1 and terrains[0][0] is not None and terrains[0][1].all()
-    assert raw.report.plan["shadow edges"] == "sampled, not part of the error"
-    shadowed = [r.report.contributions_skipped["shadowed"] for r in (raw, exact)]
-    assert shadowed[0] == pytest.approx(shadowed[1], rel=0.1) and shadowed[0] > 0
+    assert terrains == [] and "shadow edges" not in raw.report.plan
+    np.testing.assert_array_equal(raw.samples, exact.samples)
 
 
 def test_smooth_terrain_is_clipped_whether_its_heights_are_known_or_not(terrains):

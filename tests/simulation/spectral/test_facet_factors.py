@@ -47,7 +47,7 @@ def test_factors_of_facets_are_their_amplitudes(material, antenna, every_device,
     antennas = PulseGeometry(track.positions, track.positions)
     facets, _ = facets_of(
         pieces_of(scene, np.inf, np.inf, 0), CHIRP, antennas, shadows=True, skips={"facing away"}, max_bytes=1e9,
-        device=every_device, tell=lambda n: None, exact=False, sampled=True, accuracy=1e-2,
+        device=every_device, progress=lambda *_: None, exact=False, sampled=True, accuracy=1e-2,
     )  # fmt: skip
     weights = weights_of(*ANTENNAS[antenna], track, None, CHIRP, scene.center)
     polarizations = ("HH", "HV", "VH", "VV")
