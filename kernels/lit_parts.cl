@@ -95,8 +95,16 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const double *re
     corners[at] = 0;
     __global const double *antenna = antennas + 3 * end;
     double dx = antenna[0] - r[0], dy = antenna[1] - r[1], dz = antenna[2] - r[2];
-    double above = dx * r[9] + dy * r[10] + dz * r[11], side = above < 0 ? -1 : 1, height = fabs(above);
-    if (!(height > 1e-6 * sqrt(dx * dx + dy * dy + dz * dz))) return;  // the facet is seen edge-on
+    double distance = sqrt(dx * dx + dy * dy + dz * dz), above = dx * r[9] + dy * r[10] + dz * r[11], both = above / distance;
+#if ENDS == 2
+    __global const double *other = antennas + 3 * (end ^ 1);
+    double ox = other[0] - r[0], oy = other[1] - r[1], oz = other[2] - r[2];
+    both += (ox * r[9] + oy * r[10] + oz * r[11]) / sqrt(ox * ox + oy * oy + oz * oz);
+#endif
+    // Edge-on, or behind the side that both antennas look at, an antenna casts no shadow: the echo fades instead
+    // (sarcl/scattering/physical_optics.py:lit_share).
+    double side = both < 0 ? -1 : 1, height = side * above;
+    if (!(height > 1e-6 * distance)) return;
     place eye = {dx * r[3] + dy * r[4] + dz * r[5], dx * r[6] + dy * r[7] + dz * r[8], height};
     place a = in_axes(r, occluder[0], occluder[1], occluder[2], side);
     place b = in_axes(r, occluder[3], occluder[4], occluder[5], side);

@@ -83,8 +83,18 @@ def lit_part(
     facet: np.ndarray, occluders: np.ndarray, antennas: list[np.ndarray], waves: np.ndarray, on_plane: float = 1e-9
 ) -> tuple[float, np.ndarray]:
     """Share of a facet, m (3, 3), that one antenna or two, m (3,), see past occluders, m (k, 3, 3), and the mean over
-    the whole facet of exp(j k (u_t + u_r).rho) on that part, rho from the centroid, at wavenumbers k, rad/m: (m,)."""
-    shadows = [shadow(facet, other, antenna, on_plane) for antenna in antennas for other in occluders]
+    the whole facet of exp(j k (u_t + u_r).rho) on that part, rho from the centroid, at wavenumbers k, rad/m: (m,).
+
+    An antenna that is edge-on to the facet, or behind the side that both look at, casts no shadow."""
+    up = plane_axes(facet)[2]
+    sines = [float(unit(antenna - facet.mean(axis=0)) @ up) for antenna in antennas]
+    side = -1.0 if sum(sines) < 0 else 1.0
+    shadows = [
+        shadow(facet, other, antenna, on_plane)
+        for antenna, sine in zip(antennas, sines, strict=True)
+        if side * sine > 1e-6
+        for other in occluders
+    ]
     pieces = lit_pieces(facet, [s for s in shadows if len(s) and area(s) > 0])
     center = facet.mean(axis=0)
     sights = [unit(antenna - center) for antenna in antennas]

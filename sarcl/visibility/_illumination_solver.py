@@ -26,21 +26,24 @@ class Look:
     levels   amplitudes, roots of the shares, uint8 (k,): 255 of a whole facet, 0 where not wanted
     partly   the facets that are partly seen (n,), and `halves`, numbers of their samples that are seen on even and on
              odd lines (n, 2), of `samples` on each of the two
+    by_rays  whether single lines of sight told which are seen, for several samples each, not whole shadows
     """
 
     levels: np.ndarray
     partly: np.ndarray
     halves: np.ndarray
     samples: int
+    by_rays: bool = False
 
     def spread(self, weights: np.ndarray) -> float:
         """Sum of weights (k,) times the squares of the errors of the levels, as shares are counted in samples.
 
-        A quarter of what the halves of the lines differ by, for each facet: errors of the mean of both are half of the
-        difference where those of the halves are independent, and an eighth were found behind edges of wide shadows.
+        By rays what the halves of the lines differ by, for each facet: facets that cross it, and narrow shadows, fall
+        between them. By whole shadows a quarter of it: half are errors of the mean of both where those of the halves
+        are independent, and an eighth were found behind edges of wide shadows.
         """
         even, odd = np.sqrt(self.halves / self.samples).T
-        return float(weights[self.partly] @ ((even - odd) / 4) ** 2)
+        return float(weights[self.partly] @ ((even - odd) / (1 if self.by_rays else 4)) ** 2)
 
 
 class IlluminationSolver:
@@ -115,7 +118,8 @@ class IlluminationSolver:
             partly.append(index[between])
             halves.append(seen[between])
         none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
-        return Look(levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most)
+        by_rays = any(hider.by_rays(at) for _, hiders in self._parts for hider in hiders for at in viewpoints)
+        return Look(levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most, by_rays)
 
     def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Any]]]:
         """Numbers of the facets to be looked at, of those in `some` (k,) bool alone, with what may hide them."""

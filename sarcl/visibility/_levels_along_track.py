@@ -37,10 +37,13 @@ class Course:
 
 
 def look_along(
-    looks: Looks, offered: np.ndarray, judge: Judge, accuracy: float, max_bytes: float,
+    looks: Looks, offered: np.ndarray, first: np.ndarray, judge: Judge, accuracy: float, max_bytes: float,
     progress: Callable[[int, int], None] | None,
 ) -> Course:  # fmt: skip
-    """Levels at as many of the pulses offered (n,) as an accuracy asks for; changes are kept up to `max_bytes`."""
+    """Levels at as many of the pulses offered (n,) as an accuracy asks for, at those of indices `first` in any case.
+
+    Changes of levels are kept up to `max_bytes`.
+    """
     k, kept = looks.solver.facets.size, 0
     course = Course(
         looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool), np.zeros(k, bool)
@@ -48,13 +51,13 @@ def look_along(
 
     def look(place: int, base: Base | None) -> np.ndarray:
         seen = looks.at(place, base)
-        judge.note(seen, whole=base is None)
+        judge.note(seen, base)
         return seen.levels
 
     def limit() -> float:
         return max(MARGIN * accuracy**2 - judge.sampling**2, LEAST * accuracy**2)
 
-    for place, levels, left in refine_viewpoints(look, offered, judge.squares, limit):
+    for place, levels, left in refine_viewpoints(look, offered, first, judge.squares, limit):
         if not course.chosen:
             course.usual = levels
         if kept <= max_bytes and len(course.changes) == len(course.chosen):
@@ -112,41 +115,48 @@ class Looks:
 
 
 class Judge:
-    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares."""
+    """Squares of errors of levels, with weights (k,), relative to the weighed sum of their squares: means of looks."""
 
     def __init__(self, weights: np.ndarray) -> None:
-        self.weights, self._whole = weights, 0.0
+        self.weights, self._rate = weights, 0.0
         self._sampling: list[float] = []
+        self._whole: list[float] = []
 
-    def _relative(self, off: float) -> float:
-        """off over the sum of squares of the last look that was noted."""
-        return off / self._whole if self._whole else 0.0
+    @property
+    def norm(self) -> float:
+        """The weighed sum of the squares of levels, the mean of the looks that were noted."""
+        return float(np.mean(self._whole))
 
     @property
     def sampling(self) -> float:
-        """Root of the mean square of the sampling errors that were noted."""
-        return float(np.sqrt(np.mean(self._sampling)))
+        """Relative error of counting samples in the looks that were noted."""
+        return float(np.sqrt(np.mean(self._sampling) / self.norm)) if self.norm else 0.0
 
     def lines(self, look: Look, limit: float) -> int:
         """Lines of samples with which errors stay below a limit: those of straight edges fall as lines become more."""
-        self.note(look)
+        self.note(look, None)
         error = self.sampling
         return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
 
-    def note(self, look: Look, whole: bool = True) -> None:
-        """Note the sampling error of a whole look; and the sum to which differences are relative."""
-        self._whole = float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2
-        if whole:
-            rounded = ROUNDED * float(self.weights[look.partly].sum())
-            self._sampling.append(self._relative(look.spread(self.weights) + rounded))
+    def note(self, look: Look, base: Base | None) -> None:
+        """Note the norm of a look, and its sampling error: of facets that were left out as for those looked at last."""
+        self._whole.append(float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2)
+        partly = float(self.weights[look.partly].sum())
+        off = look.spread(self.weights) + ROUNDED * partly
+        if base is None:
+            self._rate = off / partly if partly else 0.0
+        else:
+            self._rate = max(self._rate, off / partly if partly else 0.0)
+            off += self._rate * float(self.weights @ (~base.some & (base.even % 255 != 0)))
+        self._sampling.append(off)
 
     def squares(
         self, halfway: np.ndarray, first: np.ndarray, last: np.ndarray, part: float, some: np.ndarray
     ) -> np.ndarray:
-        """As `refine_viewpoints` asks for them; `halfway` was noted last."""
+        """As `refine_viewpoints` asks for them."""
         a, b, c = (levels[some].astype(np.float64) / 255 for levels in (halfway, first, last))
         off = self.weights[some] * (a - b * (1 - part) - c * part) ** 2
-        return np.asarray(off / self._whole if self._whole else 0 * off)
+        return np.asarray(off / self.norm if self.norm else off)
 
     def motion(self, viewpoints: np.ndarray, left: list[float]) -> float:
         """Root of the mean square over the track of the differences `left` up to each viewpoint."""

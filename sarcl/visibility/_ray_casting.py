@@ -40,12 +40,16 @@ class Occluders:
         other  the other antenna, m (3,), or `viewpoint`: it decides on which side of a facet that is edge-on to the
                viewpoint its sample points lie
         """
-        if not self._few and sees_from_outside(self.frame, self._bounds, viewpoint):
+        if not self.by_rays(viewpoint):
             self._buffer(viewpoint).hide(facets, index, n, lines, other, words)
             return
         if self._tree is None:
             self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
         self._tree.hide(facets, index, n, lines, viewpoint, other, words)
+
+    def by_rays(self, viewpoint: np.ndarray) -> bool:
+        """Whether rays through a tree tell what a viewpoint, m (3,), sees."""
+        return self._few or not sees_from_outside(self.frame, self._bounds, viewpoint)
 
     def _buffer(self, viewpoint: np.ndarray) -> LightBuffer:
         """The light buffer of a viewpoint; the last two are kept."""

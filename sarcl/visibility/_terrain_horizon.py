@@ -41,6 +41,10 @@ class Terrain:
             self._swept = [*self._swept[-1:], *known]
         known[0].hide(facets, index, n, lines, other, words)
 
+    def by_rays(self, viewpoint: np.ndarray) -> bool:
+        """Whether single lines of sight tell what a viewpoint, m (3,), sees: always."""
+        return True
+
     def sweep(self, viewpoint: np.ndarray) -> Horizons:
         """Horizons along range lines around a viewpoint, m (3,)."""
         eye = (viewpoint - self.frame.center) * self.frame.unit

@@ -35,24 +35,26 @@ Squares = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray], np.n
 
 
 def refine_viewpoints(
-    look: Look, at: np.ndarray, squares: Squares, limit: Callable[[], float]
+    look: Look, at: np.ndarray, first: np.ndarray, squares: Squares, limit: Callable[[], float]
 ) -> Iterator[tuple[int, np.ndarray, float]]:
     """Viewpoints between which levels change linearly, as increasing indices into `at`, pulses (n,).
 
+    first        indices of viewpoints that are taken in any case
     look(index, base)  the levels, uint8 (k,), at a viewpoint; of some facets alone where there is a base
     squares(found, first, last, part, some)  of differences of the levels of facets `some` (n,) from what lies at `part`
                  between those of two viewpoints around it (n,)
     limit()      mean square of differences that is left, on the average of all pulses
 
-    Every 128th viewpoint and the last are taken. Between two of them, the one halfway is compared with linear
-    interpolation: where more than the limit would be left, both halves are refined in the same way. Facets with the
-    smallest differences are left out from there on: an eighth of them is looked at once more, in the halves' middles,
-    and if these differ, all are. Yields the index, the levels, and the mean square of differences from the viewpoint
-    before.
+    Every 128th viewpoint, the first ones and the last are taken. Between two of them, the one halfway is compared with
+    linear interpolation: where more than the limit would be left, both halves are refined in the same way. Facets with
+    the smallest differences are left out from there on: an eighth of them is looked at once more, in the halves'
+    middles, and if these differ, all are. Yields the index, the levels, and the mean square of differences from the
+    viewpoint before.
     """
     refined, start, levels = _Refinement(look, at, squares, limit), 0, look(0, None)
     yield start, levels, 0.0
-    for place in np.unique(np.append(np.arange(STRIDE, len(at), STRIDE), len(at) - 1)).tolist()[len(at) == 1 :]:
+    taken = np.unique(np.concatenate([first, np.arange(STRIDE, len(at), STRIDE), [len(at) - 1]]))
+    for place in taken[taken > 0].tolist():
         end = look(place, None)
         yield from refined.between(start, levels, place, end, _Which(None, None, 0.0), 0.0)
         start, levels = place, end

@@ -29,6 +29,10 @@ from ._levels_along_track import SAMPLING, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
 
+# Widths of a facet, by which shadows move at most between the looks that are taken in any case: none crosses a facet
+# unseen; more where the looks would be at more facets than MUCH
+COARSE, COARSEST, MUCH = 1.0, 16, 3e6
+
 log = logging.getLogger(__name__)
 
 ALL_DARK = (
@@ -262,22 +266,25 @@ def lit(
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     judge = Judge(power * (1.0 if wanted is None else wanted))
     lines, finer = 0, 1.0
+    # from all facets: which of them are wanted must not move the blocks
+    widths = [
+        projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
+    ]  # rad, by which an antenna turns while shadows move by the width of a facet
+    _, coarse, _ = pulse_blocks(ends, bounds, [COARSE * width for width in widths])
+    coarse = coarse[:: int(np.clip(len(coarse) * k / MUCH, 1, COARSEST))]
     while True:
-        # from all facets: which of them are wanted must not move the blocks
-        limits = [
-            finer * tolerance * projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300)
-            for e in ends
-        ]
+        limits = [finer * tolerance * width for width in widths]
         _, offered, turns = pulse_blocks(ends, bounds, limits)
         # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
         # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
         edge_on = 0.0 if rx is None else 2 * EDGE_ON
         slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
+        first = np.unique(np.searchsorted(offered, coarse, side="right") - 1)
         looks = Looks(solver, [end[offered] for end in ends], slack)
         lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
         solver.take_lines(lines)
         judge = Judge(judge.weights)
-        course = look_along(looks, offered, judge, accuracy, max_bytes, progress)
+        course = look_along(looks, offered, first, judge, accuracy, max_bytes, progress)
         viewpoints = offered[course.chosen]
         motion = judge.motion(viewpoints, course.left)
         error = float(np.hypot(judge.sampling, motion))

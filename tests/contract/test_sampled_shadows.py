@@ -92,6 +92,29 @@ def test_facets_edge_on_to_one_of_two_antennas_and_slivers_that_both_see(name, m
     assert error.max() <= 0.9e-3  # at every pulse
 
 
+def plate_behind(screen, n, length):
+    """A rough plate of 1 m, and a screen between it and a line that sends nothing back, m (y from, to, z from, to)."""
+    left, right, low, high = screen
+    corners = np.array([[6, left, low], [6, right, low], [6, right, high], [6, left, high]], float)
+    screen = sarcl.Scene.facets(corners[[[0, 1, 2], [0, 2, 3]]], material=ROUGH, reflectivity=0.0)
+    plate = sarcl.Scene.facets(sarcl.shapes.plate((1, 1)).triangles, material=ROUGH)
+    start, speed = (6e3, -length / 2, 5e3), length * 100 / max(n - 1, 1)
+    return plate + screen, (sarcl.Trajectory.line(start=start, velocity=(0, speed, 0), prf=100, n_pulses=n), None)
+
+
+@pytest.mark.parametrize("n", [9, 33, 129])
+@pytest.mark.parametrize(
+    ("screen", "length"), [((-0.7, 0.7, 0, 12), 4e3), ((0.55, 1.05, 0, 12), 2e4), ((-3.6, -0.2, -0.1, 9), 6e3)]
+)
+def test_one_facet_and_one_screen(screen, length, n, monkeypatch):
+    """Wholly dark half-way; dark between looks far apart; partly lit there alone: errors of up to a half before."""
+    scene, track = plate_behind(screen, n, length)
+    wanted = echo(scene, track, monkeypatch, np.inf, 1e-3)
+    raw = echo(scene, track, monkeypatch, 0, 1e-2)
+    error = np.linalg.norm(raw.samples - wanted.samples) / np.linalg.norm(wanted.samples)
+    assert error <= raw.report.predicted_error + 1e-3
+
+
 def terms_of(report):
     terms = {term.name: term.value for term in report.error_terms}
     assert np.sqrt(sum(value**2 for value in terms.values())) == pytest.approx(report.predicted_error, rel=1e-12)

@@ -366,7 +366,7 @@ def refined(levels, at, limit):
     def squares(found, first, last, part, some):
         return (found[some] - (first[some] + part * (last[some] - first[some].astype(float)))) ** 2 / most
 
-    found = list(refine_viewpoints(look, at, squares, lambda: limit))
+    found = list(refine_viewpoints(look, at, np.zeros(1, int), squares, lambda: limit))
     assert [place for place, *_ in found] == sorted({place for place, *_ in found})
     return found, whole, seen
 

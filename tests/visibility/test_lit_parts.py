@@ -196,3 +196,16 @@ def test_pairs_beyond_the_memory_are_found_anew_with_the_same_bits(every_device)
     assert found[0][0].any()
     for one, other in zip(*found, strict=True):
         np.testing.assert_array_equal(one, other)
+
+
+@pytest.mark.parametrize("sine", [-3e-3, -5e-7, 5e-4, 3e-3])
+@pytest.mark.parametrize("turn", [0.0, 1e-3])
+def test_of_two_antennas_one_that_is_edge_on_or_behind_casts_no_shadow(sine, turn, device):
+    """Whatever pulses share a block: the echo fades there, and what is left of it has the shadows of the other one."""
+    screens = np.array([[[2, -3, -1], [2, 3, -1], [2, 0, 9]], [[0.2, -2, 0.5], [0.2, 2, 0.5], [-2, 0, 0.5]]], float)
+    low, high = np.array([[1e4, 0, 1e4 * sine], [1e4, 1e4 * turn, 1e4 * sine]]), np.array([[0, 0, 1e4], [0, 0, 1e4]])
+    found = shares(device, FACET, screens, [low, high])
+    for pulse, share in enumerate(found[:, 0]):
+        wanted, _ = lit_part(FACET[0], screens, [low[pulse], high[pulse]], WAVES)
+        assert share == pytest.approx(wanted, abs=1e-6)
+    assert (found == 0).all() if sine > 0 else (0.2 < found).all() and (found < 0.8).all()
