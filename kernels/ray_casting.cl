@@ -38,7 +38,7 @@ __kernel void face(face_numbers given, __global const float *restrict facet, __g
 
 typedef struct {
     float eye[3], other[3], shrink;
-    int step, depth;
+    int step, depth, probe;  // probe 1: four probes decide where they agree; they miss narrow shadows
 } hidden_numbers;
 
 __kernel void hidden(hidden_numbers given, __global const float *restrict facet, __global const int *restrict index,
@@ -48,14 +48,24 @@ __kernel void hidden(hidden_numbers given, __global const float *restrict facet,
     size_t i = get_global_id(0);
     __global const float *f = facet + 12 * (size_t)index[i];
     float3 eye = vload3(0, given.eye), other = vload3(0, given.other);
+    int dark = 0, probed = given.probe && !(kind[index[i]] & ALL_SAMPLES);
     word += i * LINES;
     if (is_behind(f, eye, other) || all_hidden(word)) return;
-    // all samples of every facet: probes at its corners and centre do not find narrow shadows, or facets that cross it
-    for (int s = 0; s < LINES * PER_LINE; s += given.step) {
-        int l = s / PER_LINE, bit = s % PER_LINE, some = some_samples(bit, given.step);
-        if ((word[l] & some) == some) continue;
-        float3 p = lifted(f, sample_at(line, l, bit, given.step), eye, other);
-        if (blocked(leaf, node, base, given.depth, p, eye, given.shrink)) word[l] |= some;
+    for (int s = probed ? -PROBES : 0; s < LINES * PER_LINE; s += s < 0 ? 1 : given.step) {
+        if (s == 0 && probed && dark == 0) return;
+        int l = max(s, 0) / PER_LINE, bit = max(s, 0) % PER_LINE, some = some_samples(bit, given.step);
+        if (s == 0 && dark == PROBES) {
+            for (int k = 0; k < LINES; k++) word[k] = -1;
+            return;
+        }
+        if (s >= 0 && (word[l] & some) == some) continue;
+        float2 at = s < 0 ? probe_at(s + PROBES) : sample_at(line, l, bit, given.step);
+        float3 p = lifted(f, at, eye, other);
+        if (!blocked(leaf, node, base, given.depth, p, eye, given.shrink)) continue;
+        if (s < 0)
+            dark++;
+        else
+            word[l] |= some;
     }
 }
 

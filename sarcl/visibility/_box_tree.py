@@ -48,14 +48,18 @@ class BoxTree:
 
     def hide(
         self, facets: DeviceFacets | DevicePoints, index: Any, n: int, lines: SampleLines, viewpoint: np.ndarray,
-        other: np.ndarray, words: Any,
+        other: np.ndarray, words: Any, probe: bool,
     ) -> None:  # fmt: skip
-        """Set the bits of occluded samples: arguments as of `Occluders.hide`."""
+        """Set the bits of occluded samples: arguments as of `Occluders.hide`.
+
+        probe  lines of sight from a facet's corners and centre decide where they agree: no narrow shadows are expected
+        """
         kernel = self.device.kernel("ray_casting.cl", "hidden", LINES=lines.count)
         *eye, shrink = facets.frame.eye(viewpoint)
         numbers = launch_numbers(
             "ray_casting.cl", "hidden", step=max(lines.step, RAY_STEP), eye=eye,
             other=facets.frame.eye(other)[:3], shrink=shrink, depth=self.depth,
+            probe=probe,
         )  # fmt: skip
         buffers = facets.buffer, index, facets.kind, lines.places, self.leaf, self.node, self.base, words
         self.device.run(kernel, (n,), None, numbers, *buffers)

@@ -26,14 +26,14 @@ class Look:
     levels   amplitudes, roots of the shares, uint8 (k,): 255 of a whole facet, 0 where not wanted
     partly   the facets that are partly seen (n,), and `halves`, numbers of their samples that are seen on even and on
              odd lines (n, 2), of `samples` on each of the two
-    by_rays  whether single lines of sight told which are seen, for several samples each, not whole shadows
+    by_rays  (n,) bool: whether single lines of sight told which are seen, for several samples each, not whole shadows
     """
 
     levels: np.ndarray
     partly: np.ndarray
     halves: np.ndarray
     samples: int
-    by_rays: bool = False
+    by_rays: np.ndarray
 
     def spread(self, weights: np.ndarray) -> float:
         """Sum of weights (k,) times the squares of the errors of the levels, as shares are counted in samples.
@@ -43,7 +43,7 @@ class Look:
         are independent, and an eighth were found behind edges of wide shadows.
         """
         even, odd = np.sqrt(self.halves / self.samples).T
-        return float(weights[self.partly] @ ((even - odd) / (1 if self.by_rays else 4)) ** 2)
+        return float(weights[self.partly] @ ((even - odd) / np.where(self.by_rays, 1, 4)) ** 2)
 
 
 class IlluminationSolver:
@@ -99,6 +99,7 @@ class IlluminationSolver:
         some   (k,) bool: facets that some antenna near sees partly; the others are not looked at
         """
         levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
+        by_rays = [np.zeros(0, bool)]
         most = self._more.count * PER_LINE // 2
         for index, hiders in self._chunks(some):
             both = list(range(len(viewpoints)))
@@ -117,9 +118,13 @@ class IlluminationSolver:
             between = (total > 0) & (total < 2 * most)
             partly.append(index[between])
             halves.append(seen[between])
+            rays = any(hider.by_rays(at) for hider in hiders for at in viewpoints)
+            by_rays.append(np.full(len(partly[-1]), rays))
         none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
-        by_rays = any(hider.by_rays(at) for _, hiders in self._parts for hider in hiders for at in viewpoints)
-        return Look(levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most, by_rays)
+        return Look(
+            levels, np.concatenate([none[0], *partly]), np.concatenate([none[1], *halves]), most,
+            np.concatenate(by_rays),
+        )  # fmt: skip
 
     def _chunks(self, some: np.ndarray | None) -> Iterator[tuple[np.ndarray, list[Any]]]:
         """Numbers of the facets to be looked at, of those in `some` (k,) bool alone, with what may hide them."""

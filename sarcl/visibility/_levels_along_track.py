@@ -139,14 +139,13 @@ class Judge:
         return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
 
     def note(self, look: Look, base: Base | None) -> None:
-        """Note the norm of a look, and its sampling error: of facets that were left out as for those looked at last."""
+        """Note the norm of a look, and its sampling error: of facets that were left out as in the last whole look."""
         self._whole.append(float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2)
         partly = float(self.weights[look.partly].sum())
         off = look.spread(self.weights) + ROUNDED * partly
-        if base is None:
-            self._rate = off / partly if partly else 0.0
-        else:
-            self._rate = max(self._rate, off / partly if partly else 0.0)
+        if base is None or not self._rate:
+            self._rate = off / partly if partly else self._rate
+        if base is not None:
             off += self._rate * float(self.weights @ (~base.some & (base.even % 255 != 0)))
         self._sampling.append(off)
 

@@ -45,7 +45,8 @@ class Occluders:
             return
         if self._tree is None:
             self._tree = BoxTree(self.device, self._corners.reshape(-1, 3, 3))
-        self._tree.hide(facets, index, n, lines, viewpoint, other, words)
+        outside = sees_from_outside(self.frame, self._bounds, viewpoint)
+        self._tree.hide(facets, index, n, lines, viewpoint, other, words, outside)
 
     def by_rays(self, viewpoint: np.ndarray) -> bool:
         """Whether rays through a tree tell what a viewpoint, m (3,), sees."""

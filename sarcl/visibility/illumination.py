@@ -31,7 +31,7 @@ from ._lit_shares import pixel_shares as pixel_shares
 
 # Widths of a facet, by which shadows move at most between the looks that are taken in any case: none crosses a facet
 # unseen; more where the looks would be at more facets than MUCH
-COARSE, COARSEST, MUCH = 1.0, 16, 3e6
+COARSE, COARSEST, MUCH = 1.0, 32, 3e6
 
 log = logging.getLogger(__name__)
 
