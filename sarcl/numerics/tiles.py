@@ -63,12 +63,12 @@ def tile_points(
     packed = np.empty((6, len(order)), np.float32)
     step = max(BLOCK // per_tile, 1)
     for first in range(0, n_tiles, step):  # so few at a time stay in the processor's cache
-        some = slice(first, min(first + step, n_tiles))
-        points = slice(some.start * per_tile, some.stop * per_tile)
+        block = slice(first, min(first + step, n_tiles))
+        points = slice(block.start * per_tile, block.stop * per_tile)
         # coordinate by coordinate: reductions along an axis of three, or across one, are slow
         local = (positions[order[points]].T - center[:, None]).reshape(3, -1, per_tile)
         middle = (local.min(axis=2) + local.max(axis=2)) / 2
         local -= middle[:, :, None]
-        references[some], radius[some] = middle.T, np.sqrt((local**2).sum(axis=0).max(axis=1))
+        references[block], radius[block] = middle.T, np.sqrt((local**2).sum(axis=0).max(axis=1))
         packed[:, points] = float_pairs.wide(local.reshape(3, -1)).reshape(6, -1)
     return Tiles(per_tile, references, radius, packed, shared=False), order

@@ -249,23 +249,23 @@ class FacetSet:
         out = np.empty((n, len(order)), np.float32)
         rough = roughness_planes(self.materials) if self.is_rough else np.zeros((4, 0))
         for first in range(0, len(order), BLOCK):  # so few at a time stay in the processor's cache
-            some = order[first : first + BLOCK]
+            block = order[first : first + BLOCK]
             rows = iter(out[:, first : first + BLOCK])
 
             def put(*values: np.ndarray, rows: Iterator[np.ndarray] = rows) -> None:
                 for value in values:
                     next(rows)[:] = value
 
-            corners = _from_widest_angle(self.triangles[some])
+            corners = _from_widest_angle(self.triangles[block])
             for i in (1, 2):
                 put(*(corners[:, i] - corners[:, 0]).T)
-            put(np.where(self.two_sided[some], -self.reflectivity[some], self.reflectivity[some]))
-            material = self.material[some]
+            put(np.where(self.two_sided[block], -self.reflectivity[block], self.reflectivity[block]))
+            material = self.material[block]
             if self.is_rough:
                 height, *diagram = rough[:, material]
                 if self.incoherent is not None:
-                    height = np.where(self.incoherent[some], -height, height)  # the sign tells the kernels
-                put(height, *diagram, self.random[some].real, self.random[some].imag)
+                    height = np.where(self.incoherent[block], -height, height)  # the sign tells the kernels
+                put(height, *diagram, self.random[block].real, self.random[block].imag)
             for root in roots:
                 put(root[material].real, root[material].imag)
         out[:6, len(self) :] = 0

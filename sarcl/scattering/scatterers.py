@@ -89,7 +89,7 @@ def facets_of(
     progress("scene", 2, 3)
     illumination, lit_parts = None, None
 
-    def of_shadows(done: int, total: int) -> None:
+    def report_shadows(done: int, total: int) -> None:
         progress("shadows", done, total)
 
     clipped = np.zeros(len(keep), bool)
@@ -108,7 +108,7 @@ def facets_of(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
             two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
             accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
-            occluders=solid, ground=ground, device=device, progress=of_shadows,
+            occluders=solid, ground=ground, device=device, progress=report_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
@@ -116,7 +116,7 @@ def facets_of(
         lit_parts = LitParts(
             device, scene.triangles, original.triangles, antennas.ends,
             two_sided=scene.two_sided, wanted=keep & clipped, max_bytes=max_bytes, margin=margin,
-            given=original.triangles, of=pieces.of, progress=of_shadows,
+            given=original.triangles, of=pieces.of, progress=report_shadows,
         )  # fmt: skip
         left_out["shadowed"] += int((keep & lit_parts.dark).sum()) * n_pulses
         if keep.any() and not (keep & ~lit_parts.dark).any():
@@ -125,12 +125,12 @@ def facets_of(
     progress("scene", 3, 3)
     if not keep.any():
         return None, left_out
-    some = slice(None) if keep.all() else keep  # no copies where all are kept
+    kept = slice(None) if keep.all() else keep  # no copies where all are kept
     return FacetSet(
-        triangles[some], scene.reflectivity[some], scene.two_sided[some], scene.material[some], scene.materials,
-        illumination, np.flatnonzero(keep), pieces.random[some], lit_parts,
-        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[some],
-        by_samples[some], pieces.incoherent[some] if pieces.incoherent.any() else None,
+        triangles[kept], scene.reflectivity[kept], scene.two_sided[kept], scene.material[kept], scene.materials,
+        illumination, np.flatnonzero(keep), pieces.random[kept], lit_parts,
+        None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
+        by_samples[kept], pieces.incoherent[kept] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
 
 

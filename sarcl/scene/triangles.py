@@ -68,17 +68,17 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
         raise MemoryError(too_many)
     parts, rows, n = [triangles[:0]], [np.zeros(0, np.int64)], 0
     for first in range(0, len(triangles), BLOCK):  # so few at a time stay in the processor's cache
-        some = triangles[first : first + BLOCK]
-        row = np.arange(first, first + len(some))
-        while len(some):
-            lengths = edges(some)
+        block = triangles[first : first + BLOCK]
+        row = np.arange(first, first + len(block))
+        while len(block):
+            lengths = edges(block)
             long = np.maximum.reduce(lengths) > max_edge
-            parts.append(some[~long])
+            parts.append(block[~long])
             rows.append(row[~long])
             n += len(parts[-1])
             if n + 2 * long.sum() > max_facets:
                 raise MemoryError(too_many)
-            some = np.concatenate(bisect(some[long], lengths[:, long]))
+            block = np.concatenate(bisect(block[long], lengths[:, long]))
             row = np.tile(row[long], 2)
     return np.concatenate(parts), np.concatenate(rows)
 

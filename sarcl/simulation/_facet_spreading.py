@@ -176,18 +176,18 @@ class FacetSpreader:
 
     def _pulse_blocks(self, first: int, end: int) -> Iterator[PulseLevels]:
         """Blocks of pulses that keep to the budget, and their levels."""
-        made: PulseLevels | None = None
+        block: PulseLevels | None = None
         for span in self.facets.spans(len(self.antennas)):
             at, stop = max(span.first, first), min(span.stop, end)
             while at < stop:
-                if made is None:
-                    made = PulseLevels(at)
-                at = made.extend(span, min(stop, made.start + self.at_once))
-                if made.stop - made.start == self.at_once or len(made.levels) >= self.levels_at_once:
-                    yield made
-                    made = None
-        if made is not None:
-            yield made
+                if block is None:
+                    block = PulseLevels(at)
+                at = block.extend(span, min(stop, block.start + self.at_once))
+                if block.stop - block.start == self.at_once or len(block.levels) >= self.levels_at_once:
+                    yield block
+                    block = None
+        if block is not None:
+            yield block
 
     def _profiles(self, levels: PulseLevels) -> tuple[Any, np.ndarray]:
         """Range profiles of a block of pulses on the device, as `SpreadSamples.of` takes them, and counts of pairs

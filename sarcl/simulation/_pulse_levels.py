@@ -13,7 +13,7 @@ from ..visibility.illumination import Span
 class PulseLevels:
     """Consecutive pulses from `start` to `stop` - 1, and levels of facets, uint8 (k,), at some moments among them.
 
-    moments  int32 (n, 2), of each pulse, the two around it;  between  float32 (n,), where it lies: 0 at the first
+    A moment is the number of an array in `levels`.
     """
 
     start: int
@@ -28,10 +28,12 @@ class PulseLevels:
 
     @property
     def moments(self) -> np.ndarray:
+        """The moments around each pulse, int32 (n, 2)."""
         return np.concatenate(self._moments)
 
     @property
     def between(self) -> np.ndarray:
+        """Where each pulse lies between its two moments, float32 (n,)."""
         return np.concatenate(self._between)
 
     def extend(self, span: Span, stop: int) -> int:

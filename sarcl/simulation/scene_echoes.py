@@ -39,7 +39,7 @@ UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
 SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
-SMALLER = "a smaller tolerance"  # makes an error term smaller
+SMALLER_TOLERANCE = "a smaller tolerance"  # makes an error term smaller
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 Progress = Callable[[str, int, int], None]
 
@@ -198,7 +198,9 @@ class SceneEchoes:
             nodes = chebyshev(waveform.center, waveform.bandwidth, self.n_nodes)
             band = Band(len(frequencies), waveform.bandwidth, float(antennas.frequency.mean()))
             plan, error = self._plan_points(self.tiled_points, antennas, band)
-            parts.append((ErrorTerm("points", plan.predicted_error + error, SMALLER), plan.describe("spread")))
+            parts.append(
+                (ErrorTerm("points", plan.predicted_error + error, SMALLER_TOLERANCE), plan.describe("spread"))
+            )
         if self.facets is not None and self.subdivision is not None and self.subdivision.plan.is_float64:
             facets = self.facets if stop - first == self.n_pulses else self.facets.between(first, stop)
             exact = ExactFacets(
@@ -206,7 +208,7 @@ class SceneEchoes:
                 request.vertical, weights,
             )  # fmt: skip
             words = exact.describe() | self.mesh_warnings | self.shadow_words
-            parts.append((ErrorTerm("facets", self.gain * exact.predicted_error, SMALLER), words))
+            parts.append((ErrorTerm("facets", self.gain * exact.predicted_error, SMALLER_TOLERANCE), words))
             spreaders.append(exact)
         spread = []
         for tiled in self.tiled_facets:
@@ -220,7 +222,7 @@ class SceneEchoes:
             spread.append((self.gain * spreader.predicted_error, words))
             spreaders.append(spreader)
         if spread:  # relative to the norm of the facets that each adds: not more of all of them
-            parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER), spread[0][1]))
+            parts.append((ErrorTerm("facets", max(error for error, _ in spread), SMALLER_TOLERANCE), spread[0][1]))
         chosen = max(parts, key=lambda part: part[0].value)[1] if parts else {}
         model = {"model": "stop and go, single scattering"} if parts else {}
         return ChannelEchoes(

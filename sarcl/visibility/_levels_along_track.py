@@ -9,7 +9,7 @@ import numpy as np
 
 from ._facet_samples import FEWEST_LINES
 from ._illumination_solver import IlluminationSolver, Look
-from ._viewpoints import Base, between_levels, refine_viewpoints
+from ._viewpoints import PartialLook, between_levels, refine_viewpoints
 
 SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside that of looks at some pulses alone
 # Of the square of the accuracy: what both errors may take while those of samples are not known of all pulses, and the
@@ -49,9 +49,9 @@ def look_along(
         looks, [], [], [], np.zeros(k, np.uint8), [], np.zeros(k, bool), np.ones(k, bool), np.zeros(k, bool)
     )
 
-    def look(place: int, base: Base | None) -> np.ndarray:
-        seen = looks.at(place, base)
-        judge.note(seen, base)
+    def look(place: int, partial: PartialLook | None) -> np.ndarray:
+        seen = looks.at(place, partial)
+        judge.note(seen, partial)
         return seen.levels
 
     def limit() -> float:
@@ -81,28 +81,28 @@ class Looks:
 
     def __init__(self, solver: IlluminationSolver, ends: list[np.ndarray], slack: np.ndarray) -> None:
         self.solver, self.ends, self.slack = solver, ends, slack
-        self._bases: dict[int, tuple[int, int, float, np.ndarray]] = {}
+        self._partial_looks: dict[int, tuple[int, int, float, np.ndarray]] = {}
         self._recent: dict[int, np.ndarray] = {}
 
     def whole(self, place: int, some: np.ndarray | None = None) -> Look:
         """A look at facets `some` (k,) bool; None: at all."""
         return self.solver.look([end[place] for end in self.ends], float(self.slack[place]), some)
 
-    def at(self, place: int, base: Base | None) -> Look:
-        """A look; at some facets alone where it has a base."""
-        if base is None:
-            self._bases.pop(place, None)
+    def at(self, place: int, partial: PartialLook | None) -> Look:
+        """A look; at some facets alone where it has a partial."""
+        if partial is None:
+            self._partial_looks.pop(place, None)
             return self.whole(place)
-        self._bases[place] = base.before, base.after, base.part, np.packbits(base.some)
-        seen = self.whole(place, base.some)
-        return replace(seen, levels=np.where(base.some, seen.levels, base.even))
+        self._partial_looks[place] = partial.before, partial.after, partial.part, np.packbits(partial.facets)
+        seen = self.whole(place, partial.facets)
+        return replace(seen, levels=np.where(partial.facets, seen.levels, partial.interpolated))
 
     def again(self, place: int) -> np.ndarray:
         """The levels of a look that was taken."""
         if place in self._recent:
             return self._recent[place]
-        if place in self._bases:
-            before, after, part, packed = self._bases[place]
+        if place in self._partial_looks:
+            before, after, part, packed = self._partial_looks[place]
             some = np.unpackbits(packed, count=self.solver.facets.size).astype(bool)
             even = between_levels(self.again(before), self.again(after), part)
             levels = np.where(some, self.whole(place, some).levels, even)
@@ -138,15 +138,15 @@ class Judge:
         error = self.sampling
         return FEWEST_LINES * 2 ** int(np.clip(np.ceil(np.log2(max(error / limit, 1e-9))), 0, 8))
 
-    def note(self, look: Look, base: Base | None) -> None:
+    def note(self, look: Look, partial: PartialLook | None) -> None:
         """Note the norm of a look, and its sampling error: of facets that were left out as in the last whole look."""
         self._whole.append(float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2)
         partly = float(self.weights[look.partly].sum())
         off = look.spread(self.weights) + ROUNDED * partly
-        if base is None or not self._rate:
+        if partial is None or not self._rate:
             self._rate = off / partly if partly else self._rate
-        if base is not None:
-            off += self._rate * float(self.weights @ (~base.some & (base.even % 255 != 0)))
+        if partial is not None:
+            off += self._rate * float(self.weights @ (~partial.facets & (partial.interpolated % 255 != 0)))
         self._sampling.append(off)
 
     def squares(

@@ -19,28 +19,28 @@ DRAWN, FEW = 8, 2**13  # one in so many facets is looked at to learn whether the
 
 
 @dataclass(frozen=True, eq=False)
-class Base:
-    """A look at some facets, (k,) bool. Levels of the others, `even`, uint8 (k,), lie at `part`, 0 to 1, between
-    those of the viewpoints `before` and `after`."""
+class PartialLook:
+    """A look at some `facets`, (k,) bool. Levels of the others, `interpolated`, uint8 (k,), lie at `part`, 0 to 1,
+    between those of the viewpoints `before` and `after`."""
 
     before: int
     after: int
     part: float
-    some: np.ndarray
-    even: np.ndarray
+    facets: np.ndarray
+    interpolated: np.ndarray
 
 
-Look = Callable[[int, Base | None], np.ndarray]
-Squares = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
+LevelsAt = Callable[[int, PartialLook | None], np.ndarray]
+SquaredDifferences = Callable[[np.ndarray, np.ndarray, np.ndarray, float, np.ndarray], np.ndarray]
 
 
 def refine_viewpoints(
-    look: Look, at: np.ndarray, first: np.ndarray, squares: Squares, limit: Callable[[], float]
+    look: LevelsAt, at: np.ndarray, first: np.ndarray, squares: SquaredDifferences, limit: Callable[[], float]
 ) -> Iterator[tuple[int, np.ndarray, float]]:
     """Viewpoints between which levels change linearly, as increasing indices into `at`, pulses (n,).
 
     first        indices of viewpoints that are taken in any case
-    look(index, base)  the levels, uint8 (k,), at a viewpoint; of some facets alone where there is a base
+    look(index, partial)  the levels, uint8 (k,), at a viewpoint; of some facets alone where it is a partial look
     squares(found, first, last, part, some)  of differences of the levels of facets `some` (n,) from what lies at `part`
                  between those of two viewpoints around it (n,)
     limit()      mean square of differences that is left, on the average of all pulses
@@ -56,12 +56,12 @@ def refine_viewpoints(
     taken = np.unique(np.concatenate([first, np.arange(STRIDE, len(at), STRIDE), [len(at) - 1]]))
     for place in taken[taken > 0].tolist():
         end = look(place, None)
-        yield from refined.between(start, levels, place, end, _Which(None, None, 0.0), 0.0)
+        yield from refined.between(start, levels, place, end, _Selection(None, None, 0.0), 0.0)
         start, levels = place, end
 
 
 @dataclass(frozen=True, eq=False)
-class _Which:
+class _Selection:
     """Facets (k,) bool to be looked at, and those of which an eighth is; None: all, none.
 
     settled  mean square of the differences of those that were left out before
@@ -76,14 +76,14 @@ class _Which:
 class _Refinement:
     """`saved` is what was left below the limit so far, times pulses: later intervals may exceed the limit by it."""
 
-    look: Look
+    look: LevelsAt
     at: np.ndarray
-    squares: Squares
+    squares: SquaredDifferences
     limit: Callable[[], float]
     saved: float = 0.0
 
     def between(
-        self, a: int, first: np.ndarray, b: int, last: np.ndarray, which: _Which, left: float
+        self, a: int, first: np.ndarray, b: int, last: np.ndarray, which: _Selection, left: float
     ) -> Iterator[tuple[int, np.ndarray, float]]:
         """Viewpoints after a, up to b, with levels `first` and `last`, between which `left` is left."""
         at = self.at
@@ -105,21 +105,21 @@ class _Refinement:
             yield middle, halfway, left
             yield b, last, left
             return
-        below = _Which(moves | (halfway % 255 != 0), ~moves & (halfway % 255 == 0), 0.0)
+        below = _Selection(moves | (halfway % 255 != 0), ~moves & (halfway % 255 == 0), 0.0)
         if which.kept is not None:
-            below = self._smaller(which.kept, which.settled, some, off)
+            below = self._without_smallest(which.kept, which.settled, some, off)
         yield from self.between(a, first, middle, halfway, below, left)
         yield from self.between(middle, halfway, b, last, below, left)
 
     def _halfway(
-        self, a: int, first: np.ndarray, b: int, last: np.ndarray, middle: int, part: float, which: _Which
-    ) -> tuple[np.ndarray, _Which]:
+        self, a: int, first: np.ndarray, b: int, last: np.ndarray, middle: int, part: float, which: _Selection
+    ) -> tuple[np.ndarray, _Selection]:
         """The levels in the middle, and the facets that were looked at for them."""
         if which.kept is None or which.doubtful is None:
             return self.look(middle, None), which
         even = between_levels(first, last, part)
         drawn = _some_of(which.doubtful)
-        found = self.look(middle, Base(a, b, part, which.kept | drawn, even))
+        found = self.look(middle, PartialLook(a, b, part, which.kept | drawn, even))
         some = np.flatnonzero(drawn)
         off = self.squares(found, first, last, part, some)
         times = float(np.count_nonzero(which.doubtful)) / max(len(some), 1)
@@ -127,19 +127,19 @@ class _Refinement:
         if settled <= LEFT_OUT * self.limit():
             kept = which.kept.copy()
             kept[some[off > 0]] = True
-            return found, _Which(kept, None, settled)
+            return found, _Selection(kept, None, settled)
         kept = which.kept | which.doubtful
         everything = bool(kept.all())
-        found = self.look(middle, None if everything else Base(a, b, part, kept, even))
-        return found, _Which(None if everything else kept, None, which.settled)
+        found = self.look(middle, None if everything else PartialLook(a, b, part, kept, even))
+        return found, _Selection(None if everything else kept, None, which.settled)
 
-    def _smaller(self, of: np.ndarray, settled: float, some: np.ndarray, off: np.ndarray) -> _Which:
+    def _without_smallest(self, of: np.ndarray, settled: float, some: np.ndarray, off: np.ndarray) -> _Selection:
         """Of facets (k,) bool without those whose differences are the smallest: `off` of facets `some`, 0 of others."""
         room = (LEFT_OUT * self.limit() - settled) / 2
         order = np.argsort(off)
         kept = np.zeros(len(of), bool)
         kept[some[order[np.searchsorted(np.cumsum(off[order]), room, side="right") :]]] = True
-        return _Which(kept, of & ~kept, settled)
+        return _Selection(kept, of & ~kept, settled)
 
 
 def between_levels(first: np.ndarray, last: np.ndarray, part: float) -> np.ndarray:

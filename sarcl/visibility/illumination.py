@@ -29,8 +29,8 @@ from ._levels_along_track import SAMPLING, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
 
-# Widths of a facet, by which shadows move at most between the looks that are taken in any case: none crosses a facet
-# unseen; more where the looks would be at more facets than MUCH
+# Looks that are taken in any case: shadows move by two COARSE widths of a facet at most from one to the next, so that
+# none crosses a facet unseen. Up to COARSEST times fewer where they were more looks at a facet than MUCH
 COARSE, COARSEST, MUCH = 1.0, 32, 3e6
 
 log = logging.getLogger(__name__)

@@ -349,14 +349,14 @@ def refined(levels, at, limit):
     shares of facets that the others were looked at for."""
     whole, seen, made, most = [], [0.0], {}, 255.0**2 * levels.shape[1]
 
-    def look(place, base):
-        if base is None:
+    def look(place, partial):
+        if partial is None:
             whole.append(place)
             made.pop(place, None)
             return levels[place]
-        seen.append(base.some.mean())
-        assert (np.abs(base.even - between_two(base.before, base.after, place)) <= 0.5).all()
-        made[place] = np.where(base.some, levels[place], base.even)
+        seen.append(partial.facets.mean())
+        assert (np.abs(partial.interpolated - between_two(partial.before, partial.after, place)) <= 0.5).all()
+        made[place] = np.where(partial.facets, levels[place], partial.interpolated)
         return made[place]
 
     def between_two(a, b, place):

@@ -20,7 +20,7 @@ from ...base.vectors import unit
 from ...numerics import cost_model
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import SMALLER, SceneEchoes, band_of
+from ..scene_echoes import SMALLER_TOLERANCE, SceneEchoes, band_of
 from ..spreading import Band
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples
@@ -183,7 +183,7 @@ class InterpolatedChannels:
         at_positions = root_sum_square(grown)
         both = self.error + at_positions  # these two add up themselves, not their squares
         remaining = float(np.sqrt(both**2 - at_positions**2))
-        more = ErrorTerm("interpolation between channels", remaining, SMALLER)
+        more = ErrorTerm("interpolation between channels", remaining, SMALLER_TOLERANCE)
         return replace(added, error_terms=(*grown, more))
 
     def _rx_lengths(self, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -23,7 +23,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import SMALLER, ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
+from ..scene_echoes import SMALLER_TOLERANCE, ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
@@ -97,14 +97,14 @@ class SpectralTask:
             )  # fmt: skip
             parts.append(made)
             name = "facets" if isinstance(part, FacetSet) else "points"
-            terms.append(ErrorTerm(name, gain * (made.predicted_error + fixed + straight), SMALLER))
+            terms.append(ErrorTerm(name, gain * (made.predicted_error + fixed + straight), SMALLER_TOLERANCE))
         if self.window_asked and request.gated:
             for one in parts:
                 _check_window(one, self.line, self.antennas.reference_range, self.window)
         channel = None
         if direct is not None:
             channel = direct.channel(self.antennas, waveform, self.frequencies)
-            terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER))
+            terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER_TOLERANCE))
         request.clock.lap("plan")
         return prepared, parts, channel, tuple(terms)
 
