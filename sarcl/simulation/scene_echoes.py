@@ -12,7 +12,7 @@ import numpy as np
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
-from ..base.tolerances import reachable
+from ..base.tolerances import askable, reachable, rounded_up
 from ..model.waveform import Waveform
 from ..numerics.plan import LEAST_TOLERANCE, PROFILES, Plan
 from ..numerics.polynomials import chebyshev, lagrange
@@ -418,7 +418,7 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
     share, light = SHADOWS / parts_of(scene), facets.illumination
     if light.error > share * request.tolerance:
         raise ToleranceUnreachable(
-            request.tolerance, 1.05 * light.reached / share,
+            request.tolerance, askable(rounded_up(1.05 * light.reached / share)),
             "shadow edges on rough facets, counted in samples at single pulses",
         )  # fmt: skip
     remedy = "a smaller tolerance: it asks for "

@@ -160,6 +160,7 @@ def test_a_tolerance_that_samples_cannot_meet_is_refused_with_the_best(monkeypat
     with pytest.raises(sarcl.ToleranceUnreachable, match="shadow edges on rough facets") as refused:
         echo(scene, track, monkeypatch, 0, 3e-5, max_edge=1.0)
     best = refused.value.best
+    assert best == float(f"{best:.1e}")  # two digits: it can be typed as it is printed
     assert echo(scene, track, monkeypatch, 0, best, max_edge=1.0).report.predicted_error <= best
 
 
