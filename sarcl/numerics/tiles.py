@@ -38,6 +38,16 @@ class Tiles:
         high, low = self.offsets.astype(np.float64).reshape(2, 3, -1, self.per_tile)
         return np.asarray(self.references[:, None] + np.moveaxis(high + low, 0, -1))
 
+    def radius_in_parts(self, n: int) -> float:
+        """Largest radius, m, of tiles of n points, of which each tile here would make several."""
+        most = 0.0
+        step = max(BLOCK // n, 1) * n
+        for first in range(0, self.offsets.shape[1], step):
+            local = self.offsets[:3, first : first + step].reshape(3, -1, n)
+            from_middle = local - ((local.min(axis=2) + local.max(axis=2)) / 2)[:, :, None]
+            most = max(most, float(np.einsum("ijk,ijk->jk", from_middle, from_middle).max()))
+        return float(np.sqrt(most)) * (1 + 1e-5)  # above what float32 rounds off
+
     def picked(self, tiles: np.ndarray) -> Tiles:
         """These tiles only."""
         return Tiles(self.per_tile, self.references[tiles], self.radius[tiles], self.tile_offsets(tiles), self.shared)

@@ -14,7 +14,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ..base import counter_rng
+from ..base import counter_rng, validation
 from ..base.constants import SPEED_OF_LIGHT
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
@@ -65,7 +65,8 @@ def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
     some = cells.roughness > 0
     height[some] = counter_rng.gaussian(places[some], seed) * cells.roughness[some]
     # from the cells' own positions: order and neighbours have no influence
-    parts = [counter_rng.gaussian(places[rough], seed, stream) for stream in RANDOM_STREAMS]
+    where = places if rough.all() else places[rough]
+    parts = [counter_rng.gaussian(where, seed, stream) for stream in RANDOM_STREAMS]
     random[rough] = (parts[0] + 1j * parts[1]) / np.sqrt(2)
     mirror = facet_kinds.coherent(cells)
     triangles, of = _cut(cells.triangles, np.where(mirror, edge, np.inf))
@@ -85,8 +86,8 @@ def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.nda
 
     In the given order where none is cut.
     """
-    rows = np.arange(len(triangles))
-    long = np.maximum.reduce(edges(triangles)) > longest if len(triangles) else np.zeros(0, bool)
+    rows, long = np.arange(len(triangles)), np.isfinite(longest)
+    long[long] = np.maximum.reduce(edges(triangles[long])) > longest[long]
     if not long.any():
         return triangles, rows
     if long.all() and np.ptp(longest) == 0:
@@ -103,11 +104,12 @@ def _with_facets(scene: Scene, triangles: np.ndarray, of: np.ndarray) -> Scene:
     """The scene without points, its facets replaced by parts of them, m (n, 3, 3); `of`: which each belongs to (n,)."""
     if triangles is scene.triangles and not len(scene.positions):
         return scene
-    kept = {name: getattr(scene, name)[of] for name in ("reflectivity", "roughness", "two_sided", "material")}
+    names = "reflectivity", "roughness", "two_sided", "material"
+    kept = {name: validation.sealed(getattr(scene, name)[of]) for name in names}
     return Scene(
         np.zeros((0, 3)),
         np.zeros(0, np.complex128),
-        triangles,
+        validation.sealed(triangles),  # so that no copy is made
         materials=scene.materials,
         heights=scene.heights,
         **kept,

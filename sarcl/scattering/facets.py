@@ -10,7 +10,7 @@ import numpy as np
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
-from ..scene.triangles import BLOCK, centroids, edges, normals
+from ..scene.triangles import BLOCK, centroids, normals, shortest_edges
 from ..visibility.illumination import Illumination, Span, shares_of
 from ..visibility.lit_parts import LitParts
 
@@ -256,9 +256,9 @@ class FacetSet:
                 for value in values:
                     next(rows)[:] = value
 
-            corners = _from_widest_angle(self.triangles[block])
-            for i in (1, 2):
-                put(*(corners[:, i] - corners[:, 0]).T)
+            # normals of needles: float32 resolves them if one of the two edges is the short one
+            for edge in shortest_edges(self.triangles[block]):
+                put(*edge)
             put(np.where(self.two_sided[block], -self.reflectivity[block], self.reflectivity[block]))
             material = self.material[block]
             if self.is_rough:
@@ -287,12 +287,3 @@ def vertical_axes(up: np.ndarray) -> np.ndarray:
     """`up`, and the direction that replaces it for lines of sight along it (6,)."""
     other = (0.0, 1.0, 0.0) if abs(up[1]) < 0.9 else (1.0, 0.0, 0.0)
     return np.array([*up, *other], np.float32)
-
-
-def _from_widest_angle(triangles: np.ndarray) -> np.ndarray:
-    """Triangles, m (k, 3, 3), from the corner opposite the longest edge on: needles have normals that float32 resolves
-    if one of the two edges is the short one."""
-    first = 3 * np.arange(len(triangles))
-    start = edges(triangles).argmax(axis=0) + 2  # edge i joins corners i and i + 1
-    corners = triangles.reshape(-1, 3)
-    return np.stack([corners[first + (start + i) % 3] for i in range(3)], axis=1)

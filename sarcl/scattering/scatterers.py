@@ -95,14 +95,14 @@ def facets_of(
     clipped = np.zeros(len(keep), bool)
     if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
         clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
-    by_samples = keep & ~clipped
+    by_samples = keep & ~clipped & shadows
     solid = original.triangles
     ground: tuple[np.ndarray, np.ndarray] | None = None
-    if terrain:  # by its facets, where it may hide anything
+    if terrain and by_samples.any():  # by its facets, where it may hide anything
         on_pieces = terrain["on_heights"][pieces.of]
         floor, solid = solid[terrain["on_heights"]], solid[~terrain["on_heights"]]
         ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
-    if shadows and by_samples.any():
+    if by_samples.any():
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,

@@ -5,6 +5,7 @@ from __future__ import annotations
 import logging
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Literal, cast
 
@@ -313,11 +314,11 @@ class Scene:
         """Whether point_roughness is not yet realized."""
         return any(self.point_roughness.strides) and bool(self.point_roughness.any())
 
-    @property
+    @cached_property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of the box that holds all points and facets, m (2, 3)."""
-        corners = np.concatenate([self.positions, self.triangles.reshape(-1, 3)])
-        return box(corners)
+        parts = [box(part) for part in (self.positions, self.triangles.reshape(-1, 3)) if len(part)]
+        return validation.sealed(box(np.concatenate(parts)))
 
     @property
     def center(self) -> NDArray[np.float64]:

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from typing import Any
 
 import numpy as np
@@ -10,20 +11,25 @@ from ..base import validation
 from ..base.vectors import dot
 
 MOST_TURN = 1e12  # rad, of a rotation: float64 resolves 1e-4 rad there
-BLOCK = 2**15  # triangles that are cut together
+BLOCK = 2**13  # triangles that are cut together
 FARTHEST = 1e70  # m, of corners: the square of an area stays finite
 
 
 def edges(triangles: np.ndarray) -> np.ndarray:
     """Lengths of the edges of triangles (k, 3, 3), corner i to i + 1: (3, k)."""
-    d = (triangles[:, (i + 1) % 3] - triangles[:, i] for i in range(3))
-    return np.stack([np.sqrt(dot(e, e)) for e in d])
+    out = np.empty((3, len(triangles)))
+    for block, (a, b, c) in _blocks(triangles):
+        for i, (start, end) in enumerate(((a, b), (b, c), (c, a))):
+            out[i, block] = _length(end - start)
+    return out
 
 
 def areas(triangles: np.ndarray) -> np.ndarray:
     """Area of each triangle (k, 3, 3), m^2 (k,)."""
-    n = _cross(triangles)
-    return np.sqrt(dot(n, n)) / 2
+    out = np.empty(len(triangles))
+    for block, corners in _blocks(triangles):
+        out[block] = _length(_cross(*corners))
+    return out / 2
 
 
 def centroids(triangles: np.ndarray) -> np.ndarray:
@@ -33,8 +39,11 @@ def centroids(triangles: np.ndarray) -> np.ndarray:
 
 def normals(triangles: np.ndarray) -> np.ndarray:
     """Outward unit normal of each triangle (k, 3, 3): (k, 3)."""
-    n = _cross(triangles)
-    return n / np.sqrt(dot(n, n))[:, None]
+    out = np.empty((len(triangles), 3))
+    for block, corners in _blocks(triangles):
+        n = _cross(*corners)
+        out[block] = (n / _length(n)).T
+    return out
 
 
 def solid(triangles: np.ndarray) -> np.ndarray:
@@ -67,42 +76,61 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
     if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
         raise MemoryError(too_many)
     parts, rows, n = [triangles[:0]], [np.zeros(0, np.int64)], 0
-    for first in range(0, len(triangles), BLOCK):  # so few at a time stay in the processor's cache
-        block = triangles[first : first + BLOCK]
-        row = np.arange(first, first + len(block))
-        while len(block):
-            lengths = edges(block)
-            long = np.maximum.reduce(lengths) > max_edge
-            parts.append(block[~long])
-            rows.append(row[~long])
-            n += len(parts[-1])
-            if n + 2 * long.sum() > max_facets:
+    for block, corners in _blocks(triangles):
+        row, lengths = np.arange(block.start, block.stop), edges(triangles[block])
+        while len(row):
+            is_long = np.maximum.reduce(lengths) > max_edge
+            long, short = np.flatnonzero(is_long), np.flatnonzero(~is_long)
+            parts.append(np.ascontiguousarray(corners.take(short, axis=2).transpose(2, 0, 1)))
+            rows.append(row[short])
+            n += len(short)
+            if n + 2 * len(long) > max_facets:
                 raise MemoryError(too_many)
-            block = np.concatenate(bisect(block[long], lengths[:, long]))
+            corners, lengths = _halves(corners.take(long, axis=2), lengths.take(long, axis=1))
             row = np.tile(row[long], 2)
     return np.concatenate(parts), np.concatenate(rows)
 
 
 def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
-    """Both halves of every triangle, cut at the middle of its longest edge.
+    """Both halves of every triangle (k, 3, 3), cut at the middle of its longest edge; lengths  (3, k) of the edges.
 
     The cut of an edge depends on its ends alone, so triangles that share it stay joined.
     """
+    halves = _halves(triangles.transpose(1, 2, 0), lengths)[0].transpose(2, 0, 1)
+    return halves[: len(triangles)], halves[len(triangles) :]
+
+
+def _halves(corners: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
+    """One half of every triangle, then the other: corners, m (3, 3, 2 n), of (3, 3, n), and lengths (3, 2 n)."""
     start = lengths.argmax(axis=0)
-    first = 3 * np.arange(len(start))
-    corners = triangles.reshape(-1, 3)
-    a, b, c = (corners[first + (start + i) % 3] for i in range(3))
-    one, two = np.empty_like(triangles), np.empty_like(triangles)
-    middle = (a + b) / 2
-    for half, places in ((one, (a, middle, c)), (two, (middle, b, c))):
-        for i, place in enumerate(places):
-            half[:, i] = place
-    return one, two
+    (a, b, c), (longest, b_to_c, c_to_a) = _from(start, corners), _from(start, lengths)
+    middle, half = (a + b) / 2, longest / 2
+    cut_to_c = _length(c - middle)
+    one, two = np.stack([a, middle, c]), np.stack([middle, b, c])
+    return (
+        np.concatenate([one, two], axis=-1),
+        np.concatenate([np.stack([half, cut_to_c, c_to_a]), np.stack([half, b_to_c, cut_to_c])], axis=-1),
+    )
+
+
+def _from(start: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, ...]:
+    """The three corners (3, 3, n), or edges (3, n), of triangles from number `start` of each on (n,)."""
+    first, second = start == 0, start == 1
+    return tuple(np.where(first, of[i], np.where(second, of[(i + 1) % 3], of[(i + 2) % 3])) for i in range(3))
+
+
+def shortest_edges(triangles: np.ndarray) -> np.ndarray:
+    """The edges of triangles (k, 3, 3) that begin at the corner opposite the longest, in their order, m (2, 3, k)."""
+    out = np.empty((2, 3, len(triangles)))
+    for block, corners in _blocks(triangles):
+        a, b, c = _from(edges(triangles[block]).argmax(axis=0), corners)
+        out[:, :, block] = a - c, b - c
+    return out
 
 
 def distances(triangles: np.ndarray, point: np.ndarray) -> np.ndarray:
     """Distance of each triangle (k, 3, 3) from a point (3,), m (k,)."""
-    ahead, normal = triangles - point, _cross(triangles)
+    ahead, normal = triangles - point, np.cross(triangles[:, 1] - triangles[:, 0], triangles[:, 2] - triangles[:, 0])
     squared = dot(normal, normal)
     nearest = np.full(len(triangles), np.inf)
     inside = np.ones(len(triangles), bool)
@@ -166,5 +194,21 @@ def rotation(given: Any) -> np.ndarray:
     return left @ right
 
 
-def _cross(t: np.ndarray) -> np.ndarray:
-    return np.cross(t[:, 1] - t[:, 0], t[:, 2] - t[:, 0])
+def _blocks(triangles: np.ndarray) -> Iterator[tuple[slice, np.ndarray]]:
+    """Triangles (k, 3, 3) in parts that stay in the processor's cache: which, and their corners by coordinates
+    (3, 3, n)."""
+    for first in range(0, len(triangles), BLOCK):
+        block = slice(first, min(first + BLOCK, len(triangles)))
+        yield block, np.ascontiguousarray(triangles[block].transpose(1, 2, 0))
+
+
+def _cross(a: np.ndarray, b: np.ndarray, c: np.ndarray) -> np.ndarray:
+    """Normals, twice as long as the area, of triangles with these corners, all (3, n)."""
+    (x, y, z), (u, v, w) = b - a, c - a
+    return np.stack([y * w - z * v, z * u - x * w, x * v - y * u])
+
+
+def _length(vectors: np.ndarray) -> np.ndarray:
+    """Lengths (n,) of vectors (3, n)."""
+    x, y, z = vectors
+    return np.asarray(np.sqrt(x * x + y * y + z * z))

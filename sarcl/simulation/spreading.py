@@ -104,8 +104,10 @@ class TiledScatterers:
         self._n_coherent = n_coherent
         self.bounds, self._order = box(positions), morton_order(positions)
         self.center = self.bounds.mean(axis=0)
-        self._tiles = {n: self._tiled(n) for n in PER_TILE}
-        self._radius = {n: float(tiles.radius.max()) for n, (tiles, _) in self._tiles.items()}
+        largest = max(PER_TILE)
+        self._tiled_largest: tuple[Tiles, np.ndarray] | None = self._tiled(largest)
+        tiles = self._tiled_largest[0]
+        self._radius = {n: float(tiles.radius.max()) if n == largest else tiles.radius_in_parts(n) for n in PER_TILE}
         self._on_device: DeviceTiles | None = None
         self._samples: PatchSamples | None = None
         self._image_errors: dict[tuple[Any, ...], float] = {}
@@ -163,8 +165,8 @@ class TiledScatterers:
         found = self._on_device
         if found is None or found.tiles.per_tile != per_tile:
             self._on_device = None  # frees the buffers of the other size first
-            tiles, order = self._tiles[per_tile] if per_tile in self._tiles else self._tiled(per_tile)
-            self._tiles = {}  # what the device holds is not needed here, and the other size hardly ever
+            largest, self._tiled_largest = self._tiled_largest, None  # what the device holds is not needed here
+            tiles, order = largest if largest and largest[0].per_tile == per_tile else self._tiled(per_tile)
             upload = self.device.upload
             found = self._on_device = DeviceTiles(
                 tiles, order, upload(float_pairs.wide(tiles.references.T)), upload(tiles.radius.astype(np.float32)),
