@@ -11,7 +11,7 @@
 // source    docs/theory/shadows.md; phase integral of a triangle: sarcl/scattering/physical_optics.py:triangle_mean
 // symbols   rho       from the facet's centroid, which is the origin of its axes x, y in the plane and z along its normal, m
 //           slack     m, distance beside an edge; on_plane  m, distance below which a corner lies in the facet's plane
-//           receiver  (RECEIVER,): origin, x, y, z, three corners (x, y) anticlockwise, area, slack, on_plane
+//           receiver  see receiver_axes.clh
 //           shadow    (SHADOW,): least and largest x, least and largest y, up to five corners (x, y) anticlockwise, area
 //           corners   of a shadow: 0 where it misses the facet, COVERS where it covers all of it
 // macros    ENDS      antennas: 1 monostatic, 2 a transmitter and a receiver
@@ -19,9 +19,9 @@
 // numbers   float64 throughout: float32 cannot place points at `slack`, 1e-12 of a facet's edge, beside an edge
 // reference: sarcl/reference/lit_part.py:lit_part
 
-#pragma OPENCL EXTENSION cl_khr_fp64 : enable
+#include "receiver_axes.clh"
 
-enum { RECEIVER = 21, SHADOW = 15, COVERS = 255, SLIVER = 300 };
+enum { SHADOW = 15, COVERS = 255, SLIVER = 300 };
 
 typedef struct { double x, y; } point;
 
@@ -38,8 +38,6 @@ static inline int apart(__global const double *polygon, int n, __global const do
     }
     return 0;
 }
-
-typedef struct { double x, y, z; } place;
 
 // Projection of a place from an antenna at `eye` onto the plane z = 0.
 static inline place projected(place at, place eye) {
@@ -68,15 +66,6 @@ static inline void put_edge(__global double *out, int *n, place a, place b, doub
     if (a.z >= 0 && a.z <= top) put_corner(out, n, a, eye);
     if ((a.z - first) * (b.z - first) < 0) put_corner(out, n, between(a, b, first), eye);
     if ((a.z - second) * (b.z - second) < 0) put_corner(out, n, between(a, b, second), eye);
-}
-
-// A place, m, in the axes of a receiver; z on the antenna's side, 0 within `on_plane`.
-static inline place in_axes(__global const double *r, double x, double y, double z, double side) {
-    double dx = x - r[0], dy = y - r[1], dz = z - r[2];
-    place out = {dx * r[3] + dy * r[4] + dz * r[5], dx * r[6] + dy * r[7] + dz * r[8],
-                 side * (dx * r[9] + dy * r[10] + dz * r[11])};
-    out.z = fabs(out.z) <= r[20] ? 0 : out.z;
-    return out;
 }
 
 typedef struct { int n_pairs; } cast_shadows_numbers;
