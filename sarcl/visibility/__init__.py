@@ -10,6 +10,8 @@ For this folder alone:
 
     _aspect_blocks         blocks of pulses that share one illumination
     _box_tree              a tree of boxes over facets, for rays
+    _certain_shadows       pairs whose shadow misses a facet, or covers it, at all pulses of a few
+    _clipping              facets clipped by the shadows on them, on a device
     _facet_samples         sample points on a facet
     _frame                 facets and points on a device, in float32 coordinates of the scene
     _illumination_solver   shares of facets that given viewpoints see

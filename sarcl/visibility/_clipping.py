@@ -1,0 +1,184 @@
+"""Facets clipped by the shadows on them, pulse by pulse: the engine of kernels/lit_parts.cl."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..base.vectors import unit
+from ..opencl.device import Device
+from ..opencl.launch_numbers import launch_numbers
+from ..scene.triangles import areas, centroids, edges, normals
+from ._certain_shadows import COVERED, UNDECIDED, certain_shadows
+from ._shadow_pairs import PAIRS_AT_ONCE
+
+KERNELS = "lit_parts.cl"
+SHADOW = 15  # numbers of a shadow, as in the kernels
+# Wavenumbers per launch, on CPUs and on other devices: GPUs keep the sums of no more in registers
+MOST_WAVES = 4, 1
+# Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
+# what rounding moves corners by
+SLACK = 1e-12
+TOGETHER = (
+    64,
+    16,
+)  # pulses for which shadows that miss a facet, or cover it, are sorted out at once: of all, then the rest
+
+
+@dataclass(frozen=True, eq=False)
+class Receivers:
+    """Facets whose lit part is computed: indices among all (k,), corners, m (k, 3, 3); whether both sides reflect."""
+
+    index: np.ndarray
+    triangles: np.ndarray
+    two_sided: np.ndarray
+    center: np.ndarray = field(init=False)
+    normal: np.ndarray = field(init=False)
+
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "center", centroids(self.triangles))
+        object.__setattr__(self, "normal", normals(self.triangles))
+
+    def part(self, some: np.ndarray) -> Receivers:
+        """Some of them."""
+        return Receivers(self.index[some], self.triangles[some], self.two_sided[some])
+
+    def packed(self, which: np.ndarray, origin: np.ndarray, on_plane: float) -> np.ndarray:
+        """Facets `which` as the kernels read them, about `origin` (n, RECEIVER)."""
+        triangles, center, normal = self.triangles[which], self.center[which], self.normal[which]
+        along = unit(triangles[:, 1] - triangles[:, 0])
+        across = np.cross(normal, along)
+        flat = np.stack(
+            [((triangles - center[:, None]) * axis[:, None]).sum(axis=2) for axis in (along, across)], axis=2
+        )
+        longest = np.maximum.reduce(edges(triangles))
+        slack = SLACK * longest
+        columns = center - origin, along, across, normal, flat.reshape(-1, 6), areas(triangles)[:, None], slack[:, None]
+        return np.concatenate([*columns, np.full((len(which), 1), on_plane)], axis=1)
+
+
+@dataclass(frozen=True, eq=False)
+class Clipper:
+    """Occluders, m (n, 3, 3), whose shadows are cut off facets on a device.
+
+    origin    of the kernels, m (3,);  on_plane  m: corners nearer to a facet's plane lie in it
+    """
+
+    device: Device
+    occluders: np.ndarray
+    origin: np.ndarray
+    on_plane: float
+    max_bytes: float
+
+    def light(
+        self, receivers: Receivers, which: np.ndarray, pairs: np.ndarray, antennas: np.ndarray, waves: np.ndarray,
+        together: Sequence[int] = TOGETHER,
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:  # fmt: skip
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of some of `which`, increasing; in parts, each with its
+        pulses, and with the places in `which` that it is of (n,). Others are seen whole, where no waves are asked for.
+
+        pairs     (., 2), of these facets, in their order;  antennas  about the origin
+        together  pulses for which shadows are sorted out at once, and then of these
+        """
+        for first in range(0, len(antennas), together[0]):
+            here = antennas[first : first + together[0]]
+            state = self.sorted_out(receivers, pairs, here)
+            dark = np.isin(which, pairs[state == COVERED, 0])
+            nothing, shape = np.flatnonzero(dark), (len(here), int(dark.sum()))
+            if len(nothing):
+                none = np.zeros(shape, np.float32), np.zeros((*shape, len(waves)), np.complex64)
+                yield slice(first, first + len(here)), nothing, *none
+            left = pairs[state == UNDECIDED]
+            left = left[~np.isin(left[:, 0], which[nothing])]
+            some = np.flatnonzero(~dark if len(waves) else np.isin(which, left[:, 0]))
+            rest = receivers, which[some], left, here, waves
+            for pulses, part, share, mean in self.light(*rest, together[1:]) if together[1:] else self._in_parts(*rest):
+                yield slice(first + pulses.start, first + pulses.stop), some[part], share, mean
+
+    def sorted_out(
+        self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray, margin: float = 0.0
+    ) -> np.ndarray:
+        """Of pairs (n, 2): whether shadows miss the receiver, or cover it, as antennas up to `margin`, m, from these
+        cast them (n,)."""
+        state = np.empty(len(pairs), np.uint8)
+        for first in range(0, len(pairs), PAIRS_AT_ONCE):
+            part = slice(first, first + PAIRS_AT_ONCE)
+            state[part] = certain_shadows(
+                self.device, *self._on_device(receivers, pairs[part]), len(pairs[part]), antennas, margin
+            )
+        return state
+
+    def _on_device(self, receivers: Receivers, pairs: np.ndarray) -> tuple[Any, Any, Any, Any]:
+        """Receivers of pairs, receiver and occluder of each, and occluders, as the kernels read them."""
+        upload, n = self.device.upload, max(len(self.occluders), len(receivers.index))
+        which, index = [], []
+        for side in pairs.T:
+            used = np.zeros(n, bool)
+            used[side] = True
+            which.append(np.flatnonzero(used))
+            index.append((np.cumsum(used, dtype=np.int32) - 1)[side])
+        solid = (self.occluders[which[1]] - self.origin).reshape(-1, 9)
+        packed = receivers.packed(which[0], self.origin, self.on_plane)
+        return upload(packed), upload(index[0]), upload(index[1]), upload(solid)
+
+    def _in_parts(
+        self, receivers: Receivers, which: np.ndarray, pairs: np.ndarray, antennas: np.ndarray, waves: np.ndarray
+    ) -> Iterator[tuple[slice, np.ndarray, np.ndarray, np.ndarray]]:
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of `which`, increasing; in parts, each with all pulses and
+        its places in `which`."""
+        per_pair = antennas.shape[0] * antennas.shape[1] * (SHADOW * 8 + 1)
+        most = int(np.clip(self.max_bytes / 2 / per_pair, 1, PAIRS_AT_ONCE))
+        begins = np.searchsorted(pairs[:, 0], np.append(which, np.iinfo(np.int64).max))
+        at = 0
+        while at < len(which):
+            until = max(at + 1, int(np.searchsorted(begins, begins[at] + most, "right")) - 1)
+            some = slice(at, min(until, len(which), at + PAIRS_AT_ONCE))
+            here = pairs[begins[some.start] : begins[some.stop], 1]
+            light = self._computed(
+                receivers, which[some], begins[some.start : some.stop + 1] - begins[at], here, antennas, waves
+            )
+            yield slice(0, len(antennas)), np.arange(some.start, some.stop), *light
+            at = some.stop
+
+    def _computed(
+        self,
+        facets: Receivers,
+        which: np.ndarray,
+        begins: np.ndarray,
+        occluder: np.ndarray,
+        antennas: np.ndarray,
+        waves: np.ndarray,
+    ) -> tuple[np.ndarray, np.ndarray]:
+        """Shares (n_pulses, n) and means (n_pulses, n, m) of facets `which`, of whose pairs these are the occluders."""
+        device, n_pairs = self.device, max(len(occluder), 1)
+        cast = device.kernel(KERNELS, "cast_shadows", ENDS=antennas.shape[1], WAVES=0)
+        receivers = device.upload(facets.packed(which, self.origin, self.on_plane))
+        (pulses, ends), seen = antennas.shape[:2], device.upload(antennas)
+        size = pulses * ends * n_pairs
+        shadows, corners = device.empty(size * SHADOW * 8), device.empty(size)
+        if len(occluder):
+            picked, at = np.unique(occluder, return_inverse=True)
+            solid = device.upload((self.occluders[picked] - self.origin).reshape(-1, 9))
+            owner = np.repeat(np.arange(len(which), dtype=np.int32), np.diff(begins))
+            device.run(
+                cast, (n_pairs, pulses * ends), None, launch_numbers(KERNELS, "cast_shadows", n_pairs=n_pairs),
+                receivers, device.upload(owner), device.upload(at.astype(np.int32)), solid, seen, shadows, corners,
+            )  # fmt: skip
+        first, means = device.upload(begins.astype(np.int32)), []
+        share = np.empty((pulses, len(which)), np.float32)
+        most = MOST_WAVES[not device.is_cpu]
+        for some in np.split(waves, range(most, len(waves), most)):
+            light = device.kernel(KERNELS, "lit_parts", ENDS=antennas.shape[1], WAVES=len(some))
+            mean = np.empty((pulses, len(which), len(some)), np.complex64)
+            out = device.empty(share.nbytes), device.empty(max(mean.nbytes, 8))
+            device.run(
+                light, (len(which), pulses), None,
+                launch_numbers(KERNELS, "lit_parts", n_pairs=n_pairs),
+                receivers, first, seen, shadows, corners, device.upload(np.append(some, 0.0)), *out,
+            )  # fmt: skip
+            device.download(out[0], share)
+            means.append(device.download(out[1], mean) if len(some) else mean)
+        return share, np.concatenate(means, axis=2)
