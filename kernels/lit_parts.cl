@@ -25,7 +25,12 @@ enum { SHADOW = 15, COVERS = 255, SLIVER = 300 };
 
 typedef struct { double x, y; } point;
 
-static inline double crossed(double ax, double ay, double bx, double by) { return ax * by - ay * bx; }
+// (a x b) with the rounding errors of both products (Kahan): 0 to the bit for opposite vectors, whether a compiler fuses
+// sums or not. Of shadows that reach a million times as far as the facet, rounding would part edges that two share.
+static inline double crossed(double ax, double ay, double bx, double by) {
+    double second = ay * bx;
+    return fma(ax, by, -second) + fma(-ay, bx, second);
+}
 
 // Whether points all lie beyond one edge of an anticlockwise polygon; corners x, y.
 static inline int apart(__global const double *polygon, int n, __global const double *others, int m, double slack) {
@@ -134,12 +139,13 @@ __kernel void cast_shadows(cast_shadows_numbers given, __global const double *re
     corners[at] = covers ? COVERS : n;
 }
 
-// Part of the line a + s d, 0 <= s <= 1, inside an anticlockwise polygon.
-static inline int crosses(__global const double *corner, int n, point a, point d, double *from, double *to) {
+// Part of the line a + beside + s d, 0 <= s <= 1, inside an anticlockwise polygon. `beside` is added last: far away, a holds
+// no digits of it.
+static inline int crosses(__global const double *corner, int n, point a, point beside, point d, double *from, double *to) {
     double low = 0, high = 1, x0 = corner[2 * n - 2], y0 = corner[2 * n - 1];
     for (int i = 0; i < n; i++) {
         double x1 = corner[2 * i], y1 = corner[2 * i + 1], ex = x1 - x0, ey = y1 - y0;
-        double inside = crossed(ex, ey, a.x - x0, a.y - y0), change = crossed(ex, ey, d.x, d.y);
+        double inside = crossed(ex, ey, a.x - x0, a.y - y0) + crossed(ex, ey, beside.x, beside.y), change = crossed(ex, ey, d.x, d.y);
         if (change > 0) low = max(low, -inside / change);
         else if (change < 0) high = min(high, -inside / change);
         else if (inside < 0) return 0;
@@ -218,10 +224,9 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                 point a = {polygon[2 * side], polygon[2 * side + 1]}, d = {polygon[2 * next] - a.x, polygon[2 * next + 1] - a.y};
                 double length = sqrt(d.x * d.x + d.y * d.y), s = 0, end = 1;
                 if (!(length > 0)) continue;
-                double off_x = d.y / length * r[19], off_y = -d.x / length * r[19];
-                point right = {a.x + off_x, a.y + off_y}, left = {a.x - off_x, a.y - off_y};
+                point right = {d.y / length * r[19], -d.x / length * r[19]}, left = {-right.x, -right.y};
                 point lit = e < 0 ? left : right;  // beside the edge, where the facet may be lit
-                if (e >= 0 && !crosses(r + 12, 3, lit, d, &s, &end)) continue;
+                if (e >= 0 && !crosses(r + 12, 3, a, lit, d, &s, &end)) continue;
                 double low_x = min(a.x, a.x + d.x) - r[19], high_x = max(a.x, a.x + d.x) + r[19];
                 double low_y = min(a.y, a.y + d.y) - r[19], high_y = max(a.y, a.y + d.y) + r[19];
                 while (s < end) {  // from s on to the end of the shadows there, and then to the begin of the next one
@@ -237,14 +242,14 @@ __kernel void lit_parts(lit_parts_numbers given, __global const double *restrict
                                 __global const double *shadow = shadows + SHADOW * other;
                                 if (shadow[0] > high_x || shadow[1] < low_x || shadow[2] > high_y || shadow[3] < low_y) continue;
                                 double from, to;
-                                int covered = crosses(shadow + 4, corners[other], lit, d, &from, &to);
+                                int covered = crosses(shadow + 4, corners[other], a, lit, d, &from, &to);
                                 if (covered && from <= s && to > s) {
                                     s = to;
                                     moved = 1;
                                 } else if (covered && from > s)
                                     until = min(until, from);
                                 if (e >= 0 && (shadow[14] > own_area || (shadow[14] == own_area && other < own)) &&
-                                    crosses(shadow + 4, corners[other], left, d, &from, &to)) {
+                                    crosses(shadow + 4, corners[other], a, left, d, &from, &to)) {
                                     if (from <= s && to > s) {
                                         s = to;
                                         moved = 1;

@@ -67,7 +67,7 @@ def _cones(triangles: np.ndarray, viewpoint: np.ndarray, reach: float) -> tuple[
     elevation, azimuth = np.arcsin(np.clip(axis[:, 2], -1, 1)), np.arctan2(axis[:, 1], axis[:, 0])
     low, high = elevation - half, elevation + half
     pole = ~known | (low <= -np.pi / 2) | (high >= np.pi / 2)
-    wide = np.where(pole, np.pi, np.arcsin(np.minimum(np.sin(half) / np.maximum(np.cos(elevation), 1e-300), 1)))
+    wide = np.where(pole, np.pi, np.arcsin(np.clip(np.sin(half) / np.maximum(np.cos(elevation), 1e-300), 0, 1)))
     azimuth = np.where(pole, 0.0, azimuth)
     z = [np.where(known, np.sin(np.clip(side, -np.pi / 2, np.pi / 2)), end) for side, end in ((low, -1.0), (high, 1.0))]
     return np.stack([z[0], azimuth - wide], axis=1), np.stack([z[1], azimuth + wide], axis=1)
@@ -101,6 +101,8 @@ def _overlapping(
     receivers: tuple[np.ndarray, np.ndarray], occluders: tuple[np.ndarray, np.ndarray]
 ) -> Iterator[np.ndarray]:
     """Pairs of boxes that overlap, in blocks (n, 2), each pair in one block."""
+    if not len(occluders[0]):  # none lies in a direction that any receiver is seen in
+        return
     least, most = occluders[0].min(axis=0), occluders[1].max(axis=0)
     inside = np.flatnonzero(((receivers[1] >= least) & (receivers[0] <= most)).all(axis=1))
     if not len(inside):

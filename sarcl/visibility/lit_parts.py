@@ -142,7 +142,7 @@ class LitParts:
         return [MOST_TURN * width / max(shadow_length(self._bounds, end), 1e-300) for end in ends]
 
     def _spans(self, ends: list[np.ndarray], limits: list[float], first: int = 0) -> Iterator[_Span]:
-        """Pulses, the first of them number `first`, in blocks in each of which antennas turn by no more than limits, rad."""
+        """Pulses from number `first` on, in blocks in each of which antennas turn by no more than limits, rad."""
         blocks, viewpoints, turns = pulse_blocks(ends, self._bounds, limits)
         for (start, stop), viewpoint, turn in zip(blocks.tolist(), viewpoints.tolist(), turns.tolist(), strict=True):
             at, here = [end[viewpoint] for end in ends], [end[start:stop] for end in ends]

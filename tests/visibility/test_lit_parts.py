@@ -8,6 +8,7 @@ from helpers.lit_cases import lit_polygon
 
 import sarcl
 from sarcl.reference.lit_part import lit_part
+from sarcl.scene.triangles import normals
 from sarcl.visibility._shadow_pairs import candidate_pairs
 from sarcl.visibility.lit_parts import LitParts
 
@@ -209,3 +210,33 @@ def test_of_two_antennas_one_that_is_edge_on_or_behind_casts_no_shadow(sine, tur
         wanted, _ = lit_part(FACET[0], screens, [low[pulse], high[pulse]], WAVES)
         assert share == pytest.approx(wanted, abs=1e-6)
     assert (found == 0).all() if sine > 0 else (0.2 < found).all() and (found < 0.8).all()
+
+
+def test_walls_that_meet_above_the_antenna_leave_no_gap_between_their_shadows(device):
+    """Shadows of what reaches above the antenna are a million times as long as the facet: rounding must part neither
+    the edge that both walls share nor lose the distance beside it."""
+    random = np.random.default_rng(0)
+    floor = np.array([[[4.46, -2.82, 0], [4.46, 2.82, 0], [-4.46, -2.82, 0]]])
+    for _ in range(40):
+        foot, top, left, right = random.uniform(-2, 2, (4, 3)) * [1, 1, 0] + [
+            [0, 0, 0],
+            [0, 0, 1.45],
+            [0, 0, 0],
+            [0, 0, 0],
+        ]
+        walls = np.array([[foot, left, top], [right, top, foot]])
+        low = np.stack([random.uniform(-3, 3, 8), random.uniform(-2, 2.5, 8), random.uniform(0.05, 1.4, 8)], axis=1)
+        found = shares(device, floor, walls, [low])[:, 0]
+        wanted = [lit_part(floor[0], walls, [antenna], np.zeros(0))[0] for antenna in low]
+        np.testing.assert_allclose(found, wanted, atol=TOLERANCE)
+
+
+@pytest.mark.parametrize("seed", range(6))
+def test_nothing_is_seen_from_within_a_closed_body_in_a_room(device, seed):
+    random = np.random.default_rng(seed)
+    room, size = sarcl.shapes.box(random.uniform(5, 9, 3)), random.uniform(0.3, 1.5, 3)
+    body = sarcl.shapes.box(size).moved((0.3, -0.2, 0.1))
+    inside = np.array([0.3, -0.2, 0.1 + size[2] / 2]) + 0.45 * random.uniform(-1, 1, 3) * size
+    facets = np.concatenate([room.triangles[:, ::-1], body.triangles])
+    found = shares(device, facets, facets, [inside[None]], two_sided=False)[0]
+    assert (found[((inside - facets[:, 0]) * normals(facets)).sum(axis=1) > 0] == 0).all()
