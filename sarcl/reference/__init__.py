@@ -7,6 +7,7 @@ model/antenna_pattern.
 For other folders:
 
     backproject    the image equation, term by term
+    certain_shadows  shadows that miss a facet, or cover it, whatever antenna of several casts them
     compress       the matched filter
     echo           the echo equation, term by term
     facet          echo of triangular facets by physical optics
@@ -32,6 +33,7 @@ For other folders:
 
 __all__ = [
     "backproject",
+    "certain_shadows",
     "compress",
     "echo",
     "facet",

@@ -15,7 +15,7 @@ import sarcl
 from sarcl.base.counter_rng import gaussian
 from sarcl.scene.material import MATERIALS, METAL
 from sarcl.scene.scene import POINT_HEIGHTS
-from sarcl.scene.triangles import areas, centroids, edges, normals
+from sarcl.scene.triangles import areas, centroids, edges, normals, shortest_edges
 
 TOLERANCE = {
     "area": 1e-12,  # float64 sums of some ten thousand facets, relative
@@ -644,3 +644,17 @@ def test_bad_scenes_say_what_was_wanted(name):
     make, message = BAD[name]
     with pytest.raises(ValueError, match=message):
         make()
+
+
+def test_shortest_edges_begin_opposite_the_longest_and_keep_the_normal():
+    """Of a needle, the normal is a difference of products that float32 resolves if one of the edges is short."""
+    triangles = np.random.default_rng(0).normal(size=(50, 3, 3))
+    triangles[:25] = triangles[:25, :1] + np.array([[0, 0, 0], [1, 0, 0], [1, 1e-5, 0]])
+    triangles = np.concatenate([np.roll(triangles, i, axis=1) for i in range(3)])
+    one, two = shortest_edges(triangles).transpose(0, 2, 1)
+    lengths = edges(triangles)
+    np.testing.assert_allclose(np.linalg.norm(two - one, axis=1), lengths.max(axis=0), rtol=1e-9)
+    shorter = np.sort(lengths, axis=0)[:2]
+    np.testing.assert_allclose(np.sort([np.linalg.norm(e, axis=1) for e in (one, two)], axis=0), shorter, rtol=1e-9)
+    np.testing.assert_allclose(np.cross(one, two) / np.linalg.norm(np.cross(one, two), axis=1)[:, None],
+                               normals(triangles), atol=1e-9)  # fmt: skip
