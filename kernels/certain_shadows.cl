@@ -15,7 +15,7 @@
 
 #include "receiver_axes.clh"
 
-enum { UNDECIDED = 0, MISSED = 1, COVERED = 2, MOST_EYES = 8 };
+enum { MISSED = 0, UNDECIDED = 1, COVERED = 2 };
 // Of `slack`: distance from an edge's plane within which places count as in it
 #define IN_PLANE 0.1
 #define LEAST_HEIGHT 1e-6  // sine of an antenna's elevation over the facet, as in lit_parts.cl
@@ -33,25 +33,22 @@ static inline place cross3(place a, place b) {
     return out;
 }
 
-// 1 where all are positive, -1 where all are negative, else 0.
-static inline int common_sign(const double *values, int n) {
-    int positive = 1, negative = 1;
-    for (int i = 0; i < n; i++) {
-        positive &= values[i] > 0;
-        negative &= values[i] < 0;
-    }
-    return positive - negative;
+static inline place eye_at(__global const double *r, __global const double *eye) {
+    double x = eye[0] - r[0], y = eye[1] - r[1], z = eye[2] - r[2];
+    place out = {x * r[3] + y * r[4] + z * r[5], x * r[6] + y * r[7] + z * r[8], x * r[9] + y * r[10] + z * r[11]};
+    return out;
 }
 
-// Bits: 1 where three places all lie beyond an edge of a triangle that antennas see anticlockwise (sign 1) or clockwise
-// (-1), 2 where all lie on its inner side.
-static inline int sides(const place *triangle, int edge, const place *eye, int n_eyes, int sign, const place *others,
-                        double margin) {
-    place a = triangle[edge], along = minus(triangle[edge == 2 ? 0 : edge + 1], a);
+// Bits: 1 where three places all lie beyond the edge from a to b of a triangle that antennas see anticlockwise (sign 1) or
+// clockwise (-1), 2 where all lie on its inner side.
+static inline int sides(place a, place b, __global const double *r, __global const double *eyes, int n_eyes, int sign,
+                        const place *others, double margin) {
+    place along = minus(b, a);
     int beyond = 1, inner = 2;
-    for (int k = 0; k < n_eyes && (beyond || inner); k++) {
-        place normal = cross3(along, minus(eye[k], a));
+    for (int k = 0; k < n_eyes; k++) {
+        place normal = cross3(along, minus(eye_at(r, eyes + 3 * k), a));
         double most = margin * sqrt(dot3(normal, normal));
+#pragma unroll
         for (int j = 0; j < 3; j++) {
             double inside = -sign * dot3(normal, minus(others[j], a));
             beyond = inside <= most ? beyond : 0;
@@ -65,7 +62,7 @@ typedef struct { int n_eyes; } certain_shadows_numbers;
 
 // global size (pairs)
 //   receivers  (n, RECEIVER);  pair_receiver, pair_occluder (pairs);  occluders (., 9)   corners, m
-//   eyes       (ENDS, n_eyes, 3)   m, up to MOST_EYES of each
+//   eyes       (ENDS, n_eyes, 3)   m
 //   state      (pairs)   UNDECIDED, MISSED from all antennas, or COVERED from those of one box
 __kernel void certain_shadows(certain_shadows_numbers given, __global const double *restrict receivers,
                               __global const int *restrict pair_receiver, __global const int *restrict pair_occluder,
@@ -74,9 +71,10 @@ __kernel void certain_shadows(certain_shadows_numbers given, __global const doub
     size_t pair = get_global_id(0);
     __global const double *r = receivers + RECEIVER * (size_t)pair_receiver[pair];
     __global const double *o = occluders + 9 * (size_t)pair_occluder[pair];
-    int n = given.n_eyes, missed = 1, covered = 0, side[ENDS];
+    int missed = 1, covered = 0, first_side = 0;
     double margin = IN_PLANE * r[19];
     place facet[3], solid[3];
+#pragma unroll
     for (int i = 0; i < 3; i++) {
         place corner = {r[12 + 2 * i], r[13 + 2 * i], 0};
         facet[i] = corner;
@@ -84,35 +82,45 @@ __kernel void certain_shadows(certain_shadows_numbers given, __global const doub
     }
     place normal = cross3(minus(solid[1], solid[0]), minus(solid[2], solid[0]));
     for (int e = 0; e < ENDS; e++) {
-        place eye[MOST_EYES];
-        double height[MOST_EYES], before[MOST_EYES], lowest = INFINITY;
-        int above = 1;
-        for (int k = 0; k < n; k++) {
-            __global const double *at = eyes + 3 * (e * n + k);
-            double x = at[0] - r[0], y = at[1] - r[1], z = at[2] - r[2];
-            place here = {x * r[3] + y * r[4] + z * r[5], x * r[6] + y * r[7] + z * r[8], x * r[9] + y * r[10] + z * r[11]};
-            eye[k] = here;
-            height[k] = here.z;
-            before[k] = dot3(normal, minus(here, solid[0]));
+        __global const double *box = eyes + 3 * e * given.n_eyes;
+        double lowest = INFINITY;
+        int above = 1, over = 1, under = 1, before = 1, behind = 1;
+        for (int k = 0; k < given.n_eyes; k++) {
+            place here = eye_at(r, box + 3 * k);
+            double ahead = dot3(normal, minus(here, solid[0]));
+            over &= here.z > 0;
+            under &= here.z < 0;
+            before &= ahead > 0;
+            behind &= ahead < 0;
             lowest = min(lowest, fabs(here.z));
             above &= fabs(here.z) > LEAST_HEIGHT * sqrt(dot3(here, here));
         }
-        side[e] = common_sign(height, n);
-        int facing = common_sign(before, n), apart = 0, inner = 2;
-        for (int i = 0; i < 3 && facing && (inner || !apart); i++) {
-            int found = sides(solid, i, eye, n, facing, facet, margin);
-            apart |= found & 1;
-            inner &= found;
-        }
-        for (int i = 0; i < 3 && side[e] && !apart; i++) apart = sides(facet, i, eye, n, side[e], solid, margin) & 1;
-        missed &= apart;
-        int behind = facing && side[e] && above && inner;
+        // 1 or -1 where all antennas are on one side of the facet's plane, of the occluder's; else 0
+        int side = over - under, facing = before - behind, apart = 0, within = 2;
+#pragma unroll
         for (int i = 0; i < 3; i++) {
-            double high = side[e] * solid[i].z;
-            behind &= high > 0 && high < MOST_HEIGHT * lowest && facing * dot3(normal, minus(facet[i], solid[0])) <= 0;
+            int next = i == 2 ? 0 : i + 1;
+            int found = facing ? sides(solid[i], solid[next], r, box, given.n_eyes, facing, facet, margin) : 0;
+            apart |= found & 1;
+            within &= found;
         }
-        covered |= behind;
+        if (side && !apart) {
+#pragma unroll
+            for (int i = 0; i < 3; i++) {
+                int next = i == 2 ? 0 : i + 1;
+                apart |= sides(facet[i], facet[next], r, box, given.n_eyes, side, solid, margin) & 1;
+            }
+        }
+        missed &= apart;
+        int covers = side && above && within;
+#pragma unroll
+        for (int i = 0; i < 3; i++) {
+            double high = side * solid[i].z;
+            covers &= high > 0 && high < MOST_HEIGHT * lowest && facing * dot3(normal, minus(facet[i], solid[0])) <= 0;
+        }
+        covered |= covers;
+        if (e == 0) first_side = side;
+        covered &= side == first_side;  // both antennas look at one side of the facet
     }
-    for (int e = 1; e < ENDS; e++) covered &= side[e] == side[0];  // both look at one side of the facet
     state[pair] = missed ? MISSED : covered ? COVERED : UNDECIDED;
 }

@@ -8,7 +8,7 @@ import numpy as np
 
 from .lit_part import plane_axes
 
-UNDECIDED, MISSED, COVERED = 0, 1, 2
+MISSED, UNDECIDED, COVERED = 0, 1, 2
 IN_PLANE = 0.1  # of `slack`, as in the kernel
 
 

@@ -45,8 +45,8 @@ class Scene:
     materials        tuple of sarcl.Material, default a perfect conductor; their own reflectivity is moved into
                      `reflectivity`
     point_roughness  displacement of each corner by one standard deviation, m (k, 3, 3); `realized` applies it
-    heights          (x, y, z) of the largest terrain of from_heights in the scene, if any: `echo` computes its shadows
-                     from horizons, as long as all its facets are present, cut or not
+    heights          (x, y, z) of the largest terrain of from_heights in the scene, if any: no antenna may stand
+                     under it, and `echo` leaves it out as an occluder where all of it lies below every line of sight
     """
 
     positions: NDArray[np.float64]

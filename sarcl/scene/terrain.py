@@ -14,7 +14,6 @@ from .material import resolve
 log = logging.getLogger(__name__)
 
 Heights = tuple[np.ndarray, np.ndarray, np.ndarray]  # x (n_x,), y (n_y,), both increasing, and z (n_y, n_x), m
-UNEVEN = 2.0  # largest ratio of cell sizes at which horizons along range lines are used
 ON = 1e-9  # of a terrain's size: corners no farther from it lie on it
 
 
@@ -91,21 +90,6 @@ def spread(name: str, value: Any, shape: tuple[int, ...], dtype: Any = np.float6
     return validation.array(name, value, dtype, shape)
 
 
-def heights_of(value: Any) -> Heights:
-    """(x, y, z) of a terrain, checked."""
-    try:
-        x, y, z = value
-    except (TypeError, ValueError):
-        raise ValueError("heights must be (x, y, z): grid lines (n_x,) and (n_y,) and heights (n_y, n_x)") from None
-    x = validation.array("heights x", x, np.float64, ("n_x",))
-    y = validation.array("heights y", y, np.float64, ("n_y",))
-    z = validation.array("heights z", z, np.float64, (len(y), len(x)))
-    for name, axis in (("x", x), ("y", y)):
-        if len(axis) < 2 or not (np.diff(axis) > 0).all():
-            raise ValueError(f"heights {name} must hold at least two increasing values, as for Scene.from_heights")
-    return x, y, z
-
-
 def above(grid: Heights, points: np.ndarray) -> np.ndarray:
     """Heights of points, m (n, 3), above the terrain, m (n,); inf outside its grid."""
     x, y, z = grid
@@ -164,15 +148,8 @@ def clear_of(grid: Heights, triangles: np.ndarray, on: np.ndarray, ends: list[np
 
 
 def facets_on(grid: Heights, triangles: np.ndarray) -> np.ndarray | None:
-    """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it.
-
-    Also None where cells are more than twice as long or wide as others: range lines would miss some of their edges
-    (docs/theory/shadows.md).
-    """
+    """True (k,) for facets, m (k, 3, 3), that lie on a terrain; None where these are not all of it."""
     x, y, z = grid
-    steps = np.concatenate([np.diff(x), np.diff(y)])
-    if steps.max() > UNEVEN * steps.min():
-        return None
     size = max(x[-1] - x[0], y[-1] - y[0], np.ptp(z))
     corners = triangles.reshape(-1, 3).copy()
     # corners outside the border by rounding lie on it

@@ -20,7 +20,6 @@ For this folder alone:
     _lit_shares            shares of facets at every pulse, and of pixels, for labels and masks
     _shadow_pairs          pairs of a facet and an occluder whose shadow may fall on it
     _ray_casting           occlusion by facets, from anywhere: by a light buffer, or rays through a tree of boxes
-    _terrain_horizon       occlusion by terrain, by horizons along range lines
     _viewpoints            which pulses and facets are looked at, for an error between them
 """
 

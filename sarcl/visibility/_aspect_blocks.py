@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import numpy as np
 
-from ..base.boxes import box
 from ..base.vectors import dot
 from ..scene.triangles import areas, edges, normals
 
@@ -86,12 +85,3 @@ def blocks_around(viewpoints: np.ndarray, n_pulses: int) -> np.ndarray:
     """First and last + 1, int64 (n, 2), of the pulses nearest each viewpoint, increasing pulses (n,)."""
     ends = np.concatenate([[0], (viewpoints[:-1] + viewpoints[1:]) // 2 + 1, [n_pulses]])
     return np.stack([ends[:-1], ends[1:]], axis=1)
-
-
-def scene_box(triangles: np.ndarray, heights: tuple[np.ndarray, np.ndarray, np.ndarray] | None) -> np.ndarray:
-    """Lower and upper corner of facets and terrain, m (2, 3)."""
-    corners = box(triangles.reshape(-1, 3))
-    if heights is None:
-        return corners
-    ends = np.array([[v.min() for v in heights], [v.max() for v in heights]])
-    return np.stack([np.minimum(corners[0], ends[0]), np.maximum(corners[1], ends[1])])

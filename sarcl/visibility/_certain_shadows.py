@@ -10,7 +10,7 @@ from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 
 KERNELS = "certain_shadows.cl"
-UNDECIDED, MISSED, COVERED = 0, 1, 2  # as in the kernel
+MISSED, UNDECIDED, COVERED = 0, 1, 2  # as in the kernel
 # Of the distance to antennas: a box about them that is flatter than this is a rectangle, or a line. Shadows move by
 # about the distance beside an edge at which the kernels of lit parts look
 FLAT = 1e-13

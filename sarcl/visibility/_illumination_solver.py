@@ -1,4 +1,4 @@
-"""Shares of facets that given viewpoints see: samples on lines, tested for occlusion by facets and terrain."""
+"""Shares of facets that given viewpoints see: samples on lines, tested for occlusion by facets."""
 
 from __future__ import annotations
 
@@ -10,11 +10,9 @@ import numpy as np
 
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
-from ._aspect_blocks import scene_box
 from ._facet_samples import FEWEST_LINES, MOST_LINES, PER_LINE, SampleLines
 from ._frame import DeviceFacets, Frame
 from ._ray_casting import Occluders
-from ._terrain_horizon import Terrain
 
 CHUNK = 2**16  # facets per call of the kernels: bounds the memory
 
@@ -54,23 +52,18 @@ class IlluminationSolver:
         device: Device,
         triangles: np.ndarray,
         *,
-        heights: Any = None,
-        on_heights: np.ndarray | None = None,
         two_sided: np.ndarray | bool = True,
         wanted: np.ndarray | None = None,
         occluders: np.ndarray | None = None,
         ground: tuple[np.ndarray, np.ndarray] | None = None,
     ) -> None:
         self.device, k = device, len(triangles)
-        on = np.full(k, heights is not None) if on_heights is None else on_heights
-        solid = triangles[~on] if occluders is None else np.reshape(occluders, (-1, 3, 3))
+        solid = triangles if occluders is None else np.reshape(occluders, (-1, 3, 3))
         floor, over = (np.zeros((0, 3, 3)), np.zeros(k, bool)) if ground is None else ground
-        self.frame = frame = Frame.around(scene_box(np.concatenate([triangles, solid, floor]), heights))
+        self.frame = frame = Frame.around(np.concatenate([triangles, solid, floor]).reshape(-1, 3))
         self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
         keep = np.ones(k, bool) if wanted is None else wanted
         hiders: list[tuple[Any, np.ndarray]] = []  # each with the facets that it may hide
-        if heights is not None:
-            hiders.append((Terrain(device, heights, frame), np.ones(k, bool)))
         for facets, hidden in ((solid, np.ones(k, bool)), (floor, over)):
             n = int((keep & hidden).sum())
             if n and len(facets):

@@ -1,4 +1,4 @@
-"""The share of each facet that both antennas see, along a track: back faces, terrain horizons, occlusion by facets.
+"""The share of each facet that both antennas see, along a track: back faces, occlusion by facets.
 
 Shares are kept as levels, uint8: roots of shares, 255 of a whole facet. These are the amplitudes of rough facets, and
 what is interpolated between pulses.
@@ -7,22 +7,21 @@ what is interpolated between pulses.
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field, replace
 
 import numpy as np
-from numpy.typing import ArrayLike
 
 from ..base import arguments
+from ..base.boxes import box
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
 from ..base.validation import array, flags, ndim, number, sealed
 from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
 from ..opencl.memory_budget import budget
-from ..scene.terrain import check_above, heights_of
 from ..scene.triangles import areas
-from ._aspect_blocks import STRIDE, blocks_around, projected_width, pulse_blocks, scene_box, shadow_length
+from ._aspect_blocks import STRIDE, blocks_around, projected_width, pulse_blocks, shadow_length
 from ._facet_samples import MOST_LINES
 from ._illumination_solver import IlluminationSolver
 from ._levels_along_track import SAMPLING, Judge, Looks, look_along
@@ -190,8 +189,6 @@ def lit(
     tx: np.ndarray,
     rx: np.ndarray | None = None,
     *,
-    heights: Sequence[ArrayLike] | None = None,
-    on_heights: np.ndarray | None = None,
     two_sided: np.ndarray | bool = True,
     wanted: np.ndarray | None = None,
     tolerance: float = 0.25,
@@ -206,10 +203,6 @@ def lit(
     """Shares of facets, m (k, 3, 3), that both antennas, m (n_pulses, 3), see, in blocks of pulses.
 
     rx          default tx
-    heights     (x, y, z) of a terrain as in Scene.from_heights: its occlusion is computed from horizons along range
-                lines
-    on_heights  (k,) bool: facets of that terrain, or of parts of it, which occlude as terrain only; default all of
-                them. The other facets occlude by rays, from both sides
     two_sided   (k,) bool or one for all: the other facets are not illuminated where they face away from an antenna
     wanted      (k,) bool: facets whose share is computed; the others only occlude, their share is 0
     tolerance   largest change of a share between the pulses of a block, for the facet of median size: shares are
@@ -219,11 +212,11 @@ def lit(
     weights     powers of the facets (k,) in that norm; default their areas
     max_bytes   memory for the shares, default a quarter of that for blocks of `echo`; shares beyond it are computed
                 anew each time they are asked for
-    occluders   m (n, 3, 3): what occludes beside the terrain; default those of the facets that are not on_heights
+    occluders   m (n, 3, 3): what occludes, from both sides; default the facets
     ground      m (n, 3, 3), and (k,) bool: what occludes too, but those of the facets alone
     progress    called as progress(pulse, pulses), of those that are looked from
 
-    Raises ValueError for an antenna below the terrain. Warns with SarclWarning where nothing at all is illuminated.
+    Warns with SarclWarning where nothing at all is illuminated.
     """
     tx = array("tx", tx, np.float64, ("n_pulses", 3))
     ends = [tx] if rx is None else [tx, array("rx", rx, np.float64, (len(tx), 3))]
@@ -236,8 +229,6 @@ def lit(
     if max_bytes is not None:
         max_bytes = number("max_bytes", max_bytes, least=0)
     tolerance, accuracy = number("tolerance", tolerance, above=0), number("accuracy", accuracy, above=0)
-    grid = None if heights is None else heights_of(heights)
-    on_heights = _mask("on_heights", grid is not None if on_heights is None else on_heights, k)
     wanted = None if wanted is None else _mask("wanted", wanted, k)
     two_sided = _mask("two_sided", two_sided, k)
     if weights is not None:
@@ -246,9 +237,6 @@ def lit(
             raise ValueError(f"weights[{weights.argmin()}] is {weights.min():g}; give powers, 0 or more")
     if ground is not None:
         ground = array("ground[0]", ground[0], np.float64, ("n", 3, 3)), _mask("ground[1]", ground[1], k)
-    if grid is not None:
-        for name, end in zip(("tx", "rx"), ends, strict=False):
-            check_above(name, grid, end)
     opened = open_device(device)
     if max_bytes is None:
         max_bytes = budget(opened, None) / 4
@@ -258,9 +246,9 @@ def lit(
         return Illumination(
             whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, 0.0, nothing, [], lambda block: nothing
         )
-    bounds = scene_box(triangles if ground is None else np.concatenate([triangles, ground[0]]), grid)
+    bounds = box((triangles if ground is None else np.concatenate([triangles, ground[0]])).reshape(-1, 3))
     solver = IlluminationSolver(
-        opened, triangles, heights=grid, on_heights=on_heights, two_sided=two_sided, wanted=wanted,
+        opened, triangles, two_sided=two_sided, wanted=wanted,
         occluders=occluders, ground=ground,
     )  # fmt: skip
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)

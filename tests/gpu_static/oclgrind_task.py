@@ -40,7 +40,6 @@ from sarcl.opencl.choose_device import open_device
 from sarcl.opencl.device import Device
 from sarcl.reference import fdtd
 from sarcl.reference.field import field
-from sarcl.visibility._illumination_solver import IlluminationSolver
 
 PLANE = sarcl.ImageGrid.plane(center=(0, 0, 0), spacing=0.2, shape=(17, 19))
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=300e6, duration=1e-6)
@@ -141,20 +140,6 @@ def beam(tolerance: float) -> Errors:
     return float(np.abs(made - wanted).max() / np.abs(array.weights).sum()), tolerance
 
 
-def terrain() -> Errors:
-    """Shares of a terrain's facets that a low radar sees: by horizons against rays."""
-    axis = np.arange(7.0)
-    grid = (axis, axis, np.random.default_rng(0).standard_normal((7, 7)))
-    triangles = sarcl.Scene.from_heights(*grid).triangles
-    horizons, rays = (
-        IlluminationSolver(open_device(), triangles, heights=heights, two_sided=False)
-        .share([np.array([40.0, -60.0, 15.0])]).astype(float) / 255
-        for heights in (grid, None)
-    )  # fmt: skip
-    assert 0.2 < rays.mean() < 0.8, "some facets are hidden and some are not"
-    return float(np.abs(horizons - rays).mean()), 0.03
-
-
 def fields() -> Errors:
     """Steps of a grid with absorbing layers, an incident wave and lists of a target; the twin computes in float64."""
     grid, random = Lattice(0.01, (10, 9, 32), np.zeros(3)), np.random.default_rng(3)
@@ -225,7 +210,6 @@ TASKS: dict[str, Callable[[], Errors]] = {
     "spectral_echo": spectral,
     "beam": lambda: beam(1e-5),
     "beam float64": lambda: beam(1e-8),
-    "terrain": terrain,
     "fields": fields,
     "currents": currents,
 }  # fmt: skip

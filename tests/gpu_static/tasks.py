@@ -101,15 +101,13 @@ def antenna_beam(**options: Any) -> Any:
 
 
 def shares(place: str) -> Any:
-    """Sampled shares of a box on hills: seen from outside, from beside it, and with the hills as a terrain."""
+    """Sampled shares of a box on hills: seen from outside, and from beside it."""
     axis = np.linspace(-8, 8, 17)
     heights = np.random.default_rng(0).normal(size=(17, 17)) * 0.3
     ground = sarcl.Scene.from_heights(axis, axis, heights)
     scene = ground + shapes.box((2, 2, 3)).on(ground, 1, 1)
     antenna = np.array([[3.0, -4.0, 4.0]]) if place == "near" else np.array([[7e3, 0, 5e3]])
-    on = np.arange(len(scene.triangles)) < len(ground.triangles)
-    terrain = {"heights": ground.heights, "on_heights": on} if place == "terrain" else {}
-    return sarcl.illumination.lit(scene.triangles, antenna, tolerance=0.1, **terrain)
+    return sarcl.illumination.lit(scene.triangles, antenna, tolerance=0.1)
 
 
 def rays() -> Any:
@@ -120,7 +118,7 @@ def rays() -> Any:
 
 
 OWN: dict[str, Callable[[], Any]] = {
-    **{f"shares {place}": partial(shares, place) for place in ("outside", "near", "terrain")},
+    **{f"shares {place}": partial(shares, place) for place in ("outside", "near")},
     **{
         f"{'listed ' * listed}spaceborne {name}": partial(spaceborne, float(name), listed)
         for listed, name in itertools.product((False, True), ("1e-3", "3e-5"))

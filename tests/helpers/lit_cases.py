@@ -11,10 +11,8 @@ from sarcl.opencl.choose_device import open_device
 from sarcl.reference.lit_part import plane_axes
 from sarcl.scattering.physical_optics import scattering_matrix, triangle_integral
 from sarcl.scene.triangles import centroids, cut, normals
-from sarcl.visibility._aspect_blocks import scene_box
 from sarcl.visibility._frame import DevicePoints, Frame
 from sarcl.visibility._ray_casting import Occluders
-from sarcl.visibility._terrain_horizon import Terrain
 
 BELOW = 0.999  # of the height of an antenna: occluders above that are nowhere near it
 FAR = 2e6  # m: the waves are plane over scenes of a few metres
@@ -133,14 +131,9 @@ def near_echo(triangles, two_sided, frequencies, antennas, reference_range, edge
     return out
 
 
-def seen_centroids(device, triangles, viewpoint, *, heights=None, by_rays=False):
-    """True (k,) where a viewpoint, m (3,), sees the centroid of a facet, m (k, 3, 3).
-
-    heights  (x, y, z) of a terrain, which hides instead of the facets;  by_rays  through a tree from anywhere
-    """
+def seen_centroids(device, triangles, viewpoint, *, by_rays=False):
+    """True (k,) where a viewpoint, m (3,), sees the centroid of a facet, m (k, 3, 3); by_rays  through a tree."""
     opened = open_device(device)
-    frame = Frame.around(scene_box(triangles, heights))
+    frame = Frame.around(triangles.reshape(-1, 3))
     points = DevicePoints(opened, centroids(triangles), frame, normals(triangles))
-    if heights is not None:
-        return points.seen(Terrain(opened, heights, frame), [viewpoint])
     return points.seen(Occluders(opened, triangles, frame, 0 if by_rays else len(triangles)), [viewpoint])

@@ -332,8 +332,7 @@ def test_programs_are_given_only_the_macros_they_name(device, monkeypatch):
     assert [option for option in given[-1] if option != "-D_OPENCL_H_"] == []
     assert {"VW", "FP64", "TAPS"} <= _programs.names_in(_programs.source("backproject.cl"))
     # tests/visibility runs on no twin of a device: none would change these
-    for file in ("ray_casting.cl", "terrain_horizon.cl"):
-        assert not {"VW", "FP64"} & _programs.names_in(_programs.source(file))
+    assert not {"VW", "FP64"} & _programs.names_in(_programs.source("ray_casting.cl"))
 
 
 # a value of each macro that some program needs

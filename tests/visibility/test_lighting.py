@@ -497,9 +497,6 @@ def test_a_scene_wholly_in_shadow_is_reported():
         ({"weights": -np.ones(8)}, r"weights\[0\] is -1; give powers"),
         ({"ground": (ground(1), np.ones(2, bool))}, r"ground\[1\] has shape \(2,\)"),
         ({"wanted": np.ones(3, bool)}, r"wanted has shape \(3,\); wanted one for each of 8 facets"),
-        ({"heights": 7}, r"heights must be \(x, y, z\)"),
-        ({"heights": ([0, 1], [0, 1], np.zeros((3, 2)))}, r"heights z has shape \(3, 2\), wanted \(2, 2\)"),
-        ({"heights": ([1, 0], [0, 1], np.zeros((2, 2)))}, "heights x must hold at least two increasing"),
     ],
 )
 def test_bad_input_is_refused(change, message):
