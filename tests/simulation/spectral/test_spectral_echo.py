@@ -138,8 +138,9 @@ def test_blocks_of_memory_change_nothing(device, tmp_path):
     assert np.linalg.norm(small.samples - raw.samples) <= 1e-6 * np.linalg.norm(raw.samples)
     kept = sarcl.spectral_echo(points(), CHIRP, TRACK, tolerance=1e-3, out=tmp_path / "raw.h5", device=device)
     assert np.array_equal(kept.read(0, kept.n_rows), raw.samples)
+    long = sarcl.Trajectory.line(start=(0, -300, 6e3), velocity=(0, 100, 0), prf=600, n_pulses=3600)
     with pytest.raises(MemoryError, match="raise max_bytes to"):
-        sarcl.spectral_echo(points(), CHIRP, TRACK, max_bytes=1e6, device=device)
+        sarcl.spectral_echo(points(), CHIRP, long, max_bytes=1e6, device=device)
 
 
 def test_the_echoes_focus_as_they_are(device):
