@@ -216,16 +216,21 @@ def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
     from scipy.spatial import cKDTree
 
     tree = cKDTree(centroids(scene.triangles))
-    away = min(float(tree.query(end)[0].min()) for end in antennas.ends)
+    ends = list(zip(("track", "receiver"), antennas.ends, strict=False))
+    away = [(float(d.min()), name, int(d.argmin())) for name, end in ends for d in [tree.query(end)[0]]]
     reach = TO_CORNER * np.maximum.reduce(edges(scene.triangles))
-    large = reach > away / 2
-    found = away - float(reach[~large].max(initial=0.0))
+    large = reach > min(away)[0] / 2
+    found = [(least - float(reach[~large].max(initial=0.0)), name, pulse) for least, name, pulse in away]
     if large.any():  # few, as a rule
         near = scene.triangles[large]
-        found = min(found, *(float(distances(near, at).min()) for end in antennas.ends for at in end))
-    if max(found, distance) <= 0:
-        raise ValueError("an antenna stands on a facet; move the track away from the scene")
-    return max(found, distance)
+        found += [(float(distances(near, at).min()), name, i) for name, end in ends for i, at in enumerate(end)]
+    least, name, pulse = min(found)
+    if max(least, distance) <= 0:
+        place = np.array2string(dict(ends)[name][pulse], precision=6)
+        raise ValueError(
+            f"{name}[{pulse}] is {place} m: an antenna stands on a facet; move the track away from the scene"
+        )
+    return max(least, distance)
 
 
 def _spherical(corner: float, distance: float, highest: float) -> float:

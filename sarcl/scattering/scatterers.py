@@ -17,13 +17,16 @@ from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, lit
-from ..visibility.lit_parts import LitParts
+from ..visibility.lit_parts import ON_PLANE, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
 
 # pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
 FEW_LOOKS = 2e6
+# Facets count as small where their sides are less than so many times the distance below which corners lie in a plane;
+# so many of them, or such a share of all, are worth a warning
+SMALL, MANY_SMALL, FEW_SMALL = 10.0, 100, 0.01
 # Of a facet of median width, by which shadows move between pulses that they are looked at from: largest, and over the
 # accuracy of amplitudes
 FINEST = 0.25, 4.0
@@ -96,6 +99,8 @@ def facets_of(
     if shadows and exact:  # rough facets too where they are few: their power is that of the lit part
         clipped |= (coherent(scene) & ~pieces.incoherent) | (not sampled)
     by_samples = keep & ~clipped & shadows
+    if shadows:
+        _warn_of_reach(original.triangles)
     solid = original.triangles
     ground: tuple[np.ndarray, np.ndarray] | None = None
     if terrain and by_samples.any():  # by its facets, where it may hide anything
@@ -132,6 +137,19 @@ def facets_of(
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
         by_samples[kept], pieces.incoherent[kept] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
+
+
+def _warn_of_reach(triangles: np.ndarray) -> None:
+    """Warn where facets are so small beside all of the scene, m (k, 3, 3), that they count as lying in one plane."""
+    low, high = boxes.box(triangles.reshape(-1, 3))
+    apart = ON_PLANE * float(np.linalg.norm(high - low))
+    small = int((geometry.areas(triangles) < (SMALL * apart) ** 2).sum())
+    if small >= min(MANY_SMALL, FEW_SMALL * len(triangles)) and small:
+        warn(
+            f"the scene reaches over {float((high - low).max()):.3g} m: facets nearer to one another's planes than "
+            f"{apart:.2g} m do not shadow one another, and {small} are hardly larger than that; leave out what lies "
+            "far away, or compute its echoes on their own"
+        )
 
 
 def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
