@@ -5,9 +5,13 @@ Loads nothing that takes time: the command line checks names of files with it.
 
 from __future__ import annotations
 
+import inspect
 import os
+from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
+
+from .text import unknown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -33,6 +37,16 @@ def text(name: str, value: Any) -> str | None:
     if value is not None and len(value) > LONGEST_TEXT:
         raise ValueError(f"{name} has {len(value)} characters, wanted at most {LONGEST_TEXT}: shorten it")
     return value
+
+
+def keywords(verb: Callable[..., object], options: Iterable[str]) -> None:
+    """TypeError for a name in `options` that is no keyword of `verb`, with the most similar one: a forecast takes what
+    its verb takes, and nothing else."""
+    parameters = inspect.signature(verb).parameters.values()
+    known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
+    for name in options:
+        if name not in known:
+            raise TypeError(f"{verb.__name__} has {unknown(name, known, 'option')}")
 
 
 def progress(value: Any, called: str = "progress(stage, done, total)") -> None:

@@ -6,6 +6,7 @@ from collections.abc import Callable, Mapping
 from dataclasses import fields
 from typing import TYPE_CHECKING, Any
 
+from ..base import arguments
 from . import _schema
 from ._building import Builder
 from ._earth import side_of, time_over
@@ -60,6 +61,8 @@ def focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options
 def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Forecast:
     """See `Scenario.plan_focus`."""
     section = section_of(scenario)
+    if section != "backproject":  # `Scenario.focus` writes the file
+        options = {k: v for k, v in options.items() if k != "out"}
     if section == "range_doppler":
         from ..imaging.range_doppler.range_doppler import plan_range_doppler
 
@@ -69,9 +72,11 @@ def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, op
         from ..imaging.polar_format.polar_format import plan_polar_format
 
         return _focused(scenario, plan_polar_format, raw, grid, options, given)
+    from ..imaging.backproject import backproject
     from ..imaging.focus_options import FocusOptions
     from ..imaging.forecast import plan
 
+    arguments.keywords(backproject, given)
     known = {f.name for f in fields(FocusOptions)}
     return _focused(scenario, plan, raw, grid, options, {k: v for k, v in given.items() if k in known})
 

@@ -11,7 +11,7 @@ from typing import Any, Unpack
 import numpy as np
 
 from ..arrays.channels import channels_of, is_single, sampling
-from ..base import errors, validation
+from ..base import arguments, errors, validation
 from ..base.report import ErrorTerm, root_sum_square
 from ..base.text import duration, size_text
 from ..io import sarcl_hdf5
@@ -22,7 +22,7 @@ from ..scene.scene import Scene
 from . import echo_sampling
 from .echo import EchoOptions, echo, echo_request
 from .echo_output import log as output_log
-from .spectral.spectral_echo import SKIPS
+from .spectral.spectral_echo import SKIPS, spectral_echo
 from .spectral.spectral_task import spectral_task
 
 # options of echo that make up its request, and those that a task of spectral_echo takes besides
@@ -74,6 +74,7 @@ def plan_echo(scene: Scene, waveform: Waveform, track: Trajectory, **options: Un
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         validation.instance(name, value, kind)
+    arguments.keywords(echo, options)
     receiver, array = options.get("receiver"), options.get("array")
     given: dict[str, Any] = {
         k: v for k, v in options.items() if k not in ("out", "progress", "receiver", "array", "check")
@@ -142,6 +143,7 @@ def plan_spectral_echo(
     Nothing is transformed. Raises as `spectral_echo` does; `out` is not written.
     """
     validation.choice("variant", variant, ("exact", "saras"))
+    arguments.keywords(spectral_echo, options)
     request = echo_request(scene, SKIPS, tolerance=tolerance, **{k: v for k, v in options.items() if k in REQUEST})
     task = spectral_task(scene, waveform, track, request, **{k: v for k, v in options.items() if k in TASK})
     prepared, parts, direct, terms = task.planned(variant)

@@ -7,6 +7,7 @@ from typing import Any, Unpack
 
 import numpy as np
 
+from ...base import arguments
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.text import duration, size_text
 from ...base.validation import instance
@@ -20,7 +21,7 @@ from ._fullwave_task import FullwaveTask, fullwave_task
 from ._grid_choice import SHARE
 from ._model_error import RATIO, coarse_task
 from ._run_speed import run_speed
-from .fullwave_echo import TOLERANCE, FullwaveOptions
+from .fullwave_echo import TOLERANCE, FullwaveOptions, fullwave_echo
 
 MOST_CELLS = 5e7  # of a grid by which a forecast cuts the bodies: seconds, and some gigabytes
 FEWEST = 5  # anchors before any interval is bisected, where there are as many pulses
@@ -78,8 +79,7 @@ def plan_fullwave_echo(
     """
     for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
         instance(name, value, kind)
-    if unknown := set(options) - set(FullwaveOptions.__annotations__):
-        raise TypeError(f"plan_fullwave_echo() got an unexpected keyword argument {sorted(unknown)[0]!r}")
+    arguments.keywords(fullwave_echo, options)
     given: dict[str, Any] = {"tolerance": TOLERANCE, **options}
     request = echo_request(scene, (), **{k: v for k, v in given.items() if k in REQUEST})
     task = fullwave_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})

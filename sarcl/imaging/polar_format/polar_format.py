@@ -126,11 +126,12 @@ def plan_polar_format(
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
     sum_polarizations: bool = False,
-    **options: object,
+    check: bool | None = None,
+    progress: Progress | None = None,
 ) -> Forecast:
     """What `polar_format` would do with these arguments: a Forecast. Raises and warns as it does; no sample is read.
 
-    options   `check` and `progress`, which do not matter here
+    check, progress   are of `polar_format` alone
     """
     made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
     plan = made.engine.plan

@@ -170,13 +170,14 @@ def plan_range_doppler(
     doppler_rate: Literal["geometry", "data"] | float = "geometry",
     max_bytes: float | None = None,
     device: DeviceChoice | None = None,
-    **options: object,
+    check: bool | None = None,
+    progress: Progress | None = None,
 ) -> Forecast:
     """What `range_doppler` would do with these arguments: a Forecast. Raises as it does.
 
     Some rows are read, as for the plan itself; all of them only for a centroid or rate from the data.
 
-    options   `check` and `progress`, which do not matter here
+    check, progress   are of `range_doppler` alone
     """
     task = make_task(
         raw, heights, side, tolerance, window, weights, times, ranges, spacing, beam, doppler, near, doppler_rate,
