@@ -4,7 +4,14 @@ from __future__ import annotations
 
 import numpy as np
 
-_GOLDEN = 0x9E3779B97F4A7C15
+# Step of splitmix64: the odd number nearest to 2^64 over the golden ratio (Steele, Lea and Flood 2014, "Fast splittable
+# pseudorandom number generators")
+GOLDEN = 0x9E3779B97F4A7C15
+# Multiplier of 64 bits with a good lattice in 2 to 8 dimensions (Steele and Vigna 2021, "Computationally easy,
+# spectrally good multipliers for congruential pseudorandom number generators"): it sets streams apart
+STREAM = 0xD1342543DE82EF95
+# Multipliers and shifts of the mixing function: David Stafford's variant 13, as splitmix64 has it
+MULTIPLIERS, SHIFTS = (0xBF58476D1CE4E5B9, 0x94D049BB133111EB), (30, 27, 31)
 BLOCK = 2**15  # numbers that are computed together: so few stay in the processor's cache
 
 
@@ -22,17 +29,22 @@ def gaussian(places: np.ndarray, seed: int, stream: int = 0) -> np.ndarray:
 
 def _gaussian(places: np.ndarray, seed: int, stream: int) -> np.ndarray:
     with np.errstate(over="ignore"):
-        state = np.full(len(places), ((seed + 1) * _GOLDEN + stream * 0xD1342543DE82EF95) % 2**64, np.uint64)
+        state = np.full(len(places), start_of(seed, stream))
         for axis in np.rint(places.T * 1e6).astype(np.int64).view(np.uint64):
             state = mix(state ^ axis)
-        first, second = mix(state), mix(state + np.uint64(_GOLDEN))
+        first, second = mix(state), mix(state + np.uint64(GOLDEN))
     radius = np.sqrt(-2 * np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
     return np.asarray(radius * np.cos(2 * np.pi * (second >> np.uint64(11)).astype(np.float64) * 2.0**-53))
 
 
+def start_of(seed: int, stream: int) -> np.uint64:
+    """The state from which a stream of a seed begins."""
+    return np.uint64(((seed + 1) * GOLDEN + stream * STREAM) % 2**64)
+
+
 def mix(x: np.ndarray) -> np.ndarray:
     """One step of splitmix64."""
-    x = x + np.uint64(_GOLDEN)
-    x = (x ^ (x >> np.uint64(30))) * np.uint64(0xBF58476D1CE4E5B9)
-    x = (x ^ (x >> np.uint64(27))) * np.uint64(0x94D049BB133111EB)
-    return x ^ (x >> np.uint64(31))
+    x = x + np.uint64(GOLDEN)
+    for shift, multiplier in zip(SHIFTS, MULTIPLIERS, strict=False):
+        x = (x ^ (x >> np.uint64(shift))) * np.uint64(multiplier)
+    return np.asarray(x ^ (x >> np.uint64(SHIFTS[2])))

@@ -98,13 +98,12 @@ def complex_gaussian(rows: np.ndarray, n_samples: int, seed: int) -> np.ndarray:
 
     Two hashes of (seed, row, column) (splitmix64, Steele, Lea and Flood 2014), Box and Muller.
     """
-    golden = 0x9E3779B97F4A7C15
     with np.errstate(over="ignore"):
-        start = np.uint64(((seed + 1) * golden + STREAM * 0xD1342543DE82EF95) % 2**64)
+        start = counter_rng.start_of(seed, STREAM)
         state = counter_rng.mix(
             counter_rng.mix(start ^ rows.astype(np.uint64))[:, None] ^ np.arange(n_samples, dtype=np.uint64)
         )
-        first, second = counter_rng.mix(state), counter_rng.mix(state + np.uint64(golden))
+        first, second = counter_rng.mix(state), counter_rng.mix(state + np.uint64(counter_rng.GOLDEN))
     radius = np.sqrt(-np.log((first >> np.uint64(11)).astype(np.float64) * 2.0**-53 + 2.0**-54))
     return np.asarray(radius * np.exp(2j * np.pi * ((second >> np.uint64(11)).astype(np.float64) * 2.0**-53)))
 

@@ -48,7 +48,7 @@ NOTHING_SEEN = "no pixel lies inside the %s of any row: the image is zero; check
 
 MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
 # Relative distance from the edge of a range window or beam. Pixels closer to it may fall on either side by rounding,
-# and # are left out where the error is measured.
+# and are left out where the error is measured.
 EDGE = 1e-5
 Progress = Callable[[str, int, int], None]
 Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
