@@ -24,7 +24,7 @@ from ..scene.triangles import areas
 from ._aspect_blocks import STRIDE, blocks_around, projected_width, pulse_blocks, shadow_length
 from ._facet_samples import MOST_LINES
 from ._illumination_solver import IlluminationSolver
-from ._levels_along_track import SAMPLING, Judge, Looks, look_along
+from ._levels_along_track import SAMPLING, Course, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
 from ._lit_shares import pixel_shares as pixel_shares
 
@@ -246,46 +246,16 @@ def lit(
         return Illumination(
             whole, first, none, none, none, first, (0, len(tx)), 0.0, 0.0, 0.0, nothing, [], lambda block: nothing
         )
-    bounds = box((triangles if ground is None else np.concatenate([triangles, ground[0]])).reshape(-1, 3))
     solver = IlluminationSolver(
         opened, triangles, two_sided=two_sided, wanted=wanted,
         occluders=occluders, ground=ground,
     )  # fmt: skip
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
-    judge = Judge(power * (1.0 if wanted is None else wanted))
-    lines, finer = 0, 1.0
-    # from all facets: which of them are wanted must not move the blocks
-    widths = [
-        projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
-    ]  # rad, by which an antenna turns while shadows move by the width of a facet
-    _, coarse, _ = pulse_blocks(ends, bounds, [COARSE * width for width in widths])
-    coarse = coarse[:: int(np.clip(len(coarse) * k / MUCH, 1, COARSEST))]
-    while True:
-        limits = [finer * tolerance * width for width in widths]
-        _, offered, turns = pulse_blocks(ends, bounds, limits)
-        # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
-        # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
-        edge_on = 0.0 if rx is None else 2 * EDGE_ON
-        slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
-        first = np.unique(np.searchsorted(offered, coarse, side="right") - 1)
-        looks = Looks(solver, [end[offered] for end in ends], slack)
-        lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
-        solver.take_lines(lines)
-        judge = Judge(judge.weights)
-        course = look_along(looks, offered, first, judge, accuracy, max_bytes, progress)
-        viewpoints = offered[course.chosen]
-        motion = judge.motion(viewpoints, course.left)
-        error = float(np.hypot(judge.sampling, motion))
-        # the accuracy that could be asked for: each part has its share of it
-        reached = max(judge.sampling / SAMPLING, motion / np.sqrt(1 - SAMPLING**2))
-        if error <= accuracy:
-            break
-        if motion > np.sqrt(1 - SAMPLING**2) * accuracy and len(offered) < len(tx):
-            finer /= 4
-        elif judge.sampling > SAMPLING * accuracy and lines < MOST_LINES:
-            lines *= 4
-        else:
-            break
+    power = power * (1.0 if wanted is None else wanted)
+    solid = triangles if ground is None else np.concatenate([triangles, ground[0]])
+    course, viewpoints, errors = _within(
+        accuracy, tolerance, solver, triangles, box(solid.reshape(-1, 3)), ends, power, max_bytes, progress
+    )
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
     if not course.ever.any() and n_wanted:
@@ -295,9 +265,52 @@ def lit(
     )
     return Illumination(
         sealed(blocks), sealed(viewpoints), sealed(~course.ever), sealed(course.always), sealed(course.changing),
-        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), judge.sampling, motion, float(reached),
+        sealed(n_wanted - np.array(course.seen, np.int64)), (0, len(tx)), *errors,
         sealed(course.usual), course.changes, lambda block: course.looks.again(course.chosen[block]),
     )  # fmt: skip
+
+
+def _within(
+    accuracy: float, tolerance: float, solver: IlluminationSolver, triangles: np.ndarray, bounds: np.ndarray,
+    ends: list[np.ndarray], power: np.ndarray, max_bytes: float, progress: Callable[[int, int], None] | None,
+) -> tuple[Course, np.ndarray, tuple[float, float, float]]:  # fmt: skip
+    """Looks with an error of at most `accuracy`, or as many as there are; their pulses (n,); and errors: of sampling,
+    of motion, and the accuracy that could have been asked for.
+
+    triangles, bounds  facets, m (k, 3, 3), and the box of all that occludes (2, 3);  power  of the facets (k,)
+    """
+    judge, lines, finer = Judge(power), 0, 1.0
+    n_pulses = len(ends[0])
+    # from all facets: which of them are wanted must not move the blocks
+    widths = [
+        projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
+    ]  # rad, by which an antenna turns while shadows move by the width of a facet
+    _, coarse, _ = pulse_blocks(ends, bounds, [COARSE * width for width in widths])
+    coarse = coarse[:: int(np.clip(len(coarse) * len(triangles) / MUCH, 1, COARSEST))]
+    while True:
+        _, offered, turns = pulse_blocks(ends, bounds, [finer * tolerance * width for width in widths])
+        # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
+        # of two antennas send back a part of their echo (sarcl/scattering/physical_optics.py:lit_share)
+        edge_on = 0.0 if len(ends) == 1 else 2 * EDGE_ON
+        slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
+        first = np.unique(np.searchsorted(offered, coarse, side="right") - 1)
+        looks = Looks(solver, [end[offered] for end in ends], slack)
+        lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
+        solver.take_lines(lines)
+        judge = Judge(power)
+        course = look_along(looks, offered, first, judge, accuracy, max_bytes, progress)
+        viewpoints = offered[course.chosen]
+        sampling, motion = judge.sampling, judge.motion(viewpoints, course.left)
+        # each part has its share of the accuracy
+        few_looks = motion > np.sqrt(1 - SAMPLING**2) * accuracy and len(offered) < n_pulses
+        few_lines = sampling > SAMPLING * accuracy and lines < MOST_LINES
+        if np.hypot(sampling, motion) <= accuracy or not (few_looks or few_lines):
+            reached = max(sampling / SAMPLING, motion / np.sqrt(1 - SAMPLING**2))
+            return course, viewpoints, (sampling, motion, float(reached))
+        if few_looks:
+            finer /= 4
+        else:
+            lines *= 4
 
 
 def _mask(name: str, given: np.ndarray | bool, k: int) -> np.ndarray:
