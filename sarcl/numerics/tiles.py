@@ -43,10 +43,11 @@ class Tiles:
         most = 0.0
         step = max(BLOCK // n, 1) * n
         for first in range(0, self.offsets.shape[1], step):
-            local = self.offsets[:3, first : first + step].reshape(3, -1, n)
+            high, low = self.offsets[:, first : first + step].astype(np.float64).reshape(2, 3, -1, n)
+            local = high + low
             from_middle = local - ((local.min(axis=2) + local.max(axis=2)) / 2)[:, :, None]
             most = max(most, float(np.einsum("ijk,ijk->jk", from_middle, from_middle).max()))
-        return float(np.sqrt(most)) * (1 + 1e-5)  # above what float32 rounds off
+        return float(np.sqrt(most))
 
     def picked(self, tiles: np.ndarray) -> Tiles:
         """These tiles only."""

@@ -314,11 +314,15 @@ class Scene:
         """Whether point_roughness is not yet realized."""
         return any(self.point_roughness.strides) and bool(self.point_roughness.any())
 
-    @cached_property
+    @property
     def bounds(self) -> NDArray[np.float64]:
         """Lower and upper corner of the box that holds all points and facets, m (2, 3)."""
+        return self._bounds.copy()
+
+    @cached_property
+    def _bounds(self) -> NDArray[np.float64]:
         parts = [box(part) for part in (self.positions, self.triangles.reshape(-1, 3)) if len(part)]
-        return validation.sealed(box(np.concatenate(parts)))
+        return box(np.concatenate(parts))
 
     @property
     def center(self) -> NDArray[np.float64]:

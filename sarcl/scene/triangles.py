@@ -11,7 +11,7 @@ from ..base import validation
 from ..base.vectors import dot
 
 MOST_TURN = 1e12  # rad, of a rotation: float64 resolves 1e-4 rad there
-BLOCK = 2**13  # triangles that are cut together
+BLOCK = 2**13  # triangles that are looked at together: so few stay in the processor's cache
 FARTHEST = 1e70  # m, of corners: the square of an area stays finite
 
 
@@ -120,7 +120,7 @@ def _from(start: np.ndarray, of: np.ndarray) -> tuple[np.ndarray, ...]:
 
 
 def shortest_edges(triangles: np.ndarray) -> np.ndarray:
-    """The edges of triangles (k, 3, 3) that begin at the corner opposite the longest, in their order, m (2, 3, k)."""
+    """Both shorter edges of triangles (k, 3, 3), m (2, 3, k), from the corner opposite the longest, anticlockwise."""
     out = np.empty((2, 3, len(triangles)))
     for block, corners in _blocks(triangles):
         a, b, c = _from(edges(triangles[block]).argmax(axis=0), corners)

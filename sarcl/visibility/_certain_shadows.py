@@ -41,8 +41,9 @@ def box_about(positions: np.ndarray, margin: float = 0.0) -> np.ndarray:
     """Corners of a small box that holds positions, m (n, 3), and what is up to `margin`, m, from them: 1 of a point, 2
     of a line, 4 or 8, (m, 3)."""
     middle = positions.mean(axis=0)
-    axes = np.linalg.svd(positions - middle, full_matrices=True)[2]
-    along = (positions - middle) @ axes.T
+    away = positions - middle
+    axes = np.linalg.eigh(away.T @ away)[1].T
+    along = away @ axes.T
     corners = middle[None]
     flat = FLAT * float(np.linalg.norm(positions, axis=1).max())
     for least, most, axis in zip(along.min(axis=0) - margin, along.max(axis=0) + margin, axes, strict=True):

@@ -22,10 +22,9 @@ MOST_WAVES = 4, 1
 # Distance beside an edge at which the kernels look whether it is covered, relative to the facet's longest edge: above
 # what rounding moves corners by
 SLACK = 1e-12
-TOGETHER = (
-    64,
-    16,
-)  # pulses for which shadows that miss a facet, or cover it, are sorted out at once: of all, then the rest
+FEW_PAIRS = 64  # that are clipped at every pulse: launches take longer than they would save
+# Pulses for which shadows that miss a facet, or cover it, are sorted out at once: of all facets, then of the rest
+TOGETHER = 64, 16
 
 
 @dataclass(frozen=True, eq=False)
@@ -83,6 +82,13 @@ class Clipper:
         pairs     (., 2), of these facets, in their order;  antennas  about the origin
         together  pulses for which shadows are sorted out at once, and then of these
         """
+        if not len(antennas) or not len(which):
+            return
+        if len(pairs) < FEW_PAIRS:
+            some = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
+            for pulses, part, share, mean in self._in_parts(receivers, which[some], pairs, antennas, waves):
+                yield pulses, some[part], share, mean
+            return
         for first in range(0, len(antennas), together[0]):
             here = antennas[first : first + together[0]]
             state = self.sorted_out(receivers, pairs, here)

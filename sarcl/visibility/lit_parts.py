@@ -22,8 +22,9 @@ from ._shadow_pairs import candidate_pairs
 # Corners nearer to a facet's plane than this, relative to the scene's diagonal, lie in it: sheets that coincide, or
 # touch within the digits of float32 files, do not shadow one another
 ON_PLANE = 1e-6
-# Pulses for which the occluders of these blocks are found first: times as much, or all of up to so many pairs of facets
-MANY, EVERY = 16, 2**24
+# Of few facets among many occluders, those that count are found first for pulses that turn by up to WIDE, rad: where
+# there are FEW times as many occluders at least, and up to so many pairs
+WIDE, FEW, MOST_PAIRS = 0.1, 16, 2**24
 MOST_TURN = 0.25  # of the usual occluder's width, by which shadows may move within a block of pulses
 
 
@@ -106,13 +107,14 @@ class LitParts:
         self._rows = np.flatnonzero(self.partly[keep])
 
     def _look(self, parents: Receivers, ends: list[np.ndarray], progress: Callable[[int, int], object] | None) -> None:
-        """Find blocks of pulses, the pairs of each within `max_bytes`, and which pieces are dark or partly lit."""
+        """Find blocks of pulses, the pairs of pieces of each within `max_bytes`, and which are dark or partly lit."""
         kept, solid = 0, np.arange(len(self._occluders))
         dark_pulses = np.zeros(len(self._child), np.int64)
         changing = np.zeros(len(self._child), bool)
         limits = self._limits(ends, solid)
-        every = len(parents.index) * len(solid) <= EVERY
-        for outer in self._spans(ends, [np.inf if every else MANY * limit for limit in limits]):
+        n = len(parents.index)
+        few = FEW * n <= len(solid) and n * len(solid) <= MOST_PAIRS
+        for outer in self._spans(ends, [max(WIDE, limit) if few else limit for limit in limits]):
             within = [end[outer.first : outer.stop] for end in ends]
             some, spans = solid, list(self._spans(within, limits, outer.first))
             if len(spans) > 2:

@@ -1,4 +1,4 @@
-"""Tests of rays and horizons run on every device, and not on its twins: their kernels are the same binaries there."""
+"""Tests of shadows run on every device, and not on its twins: their kernels are the same binaries there."""
 
 from __future__ import annotations
 

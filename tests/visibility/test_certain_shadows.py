@@ -123,3 +123,14 @@ def test_nothing_is_certain_of_an_occluder_that_antennas_see_from_both_sides(dev
     upright = np.array([[[0.0, -1, 0.5], [0.0, 1, 0.5], [0.0, 0, 3.0]]])
     antennas = np.array([[[-3.0, 0, 10]], [[3.0, 0, 10]]])
     assert states(device, facet, upright, antennas)[0] == UNDECIDED
+
+
+def test_a_box_about_many_positions_takes_memory_for_these_alone():
+    import tracemalloc
+
+    positions = np.random.default_rng(0).normal(size=(30_000, 3))
+    tracemalloc.start()
+    box_about(positions)
+    most = tracemalloc.get_traced_memory()[1]
+    tracemalloc.stop()
+    assert most < 8 * positions.nbytes
