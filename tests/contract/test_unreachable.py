@@ -381,7 +381,6 @@ MAY_CATCH = {
     "imaging/run/tile_files.py": "text that is no JSON",
     "scenario/_schema.py": "the file and line are put before a message, which is raised again",
     "imaging/run/image_output.py": "numpy's sizes that overflow",
-    "scene/terrain.py": "what is not three things",
     "numerics/windows.py": "text of a command line",
 }
 
