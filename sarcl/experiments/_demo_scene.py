@@ -21,11 +21,8 @@ ROUGH = Material(diagram="cos")  # rough on a scale below the facets, so that ev
 # Heights of 4 mm: at 35 deg grazing, 9.6 GHz, 0.4 of the power stays in the mirror's direction. The edge of a shadow on
 # such facets is clipped exactly
 SLIGHTLY_ROUGH = Material(diagram="cos", height=4e-3)
-APRON, APRON_SIZE, APRON_HEIGHT = (
-    (13.0, 9.5),
-    (17.0, 12.0),
-    0.03,
-)  # m: middle, sides, height of its slab above the ground
+APRON, APRON_SIZE = (13.0, 9.5), (17.0, 12.0)  # m: middle and sides of the slab before the hangar
+APRON_HEIGHT = 0.03  # m, of the slab above the ground
 FLAT_BEYOND = 3.0  # m about the apron, over which the ground rises to its own height
 
 
@@ -94,7 +91,7 @@ def ground(edge: float, random: np.random.Generator) -> Scene:
 
 
 def apron() -> Scene:
-    """A slab of smooth concrete in front of the hangar, on which its shadow falls."""
+    """A slab of slightly rough concrete in front of the hangar, on which its shadow falls."""
     from ..scene import shapes
 
     slab = shapes.plate(APRON_SIZE, material=replace(SLIGHTLY_ROUGH, reflectivity=CONCRETE))

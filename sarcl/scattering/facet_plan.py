@@ -220,11 +220,11 @@ def nearest(scene: Scene, antennas: PulseGeometry, bounds: np.ndarray) -> float:
     away = [(float(d.min()), name, int(d.argmin())) for name, end in ends for d in [tree.query(end)[0]]]
     reach = TO_CORNER * np.maximum.reduce(edges(scene.triangles))
     large = reach > min(away)[0] / 2
-    found = [(least - float(reach[~large].max(initial=0.0)), name, pulse) for least, name, pulse in away]
+    nearest_of = [(least - float(reach[~large].max(initial=0.0)), name, pulse) for least, name, pulse in away]
     if large.any():  # few, as a rule
         near = scene.triangles[large]
-        found += [(float(distances(near, at).min()), name, i) for name, end in ends for i, at in enumerate(end)]
-    least, name, pulse = min(found)
+        nearest_of += [(float(distances(near, at).min()), name, i) for name, end in ends for i, at in enumerate(end)]
+    least, name, pulse = min(nearest_of)
     if max(least, distance) <= 0:
         place = np.array2string(dict(ends)[name][pulse], precision=6)
         raise ValueError(

@@ -133,8 +133,7 @@ class FacetSet:
         return Light(index, share[:, rows], mean[:, rows])
 
     def share_at(self, pulse: int) -> np.ndarray:
-        """Amplitude of the share of each facet that a pulse sees, 0 to 1 (k,), by sampled shadows
-        alone."""
+        """Amplitude of the share of each facet that a pulse sees, 0 to 1 (k,), by sampled shadows alone."""
         if self.illumination is None:
             return np.ones(len(self))
         *levels, part = self.illumination.levels_around(pulse)

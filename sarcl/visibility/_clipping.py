@@ -85,24 +85,24 @@ class Clipper:
         if not len(antennas) or not len(which):
             return
         if len(pairs) < FEW_PAIRS:
-            some = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
-            for pulses, part, share, mean in self._in_parts(receivers, which[some], pairs, antennas, waves):
-                yield pulses, some[part], share, mean
+            clipped = np.flatnonzero(np.isin(which, pairs[:, 0]) | (len(waves) > 0))
+            for pulses, part, share, mean in self._in_parts(receivers, which[clipped], pairs, antennas, waves):
+                yield pulses, clipped[part], share, mean
             return
         for first in range(0, len(antennas), together[0]):
-            here = antennas[first : first + together[0]]
-            state = self.sorted_out(receivers, pairs, here)
-            dark = np.isin(which, pairs[state == COVERED, 0])
-            nothing, shape = np.flatnonzero(dark), (len(here), int(dark.sum()))
-            if len(nothing):
-                none = np.zeros(shape, np.float32), np.zeros((*shape, len(waves)), np.complex64)
-                yield slice(first, first + len(here)), nothing, *none
-            left = pairs[state == UNDECIDED]
-            left = left[~np.isin(left[:, 0], which[nothing])]
-            some = np.flatnonzero(~dark if len(waves) else np.isin(which, left[:, 0]))
-            rest = receivers, which[some], left, here, waves
+            block = antennas[first : first + together[0]]
+            state = self.sorted_out(receivers, pairs, block)
+            is_dark = np.isin(which, pairs[state == COVERED, 0])
+            dark, shape = np.flatnonzero(is_dark), (len(block), int(is_dark.sum()))
+            if len(dark):
+                zeros = np.zeros(shape, np.float32), np.zeros((*shape, len(waves)), np.complex64)
+                yield slice(first, first + len(block)), dark, *zeros
+            undecided = pairs[state == UNDECIDED]
+            undecided = undecided[~np.isin(undecided[:, 0], which[dark])]
+            clipped = np.flatnonzero(~is_dark if len(waves) else np.isin(which, undecided[:, 0]))
+            rest = receivers, which[clipped], undecided, block, waves
             for pulses, part, share, mean in self.light(*rest, together[1:]) if together[1:] else self._in_parts(*rest):
-                yield slice(first + pulses.start, first + pulses.stop), some[part], share, mean
+                yield slice(first + pulses.start, first + pulses.stop), clipped[part], share, mean
 
     def sorted_out(
         self, receivers: Receivers, pairs: np.ndarray, antennas: np.ndarray, margin: float = 0.0

@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+import warnings
+
 import numpy as np
 import pytest
 from helpers.lit_cases import FAR, exact_echo, lit_polygon
@@ -176,3 +178,16 @@ def test_rough_facets_send_back_the_power_of_their_lit_part():
         share = lit_polygon(facet[0], black.triangles, [lit.tx[pulse]]).area / 2
         ratio = np.vdot(whole.samples[pulse], lit.samples[pulse]) / np.vdot(whole.samples[pulse], whole.samples[pulse])
         assert ratio == pytest.approx(np.sqrt(share), abs=2e-3)
+
+
+def test_a_scene_that_reaches_too_far_for_its_facets_is_warned_of():
+    """Facets nearer to one another's planes than 1e-6 of the scene do not shadow one another."""
+    plates = sarcl.shapes.plate((3, 3)) + sarcl.shapes.plate((0.5, 0.5)).moved((0, 0, 0.5))
+    window = {"reference": (0, 0, 0), "range_window": (-5, 5), "tolerance": 1e-1}
+    path = sarcl.Trajectory.circle(radius=7e3, height=5e3, arc=0.001, n_pulses=2)
+    far = plates + sarcl.shapes.plate((1, 1)).moved((1e6, 0, 0))
+    with pytest.warns(sarcl.SarclWarning, match=r"the scene reaches over 1e\+06 m: .* 6 are hardly larger than that"):
+        sarcl.echo(far, CHIRP, path, **window)
+    with warnings.catch_warnings():
+        warnings.simplefilter("error", sarcl.SarclWarning)
+        sarcl.echo(plates, CHIRP, path, **window)
