@@ -52,7 +52,8 @@ def __getattr__(name: str) -> Any:
         raise AttributeError(f"module 'sarcl' has no attribute {name!r}; dir(sarcl) lists the public names")
     home, attribute = _PUBLIC[name]
     # of a public module the package that holds it is imported first, then the module itself
-    value = vars(import_module(home, __name__)).get(attribute)
+    package = import_module(home, __name__)
+    value = vars(package).get(attribute) if home == "." else getattr(package, attribute, None)
     if value is None:
         value = import_module(f"{home.rstrip('.')}.{attribute}", __name__)
     globals()[name] = value

@@ -13,6 +13,7 @@ from .base import wgs84 as wgs84
 from .base.errors import SarclWarning as SarclWarning
 from .base.errors import ToleranceMissed as ToleranceMissed
 from .base.errors import ToleranceUnreachable as ToleranceUnreachable
+from .base.forecast import Forecast as Forecast
 from .base.report import Report as Report
 from .base.version import __version__ as __version__
 from .earth.elevation import ElevationModel as ElevationModel
@@ -21,15 +22,7 @@ from .effects import noise as noise
 from .effects import stop_and_go as stop_and_go
 from .effects.noise import add_noise as add_noise
 from .experiments import fda as fda
-from .fullwave.echoes.fullwave_echo import fullwave_echo as fullwave_echo
-from .fullwave.echoes.fullwave_forecast import FullwaveForecast as FullwaveForecast
-from .fullwave.echoes.fullwave_forecast import plan_fullwave_echo as plan_fullwave_echo
-from .imaging.backproject import backproject as backproject
 from .imaging.compress import compress as compress
-from .imaging.forecast import Forecast as Forecast
-from .imaging.forecast import plan as plan
-from .imaging.polar_format.polar_format import polar_format as polar_format
-from .imaging.range_doppler.range_doppler import range_doppler as range_doppler
 from .imaging.strip_map import EffectiveVelocity as EffectiveVelocity
 from .imaging.strip_map import doppler_centroid as doppler_centroid
 from .imaging.strip_map import effective_velocity as effective_velocity
@@ -54,10 +47,13 @@ from .scene import material as material
 from .scene import shapes as shapes
 from .scene.material import Material as Material
 from .scene.scene import Scene as Scene
-from .simulation.echo import echo as echo
-from .simulation.echo_forecast import EchoForecast as EchoForecast
-from .simulation.echo_forecast import plan_echo as plan_echo
-from .simulation.spectral.spectral_echo import spectral_echo as spectral_echo
+from .verbs import backproject as backproject
+from .verbs import echo as echo
+from .verbs import fullwave_echo as fullwave_echo
+from .verbs import plan as plan
+from .verbs import polar_format as polar_format
+from .verbs import range_doppler as range_doppler
+from .verbs import spectral_echo as spectral_echo
 from .visibility import illumination as illumination
 
 from . import papers as papers  # isort: skip

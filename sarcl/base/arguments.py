@@ -5,13 +5,9 @@ Loads nothing that takes time: the command line checks names of files with it.
 
 from __future__ import annotations
 
-import inspect
 import os
-from collections.abc import Callable, Iterable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
-
-from .text import unknown
 
 if TYPE_CHECKING:
     import numpy as np
@@ -39,20 +35,11 @@ def text(name: str, value: Any) -> str | None:
     return value
 
 
-def keywords(verb: Callable[..., object], options: Iterable[str]) -> None:
-    """TypeError for a name in `options` that is no keyword of `verb`, with the most similar one: a forecast takes what
-    its verb takes, and nothing else."""
-    parameters = inspect.signature(verb).parameters.values()
-    known = [p.name for p in parameters if p.kind is p.KEYWORD_ONLY]
-    for name in options:
-        if name not in known:
-            raise TypeError(f"{verb.__name__} has {unknown(name, known, 'option')}")
-
-
-def progress(value: Any, called: str = "progress(stage, done, total)") -> None:
-    """TypeError unless `value` is None or can be called."""
+def progress(value: Any, called: str = "progress(stage, done, total)") -> Any:
+    """`value` where it is None or can be called; TypeError otherwise."""
     if value is not None and not callable(value):
         raise TypeError(f"progress is {_shown(value)}; give a function, which is called as {called}, or None")
+    return value
 
 
 def checked_index(name: str, what: str, value: Any, shape: tuple[int, ...]) -> None:

@@ -8,6 +8,9 @@ from dataclasses import asdict, dataclass, field
 from types import MappingProxyType
 from typing import Any
 
+SHOWN = 1e-2  # of the predicted error: smaller terms are left out of the text of a report
+SMALLER_TOLERANCE = "a smaller tolerance"  # the remedy of an error term that a plan makes as large as it may be
+
 
 @dataclass(frozen=True)
 class ErrorTerm:
@@ -41,8 +44,7 @@ class Report:
     seed                   of the random numbers, or None
     model_error            predicted relative L2 error of the model itself, which no tolerance bounds: of the grid of
                            `fullwave_echo`; None where the model has no error of its own, or none was predicted
-    error_terms            parts of predicted_error, whose squares add up to its square: of `echo` and `spectral_echo`;
-                           empty for other functions
+    error_terms            parts of predicted_error, which is the root of the sum of their squares
     """
 
     plan: Mapping[str, object] = field(default_factory=dict)
@@ -82,8 +84,9 @@ class Report:
         lines.append("plan        " + ", ".join(f"{k} {v}" for k, v in self.plan.items()))
         error = "not measured" if self.measured_error is None else f"{self.measured_error:.1e} measured"
         lines.append(f"error       {self.tolerance:.1e} asked, {self.predicted_error:.1e} predicted, {error}")
-        if len(self.error_terms) > 1:
-            lines.append("of which    " + ", ".join(f"{term.name} {term.value:.1e}" for term in self.error_terms))
+        terms = [term for term in self.error_terms if term.value >= SHOWN * self.predicted_error]
+        if len(terms) > 1:
+            lines.append("of which    " + ", ".join(f"{term.name} {term.value:.1e}" for term in terms))
         if self.model_error is not None:
             lines.append(f"model       {self.model_error:.1e} predicted for the model itself")
         if self.predicted_error > 0:

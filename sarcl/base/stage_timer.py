@@ -2,15 +2,17 @@
 
 from __future__ import annotations
 
+from collections.abc import Mapping
+
 
 class Clock:
-    """Seconds since the last lap, added up by stage."""
+    """Seconds since the last lap, added up by stage to those `before`."""
 
-    def __init__(self) -> None:
+    def __init__(self, before: Mapping[str, float] | None = None) -> None:
         import time
 
         self._now = time.perf_counter
-        self.seconds: dict[str, float] = {}
+        self.seconds: dict[str, float] = dict(before or {})
         self._last = self._now()
 
     def lap(self, stage: str) -> None:

@@ -3,136 +3,57 @@
 from __future__ import annotations
 
 import logging
-from collections.abc import Callable, Collection, Sequence
-from contextlib import ExitStack, closing
-from typing import TYPE_CHECKING, Any, Literal, Unpack, overload
+from contextlib import ExitStack
+from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
-from ..arrays.map_aperture import MapApertureOptions, MapKind
-from ..base import arguments
 from ..base.errors import confirm_tolerance, warn
+from ..base.forecast import Forecast, Plan
 from ..base.report import Report
 from ..base.stage_timer import Clock
-from ..base.types import PathLike, WritableArray
-from ..base.validation import count, flag, instance
+from ..base.verb import verb
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
-from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
-from ..opencl.device import Device, DeviceChoice
-from ..opencl.failures import DeviceFailed
+from ..opencl.device import Device
 from ._row_coverage import room_for_gain, seen_by
 from .antenna_beam import shares
+from .backproject_options import BackprojectOptions
 from .choose_method import MethodChoice, choose
 from .collection import collection
 from .engine import Skipped
-from .focus_options import FocusKeywords, FocusOptions
-from .focusing_task import BeamCone, FocusingTask, Skip
-from .forecast import speed
+from .focusing_task import FocusingTask
+from .forecast import forecast_of, speed
 from .pixel_taper import PixelTaper
 from .run.checkpoint import Checkpoint
+from .run.fill_bands import BandFiller
 from .run.image_output import BandBuffer, ImageOutput, is_path
-from .run.tile_files import gaps, share
+from .run.tile_files import share
 from .run.workers import LocalWorkers, WorkerPool
-from .tiling.tiling import Run
 from .unseen_pixels import unseen_pixels
-
-if TYPE_CHECKING:
-    import distributed
 
 log = logging.getLogger(__name__)
 NOTHING_SEEN = "no pixel lies inside the %s of any row: the image is zero; check the grid's center%s"
 
-MOST_FILES = 64  # blocks per image, where finished tiles are written to files: each block makes one file
 # Relative distance from the edge of a range window or beam. Pixels closer to it may fall on either side by rounding,
 # and are left out where the error is measured.
 EDGE = 1e-5
-Progress = Callable[[str, int, int], None]
-Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
+CHECKED = 256  # pixels that a check computes exactly
+EXACT_PAIR = 3e-8  # s: the exact sum of one sample at one pixel
+CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
 
 
-class BackprojectOptions(FocusKeywords, total=False):
-    """Options of `backproject` other than `tile`, which decides what it returns."""
-
-    out: PathLike | WritableArray | None
-    resume: bool | None
-    check: bool | None
-    cluster: distributed.Client | None
-    progress: Progress | None
-
-
-@overload
-def backproject(
-    raw: PhaseHistory, grid: ImageGrid, *, tile: None = None, **options: Unpack[BackprojectOptions]
-) -> Image: ...
-
-
-@overload
-def backproject(
-    raw: PhaseHistory, grid: ImageGrid, *, tile: Tile | None, **options: Unpack[BackprojectOptions]
-) -> Image | None: ...
-
-
-def backproject(
-    raw: PhaseHistory,
-    grid: ImageGrid,
-    *,
-    tolerance: float = 1e-3,
-    method: Literal["auto", "direct", "factorized"] = "auto",
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
-    beam: BeamCone | None = None,
-    mapping: MapKind | MapApertureOptions | None = None,
-    wrap: bool = False,
-    skip: bool | Collection[Skip] = True,
-    max_bytes: float | None = None,
-    out: PathLike | WritableArray | None = None,
-    resume: bool | None = None,
-    tile: Tile | None = None,
-    check: bool | None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    sum_polarizations: bool = False,
-    cluster: distributed.Client | None = None,
-    progress: Progress | None = None,
-) -> Image | None:
+@verb(BackprojectOptions)
+def backproject(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions) -> Plan[Image]:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
 
     raw        PhaseHistory, compressed
     grid       ImageGrid, a plane or any points
-    tolerance  L2 error allowed, relative to the larger of the norm of I and the norm of the same contributions with
-               random phases
-    method     "direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest
-    window     None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as "hann" or
-               ("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or of
-               arrays with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels
-               out: over the aperture of each pixel, the rows that see it
-    weights    one per row (n_rows,), multiplied with window and raw.weight
-    beam       None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the
-               grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap). Or an
-               Antenna, aimed at the grid's centre, (antenna, direction) or (antenna, attitude), attitude (n_rows, 3, 3)
-               or a Trajectory that has one: rows are weighted by the conjugate of its gain towards the pixel, transmit
-               times receive (matched filter)
-    mapping    for echoes of a frequency-diverse array: the mapping that `sarcl.map_aperture` applies first,
-               "corrected", "apparent" or "channels", or a dict of its arguments, such as {"mapping": "apparent",
-               "center": (0, 0, 5)}
-    wrap       False: a row covers only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats with that period
-    skip       True, False or a set of reasons ("range window", "beam", "zero weight", "no data"): pairs of rows and
-               pixels that add nothing for these reasons are left out instead of computed; the image is the same
-    max_bytes  memory for blocks on each device; default 1 GiB on a CPU, half the memory of a GPU
-    out        None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"
-    resume     whether finished tiles of an image at a path are kept in "PATH.parts", where the same call finds them if
-               the run is killed. None: they are kept from the first second on; True: also when the run ends in an
-               exception; False: they are not kept, and those of earlier runs are deleted
-    tile       (i, n): compute only piece i of n, 1 <= i <= n, and keep its tiles in "PATH.parts"; the run that
-               completes the image assembles and returns it, the others return None
-    check      recompute 256 random pixels exactly; None: where that costs less than 2 %
-    device     see `sarcl.devices`; a list of devices, or "all", for several at once
-    sum_polarizations   True: rows of several polarisations are summed coherently; False: they are refused
-    cluster    a dask.distributed.Client whose workers compute the tiles, each on a device of its own
-    progress   called as progress(stage, done, total), done and total in (row, pixel) pairs
+    {options}
 
     Returns an Image, whose gain is the sum of the weights of the rows that saw a pixel: an array where some pixels lie
     outside the range window or the beam of some rows, else a number. Raises ToleranceUnreachable, a ValueError, where
@@ -142,52 +63,125 @@ def backproject(
     SarclWarning: 1 % of the pixels or more lie outside the range window of every row; report.plan counts them.
     Source: Farooq 2009, section 2.2.2; docs/theory/accuracy.md and docs/guide/large_images.md.
     """
-    clock = Clock()
-    options = FocusOptions(
-        tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
-    )
-    if check is not None:
-        flag("check", check)
-    arguments.progress(progress)
-    tolerance = options.tolerance
-    piece = _piece(tile, resume, out)
-    raw, task = options.task(raw, grid)
-    workers, chosen = _open_workers(task, options, cluster)
-    room_for_gain(task, chosen.dtype)
-    clock.lap("plan")
+    return plan_of(raw, grid, options)
 
-    with ExitStack() as stack:
+
+def plan_of(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions) -> BackprojectPlan:
+    """The plan of `backproject`."""
+    clock, piece = Clock(), options.piece()
+    mapped, task = options.task(raw, grid)
+    if options.cluster is None:
+        chosen = options.choose(task, open_devices(options.device))
+    else:
+        from .run.dask_workers import device_class
+
+        chosen = choose(task, options.method, options.tolerance, device_class(options.cluster, options.device))
+    clock.lap("plan")
+    return BackprojectPlan(options, mapped, grid, task, chosen, piece, clock.seconds)
+
+
+def pixels_alone(raw: PhaseHistory, grid: ImageGrid, **options: Any) -> NDArray[np.complexfloating]:
+    """The pixels of `backproject`, of grid.shape, for images that nobody keeps: no gain, check, report or warning.
+
+    options  as `backproject` takes them, without files, pieces and clusters
+    """
+    return plan_of(raw, grid, BackprojectOptions(**options)).pixels()
+
+
+@dataclass(frozen=True, eq=False)
+class BackprojectPlan:
+    """One image to be made by the chosen method: a Plan.
+
+    raw      all rows, mapped where a mapping is asked for;  grid  as it was given
+    task     of the rows that have a weight
+    piece    (i, n) where only that piece of the tiles is made;  seconds  of planning, by stage
+    """
+
+    options: BackprojectOptions
+    raw: PhaseHistory
+    grid: ImageGrid
+    task: FocusingTask
+    chosen: MethodChoice
+    piece: tuple[int, int] | None
+    seconds: dict[str, float]
+
+    def forecast(self) -> Forecast[Image]:
+        """Its Forecast."""
+        return forecast_of(self.task, self.options, self.chosen, sum(self.seconds.values()), self.run)
+
+    def pixels(self) -> NDArray[np.complexfloating]:
+        """The pixels alone."""
+        with ExitStack() as stack:
+            output = ImageOutput(self.grid, self.chosen.tiling, None, stack, self.chosen.dtype)
+            self._filler(None, Clock(), progress=False).fill(output, (0, self.chosen.tiling.n_bands))
+            output.finish()
+        return np.asarray(output.data)
+
+    def run(self) -> Image:
+        """The image; None for a piece while others are missing."""
+        room_for_gain(self.task, self.chosen.dtype)
+        clock = Clock(self.seconds)
+        with ExitStack() as stack:
+            image = self._image(stack, clock)
+        return image  # type: ignore[return-value]
+
+    def _image(self, stack: ExitStack, clock: Clock) -> Image | None:
+        options, n_bands, out = self.options, self.chosen.tiling.n_bands, self.options.out
         checkpoint = None
         if is_path(out):
-            checkpoint = Checkpoint(out, task, chosen, tolerance, True if piece else resume)
+            kept = True if self.piece else options.resume
+            checkpoint = Checkpoint(out, self.task, self.chosen, options.tolerance, kept)
             stack.push(checkpoint)
-        if piece and checkpoint:
+        filler = self._filler(checkpoint, clock)
+        if self.piece and checkpoint:
             finished = checkpoint.finished()
             if finished is not None:
                 return finished
-            _fill(
-                workers,
-                task,
-                chosen,
-                None,
-                checkpoint,
-                share(chosen.tiling.n_bands, *piece, chosen.unit),
-                clock,
-                progress,
-            )
+            filler.fill(None, share(n_bands, *self.piece, self.chosen.unit))
             if not checkpoint.complete():
                 return None
         try:
-            output = ImageOutput(grid, chosen.tiling, out, stack, chosen.dtype)
+            output = ImageOutput(self.grid, self.chosen.tiling, out, stack, self.chosen.dtype)
         except FileExistsError:
-            if piece:  # another run is assembling the image from all tiles
+            if self.piece:  # another run is assembling the image from all tiles
                 return None
             raise
         if checkpoint:
             checkpoint.begin()
-        bands = 0, chosen.tiling.n_bands
-        skipped, kept = _fill(workers, task, chosen, output, checkpoint, bands, clock, progress)
+        skipped, n_kept = filler.fill(output, (0, n_bands))
         output.finish()
+        fields = self._fields(filler, skipped, n_kept, output)
+        image = output.image(job=checkpoint.mark if checkpoint and checkpoint.tiles else None, **fields)
+        if checkpoint:
+            checkpoint.done()
+        confirm_tolerance(image=image, instead="try method='direct'")
+        return image
+
+    def _filler(self, checkpoint: Checkpoint | None, clock: Clock, progress: bool = True) -> BandFiller:
+        """The filler of this task on its workers."""
+        report = self.options.progress if progress else None
+        return BandFiller(self._workers(), self.task, self.chosen, checkpoint, clock, report)
+
+    def _workers(self) -> WorkerPool:
+        """The workers that make the image."""
+        options, task, chosen = self.options, self.task, self.chosen
+        if options.cluster is not None:
+            from .run.dask_workers import DaskWorkers
+
+            return DaskWorkers(options.cluster, task, chosen, options.device, options.max_bytes)
+        devices = open_devices(options.device)
+        engines = [chosen.on(d, task) for d in devices]
+        kinds = {(d.info.platform, d.info.name, d.info.kind, d.info.units) for d in devices}
+        rates = [speed(d) for d in devices] if len(kinds) > 1 else [1.0 for _ in devices]
+        budgets = [options.budget(d) for d in devices]
+        return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates)
+
+    def _fields(self, filler: BandFiller, skipped: Skipped, n_kept: int, output: ImageOutput) -> dict[str, Any]:
+        """What the Image says of its data: gain, carrier, collection, report; warns of pixels that no row sees.
+
+        n_kept  bands that files of earlier runs held
+        """
+        task, grid, clock = self.task, self.grid, filler.clock
         no_data = 0 if task.grid.empty is None else task.raw.n_rows * int(task.grid.empty.sum())
         done = task.pairs - skipped.window - skipped.beam - no_data
         if done == 0:
@@ -196,159 +190,63 @@ def backproject(
         unseen = unseen_pixels(task)
         if unseen and unseen.warning and done:
             warn(unseen.warning)
-        measured = None
-        exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
-        if check or (check is None and exact_seconds < 0.02 * clock.seconds.get("backproject", 0.0)):
-            measured = _measure_error(task, grid, output.data)
-            clock.lap("check")
-        if task.antenna is None:
-            seen = seen_by(task, chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
-        else:
-            gain = _antenna_gain(task, chosen, open_devices(None if cluster else device)[0], options)
-            if gain is None:  # the image is zero, and a gain is not
-                gain = float(task.antenna.peak**2 * task.row_weight.sum() * task.sample_weight.sum())
-                if done:
-                    log.warning(NOTHING_SEEN, "range window and beam", " and the beam")
-            seen = {"gain": gain}
+        measured = self._measured(output.data, clock)
+        gain = self._gain(done)
         clock.lap("gain")
-        plan = chosen.plan.describe(chosen.method)
-        if kept:
-            plan["from files"] = f"{kept} of {chosen.tiling.n_bands} bands"
+        plan = self.chosen.plan.describe(self.chosen.method)
+        if n_kept:
+            plan["from files"] = f"{n_kept} of {self.chosen.tiling.n_bands} bands"
         if unseen:
             plan["pixels outside every range window"] = unseen.describe()
         report = Report(
             plan=plan,
-            tolerance=tolerance,
-            predicted_error=chosen.predicted_error,
+            tolerance=self.options.tolerance,
+            predicted_error=self.chosen.predicted_error,
+            error_terms=self.chosen.error_terms,
             measured_error=measured,
             contributions_done=done,
             contributions_skipped={
                 "range window": skipped.window,
                 "beam": skipped.beam,
-                "zero weight": (raw.n_rows - task.raw.n_rows) * grid.size,
+                "zero weight": (self.raw.n_rows - task.raw.n_rows) * grid.size,
                 "no data": no_data,
             },
             seconds=clock.seconds,
-            device=" + ".join(workers.names),
+            device=" + ".join(filler.workers.names),
         )
-        image = output.image(
-            job=checkpoint.mark if checkpoint and checkpoint.tiles else None,
-            **seen,
-            frequency=float(np.median(task.antennas.frequency)),
-            report=report,
-            **collection(task.raw, grid, window),
-        )
-        if checkpoint:
-            checkpoint.done()
-        confirm_tolerance(image=image, instead="try method='direct'")
-        return image
+        frequency = float(np.median(task.antennas.frequency))
+        return {
+            **gain,
+            "frequency": frequency,
+            "report": report,
+            **collection(task.raw, grid, self.options.window),
+        }
+
+    def _measured(self, data: Any, clock: Clock) -> float | None:
+        """The error at random pixels, where that is asked for or cheap."""
+        seconds = CHECKED * self.task.raw.n_rows * self.raw.n_samples * EXACT_PAIR
+        cheap = seconds < CHEAP_CHECK * clock.seconds.get("backproject", 0.0)
+        if not (cheap if self.options.check is None else self.options.check):
+            return None
+        measured = _measure_error(self.task, self.grid, data)
+        clock.lap("check")
+        return measured
+
+    def _gain(self, done: int) -> dict[str, Any]:
+        """The gain of the image, as fields of Image."""
+        task = self.task
+        if task.antenna is None:
+            return seen_by(task, self.chosen.dtype, None if task.taper is None else PixelTaper(task).gains)
+        device = open_devices(None if self.options.cluster else self.options.device)[0]
+        gain = _antenna_gain(task, self.chosen, device, self.options)
+        if gain is None:  # the image is zero, and a gain is not
+            gain = float(task.antenna.peak**2 * task.row_weight.sum() * task.sample_weight.sum())
+            if done:
+                log.warning(NOTHING_SEEN, "range window and beam", " and the beam")
+        return {"gain": gain}
 
 
-def pixels_alone(raw: PhaseHistory, grid: ImageGrid, **keywords: Unpack[FocusKeywords]) -> NDArray[np.complexfloating]:
-    """The pixels of `backproject`, of grid.shape, for images that nobody keeps: no gain, check, report or warning."""
-    options = FocusOptions(**keywords)
-    _, task = options.task(raw, grid)
-    workers, chosen = _open_workers(task, options, None)
-    with ExitStack() as stack:
-        output = ImageOutput(grid, chosen.tiling, None, stack, chosen.dtype)
-        _fill(workers, task, chosen, output, None, (0, chosen.tiling.n_bands), Clock(), None)
-        output.finish()
-    return np.asarray(output.data)
-
-
-def _piece(tile: Any, resume: Any, out: Any) -> tuple[int, int] | None:
-    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for arguments that do not go together."""
-    if resume is not None:
-        instance("resume", resume, bool)
-    if (tile is not None or resume) and not is_path(out):
-        name, given = ("tile", tile) if tile is not None else ("resume", resume)
-        raise ValueError(
-            f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are kept '
-            "beside it"
-        )
-    if tile is None:
-        return None
-    if resume is False:
-        raise ValueError("tile and resume=False do not go together: a piece would delete the tiles of the other pieces")
-    if not isinstance(tile, (tuple, list)) or len(tile) != 2:
-        raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
-    i, n = count("tile[0]", tile[0], least=0), count("tile[1]", tile[1])
-    if i > n:
-        raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
-    return i, n
-
-
-def _open_workers(task: FocusingTask, options: FocusOptions, cluster: Any) -> tuple[WorkerPool, MethodChoice]:
-    """The workers that make the image, and the one method and plan for all of them."""
-    if cluster is not None:
-        from .run.dask_workers import DaskWorkers, device_class
-
-        chosen = choose(task, options.method, options.tolerance, device_class(cluster, options.device))
-        return DaskWorkers(cluster, task, chosen, options.device, options.max_bytes), chosen
-    devices = open_devices(options.device)
-    budgets = [options.budget(d) for d in devices]
-    chosen = options.choose(task, devices)
-    engines = [chosen.on(d, task) for d in devices]
-    kinds = {(d.info.platform, d.info.name, d.info.kind, d.info.units) for d in devices}
-    rates = [speed(d) for d in devices] if len(kinds) > 1 else [1.0 for _ in devices]
-    return LocalWorkers(engines, budgets, [d.info.name for d in devices], task.raw.n_rows, rates), chosen
-
-
-def _fill(
-    workers: WorkerPool,
-    task: FocusingTask,
-    chosen: MethodChoice,
-    output: ImageOutput | None,
-    checkpoint: Checkpoint | None,
-    bands: Run,
-    clock: Clock,
-    progress: Progress | None,
-) -> tuple[Skipped, int]:
-    """Focus a run of bands into `output`, or only into tile files; returns the pairs skipped and the number of bands
-    that files already held."""
-    tiling, n_rows = chosen.tiling, task.raw.n_rows
-    there, skipped = [], Skipped()
-    for run, values, missed in checkpoint.found(*bands) if checkpoint else ():
-        if output is not None:
-            output.flat[tiling.extent(*run)] = values
-        there.append(run)
-        skipped += missed
-    todo = gaps(there, *bands)
-    total = n_rows * sum(tiling.count(*run) for run in todo)
-    reported = -1
-
-    def on_progress(done: int) -> None:
-        nonlocal reported
-        if progress and done != reported:
-            progress("backproject", done, total)
-            reported = done
-
-    def output_for(first: int, last: int) -> Any:
-        return BandBuffer(tiling, first, last, chosen.dtype) if output is None else output.flat
-
-    most = float("inf")
-    if checkpoint and checkpoint.resume is not False:
-        most = max(total / max(n_rows, 1) / MOST_FILES, workers.least_pixels)
-    clock.lap("files")
-    made = []
-    try:
-        with closing(workers.work(todo, most, chosen.unit, output_for, clock, on_progress)) as work:
-            for first, last, flat, missed in work:
-                made.append((first, last))
-                skipped += missed
-                if checkpoint:
-                    checkpoint.keep(first, last, flat, missed)
-                    clock.lap("files")
-    except DeviceFailed:
-        if checkpoint and output is not None:  # without an output every tile is written at once
-            checkpoint.rescue(output.flat)
-        raise
-    if gaps(there + made, *bands):
-        raise RuntimeError(f"bands {gaps(there + made, *bands)} were left out; please report this")
-    return skipped, sum(b - a for a, b in there)
-
-
-def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: FocusOptions) -> Any:
+def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions) -> Any:
     """Sums of the squared gains of the antenna times the weights, float32 of the grid's shape; a number where they are
     the same in all pixels; None where they are 0 in all: the antenna sees no pixel inside a range window."""
     engine: Any = chosen.engine
@@ -369,7 +267,7 @@ def _measure_error(task: FocusingTask, grid: ImageGrid, data: Any) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum, as `tolerance` is defined."""
     from ..reference.backproject import backproject as exact
 
-    index, positions = grid.sample(256, seed=0)
+    index, positions = grid.sample(CHECKED, seed=0)
     beam = None if task.antennas.beam is None else (task.antennas.beam_angle, task.antennas.beam)
     share = None if task.taper is None else PixelTaper(task).weights(positions)
     if task.antenna is not None:

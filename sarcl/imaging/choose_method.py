@@ -8,6 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
+from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.tolerances import askable, reachable, rounded_up
 from ..base.validation import LARGEST_TOLERANCE
 from ..numerics import cost_model, error_bounds
@@ -38,7 +39,7 @@ class MethodChoice:
     """A method, its plan and tiling for one task, and the class of its engine.
 
     engine           called as engine(device, task, plan, tiling)
-    predicted_error  bound of the relative error, for the energy of these rows at these pixels
+    error_terms      parts of the relative error, for the energy of these rows at these pixels
     cost             per contribution, relative to one with linear interpolation and ranges in float32
     """
 
@@ -46,8 +47,13 @@ class MethodChoice:
     plan: ImagePlan
     tiling: Tiling
     engine: type[Engine]
-    predicted_error: float
+    error_terms: tuple[ErrorTerm, ...]
     cost: float
+
+    @property
+    def predicted_error(self) -> float:
+        """Bound of the relative error."""
+        return root_sum_square(self.error_terms)
 
     @property
     def dtype(self) -> type[np.complexfloating]:
@@ -194,9 +200,15 @@ class _Float32:
             raise ToleranceUnreachable(self.tolerance, best(), "rounding of float32 sums", how=f"{how}: {dark}")
 
     def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
-        error = float(np.hypot(self.near * made[0].predicted_error + self.rounding + self.gains, self.coordinates))
-        error = min(error, self.tolerance)
-        return MethodChoice(name, *made, engine, error, made[0].cost)
+        sums = self.near * made[0].predicted_error + self.rounding + self.gains
+        if np.hypot(sums, self.coordinates) > self.tolerance:  # by rounding
+            sums = float(np.sqrt(self.tolerance**2 - self.coordinates**2)) * (1 - 1e-15 * bool(self.coordinates))
+        terms = [ErrorTerm("range profiles and sums", float(sums), SMALLER_TOLERANCE)]
+        if self.coordinates:
+            terms.append(
+                ErrorTerm("rounded coordinates of the plane", self.coordinates, "the origin put near the scene")
+            )
+        return MethodChoice(name, *made, engine, tuple(terms), made[0].cost)
 
 
 def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
@@ -273,4 +285,5 @@ def _float64(task: FocusingTask, tolerance: float) -> MethodChoice:
     """The direct method in float64."""
     plan, tiling = float64_plan.make_plan(task, tolerance)
     cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
-    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error, cost)
+    terms = (ErrorTerm("range profiles and sums", float(plan.predicted_error), SMALLER_TOLERANCE),)
+    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, terms, cost)

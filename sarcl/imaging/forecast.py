@@ -1,98 +1,42 @@
-"""Method, run time, memory and error of an image, predicted before the work."""
+"""Forecast of backproject: run time, memory and error of an image before the work; the speed of a device."""
 
 from __future__ import annotations
 
 import copy
 import functools
 import time
-from collections.abc import Collection, Sequence
-from dataclasses import dataclass
-from typing import Literal
+from collections.abc import Callable
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ..arrays.map_aperture import MapApertureOptions, MapKind
 from ..base.errors import ToleranceUnreachable, warn
+from ..base.forecast import Forecast
 from ..base.stage_timer import Clock
-from ..base.text import duration, size_text
+from ..model.image import Image
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics.cost_model import DeviceClass
-from ..numerics.windows import Window
 from ..opencl.choose_device import open_devices
-from ..opencl.device import Device, DeviceChoice
+from ..opencl.device import Device
 from . import profile_energy
+from .backproject_options import BackprojectOptions
 from .choose_method import MethodChoice
 from .factorized.plan import FactorPlan, moving_cost
-from .focus_options import FocusOptions
-from .focusing_task import BeamCone, FocusingTask, Skip, make_task
+from .focusing_task import FocusingTask, make_task
 from .unseen_pixels import unseen_pixels
 
 PROBE = 0.03  # s: shortest run of the kernel from which the speed of a device is measured
 MOST_BANDS = 2**16  # bands that are divided into blocks; the memory of the first block follows from these
 
 
-@dataclass(frozen=True, eq=False)
-class Forecast:
-    """What `backproject` would do with the same options, or `polar_format` or `range_doppler`.
+def forecast_of(
+    task: FocusingTask, options: BackprojectOptions, chosen: MethodChoice, planning: float, run: Callable[[], Image]
+) -> Forecast[Image]:
+    """Forecast of `run`, which makes an image by the chosen method; planning  seconds that the choice has taken.
 
-    method           "direct" or "factorized"; "polar format" or "range-Doppler"
-    plan             details of the plan, as in a report
-    seconds          estimated run time at the present speed of the devices: planning, the work, and what is made again
-                     for every block that max_bytes allows
-    planning         of these, seconds that planning has just taken
-    bytes            estimated memory: all pixels, and the blocks on every device
-    predicted_error  bound of the relative error
-    cheaper          (predicted error, seconds) of the next cheaper plan, or None where there is none
+    Time is scaled from a short run of the kernel on each device.
     """
-
-    method: str
-    plan: dict[str, object]
-    seconds: float
-    bytes: float
-    predicted_error: float
-    cheaper: tuple[float, float] | None
-    planning: float = 0.0
-
-    def __str__(self) -> str:
-        text = f"{self.method}: about {duration(self.seconds)}, {size_text(self.bytes)}"
-        text += f", error below {self.predicted_error:.1e}"
-        if self.cheaper:
-            text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
-        return text
-
-
-def plan(
-    raw: PhaseHistory,
-    grid: ImageGrid,
-    *,
-    tolerance: float = 1e-3,
-    method: Literal["auto", "direct", "factorized"] = "auto",
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
-    beam: BeamCone | None = None,
-    mapping: MapKind | MapApertureOptions | None = None,
-    wrap: bool = False,
-    skip: bool | Collection[Skip] = True,
-    max_bytes: float | None = None,
-    device: DeviceChoice | Sequence[DeviceChoice] | None = None,
-    sum_polarizations: bool = False,
-) -> Forecast:
-    """Predict how `backproject(raw, grid, ...)` would make the image with these options: a Forecast.
-
-    Samples are read once, up to 2^28 of them, to estimate how much of their energy lies on the grid; with `mapping`,
-    all are read and mapped first. Time is scaled from a short run of the kernel on each device. ValueError and
-    MemoryError where `backproject` would raise one.
-    """
-    options = FocusOptions(
-        tolerance, method, window, weights, beam, mapping, wrap, skip, max_bytes, device, sum_polarizations
-    )
-    devices = open_devices(device)
-    raw, task = options.task(raw, grid)
-    start = time.perf_counter()
-    chosen = options.choose(task, devices)
-    planning = time.perf_counter() - start
+    devices = open_devices(options.device)
     working, repeated = np.sum([_in_blocks(task, chosen, d, options.budget(d)) for d in devices], axis=0)
     rate = _rate(devices)
     # seconds per pixel, for all rows that see it, at cost 1
@@ -104,14 +48,17 @@ def plan(
         details["pixels outside every range window"] = unseen.describe()
         if unseen.warning:
             warn(unseen.warning)
+    cheaper = _cheaper(task, options, devices, chosen, seconds, besides)
     return Forecast(
-        chosen.method,
-        details,
-        besides + seconds * _work(task, chosen),
-        float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
-        chosen.predicted_error,
-        _cheaper(task, options, devices, chosen, seconds, besides),
-        planning,
+        method=chosen.method,
+        plan=details,
+        seconds=besides + seconds * _work(task, chosen),
+        bytes=float(task.grid.size) * np.dtype(chosen.dtype).itemsize + working,
+        predicted_error=chosen.predicted_error,
+        error_terms=chosen.error_terms,
+        cheaper=cheaper,
+        planning=planning,
+        run=run,
     )
 
 
@@ -137,7 +84,7 @@ def _rate(devices: list[Device]) -> float:
 
 
 def _cheaper(
-    task: FocusingTask, options: FocusOptions, devices: list[Device], chosen: MethodChoice, seconds: float,
+    task: FocusingTask, options: BackprojectOptions, devices: list[Device], chosen: MethodChoice, seconds: float,
     besides: float,
 ) -> tuple[float, float] | None:  # fmt: skip
     """Predicted error and seconds of the most accurate plan that costs noticeably less.

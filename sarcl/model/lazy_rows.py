@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import os
 from abc import ABC, abstractmethod
 from typing import Any
 
@@ -14,6 +15,21 @@ from ..base.validation import sealed
 def in_memory(source: Any) -> bool:
     """Whether `source` is a plain array; a memmap counts as a file."""
     return isinstance(source, np.ndarray) and not isinstance(source, np.memmap)
+
+
+def file_stamps(source: Any) -> dict[str, tuple[int, int, int]]:
+    """Inode, size and time of change of every file that a source reads its rows from, by its path."""
+    if isinstance(source, RowsOnDemand):
+        inner = [*getattr(source, "sources", []), *([source.source] if hasattr(source, "source") else [])]
+        return {path: stamp for each in inner for path, stamp in file_stamps(each).items()}
+    path = getattr(getattr(source, "file", None), "filename", None) or getattr(source, "filename", None)
+    if path is None:
+        return {}
+    try:
+        state = os.stat(path)
+    except OSError:  # it is gone
+        return {str(path): (0, 0, 0)}
+    return {str(path): (state.st_ino, state.st_size, state.st_mtime_ns)}
 
 
 def pick(source: Any, index: np.ndarray) -> Any:

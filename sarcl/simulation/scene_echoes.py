@@ -10,7 +10,7 @@ from typing import Any
 import numpy as np
 
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
-from ..base.report import ErrorTerm, root_sum_square
+from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
 from ..base.tolerances import askable, reachable, rounded_up
 from ..model.waveform import Waveform
@@ -39,7 +39,6 @@ UNSEEN = 1e-3
 NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
 SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
 CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
-SMALLER_TOLERANCE = "a smaller tolerance"  # makes an error term smaller
 UNKNOWN_SHADOWS = {"shadow edges": "sampled, not part of the error"}  # for the report
 Progress = Callable[[str, int, int], None]
 

@@ -15,12 +15,12 @@ import numpy as np
 from ...arrays.channels import Channel
 from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.report import ErrorTerm, root_sum_square
+from ...base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ...base.vectors import unit
 from ...numerics import cost_model
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import SMALLER_TOLERANCE, SceneEchoes, band_of
+from ..scene_echoes import SceneEchoes, band_of
 from ..spreading import Band
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples

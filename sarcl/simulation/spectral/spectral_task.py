@@ -10,7 +10,7 @@ import numpy as np
 from ...arrays.channels import is_single
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import NotApplicable
-from ...base.report import ErrorTerm
+from ...base.report import SMALLER_TOLERANCE, ErrorTerm
 from ...base.validation import array as numbers
 from ...base.validation import instance
 from ...model.antenna_array import AntennaArray
@@ -23,7 +23,7 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import SMALLER_TOLERANCE, ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
+from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part

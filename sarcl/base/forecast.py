@@ -1,0 +1,65 @@
+"""Forecast: what a verb would do, predicted before the work; and the plan that it carries out."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from typing import Generic, Protocol, TypeVar
+
+from .report import ErrorTerm
+from .text import duration, size_text
+
+R = TypeVar("R")
+R_co = TypeVar("R_co", covariant=True)
+
+
+@dataclass(frozen=True, eq=False)
+class Forecast(Generic[R]):
+    """Forecast of a verb with the same arguments: `sarcl.plan(verb, ...)` makes it.
+
+    method           such as "direct", "factorized", "polar format", "range-Doppler", "pulse by pulse", "full wave"
+    plan             details of the plan, as in a report
+    seconds          estimated run time at the present speed of the devices
+    bytes            estimated memory: of an image all pixels, and the blocks on every device; of echoes their samples
+                     and geometry, in memory or in a file
+    predicted_error  bound of the relative error
+    error_terms      parts of predicted_error, which is the root of the sum of their squares
+    cheaper          (predicted error, seconds) of the next cheaper plan; None: none, or not searched for
+    n_rows, n_samples  of echoes; None for images
+    model_error      predicted error of the model itself, which no tolerance bounds; None: it has none, or it is
+                     known only after the run
+    planning         seconds that planning has taken, which `seconds` includes
+    run              run() carries out this very plan and returns the verb's result. What was planned from is referred
+                     to, not copied: ValueError where a file of it has changed meanwhile
+    """
+
+    method: str
+    plan: Mapping[str, object]
+    seconds: float
+    bytes: float
+    predicted_error: float
+    run: Callable[[], R] = field(repr=False)
+    error_terms: tuple[ErrorTerm, ...] = ()
+    cheaper: tuple[float, float] | None = None
+    n_rows: int | None = None
+    n_samples: int | None = None
+    model_error: float | None = None
+    planning: float = 0.0
+
+    def __str__(self) -> str:
+        rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "
+        text = f"{self.method}: {rows}about {duration(self.seconds)}, {size_text(self.bytes)}"
+        text += f", error below {self.predicted_error:.1e}"
+        if self.cheaper:
+            text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
+        return text
+
+
+class Plan(Protocol[R_co]):
+    """What a verb has decided about one task: it can be forecast, or run."""
+
+    def forecast(self) -> Forecast[R_co]:
+        """Its Forecast."""
+
+    def run(self) -> R_co:
+        """The result."""

@@ -1,0 +1,68 @@
+"""Options of a verb: a frozen record with the type, default, check and documentation of each.
+
+A verb's signature and help (base/verb.py), its stub for type checkers, its section in scenario files, its flags on the
+command line and its table in the guide are made from its record.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+from collections.abc import Callable
+from dataclasses import Field, dataclass, field, fields
+from typing import Any
+
+Check = Callable[[str, Any], Any]
+_KEY = "option"  # of a field's metadata
+
+
+@dataclass(frozen=True)
+class Option:
+    """Documentation of an option; check(name, value) returns the value to keep, or raises.
+
+    in_files  whether scenario files have it as a key: not what belongs to one run, such as a device
+    """
+
+    doc: str
+    check: Check | None
+    in_files: bool
+
+
+def option(default: Any, doc: str = "", check: Check | None = None, *, in_files: bool = True) -> Any:
+    """The field of an option. Without `doc` and `check`: another default of an option that the record inherits."""
+    return field(default=default, metadata={_KEY: Option(inspect.cleandoc(doc), check, in_files)})
+
+
+def or_none(check: Check) -> Check:
+    """The check of an option that may be None too."""
+    return lambda name, value: None if value is None else check(name, value)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Options:
+    """Base class of records of options: checks every field, in their order, when one is made."""
+
+    def __post_init__(self) -> None:
+        for name, (_, told) in described(type(self)).items():
+            if told.check:
+                object.__setattr__(self, name, told.check(name, getattr(self, name)))
+
+
+@functools.cache
+def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
+    """Field and Option of every option of a record, in the order of its signature: its own ones, then those that it
+    inherits. TypeError for an option that nothing documents."""
+    places = {f.name: _declared(record, f) for f in fields(record)}
+    return {
+        f.name: (f, places[f.name][1]) for f in sorted(fields(record), key=lambda f: places[f.name][0])
+    }  # sorted() keeps the order of equal ones
+
+
+def _declared(record: type[Options], own: Field[Any]) -> tuple[int, Option]:
+    """How many steps up a record's bases an option is documented, and that Option."""
+    for depth, kind in enumerate(record.__mro__):
+        known = vars(kind).get("__dataclass_fields__", {}).get(own.name)
+        told: Option | None = None if known is None else known.metadata.get(_KEY)
+        if told and told.doc:
+            return depth, told
+    raise TypeError(f"{record.__name__}.{own.name} has no documentation; declare it by option(default, doc)")

@@ -1,0 +1,98 @@
+"""A verb: a function whose options are a record, and whose work is planned before it runs.
+
+    @verb(PolarFormatOptions)
+    def polar_format(raw: PhaseHistory, grid: ImageGrid, options: PolarFormatOptions) -> Plan[Image]:
+        ...
+
+is written as the function that plans: arguments -> task -> plan. `polar_format(raw, grid, tolerance=1e-2)` then runs
+that plan, and `sarcl.plan(polar_format, raw, grid, tolerance=1e-2)` forecasts it.
+"""
+
+from __future__ import annotations
+
+import functools
+import inspect
+import textwrap
+from collections.abc import Callable
+from typing import Any, Protocol, TypeVar
+
+from .forecast import Plan
+from .options import Options, described
+from .text import unknown
+
+R_co = TypeVar("R_co", covariant=True)
+R = TypeVar("R")
+MARK = "{options}"  # in the docstring of a verb: here its options are listed
+WIDTH = 116  # columns of a docstring without its indentation
+
+
+class Verb(Protocol[R_co]):
+    """A verb: called it returns its result.
+
+    planned  called in the same way, returns its Plan;  options  its record
+    """
+
+    __name__: str
+    planned: Callable[..., Plan[R_co]]
+    options: type[Options]
+
+    def __call__(self, *args: Any, **options: Any) -> R_co:
+        """The result of the plan for these arguments."""
+
+
+def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
+    """Decorator that makes a verb, with the options of `record`, of the function that plans it."""
+
+    def made(plan: Callable[..., Plan[R]]) -> Verb[R]:
+        signature = inspect.signature(plan)
+        subjects = [p for p in signature.parameters.values() if p.name != "options"]
+        names, known = [p.name for p in subjects], list(described(record))
+
+        def planned(*args: Any, **given: Any) -> Plan[R]:
+            for name in given:
+                if name not in known and name not in names:
+                    raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")
+            own = {name: given.pop(name) for name in names if name in given}
+            return plan(*args, **own, options=record(**given))
+
+        @functools.wraps(plan)
+        def function(*args: Any, **given: Any) -> R:
+            return function.planned(*args, **given).run()  # type: ignore[attr-defined, no-any-return]
+
+        function.planned, function.options = planned, record  # type: ignore[attr-defined]
+        function.__signature__ = signature.replace(  # type: ignore[attr-defined]
+            parameters=[*subjects, *_keywords(record)], return_annotation=result_of(signature.return_annotation)
+        )
+        function.__annotations__ = {p.name: p.annotation for p in subjects}
+        function.__doc__ = inspect.cleandoc(plan.__doc__ or "").replace(MARK, listed(record))
+        return function  # type: ignore[return-value]
+
+    return made
+
+
+def result_of(annotation: str) -> str:
+    """What a plan returns when it runs: "Image" of "Plan[Image]"."""
+    return str(annotation).removeprefix("Plan[").removesuffix("]")
+
+
+def listed(record: type[Options]) -> str:
+    """The options of a record, one below the other, as the docstring of its verb has them."""
+    texts = {name: told.doc for name, (_, told) in described(record).items()}
+    column = max(len(name) for name in texts if len(name) <= 13) + 2
+    lines = []
+    for name, text in texts.items():
+        lines += textwrap.wrap(
+            f"{name:{column - 2}}  {' '.join(text.split())}",
+            WIDTH,
+            subsequent_indent=" " * column,
+            break_long_words=False,
+            break_on_hyphens=False,
+        )
+    return "\n".join(lines)
+
+
+def _keywords(record: type[Options]) -> list[inspect.Parameter]:
+    return [
+        inspect.Parameter(name, inspect.Parameter.KEYWORD_ONLY, default=own.default, annotation=own.type)
+        for name, (own, _) in described(record).items()
+    ]

@@ -1,0 +1,155 @@
+"""Options of backproject, and what follows from them: the task, and the method for some devices."""
+
+from __future__ import annotations
+
+from collections.abc import Collection, Sequence
+from dataclasses import dataclass
+from typing import TYPE_CHECKING, Any, Literal
+
+import numpy as np
+
+from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
+from ..base.options import option
+from ..base.types import PathLike, WritableArray
+from ..base.validation import choice, count, flag, instance
+from ..model.image_grid import ImageGrid
+from ..model.phase_history import PhaseHistory
+from ..numerics import cost_model
+from ..numerics.cost_model import DeviceClass
+from ..opencl import native_functions
+from ..opencl.device import Device, DeviceChoice
+from ..opencl.memory_budget import budget
+from .choose_method import METHODS, MethodChoice, choose
+from .focus_options import FocusOptions
+from .focusing_task import BeamCone, FocusingTask, Skip, make_task
+from .run.image_output import is_path
+
+if TYPE_CHECKING:
+    import distributed
+
+Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class BackprojectOptions(FocusOptions):
+    """Options of `backproject`."""
+
+    method: Literal["auto", "direct", "factorized"] = option(
+        "auto",
+        '"direct": every pair that is not skipped; "factorized": sub-apertures; "auto": the cheapest',
+        lambda name, value: choice(name, value, METHODS),
+    )
+    beam: BeamCone | None = option(
+        None,
+        "None, or the cone in which v_p(x) is 1: its full angle, rad, about the line from the transmitter to the "
+        "grid's centre (spotlight), or (angle, direction), direction (3,) or (n_rows, 3) (stripmap). Or an Antenna, "
+        "aimed at the grid's centre, (antenna, direction) or (antenna, attitude), attitude (n_rows, 3, 3) or a "
+        "Trajectory that has one: rows are weighted by the conjugate of its gain towards the pixel, transmit times "
+        "receive (matched filter)",
+    )
+    mapping: MapKind | MapApertureOptions | None = option(
+        None,
+        "for echoes of a frequency-diverse array: the mapping that `sarcl.map_aperture` applies first, "
+        '"corrected", "apparent" or "channels", or a dict of its arguments, such as {"mapping": "apparent", "center": '
+        "(0, 0, 5)}",
+    )
+    wrap: bool = option(
+        False,
+        "False: a row covers only |tau - tau_ref| <= 1/(2 frequency_step); True: it repeats with that period",
+        flag,
+    )
+    skip: bool | Collection[Skip] = option(
+        True,
+        'True, False or a set of reasons ("range window", "beam", "zero weight", "no data"): pairs of rows and pixels '
+        "that add nothing for these reasons are left out instead of computed; the image is the same",
+    )
+    sum_polarizations: bool = option(
+        False, "True: rows of several polarisations are summed coherently; False: they are refused"
+    )
+    out: PathLike | WritableArray | None = option(
+        None,
+        'None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"',
+        in_files=False,
+    )
+    resume: bool | None = option(
+        None,
+        'whether finished tiles of an image at a path are kept in "PATH.parts", where the same call finds them if the '
+        "run is killed. None: they are kept from the first second on; True: also when the run ends in an exception; "
+        "False: they are not kept, and those of earlier runs are deleted",
+        in_files=False,
+    )
+    tile: Tile | None = option(
+        None,
+        '(i, n): compute only piece i of n, 1 <= i <= n, and keep its tiles in "PATH.parts"; the run that completes '
+        "the image assembles and returns it, the others return None",
+        in_files=False,
+    )
+    device: DeviceChoice | Sequence[DeviceChoice] | None = option(
+        None, 'see `sarcl.devices`; a list of devices, or "all", for several at once', in_files=False
+    )
+    cluster: distributed.Client | None = option(
+        None,
+        "a dask.distributed.Client whose workers compute the tiles, each on a device of its own",
+        in_files=False,
+    )
+
+    def task(self, raw: PhaseHistory, grid: ImageGrid) -> tuple[PhaseHistory, FocusingTask]:
+        """The echoes, mapped where a mapping is asked for, and the image to be made of them."""
+        instance("raw", raw, PhaseHistory)
+        instance("grid", grid, ImageGrid)
+        if self.mapping is not None:
+            if isinstance(self.mapping, dict) and "mapping" not in self.mapping:
+                raise ValueError(
+                    f"mapping is {self.mapping!r:.60}; a dict names the kind too: {{'mapping': 'apparent'}}"
+                )
+            raw = map_aperture(raw, **(self.mapping if isinstance(self.mapping, dict) else {"mapping": self.mapping}))
+        return raw, make_task(
+            raw, grid, self.window, self.weights, self.wrap, self.skip, self.beam, self.sum_polarizations
+        )
+
+    def choose(self, task: FocusingTask, devices: Sequence[Device], tolerance: float | None = None) -> MethodChoice:
+        """The method for these devices together; tolerance: another one than asked for.
+
+        "auto" takes the direct method where a device has too little memory for sub-apertures.
+        """
+        on, float64 = DeviceClass.of(d.info for d in devices), all(d.info.fp64 for d in devices)
+        if on.local_memory and task.pairs >= cost_model.SHARING_PAYS:
+            on = on._replace(native_error=max(native_functions.sincos_error(d) for d in devices))
+        tolerance = self.tolerance if tolerance is None else tolerance
+        chosen = choose(task, self.method, tolerance, on, float64)
+        if self.method == "auto" and chosen.method == "factorized":
+            try:
+                for device in devices:
+                    chosen.on(device, task).blocks(self.budget(device))
+            except MemoryError:
+                return choose(task, "direct", tolerance, on, float64)
+        return chosen
+
+    def budget(self, device: Device) -> float:
+        """Bytes that blocks may take on a device."""
+        return min(budget(device, self.max_bytes), device.info.memory)
+
+    def piece(self) -> tuple[int, int] | None:
+        """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together."""
+        tile, resume = self.tile, self.resume
+        if resume is not None:
+            instance("resume", resume, bool)
+        if (tile is not None or resume) and not is_path(self.out):
+            name, given = ("tile", tile) if tile is not None else ("resume", resume)
+            raise ValueError(
+                f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are '
+                "kept beside it"
+            )
+        if tile is None:
+            return None
+        if resume is False:
+            raise ValueError(
+                "tile and resume=False do not go together: a piece would delete the tiles of the other pieces"
+            )
+        parts: Any = tile
+        if not isinstance(parts, (tuple, list)) or len(parts) != 2:
+            raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
+        i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
+        if i > n:
+            raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
+        return i, n
