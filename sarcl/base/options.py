@@ -61,8 +61,9 @@ def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
 def _declared(record: type[Options], own: Field[Any]) -> tuple[int, Option]:
     """How many steps up a record's bases an option is documented, and that Option."""
     for depth, kind in enumerate(record.__mro__):
-        known = vars(kind).get("__dataclass_fields__", {}).get(own.name)
-        told: Option | None = None if known is None else known.metadata.get(_KEY)
+        if own.name not in vars(kind).get("__annotations__", {}):
+            continue
+        told: Option | None = vars(kind)["__dataclass_fields__"][own.name].metadata.get(_KEY)
         if told and told.doc:
             return depth, told
     raise TypeError(f"{record.__name__}.{own.name} has no documentation; declare it by option(default, doc)")
