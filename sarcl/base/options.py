@@ -58,12 +58,12 @@ def described(record: type[Options]) -> dict[str, tuple[Field[Any], Option]]:
     }  # sorted() keeps the order of equal ones
 
 
-def _declared(record: type[Options], own: Field[Any]) -> tuple[int, Option]:
-    """How many steps up a record's bases an option is documented, and that Option."""
+def _declared(record: type[Options], own: Field[Any]) -> tuple[tuple[int, int], Option]:
+    """Where an option is documented (steps up a record's bases, place in that one), and that Option."""
     for depth, kind in enumerate(record.__mro__):
-        if own.name not in vars(kind).get("__annotations__", {}):
-            continue
-        told: Option | None = vars(kind)["__dataclass_fields__"][own.name].metadata.get(_KEY)
-        if told and told.doc:
-            return depth, told
+        declared = list(inspect.get_annotations(kind))
+        if own.name in declared:
+            told: Option | None = vars(kind)["__dataclass_fields__"][own.name].metadata.get(_KEY)
+            if told and told.doc:
+                return (depth, declared.index(own.name)), told
     raise TypeError(f"{record.__name__}.{own.name} has no documentation; declare it by option(default, doc)")
