@@ -10,6 +10,9 @@ from ..base.options import option
 from ..numerics.run_options import RunOptions
 from ..numerics.windows import Window
 
+EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
+CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
+
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FocusOptions(RunOptions):
@@ -19,7 +22,21 @@ class FocusOptions(RunOptions):
         None,
         'None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as "hann" or '
         '("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or of arrays '
-        "with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels out: over the "
-        "aperture of each pixel, the rows that see it",
+        "with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels out: over "
+        "the aperture of each pixel, the rows that see it",
     )
     weights: ArrayLike | None = option(None, "one per row (n_rows,), multiplied with window and raw.weight")
+
+    def is_checked(self, pairs: float, seconds: float) -> bool:
+        """Whether the exact sum of so many pairs of sample and pixel is asked for, or cheap beside the seconds of the
+        image."""
+        return pairs * EXACT_PAIR < CHEAP_CHECK * seconds if self.check is None else self.check
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridOptions(FocusOptions):
+    """Options of every verb that makes an image on a grid."""
+
+    sum_polarizations: bool = option(
+        False, "True: rows of several polarisations are summed coherently; False: they are refused"
+    )
