@@ -63,7 +63,7 @@ class BackprojectOptions(GridOptions):
         'True, False or a set of reasons ("range window", "beam", "zero weight", "no data"): pairs of rows and pixels '
         "that add nothing for these reasons are left out instead of computed; the image is the same",
     )
-    out: PathLike | WritableArray | None = option(
+    out: PathLike | WritableArray | None = option(  # type: ignore[assignment]  # wider than others'
         None,
         'None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"',
         in_files=False,

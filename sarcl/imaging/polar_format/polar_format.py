@@ -6,7 +6,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from ...base.errors import confirm_tolerance, warn
+from ...base.errors import warn
 from ...base.forecast import Forecast, Plan
 from ...base.options import option
 from ...base.report import ErrorTerm, Report, terms_of_sum
@@ -23,7 +23,7 @@ from ...numerics.range_profiles import check_digits
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
 from ..collection import collection
-from ..focus_options import GridOptions
+from ..focus_options import GridOptions, check_output, finished
 from ..focusing_task import FocusingTask, make_task
 from ..forecast import speed
 from ._samples import WeightedRows
@@ -68,6 +68,7 @@ def polar_format(raw: PhaseHistory, grid: ImageGrid, options: PolarFormatOptions
     instance("grid", grid, ImageGrid)
     if not grid.is_plane:
         raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
+    check_output(options.out)
     clock = Clock()
     task = make_task(
         raw, grid, options.window, options.weights, wrap=True, skip=True, sum_polarizations=options.sum_polarizations
@@ -161,8 +162,7 @@ class PolarFormatPlan:
                 device=self.engine.device.info.name,
             ),
         )
-        confirm_tolerance(image=image, instead="use backproject")
-        return image
+        return finished(image, self.options.out, "use backproject")
 
     def _measured(self, data: np.ndarray, clock: Clock) -> float | None:
         """The error at random pixels, where that is asked for or cheap."""

@@ -8,7 +8,6 @@ from dataclasses import dataclass
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.errors import confirm_tolerance
 from ...base.forecast import Forecast, Plan
 from ...base.report import Report, terms_of_sum
 from ...base.stage_timer import Clock
@@ -18,6 +17,7 @@ from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ..collection import collection
+from ..focus_options import check_output, finished
 from ..forecast import speed
 from ._doppler import fresnel, sine
 from ._focus import focus
@@ -56,6 +56,7 @@ def range_doppler(raw: PhaseHistory, options: RangeDopplerOptions) -> Plan[Image
     docs/theory/range_doppler.md.
     """
     instance("raw", raw, PhaseHistory)
+    check_output(options.out)
     clock = Clock()
     task = range_doppler_task(raw, options)
     clock.lap("plan")
@@ -128,8 +129,7 @@ class RangeDopplerPlan:
                 device=task.device.info.name,
             ),
         )
-        confirm_tolerance(image=image, instead="use backproject")
-        return image
+        return finished(image, self.options.out, "use backproject")
 
 
 def _row_weights(track: Track, plan: FocusPlan, u: np.ndarray, r: np.ndarray, wavelength: float) -> np.ndarray:
