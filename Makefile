@@ -2,7 +2,7 @@
 # see .ci/setup.sh for what is looked for and what is installed.
 
 .DEFAULT_GOAL := help
-.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture lint clean ready ready-dev
+.PHONY: help demo test test-all fuzz tasks mutants gpu-static bench results architecture options lint clean ready ready-dev
 
 ARGS ?=
 PYTEST = .venv/bin/python -m pytest --numprocesses auto --maxprocesses 4 --dist loadfile
@@ -45,6 +45,9 @@ results: ready  ## docs/guide/results.md from bench/results/*.json
 
 architecture: ready  ## the drawing and the table of docs/developers/architecture.md, from the imports
 	@.venv/bin/python docs/developers/draw_architecture.py
+
+options: ready  ## type stubs, page and flags of the verbs' options, from their records
+	@.venv/bin/python docs/developers/write_options.py
 
 lint: ready-dev  ## style, format, types, and imports that point down
 	@status=0; for tool in "ruff check $(CODE)" "ruff format --check $(CODE)" mypy; do \

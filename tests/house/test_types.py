@@ -5,37 +5,35 @@ from __future__ import annotations
 import ast
 import dataclasses
 import inspect
+import json
 import re
 import subprocess
 import sys
 import textwrap
 import tomllib
-import types
 import typing
 from importlib.resources import files
 from pathlib import Path
 
 import pytest
+from helpers.annotations import hints_of, namespace, stub
 
 import sarcl
 from sarcl import motion, shapes
 from sarcl.arrays import map_aperture
 from sarcl.experiments.fda import _array, case
-from sarcl.fullwave.echoes.fullwave_echo import FullwaveOptions
 from sarcl.imaging import choose_method, focusing_task
-from sarcl.imaging.backproject import BackprojectOptions
 from sarcl.model import antenna
 from sarcl.papers.farooq import range_zones
 from sarcl.scattering import facets
 from sarcl.scene import material
 from sarcl.simulation.channels import channel_rows
-from sarcl.simulation.echo import SKIPS, EchoOptions, Polarization, Skip
+from sarcl.simulation.echo import SKIPS, Polarization, Skip
 
 ROOT = Path(__file__).parents[2]
 MODULES = {f"sarcl.{n}": getattr(sarcl, n) for n in sarcl.__all__ if inspect.ismodule(getattr(sarcl, n))}
 MODULES["sarcl.papers.farooq.range_zones"] = range_zones
 ONLY = {"sarcl.illumination": ("lit", "Illumination")}  # of a module whose other names are not for users
-EXTRAS = {"distributed": types.SimpleNamespace(Client=object)}  # packages of extras, which need not be installed
 
 
 def public() -> dict[str, typing.Any]:
@@ -53,24 +51,6 @@ def public() -> dict[str, typing.Any]:
 
 
 PUBLIC = public()
-
-
-def namespace(thing: typing.Any) -> dict[str, typing.Any]:
-    """What annotations of a function or class may name: its module's names, those imported for type checkers too."""
-    module = sys.modules[thing.__module__]
-    out = dict(vars(module))
-    for node in ast.parse(inspect.getsource(module)).body:
-        if isinstance(node, ast.If) and ast.unparse(node.test) == "TYPE_CHECKING":
-            for line in node.body:
-                try:
-                    exec(compile(ast.Module([line], []), module.__name__, "exec"), out)
-                except ModuleNotFoundError as exc:
-                    out[exc.name] = EXTRAS[exc.name]
-    return out
-
-
-def hints_of(thing: typing.Any, names: dict[str, typing.Any]) -> dict[str, typing.Any]:
-    return typing.get_type_hints(thing, names, names)
 
 
 def checker_init(kind: type) -> ast.FunctionDef | None:
@@ -95,7 +75,13 @@ def methods_of(kind: type) -> list[typing.Any]:
 
 
 def parameters(thing: typing.Any) -> dict[str, typing.Any]:
-    """Types of all parameters of a function, or of a class's constructor and public methods, by name."""
+    """Types of all parameters of a function, or of a class's constructor and public methods, by name.
+
+    Of verbs and of plan(): those that the stub shows to type checkers.
+    """
+    if thing.__name__ in stub()[1]:
+        shown = [p for signature in stub()[1][thing.__name__] for p in signature.parameters.values()]
+        return {f"{thing.__name__}({p.name})": p.annotation for p in shown}
     names, found = namespace(thing), {}
     if inspect.isclass(thing):
         init = checker_init(thing)
@@ -159,19 +145,10 @@ def test_a_constructor_shown_to_type_checkers_is_the_real_one(kind):
     assert optional == [p.name for p in real if p.default is not p.empty]
 
 
-@pytest.mark.parametrize(
-    ("options", "verb", "others"),
-    [
-        (EchoOptions, sarcl.echo, {"scene", "waveform", "track"}),
-        (FullwaveOptions, sarcl.fullwave_echo, {"scene", "waveform", "track"}),
-        (BackprojectOptions, sarcl.backproject, {"raw", "grid", "tile"}),
-        (map_aperture.MapApertureOptions, sarcl.map_aperture, {"raw"}),
-    ],
-)
-def test_options_are_those_of_the_verb_they_are_handed_to(options, verb, others):
+def test_options_of_map_aperture_are_those_that_are_handed_to_it():
+    options, verb = map_aperture.MapApertureOptions, sarcl.map_aperture
     names = namespace(options)
-    wanted = {name: kind for name, kind in hints_of(verb, names).items() if name not in others | {"return"}}
-    assert hints_of(options, names) == wanted
+    assert hints_of(options, names) == {n: k for n, k in hints_of(verb, names).items() if n not in ("raw", "return")}
 
 
 @pytest.mark.parametrize("shape", shapes.SHAPES, ids=lambda shape: shape.__name__)
@@ -197,7 +174,6 @@ def test_options_of_a_shape_are_those_that_it_spells_out(shape):
         ((sarcl.echo, "receive"), channel_rows.RECEIVE),
         ((sarcl.map_aperture, "offset"), map_aperture.OFFSETS),
         ((sarcl.backproject, "method"), choose_method.METHODS),
-        ((sarcl.plan, "method"), choose_method.METHODS),
         ((motion.perturbed, "frame"), motion.FRAMES),
         ((motion.sinusoidal, "frame"), motion.FRAMES),
         ((case.Case, "progression"), _array.PROGRESSIONS),
@@ -208,7 +184,8 @@ def test_options_of_a_shape_are_those_that_it_spells_out(shape):
 def test_words_of_a_literal_are_those_that_are_accepted(literal, words):
     if isinstance(literal, tuple):
         thing, name = literal
-        literal = hints_of(thing, namespace(thing))[name]
+        shown = stub()[1].get(thing.__name__)
+        literal = shown[0].parameters[name].annotation if shown else hints_of(thing, namespace(thing))[name]
     assert typing.get_args(literal) == words
 
 
@@ -231,7 +208,14 @@ sarcl.PhaseHistory(object(), frequency=1e9, frequency_step=1e6, tx=[(0, 0, 0)], 
 sarcl.PhaseHistory([[1j]], frequency=object(), frequency_step=1e6, tx=[(0, 0, 0)], reference_range=1.0)  # "frequency"
 sarcl.Scene.points([(0, 0, 0)], amplitude=1.0)  # Unexpected keyword argument "amplitude"
 sarcl.shapes.box((1, 1, 1), rough=0.1)  # Unexpected keyword argument "rough"
-sarcl.plan_echo(scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
+sarcl.echo(scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
+sarcl.plan(sarcl.echo, scene, chirp, track, tolerence=1e-3)  # Unexpected keyword argument "tolerence"
+sarcl.plan(sarcl.echo, scene, chirp, track, tolerance="fine")  # expected "float"
+sarcl.plan(sarcl.echo, scene, chirp)  # No overload variant of "plan"
+sarcl.plan(sarcl.backproject, raw, grid, windo="hamming")  # incompatible type overloaded function
+sarcl.plan(raw, grid, windo="hamming")  # No overload variant of "plan"
+sarcl.plan(sarcl.compress, 3)  # No overload variant of "plan"
+sarcl.plan(raw, grid).runs  # has no attribute "runs"
 sarcl.Antenna(kind="dish")  # Literal['dish']
 image.save(5)  # Argument 1 to "save"
 image.grid.shapes  # has no attribute "shapes"
@@ -263,33 +247,106 @@ sarcl.Scenario(waveform=chirp, scene=scene, grid={"plane": {"shape": [64, 64], "
 '''
 
 
+REVEALED = """
+reveal_type(sarcl.echo(scene, chirp, track, tolerance=1e-3))  # PhaseHistory
+reveal_type(sarcl.plan(sarcl.echo, scene, chirp, track, tolerance=1e-3))  # Forecast[PhaseHistory]
+reveal_type(sarcl.plan(sarcl.fullwave_echo, scene, waveform=chirp, track=track))  # Forecast[PhaseHistory]
+reveal_type(sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-3))  # Forecast[Image]
+reveal_type(sarcl.plan(sarcl.range_doppler, raw, side="left").run())  # Image
+reveal_type(sarcl.plan(raw, grid, window="hamming"))  # Forecast[Image]
+reveal_type(sarcl.plan(raw, grid).run())  # Image
+reveal_type(sarcl.backproject(raw, grid))  # Image
+reveal_type(sarcl.backproject(raw, grid, out="a.h5", tile=(1, 2)))  # Image | None
+reveal_type(sarcl.plan(sarcl.backproject, raw, grid, out="a.h5", tile=(1, 2)).run())  # Image | None
+"""
+
+
+@dataclasses.dataclass
+class Said:
+    """What a type checker says of the README's first example, of more that is right, and of a program of mistakes.
+
+    right  number of the program's lines that are right
+    """
+
+    right: int
+    errors: list[tuple[int, str]]
+    types: dict[int, str]
+    out: str
+
+    def check_types(self) -> None:
+        first = self.right - len(REVEALED.splitlines()) + 1
+        wanted = {n: line.rpartition("# ")[2] for n, line in enumerate(REVEALED.splitlines(), first) if line}
+        assert self.types == wanted, self.out
+
+    def check_mistakes(self, words: bool) -> None:
+        for number, line in enumerate(MISTAKES.splitlines(), self.right + 1):
+            word = line.rpartition("# ")[2] if words else ""
+            assert not line or any(at == number and word in text for at, text in self.errors), f"{line}\n{self.out}"
+
+
 @pytest.fixture(scope="module")
-def said(tmp_path_factory):
-    """What mypy says of the README's first example, of more that is right, and of a program of mistakes, by line."""
-    api = pytest.importorskip("mypy.api", reason="mypy is not installed: pip install 'sarcl[dev]'")
+def program(tmp_path_factory):
+    """The program, and the number of its lines that are right."""
     example = re.search(r"```python\n(import numpy.*?)```", (ROOT / "README.md").read_text(), re.S)[1]
-    program = "from pathlib import Path\n" + example.replace("import sarcl\n", "import sarcl\nimport sarcl.shapes\n")
+    right = "from pathlib import Path\n" + example + GOOD + REVEALED
     path = tmp_path_factory.mktemp("user") / "program.py"
-    path.write_text(program + GOOD + MISTAKES)
+    path.write_text(right + MISTAKES)
+    return path, len(right.splitlines())
+
+
+@pytest.fixture(scope="module")
+def mypy(program):
+    api = pytest.importorskip("mypy.api", reason="mypy is not installed: pip install 'sarcl[dev]'")
+    path, right = program
     with pytest.MonkeyPatch.context() as patch:
         patch.chdir(ROOT)  # the cache of `mypy` in the repository serves here too
         out, error, _ = api.run(["--config-file", "pyproject.toml", str(path)])
     assert not error, error
-    right = len((program + GOOD).splitlines())
-    found = [re.match(r".*program\.py:(\d+): error: (.*)", line) for line in out.splitlines()]
-    return right, [(int(m[1]), m[2]) for m in found if m], out
+    errors = [(int(at), text) for at, text in re.findall(r"program\.py:(\d+): error: (.*)", out)]
+    types = re.findall(r'program\.py:(\d+): note: Revealed type is "(.*)"', out)
+    return Said(right, errors, {int(at): re.sub(r"\w+\.", "", text) for at, text in types}, out)
+
+
+@pytest.fixture(scope="module")
+def pyright(program):
+    """As an editor has it."""
+    pytest.importorskip("basedpyright", reason="basedpyright is not installed: pip install 'sarcl[dev]'")
+    path, right = program
+    settings = {"typeCheckingMode": "standard", "include": [path.name], "extraPaths": [str(ROOT)]}
+    path.with_name("pyrightconfig.json").write_text(json.dumps(settings))
+    command = [sys.executable, "-m", "basedpyright", "--outputjson", "--pythonpath", sys.executable]
+    done = subprocess.run([*command, "--project", str(path.parent)], capture_output=True, text=True)
+    lines = [(d["range"]["start"]["line"] + 1, d) for d in json.loads(done.stdout)["generalDiagnostics"]]
+    errors = [(at, d["message"]) for at, d in lines if d["severity"] == "error"]
+    types = {at: d["message"].split('"')[-2] for at, d in lines if d["severity"] == "information"}
+    return Said(right, errors, types, done.stdout)
+
+
+@pytest.fixture(params=["mypy", "pyright"])
+def said(request):
+    return request.getfixturevalue(request.param)
 
 
 @pytest.mark.slow
-def test_mypy_accepts_a_program_of_a_user(said):
-    right, found, out = said
-    assert not [text for line, text in found if line <= right], out
+def test_a_program_of_a_user_is_accepted(said):
+    assert not [text for line, text in said.errors if line <= said.right], said.out
 
 
 @pytest.mark.slow
-def test_mypy_reports_mistakes_of_a_user(said):
-    right, found, out = said
-    for number, line in enumerate(MISTAKES.splitlines(), right + 1):
-        if line:
-            word = line.rpartition("# ")[2]
-            assert any(at == number and word in text for at, text in found), f"{line}\n{out}"
+def test_types_of_results_follow_from_the_verb(said):
+    said.check_types()
+
+
+@pytest.mark.slow
+def test_mistakes_of_a_user_are_reported(said, request):
+    said.check_mistakes(words="mypy" in request.node.name)
+
+
+@pytest.mark.slow
+def test_mypy_accepts_what_the_stub_stands_for():
+    """Where mypy finds a stub it reads no further: of all other files it checks the code itself."""
+    api = pytest.importorskip("mypy.api", reason="mypy is not installed: pip install 'sarcl[dev]'")
+    with pytest.MonkeyPatch.context() as patch:
+        patch.chdir(ROOT)
+        out, error, status = api.run(["--config-file", "pyproject.toml", "sarcl/verbs/__init__.py"])
+    assert status == 0, out + error
