@@ -9,12 +9,11 @@ from typing import Generic, Protocol, TypeVar
 from .report import ErrorTerm
 from .text import duration, size_text
 
-R = TypeVar("R")
 R_co = TypeVar("R_co", covariant=True)
 
 
 @dataclass(frozen=True, eq=False)
-class Forecast(Generic[R]):
+class Forecast(Generic[R_co]):
     """Forecast of a verb with the same arguments: `sarcl.plan(verb, ...)` makes it.
 
     method           such as "direct", "factorized", "polar format", "range-Doppler", "pulse by pulse", "full wave"
@@ -38,7 +37,7 @@ class Forecast(Generic[R]):
     seconds: float
     bytes: float
     predicted_error: float
-    run: Callable[[], R] = field(repr=False)
+    run: Callable[[], R_co] = field(repr=False)
     error_terms: tuple[ErrorTerm, ...] = ()
     cheaper: tuple[float, float] | None = None
     n_rows: int | None = None

@@ -33,8 +33,11 @@ class Verb(Protocol[R_co]):
     """
 
     __name__: str
-    planned: Callable[..., Plan[R_co]]
     options: type[Options]
+
+    @property
+    def planned(self) -> Callable[..., Plan[R_co]]:
+        """Its Plan for some arguments."""
 
     def __call__(self, *args: Any, **options: Any) -> R_co:
         """The result of the plan for these arguments."""
@@ -57,7 +60,7 @@ def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
 
         @functools.wraps(plan)
         def function(*args: Any, **given: Any) -> R:
-            return function.planned(*args, **given).run()  # type: ignore[attr-defined, no-any-return]
+            return function.planned(*args, **given).run()  # type: ignore[attr-defined]
 
         function.planned, function.options = planned, record  # type: ignore[attr-defined]
         function.__signature__ = signature.replace(  # type: ignore[attr-defined]

@@ -85,41 +85,16 @@ class Method:
 
     def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any) -> Any:
         """The Forecast."""
-        if self.name == "backproject":
-            from ..imaging.forecast import plan
+        return verbs.plan(getattr(verbs, self.name), *self._subjects(raw, grid), **self.options, device=device)
 
-            assert grid is not None
-            return plan(raw, grid, **self.options, device=device)
-        if self.name == "polar_format":
-            from ..imaging.polar_format.polar_format import plan_polar_format
+    def image(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any, **running: Any) -> Image | None:
+        """The image; None for a piece. running: `out`, `progress`, and `tile` and `resume` of backproject."""
+        verb = getattr(verbs, self.name)
+        image: Image | None = verb(*self._subjects(raw, grid), **self.options, device=device, **running)
+        return image
 
-            assert grid is not None
-            return plan_polar_format(raw, grid, **self.options, device=device)
-        from ..imaging.range_doppler.range_doppler import plan_range_doppler
-
-        return plan_range_doppler(raw, **self.options, device=device)
-
-    def image(
-        self, raw: PhaseHistory, grid: ImageGrid | None, out: str | None, device: Any, progress: Any, **running: Any
-    ) -> Image | None:
-        """The image, in the file `out` if one is named; None for a piece. running: `tile` and `resume`."""
-        verb: Callable[..., Any]
-        if self.name == "backproject":
-            from ..imaging.backproject import backproject as verb
-
-            made: Image | None = verb(raw, grid, **self.options, **running, device=device, progress=progress, out=out)
-            return made
-        if self.name == "polar_format":
-            from ..imaging.polar_format.polar_format import polar_format as verb
-        else:
-            from ..imaging.range_doppler.range_doppler import range_doppler as verb
-        pieces = (raw,) if grid is None else (raw, grid)
-        image: Image = verb(*pieces, **self.options, device=device, progress=progress)
-        if out is None:
-            return image
-        image.save(out)
-        kept: Any = read(out)
-        return kept
+    def _subjects(self, raw: PhaseHistory, grid: ImageGrid | None) -> tuple[Any, ...]:
+        return (raw,) if grid is None else (raw, grid)
 
 
 def heights(args: argparse.Namespace) -> Any:

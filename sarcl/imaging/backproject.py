@@ -43,8 +43,6 @@ NOTHING_SEEN = "no pixel lies inside the %s of any row: the image is zero; check
 # and are left out where the error is measured.
 EDGE = 1e-5
 CHECKED = 256  # pixels that a check computes exactly
-EXACT_PAIR = 3e-8  # s: the exact sum of one sample at one pixel
-CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
 
 
 @verb(BackprojectOptions)
@@ -224,9 +222,8 @@ class BackprojectPlan:
 
     def _measured(self, data: Any, clock: Clock) -> float | None:
         """The error at random pixels, where that is asked for or cheap."""
-        seconds = CHECKED * self.task.raw.n_rows * self.raw.n_samples * EXACT_PAIR
-        cheap = seconds < CHEAP_CHECK * clock.seconds.get("backproject", 0.0)
-        if not (cheap if self.options.check is None else self.options.check):
+        pairs = CHECKED * self.task.raw.n_rows * self.raw.n_samples
+        if not self.options.is_checked(pairs, clock.seconds.get("backproject", 0.0)):
             return None
         measured = _measure_error(self.task, self.grid, data)
         clock.lap("check")

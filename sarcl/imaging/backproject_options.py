@@ -20,7 +20,7 @@ from ..opencl import native_functions
 from ..opencl.device import Device, DeviceChoice
 from ..opencl.memory_budget import budget
 from .choose_method import METHODS, MethodChoice, choose
-from .focus_options import FocusOptions
+from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
 from .run.image_output import is_path
 
@@ -31,7 +31,7 @@ Tile = Sequence[int] | np.ndarray  # (i, n): piece i of n
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class BackprojectOptions(FocusOptions):
+class BackprojectOptions(GridOptions):
     """Options of `backproject`."""
 
     method: Literal["auto", "direct", "factorized"] = option(
@@ -63,10 +63,7 @@ class BackprojectOptions(FocusOptions):
         'True, False or a set of reasons ("range window", "beam", "zero weight", "no data"): pairs of rows and pixels '
         "that add nothing for these reasons are left out instead of computed; the image is the same",
     )
-    sum_polarizations: bool = option(
-        False, "True: rows of several polarisations are summed coherently; False: they are refused"
-    )
-    out: PathLike | WritableArray | None = option(
+    out: PathLike | WritableArray | None = option(  # type: ignore[assignment]  # wider than others'
         None,
         'None, a writable complex array of grid.shape (memmap, HDF5 dataset), or a path ending in ".h5"',
         in_files=False,
@@ -84,7 +81,7 @@ class BackprojectOptions(FocusOptions):
         "the image assembles and returns it, the others return None",
         in_files=False,
     )
-    device: DeviceChoice | Sequence[DeviceChoice] | None = option(
+    device: DeviceChoice | Sequence[DeviceChoice] | None = option(  # type: ignore[assignment]  # wider than others'
         None, 'see `sarcl.devices`; a list of devices, or "all", for several at once', in_files=False
     )
     cluster: distributed.Client | None = option(

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from ..base.errors import ToleranceUnreachable
-from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
+from ..base.report import ErrorTerm, terms_of_sum
 from ..base.tolerances import askable, reachable, rounded_up
 from ..base.validation import LARGEST_TOLERANCE
 from ..numerics import cost_model, error_bounds
@@ -31,6 +31,7 @@ from .tiling.of_grid import tiling_of
 from .tiling.tiling import Tiling
 
 METHODS = ("auto", "direct", "factorized")
+NEAR_ORIGIN = "put the origin near the scene"
 ROUNDING = 0.5  # largest share of a tolerance for rounding errors from echoes that lie away from the pixels
 
 
@@ -39,7 +40,8 @@ class MethodChoice:
     """A method, its plan and tiling for one task, and the class of its engine.
 
     engine           called as engine(device, task, plan, tiling)
-    error_terms      parts of the relative error, for the energy of these rows at these pixels
+    predicted_error  bound of the relative error, for the energy of these rows at these pixels
+    error_terms      its parts
     cost             per contribution, relative to one with linear interpolation and ranges in float32
     """
 
@@ -47,13 +49,9 @@ class MethodChoice:
     plan: ImagePlan
     tiling: Tiling
     engine: type[Engine]
+    predicted_error: float
     error_terms: tuple[ErrorTerm, ...]
     cost: float
-
-    @property
-    def predicted_error(self) -> float:
-        """Bound of the relative error."""
-        return root_sum_square(self.error_terms)
 
     @property
     def dtype(self) -> type[np.complexfloating]:
@@ -191,7 +189,7 @@ class _Float32:
             )  # fmt: skip
         if not self.coordinates <= ROUNDING * self.tolerance:
             raise ToleranceUnreachable(
-                self.tolerance, best(), "float64 coordinates of a plane's pixels", "put the origin near the scene",
+                self.tolerance, best(), "float64 coordinates of a plane's pixels", NEAR_ORIGIN,
                 how=f"{how}: coordinates this large are rounded by {self.coordinates:.1g} rad of phase",
             )  # fmt: skip
         if not self.rounding <= ROUNDING * self.tolerance:
@@ -200,15 +198,16 @@ class _Float32:
             raise ToleranceUnreachable(self.tolerance, best(), "rounding of float32 sums", how=f"{how}: {dark}")
 
     def _offer(self, name: str, made: tuple[ImagePlan, Tiling], engine: type[Engine]) -> MethodChoice:
-        sums = self.near * made[0].predicted_error + self.rounding + self.gains
-        if np.hypot(sums, self.coordinates) > self.tolerance:  # by rounding
-            sums = float(np.sqrt(self.tolerance**2 - self.coordinates**2)) * (1 - 1e-15 * bool(self.coordinates))
-        terms = [ErrorTerm("range profiles and sums", float(sums), SMALLER_TOLERANCE)]
+        errors = {
+            "range profiles": self.near * float(made[0].predicted_error),
+            "rounding of float32 sums": self.rounding,
+            "float32 gains of the antenna": self.gains,
+        }
+        terms = terms_of_sum(errors)
         if self.coordinates:
-            terms.append(
-                ErrorTerm("rounded coordinates of the plane", self.coordinates, "the origin put near the scene")
-            )
-        return MethodChoice(name, *made, engine, tuple(terms), made[0].cost)
+            terms += (ErrorTerm("float64 coordinates of a plane's pixels", self.coordinates, NEAR_ORIGIN),)
+        error = float(np.hypot(sum(errors.values()), self.coordinates))
+        return MethodChoice(name, *made, engine, min(error, self.tolerance), terms, made[0].cost)
 
 
 def _direct(task: FocusingTask, tolerance: float, on: DeviceClass, float64: bool) -> MethodChoice:
@@ -285,5 +284,7 @@ def _float64(task: FocusingTask, tolerance: float) -> MethodChoice:
     """The direct method in float64."""
     plan, tiling = float64_plan.make_plan(task, tolerance)
     cost = cost_model.FLOAT64_UNIT * plan.cost / task.grid.size
-    terms = (ErrorTerm("range profiles and sums", float(plan.predicted_error), SMALLER_TOLERANCE),)
-    return MethodChoice("direct", plan, tiling, float64_direct.DirectFloat64, terms, cost)
+    return MethodChoice(
+        "direct", plan, tiling, float64_direct.DirectFloat64, plan.predicted_error,
+        terms_of_sum({"float64 range profiles": float(plan.predicted_error)}), cost,
+    )  # fmt: skip

@@ -6,9 +6,17 @@ from dataclasses import dataclass
 
 from numpy.typing import ArrayLike
 
+from ..base.errors import confirm_tolerance
 from ..base.options import option
+from ..base.types import PathLike
+from ..io import formats, output_paths
+from ..model import store
+from ..model.image import Image
 from ..numerics.run_options import RunOptions
 from ..numerics.windows import Window
+
+EXACT_PAIR = 3e-8  # s, of the exact sum, per sample and pixel
+CHEAP_CHECK = 0.02  # of the time of the image: a check that costs less is made without being asked for
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -19,7 +27,45 @@ class FocusOptions(RunOptions):
         None,
         'None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as "hann" or '
         '("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or of arrays '
-        "with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels out: over the "
-        "aperture of each pixel, the rows that see it",
+        "with a weight per sample and per row of a channel. In cross-range with a beam that leaves pixels out: over "
+        "the aperture of each pixel, the rows that see it",
     )
     weights: ArrayLike | None = option(None, "one per row (n_rows,), multiplied with window and raw.weight")
+    out: PathLike | None = option(
+        None,
+        'None, or a path ending in ".h5": the image is written there when it is finished',
+        in_files=False,
+    )
+
+    def is_checked(self, pairs: float, seconds: float) -> bool:
+        """Whether the exact sum of so many pairs of sample and pixel is asked for, or cheap beside the seconds of the
+        image."""
+        return pairs * EXACT_PAIR < CHEAP_CHECK * seconds if self.check is None else self.check
+
+
+def check_output(out: PathLike | None) -> None:
+    """ValueError or OSError where no image can be written at `out`."""
+    if out is not None:
+        formats.writer_functions(out, "image")
+        output_paths.check_writable(out)
+
+
+def finished(image: Image, out: PathLike | None, instead: str) -> Image:
+    """The image, written to `out` and read from there where that is a path. ToleranceMissed, with that image, where its
+    check measured more than the tolerance; instead  what to do then."""
+    if out is not None:
+        image.save(out)
+        stored = store.read(out)
+        assert isinstance(stored, Image)
+        image = stored
+    confirm_tolerance(image=image, instead=instead)
+    return image
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class GridOptions(FocusOptions):
+    """Options of every verb that makes an image on a grid."""
+
+    sum_polarizations: bool = option(
+        False, "True: rows of several polarisations are summed coherently; False: they are refused"
+    )

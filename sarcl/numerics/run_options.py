@@ -27,7 +27,8 @@ class RunOptions(Options):
     )
     check: bool | None = option(
         None,
-        "recompute 256 random values of the result exactly: report.measured_error; None: where that costs less than 2 %",
+        "recompute 256 random values of the result exactly: report.measured_error; None: where that costs less than "
+        "2 %",
         or_none(validation.flag),
     )
     device: DeviceChoice | None = option(None, "see `sarcl.devices`", in_files=False)

@@ -2,18 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
-from dataclasses import fields
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
-from ..base import arguments
+from .. import verbs
 from . import _schema
 from ._building import Builder
 from ._earth import side_of, time_over
 
 if TYPE_CHECKING:
-    from ..imaging.forecast import Forecast
-    from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
     from .scenario import Scenario
@@ -36,67 +34,38 @@ def image_text(scenario: Scenario) -> str:
     return f"{section}, {' x '.join(map(str, scenario.build_grid().shape))} pixels"
 
 
-def focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Image:
+def focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Any:
     """See `Scenario.focus`."""
-    section = section_of(scenario)
-    if section == "backproject":
-        from ..imaging.backproject import backproject
-
-        return _focused(scenario, backproject, raw, grid, options, Builder(scenario).options(section, options))
-    given = dict(options)
-    out = given.pop("out", None)
-    if section == "polar_format":
-        from ..imaging.polar_format.polar_format import polar_format
-
-        image = _focused(scenario, polar_format, raw, grid, given, Builder(scenario).options(section, given))
-    else:
-        from ..imaging.range_doppler.range_doppler import range_doppler
-
-        image = _focused(scenario, range_doppler, raw, grid, given, _range_doppler_options(scenario, given))
-    if out is not None:
-        image.save(out)
-    return image
+    subjects, given, blame = _arguments(scenario, raw, grid, options)
+    with blame:
+        return getattr(verbs, section_of(scenario))(*subjects, **given)
 
 
-def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Forecast:
+def plan_focus(scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]) -> Any:
     """See `Scenario.plan_focus`."""
+    subjects, given, blame = _arguments(scenario, raw, grid, options)
+    with blame:
+        return verbs.plan(getattr(verbs, section_of(scenario)), *subjects, **given)
+
+
+def _arguments(
+    scenario: Scenario, raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any], AbstractContextManager[None]]:
+    """Echoes and grid; options; and the context in which a message that names a key names its line."""
     section = section_of(scenario)
-    if section != "backproject":  # `Scenario.focus` writes the file
-        options = {k: v for k, v in options.items() if k != "out"}
     if section == "range_doppler":
-        from ..imaging.range_doppler.range_doppler import plan_range_doppler
-
-        return _focused(scenario, plan_range_doppler, raw, grid, options, _range_doppler_options(scenario, options))
-    given = Builder(scenario).options(section, options)
-    if section == "polar_format":
-        from ..imaging.polar_format.polar_format import plan_polar_format
-
-        return _focused(scenario, plan_polar_format, raw, grid, options, given)
-    from ..imaging.backproject import backproject
-    from ..imaging.focus_options import FocusOptions
-    from ..imaging.forecast import plan
-
-    arguments.keywords(backproject, given)
-    known = {f.name for f in fields(FocusOptions)}
-    return _focused(scenario, plan, raw, grid, options, {k: v for k, v in given.items() if k in known})
-
-
-def _focused(
-    scenario: Scenario, verb: Callable[..., Any], raw: PhaseHistory, grid: ImageGrid | None, options: Mapping[str, Any],
-    given: Mapping[str, Any],
-) -> Any:  # fmt: skip
-    """verb(raw, grid, **given), or without a grid for range_doppler; `options` are those of `given` from the caller."""
-    section = section_of(scenario)
-    own = {k: v for k, v in given.items() if k not in options}
-    pieces: tuple[Any, ...] = raw, scenario.build_grid() if grid is None and section != "range_doppler" else grid
+        keys = _range_doppler_options(scenario, options)
+    else:
+        keys = Builder(scenario).options(section, options)
+    own = {k: v for k, v in keys.items() if k not in options}
+    blame = scenario.where.blame((section,), own, always=False)
     if section == "range_doppler":
         if grid is not None:
             raise ValueError(
                 "range_doppler makes a grid of its own, by zero-Doppler time and slant range; give grid=None"
             )
-        pieces = (raw,)
-    with scenario.where.blame((section,), own, always=False):
-        return verb(*pieces, **given)
+        return (raw,), keys, blame
+    return (raw, scenario.build_grid() if grid is None else grid), keys, blame
 
 
 def _range_doppler_options(scenario: Scenario, options: Mapping[str, Any]) -> dict[str, Any]:

@@ -12,9 +12,12 @@ import re
 from collections.abc import Callable, Collection, Iterator, Mapping
 from contextlib import contextmanager
 from dataclasses import dataclass, field
+from importlib import import_module
+from operator import attrgetter
 from typing import Any
 
 from ..base.errors import ToleranceMissed, ToleranceUnreachable
+from ..base.options import described
 from ..base.text import unknown
 
 Path = tuple[str | int, ...]
@@ -22,10 +25,8 @@ Call = Callable[..., Any]
 
 # Arguments that are called `file` in a scenario: a mesh or an elevation model is always a file there.
 RENAMED = {"mesh": "file", "path": "file", "dem": "file"}
-# Arguments that are no keys: other sections describe them, or they belong to one run and not to the scenario.
-NOT_KEYS = {"self", "scene", "waveform", "track", "receiver", "raw", "grid"}
-NOT_KEYS |= {"out", "resume", "tile", "device", "cluster", "progress"}
-NOT_KEYS |= {"name", "antenna", "radar", "array"}  # a material is named by its table; others are tables
+# Arguments that are no keys: other sections describe them; a material is named by its table.
+NOT_KEYS = {"self", "track", "raw", "grid", "name"}
 ON = "on"  # key of a part of the scene: the part stands on the parts before it
 _TYPES = {
     "float": ("a number", lambda v: isinstance(v, (int, float)) and not isinstance(v, bool)),
@@ -42,129 +43,79 @@ _TYPES = {
 _ON = inspect.Parameter(ON, inspect.Parameter.KEYWORD_ONLY, default=None)
 
 
-def calls(section: str) -> dict[str, Call]:
-    """The calls that a section can describe, by the name of the table; "" is the section's own table."""
-    # each section imports only the folders it needs: the verbs load pyopencl
-    if section in ("trajectory", "receiver"):
-        from ..model.trajectory import Trajectory
-
-        tracks: dict[str, Call] = {"line": Trajectory.line, "circle": Trajectory.circle}
-        if section == "trajectory":
-            from ..model.orbit import Orbit
-
-            tracks["orbit"] = Orbit.trajectory
-        return {**tracks, "": Trajectory}
-    if section == "orbit":
-        from ..model.orbit import Orbit
-
-        return {"kepler": Orbit.kepler, "tle": Orbit.tle, "states": Orbit.states, "": Orbit.read}
-    if section == "place":
-        from ..earth.place import Place
-
-        return {"": Place.above}
-    if section == "waveform":
-        from ..model.waveform import Waveform
-
-        return {"chirp": Waveform.chirp, "tone": Waveform.tone, "sampled": Waveform.sampled}
-    if section == "scene":
-        from ..scene import shapes
-        from ..scene.scene import Scene
-
-        return {
-            "points": Scene.points,
-            "from_mesh": Scene.from_mesh,
-            "from_heights": Scene.from_heights,
-            "from_dem": Scene.from_dem,
-            "facets": Scene.facets,
-            **{shape.__name__: shape for shape in shapes.SHAPES},
-        }
-    if section in ("antenna", "receiver_antenna"):
-        from ..model.antenna import Antenna
-
-        return {
-            "isotropic": Antenna.isotropic,
-            "rectangular": Antenna.rectangular,
-            "gaussian": Antenna.gaussian,
-            "table": Antenna.table,
-        }
-    if section == "array":
-        from ..model.antenna_array import AntennaArray
-
-        return {
-            "linear": AntennaArray.linear,
-            "planar": AntennaArray.planar,
-            "costas": AntennaArray.costas,
-            "": AntennaArray,
-        }
-    if section in ("pointing", "receiver_pointing"):
-        from ..model import pointing
-
-        return {"spotlight": pointing.spotlight, "stripmap": pointing.stripmap, "fixed": pointing.fixed}
-    if section == "radar":
-        from ..model.radar import Radar
-
-        return {"": Radar}
-    if section == "materials":
-        from ..scene.material import Material
-
-        return {"": Material}
-    if section == "grid":
-        from ..model.image_grid import ImageGrid
-
-        return {
-            "plane": ImageGrid.plane,
-            "points": ImageGrid.points,
-            "on_terrain": ImageGrid.on_terrain,
-            "zero_doppler": ImageGrid.zero_doppler,
-        }
-    if section == "noise":
-        from ..effects.noise import add_noise
-
-        return {"": add_noise}
-    if section == "echo":
-        from ..simulation.echo import echo
-
-        return {"": echo}
-    if section == "spectral_echo":
-        from ..simulation.spectral.spectral_echo import spectral_echo
-
-        return {"": spectral_echo}
-    if section == "fullwave_echo":
-        from ..fullwave.echoes.fullwave_echo import fullwave_echo
-
-        return {"": fullwave_echo}
-    if section == "backproject":
-        from ..imaging.backproject import backproject
-
-        return {"": backproject}
-    if section == "polar_format":
-        from ..imaging.polar_format.polar_format import polar_format
-
-        return {"": polar_format}
-    if section == "range_doppler":
-        from ..imaging.range_doppler.range_doppler import range_doppler
-
-        return {"": range_doppler}
-    raise KeyError(section)
-
-
-SECTIONS = (
-    "waveform", "orbit", "trajectory", "pointing", "receiver", "receiver_pointing", "antenna", "receiver_antenna",
-    "array", "radar", "materials", "place", "scene", "grid", "echo", "spectral_echo", "fullwave_echo", "noise",
-    "backproject",
-    "polar_format", "range_doppler",
-)  # fmt: skip
+# section -> name of the table -> the call that it describes, as file and name; "" is the section's own table
+_CALLS: dict[str, dict[str, str]] = {
+    "waveform": {kind: f"model.waveform:Waveform.{kind}" for kind in ("chirp", "tone", "sampled")},
+    "orbit": {
+        **{kind: f"model.orbit:Orbit.{kind}" for kind in ("kepler", "tle", "states")},
+        "": "model.orbit:Orbit.read",
+    },
+    "trajectory": {
+        "line": "model.trajectory:Trajectory.line",
+        "circle": "model.trajectory:Trajectory.circle",
+        "orbit": "model.orbit:Orbit.trajectory",
+        "": "model.trajectory:Trajectory",
+    },
+    "pointing": {kind: f"model.pointing:{kind}" for kind in ("spotlight", "stripmap", "fixed")},
+    "receiver": {
+        "line": "model.trajectory:Trajectory.line",
+        "circle": "model.trajectory:Trajectory.circle",
+        "": "model.trajectory:Trajectory",
+    },
+    "receiver_pointing": {kind: f"model.pointing:{kind}" for kind in ("spotlight", "stripmap", "fixed")},
+    "antenna": {kind: f"model.antenna:Antenna.{kind}" for kind in ("isotropic", "rectangular", "gaussian", "table")},
+    "receiver_antenna": {
+        kind: f"model.antenna:Antenna.{kind}" for kind in ("isotropic", "rectangular", "gaussian", "table")
+    },
+    "array": {
+        **{kind: f"model.antenna_array:AntennaArray.{kind}" for kind in ("linear", "planar", "costas")},
+        "": "model.antenna_array:AntennaArray",
+    },
+    "radar": {"": "model.radar:Radar"},
+    "materials": {"": "scene.material:Material"},
+    "place": {"": "earth.place:Place.above"},
+    "scene": {
+        kind: f"scene.scene:Scene.{kind}" for kind in ("points", "from_mesh", "from_heights", "from_dem", "facets")
+    },  # and all shapes
+    "grid": {
+        kind: f"model.image_grid:ImageGrid.{kind}" for kind in ("plane", "points", "on_terrain", "zero_doppler")
+    },
+    "echo": {"": "verbs:echo"},
+    "spectral_echo": {"": "verbs:spectral_echo"},
+    "fullwave_echo": {"": "verbs:fullwave_echo"},
+    "noise": {"": "effects.noise:add_noise"},
+    "backproject": {"": "verbs:backproject"},
+    "polar_format": {"": "verbs:polar_format"},
+    "range_doppler": {"": "verbs:range_doppler"},
+}
+SECTIONS = tuple(_CALLS)
 ECHOES = ("echo", "spectral_echo", "fullwave_echo")  # sections for echoes, and for images: one of each at most
 IMAGES = ("backproject", "polar_format", "range_doppler")
 
 
+def calls(section: str) -> dict[str, Call]:
+    """The calls that a section can describe, by the name of the table; "" is the section's own table.
+
+    Each section imports only the folders that it needs: the verbs load pyopencl.
+    """
+    known: dict[str, Call] = {}
+    for kind, place in _CALLS[section].items():
+        file, _, name = place.partition(":")
+        known[kind] = attrgetter(name)(import_module(f"..{file}", __package__))
+    if section == "scene":
+        from ..scene import shapes
+
+        known |= {shape.__name__: shape for shape in shapes.SHAPES}
+    return known
+
+
 def parameters(call: Call) -> dict[str, inspect.Parameter]:
-    """Keys of the table that describes `call`."""
-    found = inspect.signature(call).parameters
-    return {
-        RENAMED.get(n, n): p.replace(default=None) if may_be_left_out(p) else p
-        for n, p in found.items() if n not in NOT_KEYS
-    }  # fmt: skip
+    """Keys of the table that describes `call`: of a verb the options that its record has for files."""
+    signature = inspect.signature(call).parameters
+    known = {n: p for n, p in signature.items() if n not in NOT_KEYS}
+    if hasattr(call, "options"):
+        known = {n: signature[n] for n, (_, told) in described(call.options).items() if told.in_files}
+    return {RENAMED.get(n, n): p.replace(default=None) if may_be_left_out(p) else p for n, p in known.items()}
 
 
 def may_be_left_out(parameter: inspect.Parameter) -> bool:

@@ -1,10 +1,12 @@
-"""The function that makes the echoes of a scenario, its forecast, and their arguments."""
+"""The verb that makes the echoes of a scenario, and its arguments."""
 
 from __future__ import annotations
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
+from contextlib import AbstractContextManager
 from typing import TYPE_CHECKING, Any
 
+from .. import verbs
 from ._earth import earth_fixed
 from ._schema import ECHOES
 
@@ -15,33 +17,30 @@ NO_ANTENNA = ("antenna", "receiver_antenna", "array", "radar")  # sections that 
 
 
 def section_of(scenario: Scenario) -> str:
-    """The section that names the function; [echo] where there is none."""
+    """The section that names the verb; [echo] where there is none."""
     return next((name for name in ECHOES if getattr(scenario, name) is not None), "echo")
 
 
-def functions_of(section: str) -> tuple[Callable[..., Any], Callable[..., Any]]:
-    """The function of a section, and the function that forecasts it."""
-    if section == "fullwave_echo":
-        from ..fullwave.echoes.fullwave_echo import fullwave_echo
-        from ..fullwave.echoes.fullwave_forecast import plan_fullwave_echo
-
-        return fullwave_echo, plan_fullwave_echo
-    from ..simulation.echo_forecast import plan_echo, plan_spectral_echo
-
-    if section == "spectral_echo":
-        from ..simulation.spectral.spectral_echo import spectral_echo
-
-        return spectral_echo, plan_spectral_echo
-    from ..simulation.echo import echo
-
-    return echo, plan_echo
+def simulate(scenario: Scenario, options: Mapping[str, Any]) -> Any:
+    """The echoes; options  take precedence over the section's keys."""
+    subjects, given, blame = _arguments(scenario, options)
+    with blame:
+        return getattr(verbs, section_of(scenario))(*subjects, **given)
 
 
-def call(scenario: Scenario, options: Mapping[str, Any], *, forecast: bool) -> Any:
-    """The echoes, or their forecast; options  take precedence over the section's keys."""
+def plan(scenario: Scenario, options: Mapping[str, Any]) -> Any:
+    """The forecast of the echoes."""
+    subjects, given, blame = _arguments(scenario, options)
+    with blame:
+        return verbs.plan(getattr(verbs, section_of(scenario)), *subjects, **given)
+
+
+def _arguments(
+    scenario: Scenario, options: Mapping[str, Any]
+) -> tuple[tuple[Any, ...], dict[str, Any], AbstractContextManager[None]]:
+    """Scene, waveform and track; options; and the context in which a message that names a key names its line."""
     section = section_of(scenario)
-    function = functions_of(section)[forecast]
-    pieces = (scenario.build_scene(), scenario.build_waveform(), scenario.build_track())
+    subjects = scenario.build_scene(), scenario.build_waveform(), scenario.build_track()
     parts: dict[str, Any] = {"receiver": scenario.build_receiver()}
     if section == "fullwave_echo":
         for name in NO_ANTENNA:
@@ -53,8 +52,7 @@ def call(scenario: Scenario, options: Mapping[str, Any], *, forecast: bool) -> A
     else:
         parts["antenna"], parts["array"] = scenario.build_antenna(), scenario.build_array()
         parts["radar"] = scenario.build_radar()
-    given = {**earth_fixed(scenario.build_place(), getattr(scenario, section) or {}), **options}
-    given = {k: tuple(v) if isinstance(v, list) else v for k, v in given.items()}
-    named = {k: v for k, v in given.items() if k not in options}
-    with scenario.where.blame((section,), named, always=False):
-        return function(*pieces, **parts, **given)
+    keys = {**earth_fixed(scenario.build_place(), getattr(scenario, section) or {}), **options}
+    keys = {k: tuple(v) if isinstance(v, list) else v for k, v in keys.items()}
+    own = {k: v for k, v in keys.items() if k not in options}
+    return subjects, {**parts, **keys}, scenario.where.blame((section,), own, always=False)

@@ -3,11 +3,12 @@
 from __future__ import annotations
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, Unpack
 
 from ..base import arguments
+from ..base.forecast import Forecast
 from ..base.text import unknown
 from ..io import input_paths, toml
 from . import _schema, _simulating
@@ -19,10 +20,6 @@ from ._schema import Where
 if TYPE_CHECKING:
     from ..base.types import PathLike
     from ..earth.place import Place
-    from ..fullwave.echoes.fullwave_forecast import FullwaveForecast
-    from ..imaging.backproject import BackprojectOptions
-    from ..imaging.focus_options import FocusKeywords
-    from ..imaging.forecast import Forecast
     from ..model.antenna import Antenna
     from ..model.antenna_array import AntennaArray
     from ..model.image import Image
@@ -34,8 +31,7 @@ if TYPE_CHECKING:
     from ..model.waveform import Waveform
     from ..scene.material import Material
     from ..scene.scene import Scene
-    from ..simulation.echo import EchoOptions
-    from ..simulation.echo_forecast import EchoForecast
+    from ..verbs import BackprojectKeywords, EchoKeywords
 
 Table = dict[str, Any]  # table of a scenario: keys with plain values or further tables
 
@@ -201,14 +197,17 @@ class Scenario:
         """The Scene: the sum of its tables, in the order they first appear; with [place], Earth-fixed."""
         return Builder(self).scene()
 
-    def simulate(self, **options: Unpack[EchoOptions]) -> PhaseHistory:
+    def simulate(self, **options: Unpack[EchoKeywords]) -> PhaseHistory:
         """Echoes of the scene, with [noise]. `options`, arguments of `sarcl.echo`, take precedence over [echo].
 
         With [spectral_echo] or [fullwave_echo] they are computed by that function, whose options these are then.
         """
         check_window(self)
         level = self._noise_level()
-        raw: PhaseHistory = _simulating.call(self, options, forecast=False)
+        return self._noisy(_simulating.simulate(self, options), level)
+
+    def _noisy(self, raw: PhaseHistory, level: dict[str, Any]) -> PhaseHistory:
+        """Echoes with the noise of [noise], of that level."""
         if self.noise is None:
             return raw
         from ..effects.noise import add_noise
@@ -229,12 +228,12 @@ class Scenario:
             level_of(level)
         return level
 
-    def plan(self, **options: Unpack[EchoOptions]) -> EchoForecast | FullwaveForecast:
-        """Forecast of `simulate` with these options: rows, bytes, seconds, predicted error or number of runs."""
+    def plan(self, **options: Unpack[EchoKeywords]) -> Forecast[PhaseHistory]:
+        """Forecast of `simulate` with these options, as `sarcl.plan` makes it; its run() returns the echoes."""
         check_window(self)
-        self._noise_level()
-        made: EchoForecast | FullwaveForecast = _simulating.call(self, options, forecast=True)
-        return made
+        level = self._noise_level()
+        forecast: Forecast[PhaseHistory] = _simulating.plan(self, options)
+        return replace(forecast, run=lambda: self._noisy(forecast.run(), level))
 
     @property
     def has_image(self) -> bool:
@@ -255,19 +254,21 @@ class Scenario:
         place = self.build_place()
         return {} if place is None else {"center": place.origin}
 
-    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectOptions]) -> Image:
+    def focus(self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectKeywords]) -> Image:
         """The image of `raw` on `grid`, default [grid]. `options` take precedence over those in [backproject].
 
-        With [polar_format] or [range_doppler] the image is made by that function, whose options these are then (and
-        `out`, a file that is written in the end); range_doppler makes a grid of its own.
+        With [polar_format] or [range_doppler] the image is made by that function, whose options these are then;
+        range_doppler makes a grid of its own.
         """
-        return focus(self, raw, grid, options)
+        image: Image = focus(self, raw, grid, options)
+        return image
 
     def plan_focus(
-        self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[FocusKeywords]
-    ) -> Forecast:
-        """Forecast of `focus` with these options: method, seconds, bytes, predicted error."""
-        return plan_focus(self, raw, grid, options)
+        self, raw: PhaseHistory, grid: ImageGrid | None = None, **options: Unpack[BackprojectKeywords]
+    ) -> Forecast[Image]:
+        """Forecast of `focus` with these options, as `sarcl.plan` makes it; its run() returns the image."""
+        forecast: Forecast[Image] = plan_focus(self, raw, grid, options)
+        return forecast
 
 
 def load(path: PathLike) -> Scenario:

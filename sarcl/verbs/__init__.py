@@ -42,14 +42,16 @@ def plan(*args: Any, **options: Any) -> Forecast[Any]:
     plan(sarcl.backproject, raw, grid, ...). Options that only a run has (check, progress, out, resume, tile, cluster)
     are taken too, for forecast.run().
 
-    Returns a Forecast: method, plan, seconds, bytes, predicted_error, error_terms, cheaper, n_rows, n_samples. Its run()
-    carries out this very plan; ValueError where a file of echoes has changed meanwhile. TypeError for what is no verb,
-    and for options that the verb does not have; else plan raises and warns as the verb does.
+    Returns a Forecast: method, plan, seconds, bytes, predicted_error, error_terms, cheaper, n_rows, n_samples. Its
+    run() carries out this very plan; ValueError where a file of echoes has changed meanwhile. TypeError for what is no
+    verb, and for options that the verb does not have; else plan raises and warns as the verb does.
     """
     verb, subjects = (args[0], args[1:]) if args and callable(args[0]) else (__getattr__("backproject"), args)
     planned = getattr(verb, "planned", None)
     if planned is None:
-        raise TypeError(f"plan was given {verb!r:.60}, which is no verb; give one of {', '.join(HOMES)}, such as sarcl.echo")
+        raise TypeError(
+            f"plan was given {verb!r:.60}, which is no verb; give one of {', '.join(HOMES)}, such as sarcl.echo"
+        )
     forecast: Forecast[Any] = planned(*subjects, **options).forecast()
     echoes = [value for value in (*subjects, *options.values()) if isinstance(value, PhaseHistory)]
     stamps = [file_stamps(raw.samples) for raw in echoes]

@@ -10,8 +10,6 @@ import pytest
 import sarcl
 from sarcl import scenario
 from sarcl.fullwave.echoes.fullwave_echo import fullwave_echo
-from sarcl.imaging.polar_format.polar_format import plan_polar_format, polar_format
-from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler, range_doppler
 from sarcl.simulation.echo_forecast import plan_spectral_echo
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=100e6, duration=1e-6)
@@ -51,8 +49,8 @@ FORECASTS = {
     "plan_echo": lambda **o: sarcl.plan_echo(POINTS, CHIRP, TRACK, **o),
     "plan_spectral_echo": lambda **o: plan_spectral_echo(POINTS, CHIRP, TRACK, **o),
     "plan_fullwave_echo": lambda **o: sarcl.plan_fullwave_echo(sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
-    "plan_polar_format": lambda **o: plan_polar_format(raw(), grid(), **o),
-    "plan_range_doppler": lambda **o: plan_range_doppler(raw(), side="right", **o),
+    "plan, polar_format": lambda **o: sarcl.plan(sarcl.polar_format, raw(), grid(), **o),
+    "plan, range_doppler": lambda **o: sarcl.plan(sarcl.range_doppler, raw(), side="right", **o),
     **{
         f"scenario.plan, {section or 'echo'}": lambda section=section, **o: scenario.loads(TEXT + section).plan(**o)
         for section in ("", "[spectral_echo]", "[fullwave_echo]")
@@ -78,11 +76,6 @@ def test_misspelt_options_are_refused(name, option):
 def test_the_most_similar_option_is_named():
     with pytest.raises(TypeError, match="echo has unknown option 'tolerence'; did you mean 'tolerance'"):
         sarcl.plan_echo(POINTS, CHIRP, TRACK, tolerence=1e-5)
-
-
-@pytest.mark.parametrize("plan, verb", [(plan_polar_format, polar_format), (plan_range_doppler, range_doppler)])
-def test_forecasts_have_the_keywords_of_their_verbs(plan, verb):
-    assert list(inspect.signature(plan).parameters) == list(inspect.signature(verb).parameters)
 
 
 def test_options_of_the_run_alone_are_taken_by_its_forecast(tmp_path):

@@ -12,7 +12,7 @@ from helpers.cases import noise_history
 import sarcl
 from sarcl.cli.parser import main
 from sarcl.imaging import profile_energy
-from sarcl.imaging.focus_options import FocusOptions
+from sarcl.imaging.backproject_options import BackprojectOptions
 from sarcl.opencl.choose_device import open_device
 
 GRID = sarcl.ImageGrid.plane(shape=(200, 200), spacing=0.2)
@@ -58,7 +58,7 @@ def test_what_blocks_make_again_is_forecast(method, max_bytes, monkeypatch):
     from sarcl.imaging.engine import RowProfiles
 
     raw, grid = noise_on(straight(512), n_samples=512), sarcl.ImageGrid.plane(shape=(512, 512), spacing=0.2)
-    options = FocusOptions(tolerance=1e-2, method=method, max_bytes=max_bytes)
+    options = BackprojectOptions(tolerance=1e-2, method=method, max_bytes=max_bytes)
     device = open_device(None)
     _, task = options.task(raw, grid)
     engine = options.choose(task, [device]).on(device, task)

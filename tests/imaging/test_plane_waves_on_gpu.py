@@ -11,7 +11,6 @@ from helpers.devices import as_gpu
 from helpers.moved import held_bytes, moved_bytes
 
 import sarcl
-from sarcl.imaging.polar_format.polar_format import plan_polar_format
 from sarcl.numerics import nufft2d
 from sarcl.reference.polar_format import polar_format as plane_sum
 
@@ -59,7 +58,8 @@ def test_buffers_keep_to_max_bytes(device, max_bytes, monkeypatch):
     assert max_bytes / 4 < held.most <= max_bytes or max_bytes == 1e8
     assert (moved.down > 1.5 * image.data.nbytes) is (max_bytes < 1e8)
     assert np.linalg.norm(image.data - whole.data) <= 1e-6 * np.linalg.norm(whole.data)
-    assert plan_polar_format(raw, grid, tolerance=1e-3, device=as_gpu(device), max_bytes=max_bytes).predicted_error
+    options = {"tolerance": 1e-3, "device": as_gpu(device), "max_bytes": max_bytes}
+    assert sarcl.plan(sarcl.polar_format, raw, grid, **options).predicted_error
 
 
 @pytest.mark.filterwarnings("ignore:overflow encountered")

@@ -468,12 +468,12 @@ def test_measured_data_look_as_backproject_shows_them(data_folder):
 
 def test_the_forecast_is_of_the_plan_that_is_carried_out():
     raw = noise_on(ARC)
-    forecast = polar_format.plan_polar_format(raw, GRID, tolerance=1e-3)
+    forecast = sarcl.plan(sarcl.polar_format, raw, GRID, tolerance=1e-3)
     report = sarcl.polar_format(raw, GRID, tolerance=1e-3, check=False).report
     assert forecast.predicted_error == report.predicted_error and forecast.method == "polar format"
     assert {k: report.plan[k] for k in forecast.plan} == forecast.plan
     assert 8 * GRID.size < forecast.bytes and 0 < forecast.seconds < 60
-    more = polar_format.plan_polar_format(noise_on(ARC, n_samples=960), GRID, tolerance=1e-3)
+    more = sarcl.plan(sarcl.polar_format, noise_on(ARC, n_samples=960), GRID, tolerance=1e-3)
     assert more.seconds > 2 * forecast.seconds
     with pytest.raises(ValueError, match="tolerance"):
-        polar_format.plan_polar_format(raw, GRID, tolerance=2)
+        sarcl.plan(sarcl.polar_format, raw, GRID, tolerance=2)

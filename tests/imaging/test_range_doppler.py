@@ -16,7 +16,6 @@ from sarcl.imaging.range_doppler._bins import Bins
 from sarcl.imaging.range_doppler._doppler import Band
 from sarcl.imaging.range_doppler._plan import _blocks, _lacking, curved
 from sarcl.imaging.range_doppler._velocity import Hyperbolas
-from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
 from sarcl.numerics.interpolation import interpolator
 from sarcl.numerics.range_profiles import correction, from_samples
 from sarcl.reference.range_doppler import straighten
@@ -291,7 +290,7 @@ def test_the_centroid_of_data_is_the_right_multiple_of_the_pulse_rate_or_doubted
     )  # fmt: skip
 
     def centroid(raw, **options):
-        forecast = plan_range_doppler(raw, side="right", doppler="data", beam=0.004, **options)
+        forecast = sarcl.plan(sarcl.range_doppler, raw, side="right", doppler="data", beam=0.004, **options)
         return float(forecast.plan["Doppler centroid"].split()[0])
 
     rate = (told.n_rows - 1) / float(told.time[-1] - told.time[0])
@@ -489,7 +488,7 @@ def test_a_narrow_ridge_anywhere_in_the_swath_counts_in_the_predicted_error(shar
     errors = []
     for z in (0 * height, height):
         model = sarcl.ElevationModel(longitude, latitude, z)
-        plan = plan_range_doppler(raw, heights=model, **options).plan
+        plan = sarcl.plan(sarcl.range_doppler, raw, heights=model, **options).plan
         errors.append(float(str(plan["error, hyperbolic ranges"])))
 
     assert errors[1] > 100 * errors[0]
@@ -507,14 +506,14 @@ def test_the_needed_pulse_rate_of_an_orbit_is_that_of_its_doppler_rate():
 def test_the_forecast_is_of_the_plan_that_is_carried_out():
     raw = noise(n=96, aperture=40.0)
     options = {"tolerance": 3e-3, "window": "hamming"}
-    forecast = plan_range_doppler(raw, **options)
+    forecast = sarcl.plan(sarcl.range_doppler, raw, **options)
     image = sarcl.range_doppler(raw, **options, check=False)
     assert forecast.predicted_error == image.report.predicted_error and forecast.method == "range-Doppler"
     assert forecast.plan["pixels"] == " x ".join(map(str, image.data.shape))
     assert {k: forecast.plan[k] for k in image.report.plan} == image.report.plan
     assert image.data.nbytes < forecast.bytes and 0 < forecast.seconds < 60
     with pytest.raises(ValueError, match="side is 'up'"):
-        plan_range_doppler(raw, side="up")
+        sarcl.plan(sarcl.range_doppler, raw, side="up")
 
 
 def test_a_swath_wider_than_the_pulse_interval_is_warned_of():

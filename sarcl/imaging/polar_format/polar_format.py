@@ -2,52 +2,51 @@
 
 from __future__ import annotations
 
-import warnings
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import ArrayLike
 
-from ...base import arguments
-from ...base.errors import SarclWarning, confirm_tolerance
-from ...base.report import Report
+from ...base.errors import warn
+from ...base.forecast import Forecast, Plan
+from ...base.options import option
+from ...base.report import ErrorTerm, Report, terms_of_sum
 from ...base.stage_timer import Clock
-from ...base.validation import flag, instance
+from ...base.validation import instance
 from ...base.validation import tolerance as allowed_error
+from ...base.verb import verb
 from ...model.image import Image
 from ...model.image_grid import ImageGrid
 from ...model.phase_history import PhaseHistory
 from ...numerics import cost_model
 from ...numerics.nufft2d import Gridder, make_plan, tile_of
 from ...numerics.range_profiles import check_digits
-from ...numerics.windows import Window
 from ...opencl import memory_budget
 from ...opencl.choose_device import open_device
-from ...opencl.device import DeviceChoice
 from ..collection import collection
+from ..focus_options import GridOptions, check_output, finished
 from ..focusing_task import FocusingTask, make_task
-from ..forecast import Forecast, speed
+from ..forecast import speed
 from ._samples import WeightedRows
 from ._wavefront import Curvature, Waves, curvature, waves_about
 
 DEFOCUS = np.pi / 2  # rad: blurring phase at the border of the grid above which a warning is given
-Progress = Callable[[str, int, int], None]
+CHECKED = 256  # pixels that a check computes exactly
 
 
-def polar_format(
-    raw: PhaseHistory,
-    grid: ImageGrid,
-    *,
-    tolerance: float = 1e-2,
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
-    max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
-    sum_polarizations: bool = False,
-    check: bool | None = None,
-    progress: Progress | None = None,
-) -> Image:
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PolarFormatOptions(GridOptions):
+    """Options of `polar_format`."""
+
+    tolerance: float = option(
+        1e-2,
+        "L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that add "
+        "with random phases, sqrt(pixels sum |w s|^2)",
+        lambda name, value: allowed_error(value),
+    )
+
+
+@verb(PolarFormatOptions)
+def polar_format(raw: PhaseHistory, grid: ImageGrid, options: PolarFormatOptions) -> Plan[Image]:
     """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
 
     raw        PhaseHistory, compressed, of at least 2 rows; any track, and any receiver: that of an orbit's echoes, at
@@ -55,12 +54,7 @@ def polar_format(
     grid       ImageGrid.plane; c is its pixel (rows//2, columns//2). K = -(2 f/c) u, with u the unit vector from c to
                the antenna, or the mean of those to transmitter and receiver: less the gradient of half the path.
                Phases are relative to c, whatever reference_range is
-    tolerance  L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that
-               add with random phases, sqrt(pixels sum |w s|^2)
-    window, weights, max_bytes, sum_polarizations   as `backproject` takes them
-    check      compute 256 random pixels of that sum exactly; None: where that costs less than 2 %
-    device     see `sarcl.devices`
-    progress   called as progress(stage, done, total), in thousandths
+    {options}
 
     The plan in the report gives the error of plane wavefronts against `backproject`, which the tolerance does not
     include: the largest neglected phase, the part of it that defocuses, the largest displacement of a pixel, and the
@@ -70,114 +64,114 @@ def polar_format(
     error above the tolerance. MemoryError: max_bytes too small.
     Source: Farooq 2009, equations 2.59 to 2.64; docs/theory/polar_format.md.
     """
-    if check is not None:
-        flag("check", check)
-    arguments.progress(progress)
+    instance("raw", raw, PhaseHistory)
+    instance("grid", grid, ImageGrid)
+    if not grid.is_plane:
+        raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
+    check_output(options.out)
     clock = Clock()
-    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
-    task, waves, engine, tolerance = made.task, made.waves, made.engine, made.tolerance
-    plan, opened, budget = engine.plan, engine.device, made.budget
-    clock.lap("plan")
-
-    def on_progress(share: float) -> None:
-        if progress:
-            progress("polar format", round(1000 * share), 1000)
-
-    data = engine.image(made.samples, grid.shape, budget, clock, on_progress)
-    check_digits(made.samples.largest)
-    norm, random = _norm(data), float(np.sqrt(made.samples.energy() * grid.size))
-    details = plan.describe()
-    if norm < random:
-        details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
-    details |= _describe(made.bent)
-    measured = None
-    exact_seconds = 256 * task.raw.n_rows * raw.n_samples * 3e-8
-    if check or (check is None and exact_seconds < 0.02 * clock.seconds["gridding"]):
-        measured = _measure_error(task, grid, waves, data)
-        clock.lap("check")
-    image = Image(
-        data,
-        grid,
-        gain=float(task.row_weight.sum() * task.sample_weight.sum()),
-        frequency=float(np.median(task.antennas.frequency)),
-        **collection(task.raw, grid, window),
-        report=Report(
-            plan=details,
-            tolerance=tolerance,
-            predicted_error=plan.predicted_error,
-            measured_error=measured,
-            contributions_done=task.pairs,
-            contributions_skipped={"zero weight": (raw.n_rows - task.raw.n_rows) * grid.size},
-            seconds=clock.seconds,
-            device=opened.info.name,
-        ),
+    task = make_task(
+        raw, grid, options.window, options.weights, wrap=True, skip=True, sum_polarizations=options.sum_polarizations
     )
-    confirm_tolerance(image=image, instead="use backproject")
-    return image
-
-
-def plan_polar_format(
-    raw: PhaseHistory,
-    grid: ImageGrid,
-    *,
-    tolerance: float = 1e-2,
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
-    max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
-    sum_polarizations: bool = False,
-    check: bool | None = None,
-    progress: Progress | None = None,
-) -> Forecast:
-    """What `polar_format` would do with these arguments: a Forecast. Raises and warns as it does; no sample is read.
-
-    check, progress   are of `polar_format` alone
-    """
-    made = _prepare(raw, grid, tolerance, window, weights, max_bytes, device, sum_polarizations)
-    plan = made.engine.plan
-    held = 8.0 * (grid.size + plan.length[0] * plan.length[1])  # complex64
-    seconds = cost_model.GRID_UNIT * plan.cost / speed(made.engine.device)
-    details = {**plan.describe(), **_describe(made.bent)}
-    return Forecast("polar format", details, seconds, held, plan.predicted_error, None)
+    if task.raw.n_rows < 2:
+        raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
+    device = open_device(options.device)
+    budget = min(memory_budget.budget(device, options.max_bytes), device.info.memory)
+    waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
+    bent = curvature(task.raw, waves, grid)
+    _warn(task, waves, bent)
+    cycles, step = waves.pixel_cycles(task.raw, grid)
+    plan = make_plan(options.tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(device))
+    engine = Gridder(device, plan, cycles, step, raw.n_samples)
+    samples = WeightedRows(device, task, waves, options.tolerance)
+    engine.blocks(budget, grid.shape, samples.row_bytes)
+    clock.lap("plan")
+    return PolarFormatPlan(options, raw, task, waves, bent, engine, samples, budget, clock.seconds)
 
 
 @dataclass(frozen=True, eq=False)
-class _Prepared:
-    """What is to be focused, and how."""
+class PolarFormatPlan:
+    """One image to be made with plane wavefronts: a Plan.
 
-    tolerance: float
+    raw      all rows;  task  of the rows that have a weight
+    bent     error of plane wavefronts;  engine  the transform on a device;  samples  that it reads
+    budget   bytes on the device;  seconds  of planning, by stage
+    """
+
+    options: PolarFormatOptions
+    raw: PhaseHistory
     task: FocusingTask
     waves: Waves
     bent: Curvature
     engine: Gridder
     samples: WeightedRows
     budget: float
+    seconds: dict[str, float]
 
+    @property
+    def error_terms(self) -> tuple[ErrorTerm, ...]:
+        """Parts of the predicted error."""
+        return terms_of_sum({"samples to grid cells": self.engine.plan.predicted_error})
 
-def _prepare(
-    raw: PhaseHistory, grid: ImageGrid, tolerance: float, window: Window | None, weights: ArrayLike | None,
-    max_bytes: float | None, device: DeviceChoice | None, sum_polarizations: bool,
-) -> _Prepared:  # fmt: skip
-    """Arguments checked, plane waves and their error, and the plan on the device; warns where the image is blurred."""
-    instance("raw", raw, PhaseHistory)
-    instance("grid", grid, ImageGrid)
-    if not grid.is_plane:
-        raise ValueError("grid lists its points; the FFT of polar_format needs an ImageGrid.plane: use backproject")
-    tolerance = allowed_error(tolerance)
-    task = make_task(raw, grid, window, weights, wrap=True, skip=True, sum_polarizations=sum_polarizations)
-    if task.raw.n_rows < 2:
-        raise ValueError(f"raw has {task.raw.n_rows} row of weight > 0; a synthetic aperture needs at least 2")
-    opened = open_device(device)
-    budget = min(memory_budget.budget(opened, max_bytes), opened.info.memory)
-    waves = waves_about(task.raw, grid.at(grid.shape[0] // 2, grid.shape[1] // 2))
-    bent = curvature(task.raw, waves, grid)
-    _warn(task, waves, bent)
-    cycles, step = waves.pixel_cycles(task.raw, grid)
-    plan = make_plan(tolerance, grid.shape, cycles, step, raw.n_samples, tile_of(opened))
-    engine = Gridder(opened, plan, cycles, step, raw.n_samples)
-    samples = WeightedRows(opened, task, waves, tolerance)
-    engine.blocks(budget, grid.shape, samples.row_bytes)
-    return _Prepared(tolerance, task, waves, bent, engine, samples, budget)
+    def forecast(self) -> Forecast[Image]:
+        """Its Forecast; no sample is read."""
+        plan, pixels = self.engine.plan, self.task.grid.size
+        return Forecast(
+            method="polar format",
+            plan={**plan.describe(), **_describe(self.bent)},
+            seconds=cost_model.GRID_UNIT * plan.cost / speed(self.engine.device),
+            bytes=8.0 * (pixels + plan.length[0] * plan.length[1]),  # complex64
+            predicted_error=plan.predicted_error,
+            error_terms=self.error_terms,
+            planning=sum(self.seconds.values()),
+            run=self.run,
+        )
+
+    def run(self) -> Image:
+        """The image."""
+        options, task, plan, clock = self.options, self.task, self.engine.plan, Clock(self.seconds)
+        grid = task.grid
+
+        def on_progress(share: float) -> None:
+            if options.progress:
+                options.progress("polar format", round(1000 * share), 1000)
+
+        data = self.engine.image(self.samples, grid.shape, self.budget, clock, on_progress)
+        check_digits(self.samples.largest)
+        norm, random = _norm(data), float(np.sqrt(self.samples.energy() * grid.size))
+        details = plan.describe()
+        if norm < random:
+            details["error of a dark image"] = f"{plan.predicted_error * random / norm:.1e}" if norm else "unknown"
+        details |= _describe(self.bent)
+        measured = self._measured(data, clock)
+        image = Image(
+            data,
+            grid,
+            gain=float(task.row_weight.sum() * task.sample_weight.sum()),
+            frequency=float(np.median(task.antennas.frequency)),
+            **collection(task.raw, grid, options.window),
+            report=Report(
+                plan=details,
+                tolerance=options.tolerance,
+                predicted_error=plan.predicted_error,
+                error_terms=self.error_terms,
+                measured_error=measured,
+                contributions_done=task.pairs,
+                contributions_skipped={"zero weight": (self.raw.n_rows - task.raw.n_rows) * grid.size},
+                seconds=clock.seconds,
+                device=self.engine.device.info.name,
+            ),
+        )
+        return finished(image, self.options.out, "use backproject")
+
+    def _measured(self, data: np.ndarray, clock: Clock) -> float | None:
+        """The error at random pixels, where that is asked for or cheap."""
+        pairs = CHECKED * self.task.raw.n_rows * self.raw.n_samples
+        if not self.options.is_checked(pairs, clock.seconds["gridding"]):
+            return None
+        measured = _measure_error(self.task, self.waves, data)
+        clock.lap("check")
+        return measured
 
 
 def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
@@ -187,7 +181,7 @@ def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
             f"wavefronts are curved: at the grid's border {bent.defocus:.2g} rad are left that blur; polar_format "
             f"focuses within {bent.radius:.3g} m of its centre. Take a smaller grid, or backproject"
         )
-        warnings.warn(text, SarclWarning, stacklevel=4)
+        warn(text)
     reach = np.abs(waves.toward @ (_corners(task.grid) - waves.center).T) + np.abs(waves.shift)[:, None]
     if (reach > task.raw.swath[:, None] / 2 * (1 + 1e-9)).any():
         text = (
@@ -195,7 +189,7 @@ def _warn(task: FocusingTask, waves: Waves, bent: Curvature) -> None:
             f"{task.raw.swath.min() / 2:.4g} m: beyond it polar_format repeats echoes. "
             "Take a smaller grid, or backproject"
         )
-        warnings.warn(text, SarclWarning, stacklevel=4)
+        warn(text)
 
 
 def _corners(grid: ImageGrid) -> np.ndarray:
@@ -219,11 +213,11 @@ def _norm(data: np.ndarray) -> float:
     return float(np.sqrt(sum(np.linalg.norm(row.astype(np.complex128)) ** 2 for row in data)))
 
 
-def _measure_error(task: FocusingTask, grid: ImageGrid, waves: Waves, data: np.ndarray) -> float:
+def _measure_error(task: FocusingTask, waves: Waves, data: np.ndarray) -> float:
     """Relative error at up to 256 random pixels against the exact float64 sum."""
     from ...reference.polar_format import polar_format as exact
 
-    index, positions = grid.sample(256, seed=0)
+    index, positions = task.grid.sample(CHECKED, seed=0)
     wanted, random = exact(task.raw, positions, waves.center, task.sample_weight, task.row_weight)
     wrong = float(np.linalg.norm(data[index] - wanted))
     return wrong / max(float(np.linalg.norm(wanted)), random) if wrong else 0.0

@@ -4,7 +4,6 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -18,6 +17,7 @@ from ...model.phase_history import PhaseHistory
 from ...numerics import windows
 from ._aperture_window import ApertureWindow
 from ._doppler import STEEPEST, Band, delay, fresnel, sine
+from ._options import RangeDopplerOptions
 from ._range_window import RangeWindow
 from ._track import REMEDY, Track
 from ._velocity import Positions
@@ -61,16 +61,14 @@ class Extent:
 
 
 def choose_extent(
-    raw: PhaseHistory, track: Track, positions: Positions, speed: float, centroid: float, beam: float | None,
-    times: tuple[float, float] | None, ranges: tuple[float, float] | None, spacing: object, least: float,
-    allowed: float, over_beam: Any = None,
+    raw: PhaseHistory, track: Track, positions: Positions, options: RangeDopplerOptions, *, speed: float,
+    centroid: float, least: float, allowed: float, times: tuple[float, float] | None,
 ) -> Extent:  # fmt: skip
-    """The extent asked for, or the default: see `range_doppler`.
+    """The extent that `options` ask for, or the default.
 
-    speed     effective velocity, m/s
-    centroid  sine of the squint angle of the Doppler centroid;  beam  full angle, rad, or None
+    speed     effective velocity, m/s;  centroid  sine of the squint angle of the Doppler centroid
     least     shortest slant range that reaches the ground, m;  allowed  error of the ends of the Doppler band
-    over_beam  window over the rows that see a pixel; the band has it unless all rows see all pixels
+    times     zero-Doppler times asked for, s from the first row, or None
     ValueError: a pulse rate below the Doppler bandwidth, ranges outside the range window, empty images.
     """
     if abs(centroid) > STEEPEST:
@@ -78,13 +76,14 @@ def choose_extent(
             f"the Doppler centroid is {np.degrees(np.arcsin(np.clip(centroid, -1, 1))):.3g} degrees from broadside, "
             f"too near to the direction of flight; {REMEDY}"
         )
-    wide = pair("spacing", (None, None) if spacing is None else spacing)
+    beam, ranges, has_beam = options.beam, options.ranges, options.beam is not None
+    wide = pair("spacing", (None, None) if options.spacing is None else options.spacing)
     steps = [None if d is None else number(f"spacing[{i}]", d, above=0) for i, d in enumerate(wide)]
     at_middle = float(raw.reference_range[raw.n_rows // 2]) * np.sqrt(1 - centroid**2)
     about = max(at_middle if ranges is None else sum(ranges) / 2, least)
     sight = _Sight(track, speed, centroid, beam, float(raw.center_frequency[0]), about)
     window = RangeWindow(raw, track, positions, speed, sight.sines, least, about)
-    middle = (track.start + track.stop) / 2 + delay(centroid, about, speed) if times is None else sum(times) / 2
+    middle = sight.middle if times is None else sum(times) / 2
     pixel = sight.rows_at(middle)
     pixel_band = float(np.ptp(pixel))
     _check_pulse_rate(sight, pixel_band)
@@ -92,14 +91,33 @@ def choose_extent(
         near = max(least, about - float(raw.swath[0]))
         half = _default_half(sight, window, middle, near, None if ranges is not None else HELD)
         times = middle - half, middle + half
-    taper = 0.0 if beam is None else Band.tapered(0, 0, pixel_band, sight.zone(about), allowed, True).taper
+    taper = Band.tapered(0, 0, pixel_band, sight.zone(about), allowed, True).taper if has_beam else 0.0
     along, across = _wavenumbers(raw, np.clip([pixel.min() - taper, pixel.max() + taper], -STEEPEST, STEEPEST))
     finer = speed * along * track.step / FILLED if steps[0] is None else track.step / steps[0]
     finer = max(1, int(np.ceil(finer - 1e-9)))
     column = steps[1] or FILLED / across
-    ranges = window.longest(times) if ranges is None else window.checked(ranges, times)
+    near, far = window.longest(times) if ranges is None else window.checked((ranges[0], ranges[1]), times)
     n_times = int(np.floor((times[1] - times[0]) / track.step * finer + 1e-6)) + 1
-    n_ranges = int(np.floor((ranges[1] - ranges[0]) / column + 1e-6)) + 1
+    n_ranges = int(np.floor((far - near) / column + 1e-6)) + 1
+    _check_pixels(n_times, n_ranges)
+    u, r = times[0] + track.step / finer * np.arange(n_times), near + column * np.arange(n_ranges)
+    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)
+    used = _sines_used(sight, corners, u)
+    _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
+    zone = sight.zone(float(r[0]))
+    over_beam = windows.both(options.window)[1] if has_beam else None
+
+    def band_for(allowed: float) -> Band:
+        if over_beam is None or used == (corners.min(), corners.max()):
+            return Band.tapered(*used, pixel_band, zone, allowed, has_beam)
+        over = ApertureWindow.over(*sight.sines, windows.table(over_beam), zone, allowed)
+        return Band.windowed(over, (float(corners.min()), float(corners.max())), pixel_band, zone, allowed)
+
+    return Extent(u, r, finer, band_for(allowed), pixel_band, track.times, speed, has_beam, zone, band_for)
+
+
+def _check_pixels(n_times: int, n_ranges: int) -> None:
+    """MemoryError for an image that no memory holds."""
     if n_times * n_ranges > MOST_PIXELS:
         raise MemoryError(
             f"an image of {n_times} x {n_ranges} pixels is larger than range_doppler makes; give times=, ranges= of a "
@@ -112,28 +130,22 @@ def choose_extent(
             f"positions, and this machine has {size_text(room)}; give times=, ranges= of a part of at most "
             f"{int(room / PIXEL_BYTES):,} pixels, or a wider spacing="
         )
-    u, r = times[0] + track.step / finer * np.arange(n_times), ranges[0] + column * np.arange(n_ranges)
-    corners = sine(u[[0, -1], None, None], r[[0, -1], None], np.array([track.start, track.stop]), speed)
+
+
+def _sines_used(sight: _Sight, corners: np.ndarray, times: np.ndarray) -> tuple[float, float]:
+    """First and last sine of squint angles at which rows see the image; ValueError where no row does.
+
+    corners  sines at which the first and the last row see its corners
+    """
     used = float(max(sight.sines[0], corners.min())), float(min(sight.sines[1], corners.max()))
     if not used[0] < used[1]:
-        seen = (track.start + track.stop) / 2 + delay(centroid, about, speed)
+        epoch = sight.track.epoch
         raise ValueError(
-            f"no row sees the times {track.epoch + u[0]:.10g} to {track.epoch + u[-1]:.10g} s in the beam; with this "
-            f"Doppler centroid the rows see zero-Doppler times about {track.epoch + seen:.10g} s: "
+            f"no row sees the times {epoch + times[0]:.10g} to {epoch + times[-1]:.10g} s in the beam; with this "
+            f"Doppler centroid the rows see zero-Doppler times about {epoch + sight.middle:.10g} s: "
             "give times= there, or doppler='data'"
         )
-    _warn_of_ambiguities(sight, float(np.ptp(corners, axis=(0, 2)).max()), float(r[-1] - r[0]))
-    zone = sight.zone(float(r[0]))
-
-    def band_for(allowed: float) -> Band:
-        if over_beam is None or used == (corners.min(), corners.max()):
-            return Band.tapered(*used, pixel_band, zone, allowed, beam is not None)
-        over = ApertureWindow.over(*sight.sines, windows.table(over_beam), zone, allowed)
-        return Band.windowed(over, (float(corners.min()), float(corners.max())), pixel_band, zone, allowed)
-
-    return Extent(
-        u, r, finer, band_for(allowed), pixel_band, track.times, speed, beam is not None, zone, band_for
-    )  # fmt: skip
+    return used
 
 
 @dataclass(frozen=True, eq=False)
@@ -162,6 +174,11 @@ class _Sight:
         ends = np.clip([angle - self.beam / 2, angle + self.beam / 2], -np.pi / 2, np.pi / 2)
         low, high = np.clip(np.sin(ends) * ratio, -1, 1)
         return float(low), float(high)
+
+    @property
+    def middle(self) -> float:
+        """Zero-Doppler time that the middle of the track sees, s."""
+        return (self.track.start + self.track.stop) / 2 + delay(self.centroid, self.about, self.speed)
 
     @property
     def hertz(self) -> float:

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from typing import Any
 
@@ -10,8 +9,6 @@ import numpy as np
 
 from ...base import host_memory
 from ...base.constants import SPEED_OF_LIGHT
-from ...base.validation import array, instance, number
-from ...base.validation import tolerance as allowed_error
 from ...earth.elevation import ElevationModel
 from ...model.phase_history import PhaseHistory
 from ...numerics import windows
@@ -25,6 +22,7 @@ from ._focus import Budget
 from ._ground import Ground
 from ._looks import TwoLooks
 from ._map_drift import converged
+from ._options import RangeDopplerOptions
 from ._plan import FocusPlan, make_plan
 from ._track import REMEDY, Track
 from ._uneven_energy import UnevenEnergy, uneven_energy
@@ -100,13 +98,54 @@ class RangeDopplerTask:
         }
 
 
-def make_task(
-    raw: PhaseHistory, heights: Any, side: Any, tolerance: Any, window: Any, weights: Any, times: Any, ranges: Any,
-    spacing: Any, beam: Any, doppler: Any, near: Any, doppler_rate: Any, max_bytes: Any, device: Any,
-) -> RangeDopplerTask:  # fmt: skip
-    """The task of these arguments of `range_doppler`, which says what each is and what is refused."""
-    instance("raw", raw, PhaseHistory)
-    tolerance = allowed_error(tolerance)
+def range_doppler_task(raw: PhaseHistory, options: RangeDopplerOptions) -> RangeDopplerTask:
+    """The task of these echoes and options of `range_doppler`, which says what is refused."""
+    tolerance, heights = options.tolerance, options.heights
+    _check_echoes(raw, options)
+    track = Track.of(raw, 0.02 * tolerance)
+    ground = Ground.of(track, heights, track.side(raw, options.side))
+    smooth = ground.smooth().positions
+    least = ground.least_range()
+    speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
+    wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
+    centroids = _centroids(raw, track, speed, wavelength, options)
+    opened = open_device(options.device)
+    budget = Budget(
+        min(memory_budget.budget(opened, options.max_bytes), opened.info.memory),
+        host_memory.installed() / 2 if options.max_bytes is None else float(options.max_bytes),
+    )
+    epoch, times = track.epoch, options.times
+    extent = choose_extent(
+        raw, track, smooth, options, speed=speed, centroid=centroids[1], least=least, allowed=EDGES * tolerance,
+        times=None if times is None else (times[0] - epoch, times[1] - epoch),
+    )  # fmt: skip
+    window = options.window if extent.band.window is None else (windows.both(options.window)[0], None)
+    sample_weight, row_weight = weigh(raw, window, options.weights)
+    known = hyperbolas(
+        raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
+        extent.rows_of(extent.middle_time),
+    )  # fmt: skip
+    n_times, n_ranges = TRIED_ON_TERRAIN if isinstance(heights, ElevationModel) else TRIED
+    tried = np.linspace(extent.times[0], extent.times[-1], n_times)
+    model_error, worst = phase_error(raw, track, ground.positions, known, tried, extent.rows_of, n_ranges)
+    fit = known
+    if options.doppler_rate == "data":
+        looks = TwoLooks(opened, raw, track, extent, known, (sample_weight, row_weight), budget, wavelength)
+        fit = known.scaled(converged(looks.focused))
+    elif isinstance(options.doppler_rate, float):
+        middle, along = float(extent.ranges.mean()), centroids[1] * speed
+        fit = known.scaled(factor_of_rate(options.doppler_rate, known, middle, along, wavelength))
+    energy = uneven_energy(raw, track, extent, fit, sample_weight, row_weight, wavelength)
+    extent = _with_wide_ends(extent, energy, EDGES * tolerance)
+    plan = make_plan(raw, track, extent, fit, model_error, tolerance, energy.near, energy.whole)
+    return RangeDopplerTask(
+        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, centroids,
+        known, wavelength, worst,
+    )  # fmt: skip
+
+
+def _check_echoes(raw: PhaseHistory, options: RangeDopplerOptions) -> None:
+    """ValueError for echoes without one band of frequencies, or a window that is none."""
     if not raw.compressed:
         raise ValueError("raw is not compressed: its pulses still have their own spectrum; call sarcl.compress(raw)")
     for name in ("frequency", "frequency_step"):
@@ -114,55 +153,21 @@ def make_task(
             raise ValueError(f"raw.{name} differs between rows, and the FFT along the track needs one; {REMEDY}")
     if raw.n_samples < 2:
         raise ValueError("raw has one sample per row: without bandwidth there is no range; give at least 2 samples")
-    windows.check(window)
-    track = Track.of(raw, 0.02 * tolerance)
-    ground = Ground.of(track, heights, track.side(raw, side))
-    smooth = ground.smooth().positions
-    least = ground.least_range()
-    speed = effective_speed(raw, track, smooth, max(least, float(raw.reference_range[raw.n_rows // 2])))
-    wavelength = SPEED_OF_LIGHT / float(raw.frequency[0] + raw.n_samples // 2 * raw.frequency_step[0])
-    expected = centroid = centroid_of_geometry(raw, track.step, speed)
-    about = None if near is None else _number("near", near, "Hz") * wavelength / (2 * speed)
-    if isinstance(doppler, str) and doppler == "data":
-        centroid = centroid_of_data(raw, track.step, speed, expected if about is None else about, near is None)
-    elif near is not None:
-        raise ValueError("near is for doppler='data', where the centroid is known but for multiples of the pulse rate")
-    elif not (isinstance(doppler, str) and doppler == "geometry"):
-        centroid = _number("doppler", doppler, "Hz") * wavelength / (2 * speed)
-    opened = open_device(device)
-    budget = Budget(
-        min(memory_budget.budget(opened, max_bytes), opened.info.memory),
-        host_memory.installed() / 2 if max_bytes is None else float(max_bytes),
-    )
+    windows.check(options.window)
 
-    extent = choose_extent(
-        raw, track, smooth, speed, centroid, None if beam is None else _beam(beam),
-        _times(times, track.epoch), _pair("ranges", ranges), spacing, least,
-        EDGES * tolerance, None if beam is None else windows.both(window)[1],
-    )  # fmt: skip
-    over_rows = window if extent.band.window is None else (windows.both(window)[0], None)
-    sample_weight, row_weight = weigh(raw, over_rows, weights)
-    fit = hyperbolas(
-        raw, track, smooth, extent.middle_time, extent.ranges[0], extent.ranges[-1],
-        extent.rows_of(extent.middle_time),
-    )  # fmt: skip
-    n_times, n_ranges = TRIED_ON_TERRAIN if isinstance(heights, ElevationModel) else TRIED
-    some = np.linspace(extent.times[0], extent.times[-1], n_times)
-    model_error, worst = phase_error(raw, track, ground.positions, fit, some, extent.rows_of, n_ranges)
-    known = fit
-    if isinstance(doppler_rate, str) and doppler_rate == "data":
-        looks = TwoLooks(opened, raw, track, extent, fit, (sample_weight, row_weight), budget, wavelength)
-        fit = fit.scaled(converged(looks.focused))
-    elif not (isinstance(doppler_rate, str) and doppler_rate == "geometry"):
-        wanted, middle = _number("doppler_rate", doppler_rate, "Hz/s"), float(extent.ranges.mean())
-        fit = fit.scaled(factor_of_rate(wanted, fit, middle, centroid * speed, wavelength))
-    energy = uneven_energy(raw, track, extent, fit, sample_weight, row_weight, wavelength)
-    extent = _with_wide_ends(extent, energy, EDGES * tolerance)
-    plan = make_plan(raw, track, extent, fit, model_error, tolerance, energy.near, energy.whole)
-    return RangeDopplerTask(
-        tolerance, track, ground, extent, plan, sample_weight, row_weight, opened, budget, speed, (expected, centroid),
-        known, wavelength, worst,
-    )  # fmt: skip
+
+def _centroids(
+    raw: PhaseHistory, track: Track, speed: float, wavelength: float, options: RangeDopplerOptions
+) -> tuple[float, float]:
+    """Sines of the squint angles of the Doppler centroid: of the geometry, and of the one that is used."""
+    expected = centroid_of_geometry(raw, track.step, speed)
+    sine_of_hertz = wavelength / (2 * speed)
+    if options.doppler == "data":
+        about = expected if options.near is None else options.near * sine_of_hertz
+        return expected, centroid_of_data(raw, track.step, speed, about, options.near is None)
+    if options.near is not None:
+        raise ValueError("near is for doppler='data', where the centroid is known but for multiples of the pulse rate")
+    return expected, options.doppler * sine_of_hertz if isinstance(options.doppler, float) else expected
 
 
 def _with_wide_ends(extent: Extent, energy: UnevenEnergy, allowed: float) -> Extent:
@@ -180,31 +185,3 @@ def _with_wide_ends(extent: Extent, energy: UnevenEnergy, allowed: float) -> Ext
             break
         asked *= 0.8 * allowed / error
     return replace(extent, band=replace(band, error=error))
-
-
-def _beam(value: Any) -> float:
-    beam = number("beam", value, above=0)
-    if beam >= np.pi:
-        raise ValueError(f"beam is {beam:g} rad, which looks backwards too; give less than pi: was it in degrees?")
-    return beam
-
-
-def _number(name: str, value: Any, unit: str) -> float:
-    if isinstance(value, str):
-        raise ValueError(f"{name} is {value!r}; choose 'geometry', 'data' or a number in {unit}")
-    return number(name, value)
-
-
-def _times(value: Sequence[float] | None, epoch: float) -> tuple[float, float] | None:
-    """Zero-Doppler times that were asked for, s from the first row."""
-    made = _pair("times", value)
-    return made and (made[0] - epoch, made[1] - epoch)
-
-
-def _pair(name: str, value: Sequence[float] | None) -> tuple[float, float] | None:
-    if value is None:
-        return None
-    made = array(name, value, np.float64, (2,))
-    if not made[0] < made[1]:
-        raise ValueError(f"{name} is ({made[0]:g}, {made[1]:g}); the first must be less than the last")
-    return float(made[0]), float(made[1])

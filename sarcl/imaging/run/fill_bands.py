@@ -64,9 +64,7 @@ class BandFiller:
         self.clock.lap("files")
         focused = []
         try:
-            with closing(
-                self.workers.work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)
-            ) as work:
+            with closing(self.workers.work(todo, most, self.chosen.unit, output_for, self.clock, on_progress)) as work:
                 for first, last, flat, missed in work:
                     focused.append((first, last))
                     skipped += missed

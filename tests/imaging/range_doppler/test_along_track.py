@@ -12,7 +12,6 @@ from helpers.devices import as_gpu
 import sarcl
 from sarcl.imaging.range_doppler import _along_track, _focus
 from sarcl.imaging.range_doppler._plan import FocusPlan
-from sarcl.imaging.range_doppler.range_doppler import plan_range_doppler
 
 
 def few_rows(n=11, away=40e3, spacing=0.02, n_samples=24):
@@ -49,7 +48,7 @@ def test_images_by_sums_are_those_by_ffts(options, monkeypatch):
 def test_few_rows_need_no_array_of_all_doppler_bins(device):
     """An FFT of 85 000 samples was made of each column, most of them zeros: it took minutes and gigabytes."""
     raw = few_rows(spacing=2e-4)
-    forecast = plan_range_doppler(raw, side="right")
+    forecast = sarcl.plan(sarcl.range_doppler, raw, side="right")
     length = int(str(forecast.plan["Doppler bins"]).split()[-1])
     n_times, n_ranges = (int(n) for n in str(forecast.plan["pixels"]).split(" x "))
     assert length > 50_000 and n_times < 20

@@ -120,8 +120,7 @@ def test_where_every_row_sees_every_pixel_the_window_is_that_of_the_rows(raw):
 def test_the_gain_is_the_sum_of_the_weights_of_the_rows(raw, window):
     weights = np.random.default_rng(3).uniform(0.5, 1.0, raw.n_rows)
     image = sarcl.range_doppler(raw, window=window, weights=weights, check=False, **BEAM)
-    task = _task.make_task(raw, 0.0, "right", 1e-2, window, weights, None, None, None, strip_map.ANGLE,
-                           BEAM["doppler"], None, "geometry", None, None)  # fmt: skip
+    task = sarcl.range_doppler.planned(raw, window=window, weights=weights, **BEAM).task
     index, _ = image.grid.sample(200, seed=2)
     share = _row_weights(task.track, task.plan, task.plan.times[index[0]], image.grid.ranges[index[1]],
                          task.wavelength).real  # fmt: skip
