@@ -13,8 +13,6 @@ from ..earth.elevation import ElevationModel
 from ..imaging.backproject_options import Tile
 from ..imaging.focusing_task import BeamCone
 from ..imaging.focusing_task import Skip as BackprojectSkip
-from ..imaging.polar_format.polar_format import Progress as PolarFormatProgress
-from ..imaging.range_doppler.range_doppler import Progress as RangeDopplerProgress
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.image import Image
@@ -113,12 +111,12 @@ class BackprojectKeywords(TypedDict, total=False):
     mapping: MapKind | MapApertureOptions | None
     wrap: bool
     skip: bool | Collection[BackprojectSkip]
-    sum_polarizations: bool
     out: PathLike | WritableArray | None
     resume: bool | None
     tile: Tile | None
     device: DeviceChoice | Sequence[DeviceChoice] | None
     cluster: distributed.Client | None
+    sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
     tolerance: float
@@ -130,22 +128,20 @@ class PolarFormatKeywords(TypedDict, total=False):
     """Options of `polar_format`, for functions that hand them on."""
 
     tolerance: float
+    sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
+    out: PathLike | None
     max_bytes: float | None
-    device: DeviceChoice | None
-    sum_polarizations: bool
     check: bool | None
-    progress: PolarFormatProgress | None
+    device: DeviceChoice | None
+    progress: BackprojectProgress | None
 
 class RangeDopplerKeywords(TypedDict, total=False):
     """Options of `range_doppler`, for functions that hand them on."""
 
     heights: float | ElevationModel
     side: Literal["left", "right"] | None
-    tolerance: float
-    window: Window | None
-    weights: ArrayLike | None
     times: Sequence[float] | None
     ranges: Sequence[float] | None
     spacing: tuple[float | None, float | None] | None
@@ -153,10 +149,14 @@ class RangeDopplerKeywords(TypedDict, total=False):
     doppler: Literal["geometry", "data"] | float
     near: float | None
     doppler_rate: Literal["geometry", "data"] | float
+    tolerance: float
     max_bytes: float | None
-    device: DeviceChoice | None
     check: bool | None
-    progress: RangeDopplerProgress | None
+    window: Window | None
+    weights: ArrayLike | None
+    out: PathLike | None
+    device: DeviceChoice | None
+    progress: BackprojectProgress | None
 
 def echo(
     scene: Scene,
@@ -252,12 +252,12 @@ def backproject(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
@@ -278,12 +278,12 @@ def backproject(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: Tile | None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
@@ -299,13 +299,14 @@ def polar_format(
     grid: ImageGrid,
     *,
     tolerance: float = 0.01,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    out: PathLike | None = None,
     max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
-    sum_polarizations: bool = False,
     check: bool | None = None,
-    progress: PolarFormatProgress | None = None,
+    device: DeviceChoice | None = None,
+    progress: BackprojectProgress | None = None,
 ) -> Image:
     """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
     Options: docs/guide/options.md."""
@@ -315,9 +316,6 @@ def range_doppler(
     *,
     heights: float | ElevationModel = 0.0,
     side: Literal["left", "right"] | None = None,
-    tolerance: float = 0.01,
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
     times: Sequence[float] | None = None,
     ranges: Sequence[float] | None = None,
     spacing: tuple[float | None, float | None] | None = None,
@@ -325,10 +323,14 @@ def range_doppler(
     doppler: Literal["geometry", "data"] | float = "geometry",
     near: float | None = None,
     doppler_rate: Literal["geometry", "data"] | float = "geometry",
+    tolerance: float = 0.01,
     max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
     check: bool | None = None,
-    progress: RangeDopplerProgress | None = None,
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    out: PathLike | None = None,
+    device: DeviceChoice | None = None,
+    progress: BackprojectProgress | None = None,
 ) -> Image:
     """Focus echoes of a near-straight, evenly sampled track on a grid of zero-Doppler times and slant ranges.
     Options: docs/guide/options.md."""
@@ -347,12 +349,12 @@ def plan(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: Tile | None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
