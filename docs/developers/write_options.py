@@ -356,8 +356,8 @@ def _dicts(values: dict[str, dict[str, str]]) -> str:
     """A dict of dicts of texts of Python, one entry a line."""
     text = "{\n"
     for verb, options in values.items():
-        text += f"    {literal(verb)}: {{\n"
-        text += "".join(f"        {literal(name)}: {value},\n" for name, value in options.items()) + "    },\n"
+        lines = "".join(f"        {literal(name)}: {value},\n" for name, value in options.items())
+        text += f"    {literal(verb)}: {{\n{lines}    }},\n" if lines else f"    {literal(verb)}: {{}},\n"
     return text + "}\n"
 
 

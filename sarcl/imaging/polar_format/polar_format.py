@@ -116,14 +116,15 @@ class PolarFormatPlan:
     def forecast(self) -> Forecast[Image]:
         """Its Forecast; no sample is read."""
         plan, pixels = self.engine.plan, self.task.grid.size
+        planning = sum(self.seconds.values())
         return Forecast(
             method="polar format",
             plan={**plan.describe(), **_describe(self.bent)},
-            seconds=cost_model.GRID_UNIT * plan.cost / speed(self.engine.device),
+            seconds=planning + float(cost_model.GRID_UNIT * plan.cost / speed(self.engine.device)),
             bytes=8.0 * (pixels + plan.length[0] * plan.length[1]),  # complex64
             predicted_error=plan.predicted_error,
             error_terms=self.error_terms,
-            planning=sum(self.seconds.values()),
+            planning=planning,
             run=self.run,
         )
 

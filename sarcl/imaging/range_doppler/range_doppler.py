@@ -77,14 +77,15 @@ class RangeDopplerPlan:
         task, raw, plan = self.task, self.raw, self.task.plan
         pixels = len(plan.times) * len(plan.ranges)
         numbers = plan.held(raw.n_rows, raw.n_samples) + pixels
+        planning = sum(self.seconds.values())
         return Forecast(
             method="range-Doppler",
             plan={"pixels": f"{len(plan.times)} x {len(plan.ranges)}", **task.describe()},
-            seconds=plan.cost(raw.n_rows, raw.n_samples) / speed(task.device),
+            seconds=planning + float(plan.cost(raw.n_rows, raw.n_samples) / speed(task.device)),
             bytes=8.0 * numbers + 24.0 * pixels,  # complex64, and positions
             predicted_error=plan.predicted_error,
             error_terms=terms_of_sum(plan.errors),
-            planning=sum(self.seconds.values()),
+            planning=planning,
             run=self.run,
         )
 
