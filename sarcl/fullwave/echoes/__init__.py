@@ -9,6 +9,7 @@ For this folder alone:
 
     _anchor_files      echoes of finished anchors in files, so that a killed run can be continued
     _anchor_runs       runs of the grid for the anchors of one polarisation that is sent
+    _antenna_geometry  range window, angles and least distance of antennas about a scene
     _closed_bodies     refusals of scenes that are not closed bodies of smooth facets
     _formed_samples    samples of all pulses from the runs of anchors, with their report
     _fullwave_task     one task of fullwave_echo: geometry, frequencies, grid, runs

@@ -8,7 +8,6 @@ from typing import Any
 
 import numpy as np
 
-from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
 from ...base.fingerprint import checksum, kernels, leaves
@@ -26,6 +25,7 @@ from ...simulation.scene_echoes import EchoRequest
 from .. import runs
 from ..lattice import Lattice
 from ..target import Target
+from ._antenna_geometry import angle_along, check_outside, window_of
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
 from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
@@ -261,61 +261,14 @@ def fullwave_task(
     point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
     track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
     tx, rx = track.positions, echo_sampling.receiver_positions(track, receiver)
-    _check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
+    check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
     reference_range = half_path(tx, rx, point)
-    window = _window(scene, waveform, tx, rx, reference_range, range_window)
+    window = window_of(scene, waveform, tx, rx, reference_range, range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, *window, compressed)
     budget = request.budget if max_bytes is not None else default_bytes(request.device)
     lattice, cost = grid_choice(scene, band, cells, budget)
     return FullwaveTask(
         request, scene, waveform, band, track, receiver, motion, reference_range, window,
         frequency + step * np.arange(n_samples), step, compressed, cells, lattice, cost, budget,
-        _along(unit(tx - scene.center)), STRIP * SPEED_OF_LIGHT / band[1],
+        angle_along(unit(tx - scene.center)), STRIP * SPEED_OF_LIGHT / band[1],
     )  # fmt: skip
-
-
-def _along(directions: np.ndarray) -> np.ndarray:
-    """Angle along a path of unit vectors (P, 3), rad (P,)."""
-    here, after = directions[:-1], directions[1:]
-    turn = np.arctan2(np.linalg.norm(np.cross(here, after), axis=1), (here * after).sum(axis=1))
-    return np.concatenate([[0.0], np.cumsum(turn)])
-
-
-def _check_outside(scene: Scene, antennas: dict[str, np.ndarray]) -> None:
-    """ValueError where an antenna is so near that the sphere about the scene's box holds it."""
-    radius = float(np.linalg.norm(scene.bounds[1] - scene.bounds[0])) / 2
-    for name, places in antennas.items():
-        distance = np.linalg.norm(places - scene.center, axis=1)
-        if not (distance > radius).all():
-            at = int(np.argmin(distance))
-            raise ValueError(
-                f"{name} position {at} is {distance[at]:.4g} m from the scene's centre, and the scene reaches "
-                f"{radius:.4g} m from it; fullwave_echo takes the wave at the scene as plane: give antennas outside"
-            )
-
-
-def _window(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
-) -> tuple[float, float]:
-    """The range window, m: as asked, or the smallest that holds the scene's box, and waves that creep round it, plus
-    10 %.
-
-    A wave that touches a body at its sides, creeps over its back and returns has gone a quarter of the box's girth
-    farther than the box's centre: pi/2 radii for a sphere, less than the 2 radii of its box.
-    """
-    box = echo_sampling.window(scene, waveform, tx, rx, reference_range, None)
-    if asked is None:
-        size = np.sort(scene.bounds[1] - scene.bounds[0])
-        late = float(size[1] + size[2]) / 2
-        late += float((half_path(tx, rx, scene.center) - reference_range).max())
-        half = max(box[1], 1.1 * late)
-        return -half, half
-    near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, asked)
-    ends = np.array([half_path(tx, rx, corner) - reference_range for corner in corners(scene.bounds)])
-    if near > ends.min() or far < ends.max():
-        raise ValueError(
-            f"range_window ({near:g}, {far:g}) m does not hold the scene, from {ends.min():.4g} to {ends.max():.4g} m "
-            "about the reference: echoes outside would appear at a wrong range, because fullwave_echo leaves out no "
-            "part of a body; give a wider window, or none"
-        )
-    return near, far
