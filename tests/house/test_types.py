@@ -21,7 +21,6 @@ import sarcl
 from sarcl import motion, shapes
 from sarcl.arrays import map_aperture
 from sarcl.experiments.fda import _array, case
-from sarcl.fullwave.echoes.fullwave_echo import FullwaveOptions
 from sarcl.imaging import choose_method, focusing_task
 from sarcl.imaging.backproject import BackprojectOptions
 from sarcl.model import antenna
@@ -163,7 +162,6 @@ def test_a_constructor_shown_to_type_checkers_is_the_real_one(kind):
     ("options", "verb", "others"),
     [
         (EchoOptions, sarcl.echo, {"scene", "waveform", "track"}),
-        (FullwaveOptions, sarcl.fullwave_echo, {"scene", "waveform", "track"}),
         (BackprojectOptions, sarcl.backproject, {"raw", "grid", "tile"}),
         (map_aperture.MapApertureOptions, sarcl.map_aperture, {"raw"}),
     ],
