@@ -48,7 +48,7 @@ FORECASTS = {
     "plan": lambda **o: sarcl.plan(raw(), grid(), **o),
     "plan_echo": lambda **o: sarcl.plan_echo(POINTS, CHIRP, TRACK, **o),
     "plan_spectral_echo": lambda **o: plan_spectral_echo(POINTS, CHIRP, TRACK, **o),
-    "plan_fullwave_echo": lambda **o: sarcl.plan_fullwave_echo(sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
+    "plan, fullwave_echo": lambda **o: sarcl.plan(sarcl.fullwave_echo, sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
     "plan, polar_format": lambda **o: sarcl.plan(sarcl.polar_format, raw(), grid(), **o),
     "plan, range_doppler": lambda **o: sarcl.plan(sarcl.range_doppler, raw(), side="right", **o),
     **{

@@ -32,7 +32,6 @@ VERBS = {
     "plan_echo": lambda t: sarcl.plan_echo(POINT, CHIRP, TRACK, tolerance=t),
     "spectral_echo": lambda t: sarcl.spectral_echo(POINT, CHIRP, TRACK, tolerance=t),
     "fullwave_echo": lambda t: sarcl.fullwave_echo(BODY, CHIRP, TRACK, tolerance=t),
-    "plan_fullwave_echo": lambda t: sarcl.plan_fullwave_echo(BODY, CHIRP, TRACK, tolerance=t),
     "beam": lambda t: sarcl.beam(sarcl.AntennaArray.linear(3, spacing=0.015), 1e10, **TOWARDS, tolerance=t),
 }
 

@@ -88,7 +88,7 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
         "echo, array": lambda: sarcl.echo(points, chirp, track, array=array, channels="separated", check=False),
         "echo to a file": lambda: sarcl.echo(points, chirp, track, out=h5, check=False),
         "fullwave_echo": lambda: sarcl.fullwave_echo(box, long_waves, looks, **full),
-        "plan_fullwave_echo": lambda: sarcl.plan_fullwave_echo(box, long_waves, looks, **full),
+        "plan fullwave_echo": lambda: sarcl.plan(sarcl.fullwave_echo, box, long_waves, looks, **full),
         "spectral_echo": lambda: sarcl.spectral_echo(points, chirp, track, check=False),
         "plan_echo": lambda: sarcl.plan_echo(points, chirp, track),
         "compress": lambda: sarcl.compress(sarcl.echo(points, chirp, track, compressed=False, check=False)),
