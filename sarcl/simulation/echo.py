@@ -9,43 +9,36 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from ..arrays.channels import is_single
-from ..base import arguments, host_memory, wgs84
 from ..base.errors import confirm_tolerance
 from ..base.report import Report
 from ..base.types import PathLike
 from ..base.validation import array as numbers
-from ..base.validation import choice, count, direction, flag, instance, number
-from ..base.validation import tolerance as allowed_error
+from ..base.validation import choice, flag, instance
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
-from ..numerics import plan
 from ..numerics.pulse_geometry import PulseGeometry
-from ..opencl.choose_device import open_device
 from ..opencl.device import DeviceChoice
-from ..opencl.memory_budget import budget
 from ..scattering import antenna_weights
-from ..scattering.facets import POLARIZATIONS
 from ..scene.scene import Scene
 from . import echo_sampling
 from .channels.array_echo import array_echo
 from .channels.channel_rows import CHANNELS, RECEIVE
 from .echo_check import measure_error, worth_checking
 from .echo_output import EchoOutput
-from .scene_echoes import EchoRequest, Progress, prepare_scene
+from .echo_request import Polarization as Polarization
+from .echo_request import Progress
+from .echo_request import echo_request as echo_request
+from .scene_preparation import prepare_scene
 from .spreading import Band, Counts
 
-Polarization = Literal["HH", "HV", "VH", "VV"]
 Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
 ]  # fmt: skip
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
-
-# Memory for facets that are cut: a share of the machine's, or max_bytes, but no less than the process takes anyway
-HOST_SHARE, LEAST_HOST = 0.25, 2.0**28
 
 
 class EchoOptions(TypedDict, total=False):
@@ -232,50 +225,3 @@ def echo(
         )
     confirm_tolerance(raw=raw)
     return raw
-
-
-def echo_request(
-    scene: Scene, skips: tuple[str, ...] = SKIPS, *, polarization: Any = "HH", vertical: Any = None,
-    shadows: Any = True, seed: int = 0, skip: Any = True, max_edge: Any = "auto", max_bytes: float | None = None,
-    tolerance: float = 1e-3, device: DeviceChoice | None = None, progress: Progress | None = None,
-) -> EchoRequest:  # fmt: skip
-    """The options of `echo` that all its methods share, checked; skips  the reasons that `skip` may name."""
-    seed = count("seed", seed, 0)
-    if isinstance(shadows, str) and shadows == "embree":
-        raise ValueError(
-            "shadows is 'embree'; rays of Embree were taken out, since sarcl's own became faster and exact: give True"
-        )
-    shadows = flag("shadows", shadows)
-    arguments.progress(progress)
-    if isinstance(max_edge, str):
-        choice("max_edge", max_edge, ("auto",))
-    elif max_edge is not None:
-        max_edge = number("max_edge", max_edge, above=0)
-    opened = open_device(device)
-    return EchoRequest(
-        opened, allowed_error(tolerance), budget(opened, max_bytes),
-        max(LEAST_HOST, HOST_SHARE * host_memory.installed() if max_bytes is None else max_bytes),
-        plan.skips(skip, skips),
-        _polarizations(polarization), _vertical(vertical, scene.center), max_edge, shadows, seed,
-        progress,
-    )  # fmt: skip
-
-
-def _polarizations(asked: Any) -> tuple[str, ...]:
-    """Names in the order of a pulse's rows; ValueError for unknown, repeated or none."""
-    if isinstance(asked, str):
-        asked = POLARIZATIONS if asked == "all" else (asked,)
-    names = tuple(asked) if isinstance(asked, Sequence) else ()
-    for name in names:
-        choice("polarization", name, POLARIZATIONS)
-    if not names or len(set(names)) < len(names):
-        raise ValueError(f"polarization is {asked!r:.60}; give at least one, and each once")
-    return names
-
-
-def _vertical(asked: Any, center: np.ndarray) -> np.ndarray:
-    """Unit vector (3,): as asked, the ellipsoid's normal at an Earth-centred `center`, m (3,), or z."""
-    if asked is not None:
-        return direction("vertical", asked)
-    normal = wgs84.vertical_at(center)
-    return np.array([0.0, 0.0, 1.0]) if normal is None else normal

@@ -20,8 +20,10 @@ from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from . import echo_sampling
-from .echo import EchoOptions, echo, echo_request
+from .echo import SKIPS as ECHO_SKIPS
+from .echo import EchoOptions, echo
 from .echo_output import log as output_log
+from .echo_request import echo_request
 from .spectral.spectral_echo import SKIPS, spectral_echo
 from .spectral.spectral_task import spectral_task
 
@@ -159,7 +161,7 @@ def _spectral(scene: Scene, waveform: Waveform, track: Trajectory, options: Echo
     """About the seconds of spectral_echo, or None and why it refuses these arguments."""
     try:
         given: dict[str, Any] = dict(options)
-        request = echo_request(scene, **{k: v for k, v in given.items() if k in REQUEST})
+        request = echo_request(scene, ECHO_SKIPS, **{k: v for k, v in given.items() if k in REQUEST})
         task = spectral_task(scene, waveform, track, request, **{k: v for k, v in given.items() if k in TASK})
         with warnings.catch_warnings():
             warnings.simplefilter(

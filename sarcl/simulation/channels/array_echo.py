@@ -22,7 +22,9 @@ from ...scene.scene import Scene
 from .. import echo_sampling
 from ..echo_check import draws_of, exact, worth_checking
 from ..echo_output import EchoOutput
-from ..scene_echoes import EchoRequest, SceneEchoes, band_of, bounded, prepare_scene
+from ..echo_request import EchoRequest
+from ..scene_echoes import SceneEchoes, band_of
+from ..scene_preparation import bounded, prepare_scene
 from ._interpolated import InterpolatedChannels
 from ._separate import Added, ChannelLayout, SeparateChannels, active_channels
 from .channel_rows import CHANNELS, RECEIVE, ChannelRows

@@ -21,10 +21,10 @@ from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
-from ..echo import Polarization, echo_request
 from ..echo_check import measure_error, seconds_to_check
 from ..echo_output import EchoOutput
-from ..scene_echoes import UNKNOWN_SHADOWS, ChannelEchoes, EchoRequest, Progress
+from ..echo_request import EchoRequest, Polarization, Progress, echo_request
+from ..scene_echoes import UNKNOWN_SHADOWS, ChannelEchoes
 from ..spreading import Counts
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple

@@ -23,7 +23,10 @@ from ...scattering.antenna_weights import AntennaWeights
 from ...scattering.facets import FacetSet
 from ...scene.scene import Scene
 from .. import echo_sampling
-from ..scene_echoes import ChannelEchoes, EchoRequest, SceneEchoes, prepare_scene, share_of
+from ..echo_request import EchoRequest
+from ..scene_echoes import ChannelEchoes, SceneEchoes
+from ..scene_plan import share_of
+from ..scene_preparation import prepare_scene
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
 from ._spectral_part import SpectralPart, plan_part
