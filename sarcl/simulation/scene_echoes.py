@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from typing import Any
 
 import numpy as np
@@ -252,6 +252,24 @@ class ChannelEchoes:
         for spreader in self.spreaders:
             counts += spreader.add(samples, pulses, request.clock, on_progress)
         return counts
+
+
+@dataclass(frozen=True)
+class Added:
+    """Echoes that were added to samples: terms of the largest predicted error, the plan of the last channel, counts."""
+
+    error_terms: tuple[ErrorTerm, ...] = ()
+    plan: dict[str, Any] = field(default_factory=dict)
+    counts: Counts = field(default_factory=Counts)
+
+    @property
+    def predicted_error(self) -> float:
+        """The largest of all channels."""
+        return root_sum_square(self.error_terms)
+
+    def __add__(self, other: Added) -> Added:
+        worst = max(self.error_terms, other.error_terms, key=root_sum_square)
+        return Added(worst, other.plan or self.plan, self.counts + other.counts)
 
 
 def band_of(waveform: Waveform, center: float, bandwidth: float) -> Waveform:

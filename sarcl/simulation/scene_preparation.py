@@ -2,28 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterable
 from dataclasses import replace
 from typing import Any
 
 from ..base.errors import NothingSeen, ToleranceUnreachable, warn
 from ..base.report import ErrorTerm
 from ..base.tolerances import askable, rounded_up
-from ..model.waveform import Waveform
-from ..numerics.pulse_geometry import PulseGeometry
-from ..scattering.antenna_weight_error import weight_error as error_of_weights
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facets import FacetSet
 from ..scattering.mesh_quality import facet_error, speckle_contrast
-from ..scattering.scatterers import facets_of, points_of
+from ..scattering.scatterers import Points, facets_of, points_of
+from ..scattering.subdivision import Subdivision
 from ..scene.scene import Scene
 from ._facet_spreading import TiledFacets
 from ._point_spreading import tiled_points
-from ._unseen_scene import refuse_unseen
 from .echo_request import EchoRequest
 from .scene_echoes import SceneEchoes
-from .scene_plan import SHADOWS, cut_within, parts_of, samples_shadows, share_of
-from .spreading import Band
+from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
+from .spreading import TiledScatterers
 
 LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
 LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
@@ -31,53 +27,60 @@ LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
 UNSEEN = 1e-3
 
 
-def prepare_scene(
-    request: EchoRequest, original_scene: Scene, scene: Scene, waveform: Waveform, antennas: PulseGeometry,
-    weights: AntennaWeights, bands: Iterable[Band], margin: float = 0.0, tiled: bool = True, exact: bool = True,
-) -> SceneEchoes:  # fmt: skip
-    """A scene prepared for its echoes.
+def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) -> SceneEchoes:
+    """A scene prepared for its echoes as it was planned.
 
-    original_scene  as it was given;  scene  with its random heights;  waveform  over the band of all channels
-    bands           of all samples that will be asked for
-    margin          m: elements of an array stand up to this far from the antennas
-    tiled           False: no scatterers are put on the device, for callers that do not spread them into range profiles
-    exact           False: shadows on facets are shares, by sampled rays
+    tiled  False: no scatterers are put on the device, for callers that do not spread them into range profiles
+    exact  False: shadows on facets are shares, by sampled rays
     ToleranceUnreachable where these cannot meet the tolerance; NothingSeen where no scatterer is left.
     """
-    refuse_unseen(scene, weights, waveform, antennas, request.gated, margin)
-    device, vertical = request.device, request.vertical
-    error_budget = share_of(request, scene, waveform, antennas, request.tolerance)
-    weight_error = error_of_weights(weights, scene, waveform, request.polarizations, vertical)
-    bands = tuple(dict.fromkeys(bands))
-    subdivision = cut_within(request, scene, waveform, antennas, weight_error, bands)
+    request, seen, weights = plan.request, plan.seen, plan.seen.weights
     if "out of beam" in request.skips:
-        weights = weights.culled(UNSEEN * error_budget / weight_error.peak_to_rms, waveform)
-    points, skipped = points_of(scene, request.skips, len(antennas))
-    facets, held_points, mesh_warnings = None, None, dict[str, Any]()
-    shadow_terms: tuple[ErrorTerm, ...] = ()
-    held_facets: tuple[TiledFacets, ...] = ()
+        weights = weights.culled(UNSEEN * plan.error_budget / plan.weight_error.peak_to_rms, seen.waveform)
+    points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
+    facets, subdivision, mesh_warnings = None, plan.subdivision, dict[str, Any]()
     if subdivision is not None:
-        facet_plan, pieces = subdivision.apply(scene, request.seed)
+        facet_plan, pieces = subdivision.apply(seen.scene, request.seed)
         subdivision = replace(subdivision, plan=facet_plan)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         mesh_warnings = _warned(
-            facet_error.judge(original_scene, antennas, waveform),
-            speckle_contrast.judge(pieces.cells, antennas, waveform),
+            facet_error.judge(seen.original, seen.antennas, seen.waveform),
+            speckle_contrast.judge(pieces.cells, seen.antennas, seen.waveform),
         )
         request.report("scene", 1, 3)
         facets, left_out = facets_of(
-            pieces, waveform, antennas, shadows=request.shadows, skips=request.skips,
-            max_bytes=request.budget / 4, device=device, progress=request.report,
-            exact=exact and request.shadows, sampled=samples_shadows(request, scene, waveform, antennas),
-            accuracy=SHADOWS * request.tolerance / parts_of(scene), margin=margin,
+            pieces, seen.waveform, seen.antennas, shadows=request.shadows, skips=request.skips,
+            max_bytes=request.budget / 4, device=request.device, progress=request.report,
+            exact=exact and request.shadows, sampled=samples_shadows(request, seen),
+            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene), margin=seen.margin,
         )  # fmt: skip
-        shadow_terms = _shadow_terms(request, scene, facets)
         skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
-        if facets is not None and tiled and not facet_plan.is_float64:
-            held_facets = tuple(
-                TiledFacets(device, part, facet_plan, antennas, waveform, weights, request.polarizations, vertical)
-                for part in facets.split()
-            )
+    _check_left(request, points, facets, skipped)
+    if points is not None:
+        bounded(points.largest() * weights.peak)
+        weights.check_clearance(points.positions)
+    prepared = SceneEchoes(
+        request=request,
+        weights=weights,
+        weight_error=plan.weight_error,
+        subdivision=subdivision,
+        points=points,
+        facets=facets,
+        tiled_points=_tiled_points(plan, points, weights) if tiled else None,
+        tiled_facets=_tiled_facets(plan, subdivision, facets, weights) if tiled else (),
+        skipped=skipped,
+        mesh_warnings=mesh_warnings,
+        error_budget=plan.error_budget,
+        shadow_terms=_shadow_terms(request, seen.scene, facets),
+        n_pulses=len(seen.antennas),
+    )
+    request.clock.lap("scene")
+    prepared.check_plans(seen.antennas, plan.bands)
+    return prepared
+
+
+def _check_left(request: EchoRequest, points: Points | None, facets: FacetSet | None, skipped: dict[str, int]) -> None:
+    """NothingSeen where no scatterer is left that sends something back."""
     if facets is None and points is not None and not request.same:
         raise NothingSeen(
             f"polarization is {request.polarizations}, in which points send back nothing: ask for 'HH' or 'VV', or "
@@ -86,18 +89,28 @@ def prepare_scene(
     if points is None and facets is None:
         reasons = ", ".join(why for why, n in skipped.items() if n) or "the scene is empty"
         raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
-    if points is not None:
-        bounded(points.largest() * weights.peak)
-        weights.check_clearance(points.positions)
-        if request.same and tiled:
-            held_points = tiled_points(device, points, antennas, waveform, weights)
-    request.clock.lap("scene")
-    prepared = SceneEchoes(
-        request, weights, weight_error, subdivision, points, facets, held_points, held_facets, skipped, mesh_warnings,
-        error_budget, shadow_terms, len(antennas),
-    )  # fmt: skip
-    prepared.check_plans(antennas, bands)
-    return prepared
+
+
+def _tiled_points(plan: ScenePlan, points: Points | None, weights: AntennaWeights) -> TiledScatterers | None:
+    """Points in tiles on the device, where any send something back."""
+    if points is None or not plan.request.same:
+        return None
+    return tiled_points(plan.request.device, points, plan.seen.antennas, plan.seen.waveform, weights)
+
+
+def _tiled_facets(
+    plan: ScenePlan, subdivision: Subdivision | None, facets: FacetSet | None, weights: AntennaWeights
+) -> tuple[TiledFacets, ...]:
+    """Facets in tiles on the device, partly lit ones apart from the others; none where their sums are in float64."""
+    if facets is None or subdivision is None or subdivision.plan.is_float64:
+        return ()
+    request, seen, rule = plan.request, plan.seen, subdivision.plan
+    return tuple(
+        TiledFacets(
+            request.device, part, rule, seen.antennas, seen.waveform, weights, request.polarizations, request.vertical
+        )
+        for part in facets.split()
+    )
 
 
 def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> tuple[ErrorTerm, ...]:
