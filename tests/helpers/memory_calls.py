@@ -90,7 +90,7 @@ def verbs(folder: Path) -> dict[str, Callable[[], Any]]:
         "fullwave_echo": lambda: sarcl.fullwave_echo(box, long_waves, looks, **full),
         "plan fullwave_echo": lambda: sarcl.plan(sarcl.fullwave_echo, box, long_waves, looks, **full),
         "spectral_echo": lambda: sarcl.spectral_echo(points, chirp, track, check=False),
-        "plan_echo": lambda: sarcl.plan_echo(points, chirp, track),
+        "plan_echo": lambda: sarcl.plan(sarcl.echo, points, chirp, track),
         "compress": lambda: sarcl.compress(sarcl.echo(points, chirp, track, compressed=False, check=False)),
         "map_aperture": lambda: sarcl.map_aperture(tones, "corrected"),
         "fda": lambda: fda.run(fda_file.load(experiment)[1]),
