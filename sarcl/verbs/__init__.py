@@ -24,7 +24,7 @@ HOMES = {
     "polar_format": "imaging.polar_format.polar_format",
     "range_doppler": "imaging.range_doppler.range_doppler",
 }
-__all__ = [*HOMES, "plan"]
+__all__ = ["backproject", "echo", "fullwave_echo", "plan", "polar_format", "range_doppler", "spectral_echo"]
 
 
 def __getattr__(name: str) -> Any:

@@ -12,7 +12,7 @@ from types import SimpleNamespace
 
 import numpy as np
 import pytest
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO
 
 import sarcl
 from sarcl.cli import parser

@@ -14,8 +14,7 @@ from pathlib import Path
 
 import numpy as np
 import pytest
-from helpers.cases import noise_on, straight
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO, noise_on, straight
 from test_messages import FOREIGN
 
 import sarcl

@@ -6,8 +6,7 @@ import inspect
 
 import numpy as np
 import pytest
-from helpers.cases import noise_on, straight
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO, noise_on, straight
 
 import sarcl
 from sarcl.cli import parser

@@ -11,8 +11,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 from helpers.array_cases import TONE, line, passing
-from helpers.cases import noise_history, noise_on, straight
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO, noise_history, noise_on, straight
 
 import sarcl
 from sarcl import pointing, shapes

@@ -1,4 +1,4 @@
-"""Echoes, grids and errors that several tests share."""
+"""Echoes, grids, errors and a scenario that several tests share."""
 
 from __future__ import annotations
 
@@ -10,6 +10,24 @@ from sarcl.reference.backproject import backproject as exact_image
 
 # further partners of values that have quick ones: run with -m slow, on the devices themselves (tests/conftest.py)
 REPEATED = (pytest.mark.slow, pytest.mark.repeated)
+
+# a scenario file that simulates two points from an arc
+SCENARIO = """\
+[waveform.chirp]
+center = 9.6e9
+bandwidth = 300e6
+duration = 1e-6
+
+[trajectory.circle]
+radius = 7e3
+height = 5e3
+arc = 0.03
+n_pulses = 48
+
+[[scene.points]]
+positions = [[0, 0, 0], [3, 2, 0]]
+amplitudes = [1, 0.1]
+"""
 
 
 def noise_on(tx, rx=None, *, center=9.6e9, bandwidth=300e6, n_samples=96, seed=0, **fields):

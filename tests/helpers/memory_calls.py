@@ -24,8 +24,7 @@ from sarcl.experiments import fda
 from sarcl.experiments.fda import file as fda_file
 from sarcl.scenario.scenario import loads
 
-from .cases import noise_on, straight
-from .scenario_cases import SCENARIO
+from .cases import SCENARIO, noise_on, straight
 
 EXPERIMENT = """[fda]
 n = 16

@@ -9,6 +9,8 @@ from pathlib import Path
 
 import pytest
 
+from sarcl import verbs
+
 ROOT = Path(__file__).resolve().parents[2]
 PACKAGE = ROOT / "sarcl"
 FULL = 25  # files of a folder: more are two rooms
@@ -64,6 +66,9 @@ def importers() -> dict[str, set[str]]:
         here = name if path.name == "__init__.py" else folder(name)
         for other in imported(name, path):
             out[other].add(here)
+    stub = imported("sarcl.verbs", PACKAGE / "verbs" / "__init__.pyi")
+    for other in {f"sarcl.{home}" for home in verbs.HOMES.values()} | stub:  # the verbs are imported by name
+        out[other].add("sarcl.verbs")
     for script in (ROOT / "bench").glob("*.py"):
         for other in imported("bench." + script.stem, script):
             out[other].add("bench")

@@ -17,7 +17,7 @@ import numpy as np
 import pytest
 import trimesh
 from helpers import fuzz
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO
 from scipy.io import savemat
 
 import sarcl

@@ -9,8 +9,7 @@ from concurrent.futures import ThreadPoolExecutor
 
 import numpy as np
 import pytest
-from helpers.cases import noise_on, straight
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO, noise_on, straight
 
 import sarcl
 from sarcl.io import output_paths

@@ -6,6 +6,7 @@ import numpy as np
 import pytest
 
 import sarcl
+from sarcl.base.options import described
 from sarcl.scenario import _schema
 from sarcl.scenario.scenario import Scenario, load, loads
 
@@ -106,14 +107,16 @@ def test_the_keys_are_read_from_the_python_signatures(section):
     for call in _schema.calls(section).values():
         known = set(inspect.signature(call).parameters)
         known = {_schema.RENAMED.get(k, k) for k in known - _schema.NOT_KEYS}
+        if hasattr(call, "options"):
+            known = {name for name, (_, option) in described(call.options).items() if option.in_files}
+            assert {"tolerance", "check"} <= known and not known & {"device", "progress", "out"}
         assert set(_schema.parameters(call)) == known
 
 
 def test_the_verbs_get_their_tables_as_arguments_and_the_caller_has_the_last_word(monkeypatch):
     seen = {}
     scenario = loads(TEXT + "tolerance = 1e-4\n")
-    verb = "sarcl.imaging.backproject.backproject"
-    monkeypatch.setattr(verb, lambda raw, grid, **options: seen.update(options))
+    monkeypatch.setattr(sarcl.verbs, "backproject", lambda raw, grid, **options: seen.update(options))
     scenario.focus(None, tolerance=1e-2)
     assert seen == {"window": ("taylor", 35, 5), "tolerance": 1e-2}
 

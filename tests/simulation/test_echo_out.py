@@ -9,7 +9,7 @@ import sys
 import numpy as np
 import pytest
 from helpers.array_cases import F0, SCENE, TONE, WINDOW, line, passing
-from helpers.scenario_cases import SCENARIO
+from helpers.cases import SCENARIO
 
 import sarcl
 from sarcl import shapes
