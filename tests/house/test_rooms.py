@@ -114,6 +114,7 @@ def test_a_room_has_a_contents_page(room):
     own = {n.name for n in tree.body if isinstance(n, (ast.FunctionDef, ast.ClassDef))}
     own |= {a.name for n in tree.body if isinstance(n, ast.ImportFrom) for a in n.names}
     own |= {ast.unparse(n.targets[0]) for n in tree.body if isinstance(n, ast.Assign)}
+    own |= set(verbs.HOMES) if room == "sarcl.verbs" else set()
     assert {n for n in inside if not n.startswith("_")} <= public, "__all__ names every file that others may import"
     assert public <= {n for n in inside if not n.startswith("_")} | own
 
