@@ -13,8 +13,6 @@ from ..earth.elevation import ElevationModel
 from ..imaging.backproject_options import Tile
 from ..imaging.focusing_task import BeamCone
 from ..imaging.focusing_task import Skip as BackprojectSkip
-from ..imaging.polar_format.polar_format import Progress as PolarFormatProgress
-from ..imaging.range_doppler.range_doppler import Progress as RangeDopplerProgress
 from ..model.antenna import Antenna
 from ..model.antenna_array import AntennaArray
 from ..model.image import Image
@@ -23,13 +21,12 @@ from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
-from ..numerics.run_options import Progress as BackprojectProgress
+from ..numerics.run_options import Progress
 from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
 from ..scene.scene import Scene
-from ..simulation.echo import Polarization
-from ..simulation.echo import Skip as EchoSkip
-from ..simulation.scene_echoes import Progress as EchoProgress
+from ..simulation.echo_options import Skip as EchoSkip
+from ..simulation.scene_options import Polarization
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -39,52 +36,52 @@ HOMES: dict[str, str]
 class EchoKeywords(TypedDict, total=False):
     """Options of `echo`, for functions that hand them on."""
 
+    channels: Literal["simultaneous", "separated"]
+    receive: Literal["reference", "own", "all"]
+    skip: bool | Collection[EchoSkip]
     receiver: Trajectory | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
     vertical: ArrayLike | None
     range_window: ArrayLike | None
     reference: ArrayLike | None
     array: AntennaArray | None
-    channels: Literal["simultaneous", "separated"]
-    receive: Literal["reference", "own", "all"]
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    skip: bool | Collection[EchoSkip]
     compressed: bool
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
     out: PathLike | None
-    tolerance: float
     check: bool | None
+    tolerance: float
     device: DeviceChoice | None
-    progress: EchoProgress | None
+    progress: Progress | None
 
 class SpectralEchoKeywords(TypedDict, total=False):
     """Options of `spectral_echo`, for functions that hand them on."""
 
     variant: Literal["exact", "saras"]
+    ripple: bool
     receiver: Trajectory | None
+    array: AntennaArray | None
+    range_window: ArrayLike | None
+    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
+    max_bytes: float | None
+    tolerance: float
+    check: bool | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
     vertical: ArrayLike | None
-    range_window: ArrayLike | None
     reference: ArrayLike | None
-    array: AntennaArray | None
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
     compressed: bool
-    ripple: bool
     max_edge: float | Literal["auto"] | None
-    max_bytes: float | None
     out: PathLike | None
-    tolerance: float
-    check: bool | None
     device: DeviceChoice | None
-    progress: EchoProgress | None
+    progress: Progress | None
 
 class FullwaveEchoKeywords(TypedDict, total=False):
     """Options of `fullwave_echo`, for functions that hand them on."""
@@ -113,39 +110,37 @@ class BackprojectKeywords(TypedDict, total=False):
     mapping: MapKind | MapApertureOptions | None
     wrap: bool
     skip: bool | Collection[BackprojectSkip]
-    sum_polarizations: bool
     out: PathLike | WritableArray | None
     resume: bool | None
     tile: Tile | None
     device: DeviceChoice | Sequence[DeviceChoice] | None
     cluster: distributed.Client | None
+    sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
     tolerance: float
     max_bytes: float | None
     check: bool | None
-    progress: BackprojectProgress | None
+    progress: Progress | None
 
 class PolarFormatKeywords(TypedDict, total=False):
     """Options of `polar_format`, for functions that hand them on."""
 
     tolerance: float
+    sum_polarizations: bool
     window: Window | None
     weights: ArrayLike | None
+    out: PathLike | None
     max_bytes: float | None
-    device: DeviceChoice | None
-    sum_polarizations: bool
     check: bool | None
-    progress: PolarFormatProgress | None
+    device: DeviceChoice | None
+    progress: Progress | None
 
 class RangeDopplerKeywords(TypedDict, total=False):
     """Options of `range_doppler`, for functions that hand them on."""
 
     heights: float | ElevationModel
     side: Literal["left", "right"] | None
-    tolerance: float
-    window: Window | None
-    weights: ArrayLike | None
     times: Sequence[float] | None
     ranges: Sequence[float] | None
     spacing: tuple[float | None, float | None] | None
@@ -153,37 +148,41 @@ class RangeDopplerKeywords(TypedDict, total=False):
     doppler: Literal["geometry", "data"] | float
     near: float | None
     doppler_rate: Literal["geometry", "data"] | float
+    tolerance: float
     max_bytes: float | None
-    device: DeviceChoice | None
     check: bool | None
-    progress: RangeDopplerProgress | None
+    window: Window | None
+    weights: ArrayLike | None
+    out: PathLike | None
+    device: DeviceChoice | None
+    progress: Progress | None
 
 def echo(
     scene: Scene,
     waveform: Waveform,
     track: Trajectory,
     *,
+    channels: Literal["simultaneous", "separated"] = "simultaneous",
+    receive: Literal["reference", "own", "all"] = "reference",
+    skip: bool | Collection[EchoSkip] = True,
     receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
     range_window: ArrayLike | None = None,
     reference: ArrayLike | None = None,
     array: AntennaArray | None = None,
-    channels: Literal["simultaneous", "separated"] = "simultaneous",
-    receive: Literal["reference", "own", "all"] = "reference",
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    skip: bool | Collection[EchoSkip] = True,
     compressed: bool = True,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     out: PathLike | None = None,
-    tolerance: float = 0.001,
     check: bool | None = None,
+    tolerance: float = 0.001,
     device: DeviceChoice | None = None,
-    progress: EchoProgress | None = None,
+    progress: Progress | None = None,
 ) -> PhaseHistory:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
     docs/guide/options.md."""
@@ -194,26 +193,26 @@ def spectral_echo(
     track: Trajectory,
     *,
     variant: Literal["exact", "saras"] = "exact",
+    ripple: bool = False,
     receiver: Trajectory | None = None,
+    array: AntennaArray | None = None,
+    range_window: ArrayLike | None = None,
+    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
+    max_bytes: float | None = None,
+    tolerance: float = 0.01,
+    check: bool | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
-    range_window: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-    array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     compressed: bool = True,
-    ripple: bool = False,
     max_edge: float | Literal["auto"] | None = "auto",
-    max_bytes: float | None = None,
     out: PathLike | None = None,
-    tolerance: float = 0.01,
-    check: bool | None = None,
     device: DeviceChoice | None = None,
-    progress: EchoProgress | None = None,
+    progress: Progress | None = None,
 ) -> PhaseHistory:
     """The samples of `echo` for a straight track of evenly spaced pulses, by two-dimensional Fourier transforms.
     Options: docs/guide/options.md."""
@@ -252,18 +251,18 @@ def backproject(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
     Options: docs/guide/options.md."""
@@ -278,18 +277,18 @@ def backproject(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: Tile | None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image | None:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
     Options: docs/guide/options.md."""
@@ -299,13 +298,14 @@ def polar_format(
     grid: ImageGrid,
     *,
     tolerance: float = 0.01,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
+    out: PathLike | None = None,
     max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
-    sum_polarizations: bool = False,
     check: bool | None = None,
-    progress: PolarFormatProgress | None = None,
+    device: DeviceChoice | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
     Options: docs/guide/options.md."""
@@ -315,9 +315,6 @@ def range_doppler(
     *,
     heights: float | ElevationModel = 0.0,
     side: Literal["left", "right"] | None = None,
-    tolerance: float = 0.01,
-    window: Window | None = None,
-    weights: ArrayLike | None = None,
     times: Sequence[float] | None = None,
     ranges: Sequence[float] | None = None,
     spacing: tuple[float | None, float | None] | None = None,
@@ -325,10 +322,14 @@ def range_doppler(
     doppler: Literal["geometry", "data"] | float = "geometry",
     near: float | None = None,
     doppler_rate: Literal["geometry", "data"] | float = "geometry",
+    tolerance: float = 0.01,
     max_bytes: float | None = None,
-    device: DeviceChoice | None = None,
     check: bool | None = None,
-    progress: RangeDopplerProgress | None = None,
+    window: Window | None = None,
+    weights: ArrayLike | None = None,
+    out: PathLike | None = None,
+    device: DeviceChoice | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes of a near-straight, evenly sampled track on a grid of zero-Doppler times and slant ranges.
     Options: docs/guide/options.md."""
@@ -347,17 +348,17 @@ def plan(
     mapping: MapKind | MapApertureOptions | None = None,
     wrap: bool = False,
     skip: bool | Collection[BackprojectSkip] = True,
-    sum_polarizations: bool = False,
     out: PathLike | WritableArray | None = None,
     resume: bool | None = None,
     tile: Tile | None = None,
     device: DeviceChoice | Sequence[DeviceChoice] | None = None,
     cluster: distributed.Client | None = None,
+    sum_polarizations: bool = False,
     window: Window | None = None,
     weights: ArrayLike | None = None,
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Forecast[Image]:
     """Forecast of a verb: plan(verb, ...) with the arguments of `verb(...)`, before any work."""

@@ -9,10 +9,10 @@ import pytest
 from helpers.cases import noise_on
 
 import sarcl
-from sarcl.simulation import echo_request
 from sarcl.base import host_memory
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.opencl.choose_device import open_device
+from sarcl.simulation import echo_request
 
 OVERHEAD = np.stack([np.zeros(16), np.linspace(-5, 5, 16), np.full(16, 1e3)], axis=1)
 

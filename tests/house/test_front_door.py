@@ -57,7 +57,7 @@ def test_all_of_the_contract_is_there():
     wanted = (
         "Waveform Trajectory Scene Material Antenna AntennaArray Radar PhaseHistory ImageGrid Image Report Scenario "
         "echo beam ambiguity compress map_aperture backproject polar_format autofocus measure read concatenate devices "
-        "plan plan_echo Forecast EchoForecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
+        "plan Forecast PointResponse Ambiguity add_noise NoDeviceError SarclWarning "
         "ToleranceMissed ToleranceUnreachable Orbit ElevationModel spectral_echo range_doppler "
         "doppler_centroid effective_velocity EffectiveVelocity fullwave_echo plan_fullwave_echo FullwaveForecast"
     ).split()
