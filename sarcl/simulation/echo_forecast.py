@@ -11,7 +11,7 @@ from __future__ import annotations
 import time
 import warnings
 from dataclasses import replace
-from typing import Any
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -21,19 +21,29 @@ from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
 from ..base.text import duration
 from ..model.phase_history import PhaseHistory
+from ..numerics import cost_model
 from .echo_output import bytes_of, pulses_at_once
 from .echo_plan import EchoPlan, PlannedEchoes
 from .echo_work import EchoWork
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
+from .scene_preparation import warn_of_curves
 from .spectral.spectral_parts import plan_parts
 from .spectral.spectral_task import spectral_task
 
 SHARE, LEAST = 0.06, 0.035  # of the modelled job, and seconds: preparing the scene may take the larger of these
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
-SPECTRAL = 0.06  # s: shortest plan of spectral_echo; it is made where it takes a small share of the echoes
-SPECTRAL_SHARE = 0.04  # of the seconds of the echoes, for the plan of spectral_echo
+SPECTRAL_SHARE = 0.04  # of the modelled job: spectral_echo is planned where that takes no more
+
+
+class Estimate(NamedTuple):
+    """Error terms and words of a plan, and about its seconds and contributions, without planning."""
+
+    error_terms: tuple[ErrorTerm, ...]
+    words: dict[str, Any]
+    seconds: float
+    contributions: float
 
 
 def forecast_of(plan: EchoPlan) -> Forecast[PhaseHistory]:
@@ -42,30 +52,29 @@ def forecast_of(plan: EchoPlan) -> Forecast[PhaseHistory]:
     plan["contributions"]  about the number of pairs of scatterer, pulse and channel that will be added up
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
     """
-    clock = Clock(plan.seconds)
-    request = replace(plan.request(clock), progress=None)
+    clock, shape = Clock(plan.seconds), plan.channels.shape
     with warned_once():
-        planned = plan.plan_scene(request)
+        planned = plan.plan_scene(replace(plan.request(clock), progress=None))
         work = EchoWork.of(planned)
-        clock.lap("plan")
         if work.preparing <= max(SHARE * work.seconds, LEAST):
             planned, prepared = planned.with_scene()
-            terms, words, rate, contributions = _timed(plan, planned, prepared, work)
+            clock.lap("plan")
+            estimate = _timed(plan, planned, prepared, work)
         else:
-            terms, words = _allotted(planned), planned.scene.describe()
-            rate, contributions = work.preparing + work.adding, work.contributions
-    clock.lap("plan")
+            words = planned.scene.describe() | warn_of_curves(planned.scene)
+            clock.lap("plan")
+            estimate = Estimate(_allotted(planned), words, work.seconds, work.contributions)
     spent = sum(clock.seconds.values())
-    seconds = spent + rate
-    details = plan.channels.words(planned.method, words)  # type: ignore[arg-type]
-    shape = plan.channels.shape
+    seconds = spent + estimate.seconds
+    words = plan.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
+    words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(plan, work, seconds)}
     return Forecast(
         method="pulse by pulse",
-        plan=details | {"contributions": contributions, "spectral_echo": _spectral(plan, work, seconds)},
+        plan=words,
         seconds=seconds,
         bytes=bytes_of(shape),
-        predicted_error=root_sum_square(terms),
-        error_terms=terms,
+        predicted_error=root_sum_square(estimate.error_terms),
+        error_terms=estimate.error_terms,
         n_rows=int(np.prod(shape[:-1], dtype=np.int64)),
         n_samples=shape[-1],
         planning=spent,
@@ -73,10 +82,8 @@ def forecast_of(plan: EchoPlan) -> Forecast[PhaseHistory]:
     )
 
 
-def _timed(
-    plan: EchoPlan, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork
-) -> tuple[tuple[ErrorTerm, ...], dict[str, Any], float, float]:
-    """Error terms, words, and from a few pulses the seconds and contributions of all."""
+def _timed(plan: EchoPlan, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
+    """The errors of all pulses, and from a few of them the seconds and contributions of all."""
     shape, method = plan.channels.shape, planned.method
     n_pulses, most = shape[0], max(TIMED_SHARE * work.seconds, LEAST_TIMED)
     n = int(np.clip(most / (work.adding / n_pulses), 1, max(1, n_pulses // 8)))
@@ -88,23 +95,17 @@ def _timed(
         return time.perf_counter() - begin, added
 
     for first in ((n_pulses - n) // 2, 0, n_pulses - n):  # elsewhere more may be seen
-        _, added = timed(first, 1)  # builds kernels, plans
+        _, added = timed(first, 1)  # builds kernels, too
         if added.counts.contributing:
             break
-    single, _ = timed(first, 1)
-    several, added = timed(first, n) if n > 1 else (single, added)
-    slope = max((several - single) / (n - 1), 0.5 * several / n) if n > 1 else single
-    at_once = min(
-        method.pulses(prepared.request.budget), pulses_at_once(shape, plan.task.options.out, prepared.request.budget)
-    )
-    blocks = -(-n_pulses // at_once)
-    if blocks * method.runs // n_pulses <= MOST_PLANS:
-        all_planned = Added()
+    seconds, added = timed(first, n)
+    whole, room = added, prepared.request.budget
+    at_once = min(method.pulses(room), pulses_at_once(shape, plan.task.options.out, room))
+    if -(-n_pulses // at_once) * method.runs <= MOST_PLANS * n_pulses:
+        whole = Added()
         for start in range(0, n_pulses, at_once):
-            all_planned += method.planned(quiet, start, min(at_once, n_pulses - start))
-        added = replace(all_planned, counts=added.counts)
-    total = blocks * max(single - slope, 0.0) + slope * n_pulses
-    return added.error_terms, added.plan, total, added.counts.contributing / n * n_pulses
+            whole += method.planned(quiet, start, min(at_once, n_pulses - start))
+    return Estimate(whole.error_terms, whole.plan, seconds / n * n_pulses, added.counts.contributing / n * n_pulses)
 
 
 def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
@@ -127,16 +128,16 @@ def _spectral(plan: EchoPlan, work: EchoWork, seconds: float) -> str:
     task = plan.task
     try:
         spectral = spectral_task(task.original, task.waveform, task.given_track, task.options)
-        if work.cutting > SPECTRAL_SHARE * seconds:
+        longest = SPECTRAL_SHARE * work.seconds
+        if work.cutting > longest:
             return "not planned: its facets would have to be cut and illuminated first"
-        if SPECTRAL > SPECTRAL_SHARE * seconds:
-            return f"not planned: echo takes about {duration(seconds)}"
+        n_points = len(task.scene.positions)
+        if 1e-6 * (cost_model.SPECTRAL_PLAN + cost_model.SPECTRAL_PLAN_POINT * n_points) > longest:
+            return f"not planned: that takes long beside echo, about {duration(seconds)}"
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SarclWarning)  # those of the mesh came with the plan of echo
             clock = Clock()
-            parts = plan_parts(
-                spectral, replace(spectral.request, clock=clock, progress=None), SPECTRAL_SHARE * seconds
-            )
+            parts = plan_parts(spectral, replace(spectral.request, clock=clock, progress=None), longest)
     except (NotApplicable, NothingSeen, ToleranceUnreachable) as refused:
         return str(refused)
     return f"about {duration(sum(clock.seconds.values()) + parts.seconds())}"

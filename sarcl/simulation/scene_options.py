@@ -111,8 +111,8 @@ class SceneOptions(RunOptions):
     )
     shadows: bool = option(
         True,
-        "True: of every facet only the part counts that both antennas see at each pulse (docs/theory/shadows.md; points "
-        "are always seen)",
+        "True: of every facet only the part counts that both antennas see at each pulse (docs/theory/shadows.md; "
+        "points are always seen)",
         _shadows,
     )
     seed: int = option(

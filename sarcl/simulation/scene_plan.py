@@ -69,7 +69,7 @@ class ScenePlan:
 def planned_scene(request: EchoRequest, seen: SeenScene, bands: Iterable[Band]) -> ScenePlan:
     """The plan of a scene.
 
-    ToleranceUnreachable where it cannot meet the tolerance; NothingSeen where bounds prove that no pulse sees the scene.
+    ToleranceUnreachable where it cannot meet the tolerance; NothingSeen where bounds prove that no pulse sees it.
     """
     refuse_unseen(seen.scene, seen.weights, seen.waveform, seen.antennas, request.gated, seen.margin)
     error_budget = share_of(request, seen, request.tolerance)

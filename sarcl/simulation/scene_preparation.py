@@ -43,10 +43,8 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
         facet_plan, pieces = subdivision.apply(seen.scene, request.seed)
         subdivision = replace(subdivision, plan=facet_plan)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
-        mesh_warnings = _warned(
-            facet_error.judge(seen.original, seen.antennas, seen.waveform),
-            speckle_contrast.judge(pieces.cells, seen.antennas, seen.waveform),
-        )
+        speckle = speckle_contrast.judge(pieces.cells, seen.antennas, seen.waveform)
+        mesh_warnings = warn_of_curves(plan) | _warned(speckle)
         request.report("scene", 1, 3)
         facets, left_out = facets_of(
             pieces, seen.waveform, seen.antennas, shadows=request.shadows, skips=request.skips,
@@ -131,14 +129,17 @@ def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -
     )
 
 
-def _warned(*judgements: facet_error.FacetError | speckle_contrast.Speckle) -> dict[str, Any]:
-    """Warn of meshes that are too coarse; returns what a report says of them."""
-    out: dict[str, Any] = {}
-    for judgement in judgements:
-        for number, text in enumerate(judgement.warnings()):
-            warn(text, f"{type(judgement).__name__} {number}")
-        out |= judgement.describe()
-    return out
+def warn_of_curves(plan: ScenePlan) -> dict[str, Any]:
+    """Warn of facets that are too large for the curves that they stand for; returns what a report says of them."""
+    if plan.subdivision is None:
+        return {}
+    return _warned(facet_error.judge(plan.seen.original, plan.seen.antennas, plan.seen.waveform))
+
+
+def _warned(judgement: facet_error.FacetError | speckle_contrast.Speckle) -> dict[str, Any]:
+    for number, text in enumerate(judgement.warnings()):
+        warn(text, f"{type(judgement).__name__} {number}")
+    return judgement.describe()
 
 
 def bounded(largest: float) -> None:

@@ -10,7 +10,6 @@ import pytest
 import sarcl
 from sarcl import scenario
 from sarcl.fullwave.echoes.fullwave_echo import fullwave_echo
-from sarcl.simulation.echo_forecast import plan_spectral_echo
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=100e6, duration=1e-6)
 TRACK = sarcl.Trajectory.line(start=(0, -8, 1e3), velocity=(0, 10, 0), prf=16.0, n_pulses=16)
@@ -46,8 +45,8 @@ def grid():
 
 FORECASTS = {
     "plan": lambda **o: sarcl.plan(raw(), grid(), **o),
-    "plan_echo": lambda **o: sarcl.plan(sarcl.echo, POINTS, CHIRP, TRACK, **o),
-    "plan_spectral_echo": lambda **o: plan_spectral_echo(POINTS, CHIRP, TRACK, **o),
+    "plan, echo": lambda **o: sarcl.plan(sarcl.echo, POINTS, CHIRP, TRACK, **o),
+    "plan, spectral_echo": lambda **o: sarcl.plan(sarcl.spectral_echo, POINTS, CHIRP, TRACK, **o),
     "plan, fullwave_echo": lambda **o: sarcl.plan(sarcl.fullwave_echo, sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
     "plan, polar_format": lambda **o: sarcl.plan(sarcl.polar_format, raw(), grid(), **o),
     "plan, range_doppler": lambda **o: sarcl.plan(sarcl.range_doppler, raw(), side="right", **o),

@@ -4,8 +4,10 @@ from __future__ import annotations
 
 import ast
 import copy
+import functools
 import pickle
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -15,7 +17,7 @@ from helpers.cases import SCENARIO, noise_history, noise_on, straight
 
 import sarcl
 from sarcl import pointing, shapes
-from sarcl.base.errors import NothingSeen, ToleranceUnreachable
+from sarcl.base.errors import ToleranceUnreachable
 from sarcl.base.text import tolerance_text
 from sarcl.base.tolerances import reachable, rounded_up
 from sarcl.opencl.choose_device import open_device
@@ -244,10 +246,10 @@ def interpolated(verb=sarcl.echo):
 PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
-    "a scene made ready": ("sarcl.simulation.channels.array_echo.prepare_scene", interpolated),
+    "a scene made ready": ("sarcl.simulation.echo_plan.prepare_scene", interpolated),
     "forecast of echoes": (
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
-        lambda: interpolated(sarcl.plan_echo),
+        lambda: interpolated(functools.partial(sarcl.plan, sarcl.echo)),
     ),
     "direct": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.backproject(RAW, PLANE)),
     "direct, forecast": ("sarcl.imaging.direct.direct.make_plan", lambda: sarcl.plan(RAW, PLANE)),
@@ -327,17 +329,18 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
 
 
 def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
-    from sarcl.simulation import echo_forecast
+    from sarcl.simulation.single_channel import SingleEchoes
 
-    tried = []
+    tried, fill = [], SingleEchoes.fill
 
-    def seen(scene, waveform, track, **_):
-        tried.append(float(track.times[0]))
-        raise NothingSeen("nothing")
+    def unseen(method, scene, samples, start, done, total):
+        tried.append(start)
+        added = fill(method, scene, samples, start, done, total)
+        return replace(added, counts=replace(added.counts, outside_window=added.counts.pairs))
 
-    monkeypatch.setattr(echo_forecast, "echo", seen)
-    with pytest.raises(NothingSeen, match="nothing"):
-        sarcl.plan_echo(POINTS, CHIRP, track(60))
+    sarcl.plan(sarcl.echo, POINTS, CHIRP, track(60))
+    monkeypatch.setattr(SingleEchoes, "fill", unseen)
+    assert sarcl.plan(sarcl.echo, POINTS, CHIRP, track(60)).plan["contributions"] == 0
     assert len(set(tried)) == 3
 
 

@@ -215,7 +215,7 @@ def planned(draw: Draw) -> None:
         sarcl.echo(scene, waveform, track, check=False, **options)
     except sarcl.ToleranceUnreachable as exc:
         made = exc
-    expect((said is None) == (made is None), f"plan_echo: {said}; echo: {made}")
+    expect((said is None) == (made is None), f"plan: {said}; echo: {made}")
     if said is not None:
         raise said
 

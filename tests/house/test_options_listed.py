@@ -25,7 +25,7 @@ from sarcl.imaging.backproject_options import BackprojectOptions
 from sarcl.model.image import Image
 from sarcl.model.image_grid import ImageGrid
 from sarcl.model.phase_history import PhaseHistory
-from sarcl.simulation import echo
+from sarcl.simulation.echo_options import Skip as EchoSkip
 
 ROOT = Path(__file__).parents[2]
 SCRIPT = ROOT / "docs" / "developers" / "write_options.py"
@@ -158,4 +158,6 @@ def test_every_option_stands_on_the_page(write):
 def test_names_that_two_verbs_mean_differently_are_told_apart():
     """Both echo and backproject have a type Skip: the stub imports each under a name of its own."""
     skips = [stub()[1][name][0].parameters["skip"].annotation for name in ("echo", "backproject")]
-    assert skips == [bool | Collection[kind] for kind in (echo.Skip, focusing_task.Skip)] and skips[0] != skips[1]
+    assert (
+        skips == [bool | Collection[kind] for kind in (EchoSkip, focusing_task.Skip)] and skips[0] != skips[1]
+    )

@@ -111,9 +111,11 @@ def test_a_forecast_equals_the_run(name):
     raw = sarcl.echo(SCENE, TONE, passing(120), **options)
     assert (told.n_rows, told.n_samples) == raw.samples.shape
     assert told.bytes >= raw.samples.nbytes and told.seconds > 0
-    assert told.contributions == pytest.approx(raw.report.contributions_done, rel=0.5)
-    assert told.predicted_error == pytest.approx(raw.report.predicted_error, rel=0.5)
-    assert str(told).startswith(f"{raw.n_rows} rows of {raw.n_samples} samples: ")
+    assert told.plan["contributions"] == pytest.approx(raw.report.contributions_done, rel=0.5)
+    assert told.predicted_error == raw.report.predicted_error and told.error_terms == raw.report.error_terms
+    assert str(told).startswith(f"pulse by pulse: {raw.n_rows} rows of {raw.n_samples} samples, about ")
+    again = told.run()
+    assert np.array_equal(again.samples, raw.samples) and again.report.plan == raw.report.plan
 
 
 @pytest.mark.filterwarnings("ignore:.*shorter than 1/:sarcl.SarclWarning")  # of the first plan's carriers
@@ -135,7 +137,7 @@ def test_a_forecast_looks_where_there_is_something_to_see():
     options = {"antenna": beam, "reference": (0, 0, 0), "range_window": (-40, 40)}
     chirp = sarcl.Waveform.chirp(center=F0, bandwidth=100e6, duration=1e-6)
     told = sarcl.plan(sarcl.echo, SCENE, chirp, track, **options)
-    assert told.n_rows == sarcl.echo(SCENE, chirp, track, **options).n_rows
+    assert told.n_rows == sarcl.echo(SCENE, chirp, track, **options).n_rows and told.plan["contributions"] > 0
 
 
 def test_a_full_disk_ends_in_words(tmp_path):
@@ -188,7 +190,7 @@ def test_dry_run_says_what_simulating_takes_and_writes_nothing(tmp_path, monkeyp
     (tmp_path / "s.toml").write_text(SCENARIO)
     assert parser.main(["simulate", "s.toml", "--dry-run"]) == 0
     said = capsys.readouterr().out
-    assert said.startswith("48 rows of ") and "about" in said and "error below" in said
+    assert said.startswith("pulse by pulse: 48 rows of ") and "about" in said and "error below" in said
     assert [p.name for p in tmp_path.iterdir()] == ["s.toml"]
 
 

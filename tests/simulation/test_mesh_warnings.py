@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import warnings
 
 import numpy as np
@@ -23,7 +24,7 @@ def messages(run):
     return [str(one.message) for one in found if issubclass(one.category, sarcl.SarclWarning)]
 
 
-@pytest.mark.parametrize("verb", [sarcl.echo, sarcl.plan_echo])
+@pytest.mark.parametrize("verb", [sarcl.echo, functools.partial(sarcl.plan, sarcl.echo)])
 @pytest.mark.parametrize(
     "options",
     [{"polarization": "all"}, {"array": ARRAY, "channels": "separated", "receive": "all"}],

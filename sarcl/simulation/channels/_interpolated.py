@@ -188,7 +188,7 @@ class InterpolatedChannels:
         return replace(added, error_terms=self.between(added.error_terms))
 
     def _pairs(self, start: int, n: int) -> Iterator[tuple[tuple[int, int], PulseGeometry, Waveform, np.ndarray]]:
-        """Pairs of positions: numbers, geometry of n pulses from `start` on, band, and rounding of the paths, m (n,)."""
+        """Pairs of positions: numbers, geometry of n pulses from `start` on, band, rounding of the paths, m (n,)."""
         layout, rows, at = self.layout, self.layout.rows, slice(start, start + n)
         grid, frequencies = layout.grid, layout.frequencies
         band = band_of(layout.waveform, float(frequencies.mean()), grid.n * grid.step)

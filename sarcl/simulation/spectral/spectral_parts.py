@@ -31,8 +31,8 @@ WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range windo
 class PlannedParts:
     """The prepared scene, plans for its points and its facets, and the terms of the error of their sum.
 
-    direct  echoes of facets of which pulses see different parts, as `echo` adds them; None where there are none, and for
-            the variant "saras", whose shares of them change as slowly as amplitudes
+    direct  echoes of facets of which pulses see different parts, as `echo` adds them; None where there are none, and
+            for the variant "saras", whose shares of them change as slowly as amplitudes
     """
 
     task: SpectralTask
@@ -117,11 +117,12 @@ def _planned_part(
         scatterers, prepared.weights, line, request.polarizations, request.vertical,
         share if task.variant == "exact" else None,
     )  # fmt: skip
+    n_polarizations, n_scatterers = len(request.polarizations), len(amplitudes.azimuth)
     part = plan_part(
         amplitudes, line, band, prepared.weights.pair is not None, random, task.variant,
         share / gain - fixed - straight, request.tolerance, request.device,
         PlanningTime.of_echo(
-            line.n_pulses, len(amplitudes.azimuth), len(task.frequencies), len(request.polarizations), of_facets, longest
+            line.n_pulses, n_scatterers, len(task.frequencies), n_polarizations, of_facets, longest
         ),
     )  # fmt: skip
     error = gain * (part.predicted_error + fixed + straight)

@@ -1,0 +1,131 @@
+"""A forecast is that of the plan of the whole track, and its run is that of the verb."""
+
+from __future__ import annotations
+
+import numpy as np
+import pytest
+from helpers.array_cases import TONE, line, passing
+
+import sarcl
+from sarcl.base.errors import NothingSeen
+from sarcl.base.report import root_sum_square
+from sarcl.scattering import scatterers
+from sarcl.simulation import echo_forecast, echo_plan
+from sarcl.simulation.echo_work import pieces_of
+
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
+TRACK = sarcl.Trajectory.circle(radius=800.0, height=600.0, arc=0.02, n_pulses=48, prf=100.0)
+
+
+def points(n=400):
+    random = np.random.default_rng(0)
+    return sarcl.Scene.points(random.uniform(-9, 9, (n, 3)), random.normal(size=n) + 1j * random.normal(size=n))
+
+
+def box():
+    return sarcl.shapes.box((2.0, 1.5, 1.0))
+
+
+def rough():
+    return sarcl.shapes.plate((12.0, 12.0), roughness=0.02)
+
+
+SCENES = {"points": points, "box": box, "rough": rough, "all": lambda: box() + rough() + points()}
+CALLS = {name: (make, CHIRP, TRACK, {"tolerance": 2e-2}) for name, make in SCENES.items()}
+CALLS["array"] = points, TONE, passing(32), {"array": line(5), "receive": "all", "tolerance": 1e-2}
+CALLS["array apart"] = points, TONE, passing(32), CALLS["array"][3] | {"channels": "separated"}
+
+
+@pytest.fixture(params=CALLS)
+def call(request):
+    make, waveform, track, options = CALLS[request.param]
+    return (make(), waveform, track), options
+
+
+@pytest.fixture
+def prepared(monkeypatch):
+    """Forecasts prepare every scene."""
+    monkeypatch.setattr(echo_forecast, "LEAST", np.inf)
+
+
+@pytest.fixture
+def unprepared(monkeypatch):
+    """Forecasts prepare no scene."""
+    monkeypatch.setattr(echo_forecast, "LEAST", 0.0)
+    monkeypatch.setattr(echo_forecast, "SHARE", 0.0)
+
+
+def same(raw, other):
+    return np.array_equal(raw.samples, other.samples) and raw.report.plan == other.report.plan
+
+
+def test_errors_of_a_prepared_scene_are_those_of_the_run(prepared, call):
+    subjects, options = call
+    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    assert told.predicted_error == raw.report.predicted_error and told.error_terms == raw.report.error_terms
+    assert (told.n_rows, told.n_samples) == raw.samples.shape and told.seconds > told.planning > 0
+    assert {name: told.plan[name] for name in raw.report.plan} == raw.report.plan
+
+
+def test_errors_of_a_scene_that_is_not_prepared_are_bounds(unprepared, call):
+    subjects, options = call
+    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    assert raw.report.predicted_error <= told.predicted_error <= options["tolerance"] * (1 + 1e-12)
+    assert told.predicted_error == root_sum_square(told.error_terms)
+    assert told.seconds > 0 and told.plan["method"] == raw.report.plan["method"]
+    assert same(told.run(), raw)
+
+
+def test_the_shares_of_shadows_that_are_sampled_bound_their_errors(unprepared, monkeypatch):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0.0)
+    subjects, options = (SCENES["all"](), CHIRP, TRACK), {"tolerance": 5e-2}
+    told, raw = sarcl.plan(sarcl.echo, *subjects, **options), sarcl.echo(*subjects, **options)
+    assert [term.name for term in told.error_terms] == ["points", "facets", "shadows"]
+    named = {term.name: term.value for term in raw.report.error_terms}
+    shadows = np.hypot(named["shadow edges"], named["motion of shadows"])
+    for term, value in zip(told.error_terms, (named["points"], named["facets"], shadows), strict=True):
+        assert value <= term.value
+    assert told.predicted_error <= options["tolerance"] * (1 + 1e-12)
+
+
+def test_a_run_does_not_plan_again_and_may_be_repeated(prepared, call, monkeypatch):
+    subjects, options = call
+    raw, told = sarcl.echo(*subjects, **options), sarcl.plan(sarcl.echo, *subjects, **options)
+    for name in ("prepare_scene", "planned_scene"):
+        monkeypatch.setattr(echo_plan, name, lambda *given, **more: pytest.fail("planned again"))
+    first = told.run()
+    assert same(first, raw) and same(told.run(), raw)
+    seconds = first.report.seconds
+    assert seconds["plan"] + seconds["scene"] >= told.planning > 0 and seconds["echo"] > 0
+
+
+def test_progress_is_that_of_the_run_alone(prepared):
+    stages = []
+    told = sarcl.plan(sarcl.echo, points(), CHIRP, TRACK, progress=lambda stage, done, total: stages.append(stage))
+    assert stages == []
+    told.run()
+    assert "echo" in stages
+
+
+@pytest.mark.parametrize("name", ["points", "box", "rough"])
+def test_pieces_are_counted_to_a_factor_of_two(name):
+    plan = sarcl.echo.planned(SCENES[name](), CHIRP, TRACK, tolerance=1e-2)
+    planned, prepared = plan.plan_scene(plan.task.request).with_scene()
+    n = 0 if prepared.subdivision is None else prepared.subdivision.plan.n_facets
+    assert n / 2 <= sum(pieces_of(planned.scene)) <= 2 * n
+
+
+def test_a_scene_outside_the_range_window_is_refused(unprepared):
+    with pytest.raises(NothingSeen, match="outside the range window"):
+        sarcl.plan(sarcl.echo, points(), CHIRP, TRACK, range_window=(100, 120))
+
+
+def test_a_forecast_of_spectral_echo_is_that_of_its_run():
+    track = sarcl.Trajectory.line(start=(-3e3, -20, 2e3), velocity=(0, 100, 0), prf=400.0, n_pulses=160)
+    for scene in (points(), box()):
+        raw = sarcl.spectral_echo(scene, CHIRP, track)
+        told = sarcl.plan(sarcl.spectral_echo, scene, CHIRP, track)
+        assert told.method == "Fourier transforms" and (told.n_rows, told.n_samples) == raw.samples.shape
+        assert told.predicted_error == raw.report.predicted_error and told.error_terms == raw.report.error_terms
+        assert told.plan["contributions"] == raw.report.contributions_done
+        assert same(told.run(), raw) and same(told.run(), raw)
