@@ -15,8 +15,8 @@ from ...simulation import echo_sampling
 
 def angle_along(directions: np.ndarray) -> np.ndarray:
     """Angle along a path of unit vectors (P, 3), rad (P,)."""
-    here, after = directions[:-1], directions[1:]
-    turn = np.arctan2(np.linalg.norm(np.cross(here, after), axis=1), (here * after).sum(axis=1))
+    first, second = directions[:-1], directions[1:]
+    turn = np.arctan2(np.linalg.norm(np.cross(first, second), axis=1), (first * second).sum(axis=1))
     return np.concatenate([[0.0], np.cumsum(turn)])
 
 
@@ -26,10 +26,11 @@ def check_outside(scene: Scene, antennas: dict[str, np.ndarray]) -> None:
     for name, places in antennas.items():
         distance = np.linalg.norm(places - scene.center, axis=1)
         if not (distance > radius).all():
-            at = int(np.argmin(distance))
+            nearest = int(np.argmin(distance))
             raise ValueError(
-                f"{name} position {at} is {distance[at]:.4g} m from the scene's centre, and the scene reaches "
-                f"{radius:.4g} m from it; fullwave_echo takes the wave at the scene as plane: give antennas outside"
+                f"{name} position {nearest} is {distance[nearest]:.4g} m from the scene's centre, and the scene "
+                f"reaches {radius:.4g} m from it; fullwave_echo takes the wave at the scene as plane: give antennas "
+                "outside"
             )
 
 

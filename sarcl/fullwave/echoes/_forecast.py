@@ -68,8 +68,8 @@ def forecast_of(
         n_samples=n_samples,
         work=(
             f"about {n_runs} runs of {plan['grid']} cells and {task.cost.steps} steps, {size_text(task.run_bytes)} and "
-            f"{duration(each)} each; with at most {size_text(task.max_bytes)} per run (max_bytes, {memory}) the band "
-            f"takes {n_parts} runs per anchor"
+            f"{duration(each)} each; band in {n_parts} parts, with at most {size_text(task.max_bytes)} per run "
+            f"(max_bytes, {memory})"
         ),
         planning=planning,
         run=run,

@@ -1,4 +1,4 @@
-"""One task of fullwave_echo: geometry, frequencies, the grid about the bodies, and the runs of an anchor."""
+"""Task of fullwave_echo: geometry, frequencies, the grid about the bodies, and the runs of an anchor."""
 
 from __future__ import annotations
 
@@ -40,11 +40,11 @@ LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decaye
 
 @dataclass(frozen=True, eq=False)
 class FullwaveTask:
-    """What is computed, and on which grid.
+    """Echoes to be computed, and the grid for them: the checked problem.
 
     options           as they were asked for;  polarizations, vertical  names, and a unit vector (3,)
     band              lowest and highest frequency of the waveform, Hz
-    track, receiver   antennas while pulses are on their way;  motion  what the report says of them
+    track, receiver   antennas while pulses are on their way;  motion  entries of a plan about them
     reference_range   m (P,);  window  m (near, far);  frequencies  Hz (F,);  step  Hz
     cells             per shortest wavelength;  lattice, cost  the grid, and what a run on it takes
     max_bytes         allowed for a run
@@ -102,7 +102,7 @@ class FullwaveTask:
 
     @property
     def grid_choices(self) -> dict[str, object]:
-        """What plans of reports and forecasts say of the grid."""
+        """Entries of a plan, in reports and forecasts, about the grid."""
         return {
             "cells": float(f"{self.carried_cells:.4g}"),
             "cell_m": float(f"{self.lattice.cell:.4g}"),
@@ -111,7 +111,7 @@ class FullwaveTask:
 
     @property
     def losses(self) -> dict[str, object]:
-        """What the report says of complex permittivities, which become conductivities."""
+        """Entry of a plan about complex permittivities, which become conductivities; empty where there are none."""
         return losses_said(self.scene, self.waveform.center)
 
     @property
@@ -134,7 +134,7 @@ class FullwaveTask:
 
     @property
     def strips(self) -> dict[str, object]:
-        """What the report says of parts of conductors that are thinner than a cell."""
+        """Entry of a plan about parts of conductors that are thinner than a cell; empty where there are none."""
         area = self.target.strip_area
         return {"strips": f"{area:.2g} m^2 thinner than a cell, as sheets"} if area else {}
 
@@ -193,22 +193,22 @@ class FullwaveTask:
         tx, rx = self.tx[pulses], self.rx[pulses]
         senses = self.senses(rx)
         shape = len(pulses), len(received), len(self.frequencies)
-        out = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
+        formed = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
         path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
         steps, left = 0, 0.0
-        for some in self.parts:
-            found, ended = runs.run(
-                self.device, self.lattice, self.target, self.band, self.wavenumbers[some],
+        for part in self.parts:
+            part_echoes, ended = runs.run(
+                self.device, self.lattice, self.target, self.band, self.wavenumbers[part],
                 anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), twin=twin, tx=tx, rx=rx,
                 received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.options.tolerance,
                 most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=progress,
             )  # fmt: skip
-            turn = np.exp(-2j * np.outer(path, self.wavenumbers[some]))[:, None]
-            for to, echoes in zip(out, found, strict=True):
-                to[..., some] = echoes * turn
+            turn = np.exp(-2j * np.outer(path, self.wavenumbers[part]))[:, None]
+            for whole_band, echoes in zip(formed, part_echoes, strict=True):
+                whole_band[..., part] = echoes * turn
             progress.run_done()
             steps, left = steps + ended.steps, max(left, ended.left)
-        return out, runs.RunEnd(steps, left)
+        return formed, runs.RunEnd(steps, left)
 
     @property
     def spectrum(self) -> np.ndarray:
@@ -216,9 +216,9 @@ class FullwaveTask:
         pulse = self.waveform.pulse_spectrum(self.frequencies)
         return np.asarray(np.abs(pulse) ** 2 if self.options.compressed else pulse)
 
-    def factors(self, some: slice) -> np.ndarray:
+    def factors(self, pulses: slice) -> np.ndarray:
         """Factors of formed echoes: the spectrum, and the phase from the centre to the reference range, (n, F)."""
-        path = half_path(self.tx[some], self.rx[some], self.centre) - self.reference_range[some]
+        path = half_path(self.tx[pulses], self.rx[pulses], self.centre) - self.reference_range[pulses]
         return np.asarray(self.spectrum * np.exp(-2j * np.outer(path, self.wavenumbers)))
 
     def fingerprint(self) -> str:

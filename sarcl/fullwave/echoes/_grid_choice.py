@@ -104,5 +104,5 @@ def flat_sides(scene: Scene) -> np.ndarray:
     """Which sides of a scene's box hold facets of FLAT of its surface or more: low, high along x, y, z; bool (2, 3)."""
     areas = normals_and_areas(scene.triangles)[1]
     near = 1e-6 * float((scene.bounds[1] - scene.bounds[0]).max())
-    held = np.abs(scene.triangles[:, :, None] - scene.bounds).max(axis=1) <= near  # facets, low and high, axes
-    return np.asarray((areas[:, None, None] * held).sum(axis=0) >= FLAT * areas.sum())
+    is_in_side = np.abs(scene.triangles[:, :, None] - scene.bounds).max(axis=1) <= near  # facets, low and high, axes
+    return np.asarray((areas[:, None, None] * is_in_side).sum(axis=0) >= FLAT * areas.sum())

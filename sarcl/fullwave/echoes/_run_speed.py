@@ -4,8 +4,8 @@ from __future__ import annotations
 
 import functools
 import time
+from collections.abc import Callable
 from dataclasses import dataclass
-from typing import Any
 
 import numpy as np
 
@@ -35,8 +35,8 @@ def run_speed(device: Device) -> RunSpeed:
     grid = Lattice(0.01, (CELLS, CELLS, CELLS), np.zeros(3))
     fields = Fields(device, grid, Target.nothing(), absorber=ABSORBER)
     step = _seconds(device, lambda: fields.advance(BLOCK)) / BLOCK
-    at = np.linspace(0, 3 * CELLS**3 - 1, LISTED).astype(np.int64)
-    fields = Fields(device, grid, Target(at, np.zeros((2, LISTED)), at[:0], np.zeros((4, 0))))
+    edges = np.linspace(0, 3 * CELLS**3 - 1, LISTED).astype(np.int64)
+    fields = Fields(device, grid, Target(edges, np.zeros((2, LISTED)), edges[:0], np.zeros((4, 0))))
     phase = device.copied(np.zeros((BLOCK, FREQUENCIES, 2), np.float32))
     sums = device.zeros(8 * FREQUENCIES * fields.edges.count)
     summed = _seconds(device, lambda: fields.transform(fields.edges, phase, sums, BLOCK, FREQUENCIES))
@@ -44,7 +44,8 @@ def run_speed(device: Device) -> RunSpeed:
     return RunSpeed(CELLS**3 / step, LISTED * FREQUENCIES / summed)
 
 
-def _seconds(device: Device, work: Any) -> float:
+def _seconds(device: Device, work: Callable[[], object]) -> float:
+    """Least of the seconds that `work` takes."""
     best = np.inf
     for _ in range(REPEATS):
         start = time.perf_counter()
