@@ -100,8 +100,8 @@ HELP = {
         "progress": "called as progress(stage, done, total)",
     },
     "polar_format": {
-        "tolerance": "L2 error allowed against that sum, relative to the larger of the norm of I and the norm of "
-        "samples that add with random phases, sqrt(pixels sum |w s|^2)",
+        "tolerance": "L2 error allowed against the sum of plane waves, relative to the larger of the norm of I and "
+        "the norm of samples that add with random phases, sqrt(pixels sum |w s|^2)",
         "sum_polarizations": "True: rows of several polarisations are summed coherently; False: they are refused",
         "window": 'None, "hamming", ("taylor", sidelobe_db, nbar), another name of scipy.signal.windows, such as '
         '"hann" or ("kaiser", 8.6): over samples and over rows; or a pair (range, cross-range) of these, of None, or '
@@ -123,13 +123,14 @@ HELP = {
         "ranges": "(near, far) slant range, m; None: the ranges that the range window holds in every row",
         "spacing": "(s, m) between rows and columns, or None for either: the spectrum of a pixel then fills 0.8 of "
         "the sampling rate at most",
-        "beam": "None: all rows contribute to every pixel",
+        "beam": "the azimuth beam, full angle in rad about the Doppler centroid: rows that see a pixel outside it do "
+        "not contribute; None: all rows contribute to every pixel",
         "doppler": 'centroid of the beam, and of the default times: "geometry", from reference ranges that change '
         '(else broadside); "data", from the phases of neighbouring rows; or in Hz, at the centre frequency',
         "near": "Hz: data determine the centroid but for multiples of the pulse rate; the one nearest to this is taken",
-        "doppler_rate": 'of the azimuth compression: "geometry", from the track; "data", from the displacement of '
-        "two looks (map drift), which needs ground with contrast; or in Hz/s at the centre frequency, in the middle "
-        "of the ranges and at the centroid",
+        "doppler_rate": 'that of the azimuth compression: "geometry", from the track; "data", from the displacement '
+        "of two looks (map drift), which needs ground with contrast; or in Hz/s at the centre frequency, in the "
+        "middle of the ranges and at the centroid",
         "tolerance": "L2 error allowed against `backproject` at the same positions, relative to the larger of the "
         "norm of the image and the norm of the same contributions with random phases",
         "max_bytes": "memory for blocks on the device, as `backproject` takes it; arrays of all pulses or Doppler "
