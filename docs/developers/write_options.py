@@ -335,22 +335,21 @@ def first_sentence(text: str) -> str:
 def flags(entries: list[Verb]) -> str:
     """The module of the command line."""
     shown = [entry for entry in entries if entry.name in ON_COMMAND_LINE]
-    defaults, words, helps = {}, {}, {}
+    defaults, words = {}, {}
     for entry in shown:
         defaults[entry.name] = {p.name: literal(p.default) for p in entry.options}
         words[entry.name] = {p.name: f"({', '.join(map(literal, choices(p)))})" for p in entry.options if choices(p)}
-        helps[entry.name] = {p.name: _help(p) for p in entry.options}
     return f'''"""Options of the verbs for the parser of the command line, which imports nothing that takes time.
 
 Made from the verbs' records by {COMMAND}
 """
 
+from typing import Any
+
 # verb -> option -> its default
-DEFAULTS = {_dicts(defaults)}
+DEFAULTS: dict[str, dict[str, Any]] = {_dicts(defaults)}
 # verb -> option -> the words that it takes, where it takes nothing else
-CHOICES = {_dicts(words)}
-# verb -> option -> first sentence of its documentation, as argparse takes it: "%%" for "%"
-HELP = {_dicts(helps)}'''
+CHOICES: dict[str, dict[str, tuple[str, ...]]] = {_dicts(words)}'''
 
 
 def _dicts(values: dict[str, dict[str, str]]) -> str:
@@ -360,22 +359,6 @@ def _dicts(values: dict[str, dict[str, str]]) -> str:
         lines = "".join(f"        {literal(name)}: {value},\n" for name, value in options.items())
         text += f"    {literal(verb)}: {{\n{lines}    }},\n" if lines else f"    {literal(verb)}: {{}},\n"
     return text + "}\n"
-
-
-def _help(p: Parameter) -> str:
-    """The help of an option, as string literals one below the other."""
-    text, indent = first_sentence(p.doc).replace("%", "%%"), " " * 8
-    one = literal(text)
-    if len(f"{indent}{literal(p.name)}: {one},") <= WIDTH:
-        return one
-    lines = textwrap.wrap(
-        f"{'.' * (len(p.name) + 4)}{text}",
-        WIDTH - len(indent) - 5,  # two quotes, a space, a comma, and a backslash before a quote
-        break_long_words=False,
-        break_on_hyphens=False,
-    )
-    lines[0] = lines[0][len(p.name) + 4 :]
-    return f"\n{indent}".join(literal(line + " " * (line is not lines[-1])) for line in lines)
 
 
 def made(root: Path) -> dict[Path, str]:

@@ -9,8 +9,10 @@ For other folders:
     errors        warnings and errors of the library; a warning points to the user's line that called it
     fingerprint   checksums of everything that a result depends on
     float_pairs   float64 as pairs of float32, for kernels on devices without float64
+    forecast      Forecast: what a verb would do; Plan: what it carries out
     host_memory   memory of the machine, and arrays in temporary files
     morton        Morton order: neighbours in space become neighbours in memory
+    options       records of options: type, default, check and documentation of each
     progress      progress bar for verbs: echo(..., progress=Bar())
     report        Report: plan, errors, counts and seconds of a verb
     rows          some rows spread over all, and groups of rows by keys
@@ -21,6 +23,7 @@ For other folders:
     types         types of arguments that several rooms take
     validation    checks of user input: name, got, wanted, remedy
     vectors       unit vectors, scalar products
+    verb          a verb: a function whose options are a record, and whose work is planned before it runs
     version       the version of the package
     wgs84         longitude, latitude and height to Earth-centred coordinates and back; local axes
 """
@@ -33,8 +36,10 @@ __all__ = [
     "errors",
     "fingerprint",
     "float_pairs",
+    "forecast",
     "host_memory",
     "morton",
+    "options",
     "progress",
     "report",
     "rows",
@@ -45,6 +50,7 @@ __all__ = [
     "types",
     "validation",
     "vectors",
+    "verb",
     "version",
     "wgs84",
 ]

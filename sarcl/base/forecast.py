@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field
+from math import isnan
 from typing import Generic, Protocol, TypeVar
 
 from .report import ErrorTerm
@@ -21,12 +22,13 @@ class Forecast(Generic[R_co]):
     seconds          estimated run time at the present speed of the devices
     bytes            estimated memory: of an image all pixels, and the blocks on every device; of echoes their samples
                      and geometry, in memory or in a file
-    predicted_error  bound of the relative error
+    predicted_error  bound of the relative error; nan: known only after the run
     error_terms      parts of predicted_error, which is the root of the sum of their squares
     cheaper          (predicted error, seconds) of the next cheaper plan; None: none, or not searched for
     n_rows, n_samples  of echoes; None for images
     model_error      predicted error of the model itself, which no tolerance bounds; None: it has none, or it is
                      known only after the run
+    work             a line of text about the work, where rows and pixels say little of it, such as runs of a grid
     planning         seconds that planning has taken, which `seconds` includes
     run              run() carries out this very plan and returns the verb's result. What was planned from is referred
                      to, not copied: ValueError where a file of it has changed meanwhile
@@ -43,15 +45,17 @@ class Forecast(Generic[R_co]):
     n_rows: int | None = None
     n_samples: int | None = None
     model_error: float | None = None
+    work: str = ""
     planning: float = 0.0
 
     def __str__(self) -> str:
         rows = "" if self.n_rows is None else f"{self.n_rows} rows of {self.n_samples} samples, "
         text = f"{self.method}: {rows}about {duration(self.seconds)}, {size_text(self.bytes)}"
-        text += f", error below {self.predicted_error:.1e}"
+        error = "known after the run" if isnan(self.predicted_error) else f"below {self.predicted_error:.1e}"
+        text += f", error {error}"
         if self.cheaper:
             text += f" (next cheaper plan: {self.cheaper[0]:.1e} in {duration(self.cheaper[1])})"
-        return text
+        return f"{text}\n{self.work}" if self.work else text
 
 
 class Plan(Protocol[R_co]):

@@ -170,9 +170,7 @@ def focus(args: argparse.Namespace, job: Job) -> int:
         return 0
     running = {} if method.name != "backproject" else {"tile": args.tile, "resume": args.resume}
     _check_room(grid, outputs)
-    _focus(
-        lambda out: method.image(raw, grid, devices, out=out, progress=job.progress, **running), outputs, args, job
-    )
+    _focus(lambda out: method.image(raw, grid, devices, out=out, progress=job.progress, **running), outputs, args, job)
     return 0
 
 

@@ -3,60 +3,38 @@
 from __future__ import annotations
 
 import argparse
-from collections.abc import Callable
-from dataclasses import dataclass, fields
+from dataclasses import dataclass
 from typing import TYPE_CHECKING, Any
 
+from .. import verbs
 from ..io import formats
-from ..model.store import read
+from ._flags import DEFAULTS
 
 if TYPE_CHECKING:
     from ..model.image import Image
     from ..model.image_grid import ImageGrid
     from ..model.phase_history import PhaseHistory
 
-PLANE = ("grid", "center", "shape", "spacing", "normal", "x_axis")
 BLOCKS = ("tile", "resume")
-# Options, beside those that every method takes, by method; "backproject" is auto, direct, factorized
+PLANE = ("grid", "center", "shape", "spacing", "normal", "x_axis")
+GROUND = ("side", "heights", "heights_above", "geoid")  # of the default grid, or of range_doppler
+RUN = ("device", "tile", "resume", "out", "progress")  # given with the run
+# Names of arguments of the command line by verb; "backproject" is auto, direct, factorized
 TAKES = {
-    "backproject": (
-        *PLANE,
-        *BLOCKS,
-        "beam",
-        "mapping",
-        "wrap",
-        "sum_polarizations",
-        "side",
-        "heights",
-        "heights_above",
-        "geoid",
-    ),
-    "polar_format": (*PLANE, "sum_polarizations", "side", "heights", "heights_above", "geoid"),
-    "range_doppler": (
-        "beam",
-        "side",
-        "heights",
-        "heights_above",
-        "geoid",
-        "times",
-        "ranges",
-        "doppler",
-        "near",
-        "doppler_rate",
-    ),
+    "backproject": {*DEFAULTS["backproject"], *PLANE, *GROUND},
+    "polar_format": {*DEFAULTS["polar_format"], *PLANE, *GROUND},
+    "range_doppler": {*DEFAULTS["range_doppler"], *GROUND} - {"spacing"},
 }
-OPTIONS = sorted({name for names in TAKES.values() for name in names})
 WHY = {
     "range_doppler": "makes its own grid, by zero-Doppler time and slant range, of all rows at once",
     "polar_format": "makes its image on one plane, of all rows at once",
     "backproject": "takes no such option",
 }
-TOLERANCE = {"backproject": 1e-3, "polar_format": 1e-2, "range_doppler": 1e-2}
 
 
 @dataclass(frozen=True)
 class Method:
-    """A method: its name in Python, and its options."""
+    """A method: the name of its verb, and its options."""
 
     name: str
     options: dict[str, Any]
@@ -65,22 +43,16 @@ class Method:
     def of(cls, args: argparse.Namespace) -> Method:
         """The method that is asked for. ValueError names an option that it does not take."""
         name = args.method if args.method in TAKES else "backproject"
-        for option in OPTIONS:
-            if getattr(args, option) not in (None, False) and option not in TAKES[name]:
-                others = " or ".join(n for n in TAKES if option in TAKES[n])
-                raise ValueError(f"--{option.replace('_', '-')} is for {others}; --method {args.method} {WHY[name]}")
-        options = {"tolerance": TOLERANCE[name] if args.tolerance is None else args.tolerance}
-        options |= {"window": args.window, "max_bytes": args.max_bytes}
+        given = {k: v for k, v in vars(args).items() if v is not None and v is not False and k != "method"}
+        for option in given:
+            others = [n for n in TAKES if option in TAKES[n]]
+            if others and name not in others:
+                raise ValueError(
+                    f"--{option.replace('_', '-')} is for {' or '.join(others)}; --method {args.method} {WHY[name]}"
+                )
+        options = {k: given[k] for k in DEFAULTS[name] if k in given and k in TAKES[name] and k not in RUN}
         if name == "backproject":
-            from ..imaging.focus_options import FocusOptions
-
-            known = {f.name for f in fields(FocusOptions)} - {*options, "device"}
-            options |= {k: v for k, v in vars(args).items() if k in known}
-        if name == "polar_format":
-            options["sum_polarizations"] = args.sum_polarizations
-        if name == "range_doppler":
-            given = ("beam", "side", "times", "ranges", "doppler", "near", "doppler_rate")
-            options |= {k: getattr(args, k) for k in given if getattr(args, k) is not None}
+            options["method"] = args.method
         return cls(name, options)
 
     def plan(self, raw: PhaseHistory, grid: ImageGrid | None, device: Any) -> Any:

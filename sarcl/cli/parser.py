@@ -15,6 +15,7 @@ import sys
 from typing import Any, NoReturn
 
 from ..io import formats
+from ._flags import CHOICES, DEFAULTS
 
 EPILOG = """examples:
   sarcl demo                                            simulate and focus a scene: out/demo.png
@@ -141,13 +142,14 @@ def _focus(p: argparse.ArgumentParser) -> None:
         "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
     )
     how = p.add_argument_group("focusing")
+    usual, fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
     how.add_argument(
-        "--tolerance", type=float, help="relative error allowed (default 1e-3; polar_format, range_doppler: 1e-2)"
+        "--tolerance", type=float, help=f"relative error allowed (default {usual}; polar_format, range_doppler: {fast})"
     )
     how.add_argument(
         "--method",
-        choices=["auto", "direct", "factorized", "polar_format", "range_doppler"],
-        default="auto",
+        choices=[*CHOICES["backproject"]["method"], "polar_format", "range_doppler"],
+        default=DEFAULTS["backproject"]["method"],
         help="backprojection (default auto: the cheaper of direct and factorized); polar_format: plane wavefronts; "
         "range_doppler: straight tracks and orbits, by zero-Doppler time and slant range",
     )
@@ -165,7 +167,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     how.add_argument(
         "--mapping",
-        choices=["corrected", "apparent", "channels"],
+        choices=CHOICES["backproject"]["mapping"],
         help="map the echoes of a frequency-diverse array first (docs/guide/fda.md)",
     )
     how.add_argument("--wrap", action="store_true", help="repeat ranges outside the unambiguous swath")
@@ -178,7 +180,7 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     earth.add_argument("--heights-above", metavar="NAME", help="what a DEM's heights are above: ellipsoid, EGM96 ...")
     earth.add_argument("--geoid", metavar="M|FILE", help="height of that geoid above the ellipsoid, m, or its raster")
-    earth.add_argument("--side", choices=["left", "right"], help="side of the track, seen from above")
+    earth.add_argument("--side", choices=CHOICES["range_doppler"]["side"], help="side of the track, seen from above")
     earth.add_argument("--times", nargs=2, type=float, metavar=("FIRST", "LAST"), help="zero-Doppler times, s")
     earth.add_argument("--ranges", nargs=2, type=float, metavar=("NEAR", "FAR"), help="slant ranges, m")
     earth.add_argument(

@@ -9,9 +9,10 @@ For other folders:
     compress         compress(): pulse compression
     default_grid     a grid for data that come without one
     engine           what every method offers: a plan, and an engine that makes bands on one device
-    focus_options    options that backproject, plan, the command line and scenarios share
+    backproject_options  options of backproject, its task, and the method for some devices
+    focus_options    options that the verbs which make images share
     focusing_task    the image to be made: echoes, grid, weights, geometry
-    forecast         plan(): method, seconds, bytes and error before the work
+    forecast         forecast of backproject; the speed of a device
     pixel_taper      a taper over the aperture of each pixel
     profile_energy   energy of the range profiles against the energy at the pixels
     strip_map        doppler_centroid(), effective_velocity(): strip maps on an equivalent straight track
@@ -33,6 +34,7 @@ For this folder alone:
 __all__ = [
     "antenna_beam",
     "backproject",
+    "backproject_options",
     "choose_method",
     "collection",
     "compress",

@@ -14,6 +14,7 @@ from ..base.errors import confirm_tolerance, warn
 from ..base.forecast import Forecast, Plan
 from ..base.report import Report
 from ..base.stage_timer import Clock
+from ..base.validation import count, instance
 from ..base.verb import verb
 from ..model.image import Image
 from ..model.image_grid import ImageGrid
@@ -66,7 +67,7 @@ def backproject(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions)
 
 def plan_of(raw: PhaseHistory, grid: ImageGrid, options: BackprojectOptions) -> BackprojectPlan:
     """The plan of `backproject`."""
-    clock, piece = Clock(), options.piece()
+    clock, piece = Clock(), _piece(options)
     mapped, task = options.task(raw, grid)
     if options.cluster is None:
         chosen = options.choose(task, open_devices(options.device))
@@ -241,6 +242,30 @@ class BackprojectPlan:
             if done:
                 log.warning(NOTHING_SEEN, "range window and beam", " and the beam")
         return {"gain": gain}
+
+
+def _piece(options: BackprojectOptions) -> tuple[int, int] | None:
+    """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together."""
+    tile, resume = options.tile, options.resume
+    if resume is not None:
+        instance("resume", resume, bool)
+    if (tile is not None or resume) and not is_path(options.out):
+        name, given = ("tile", tile) if tile is not None else ("resume", resume)
+        raise ValueError(
+            f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are '
+            "kept beside it"
+        )
+    if tile is None:
+        return None
+    if resume is False:
+        raise ValueError("tile and resume=False do not go together: a piece would delete the tiles of the other pieces")
+    parts: Any = tile
+    if not isinstance(parts, (tuple, list)) or len(parts) != 2:
+        raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
+    i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
+    if i > n:
+        raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
+    return i, n
 
 
 def _antenna_gain(task: FocusingTask, chosen: MethodChoice, device: Device, options: BackprojectOptions) -> Any:

@@ -4,14 +4,14 @@ from __future__ import annotations
 
 from collections.abc import Collection, Sequence
 from dataclasses import dataclass
-from typing import TYPE_CHECKING, Any, Literal
+from typing import TYPE_CHECKING, Literal
 
 import numpy as np
 
 from ..arrays.map_aperture import MapApertureOptions, MapKind, map_aperture
 from ..base.options import option
 from ..base.types import PathLike, WritableArray
-from ..base.validation import choice, count, flag, instance
+from ..base.validation import choice, flag, instance
 from ..model.image_grid import ImageGrid
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
@@ -22,7 +22,6 @@ from ..opencl.memory_budget import budget
 from .choose_method import METHODS, MethodChoice, choose
 from .focus_options import GridOptions
 from .focusing_task import BeamCone, FocusingTask, Skip, make_task
-from .run.image_output import is_path
 
 if TYPE_CHECKING:
     import distributed
@@ -125,28 +124,3 @@ class BackprojectOptions(GridOptions):
     def budget(self, device: Device) -> float:
         """Bytes that blocks may take on a device."""
         return min(budget(device, self.max_bytes), device.info.memory)
-
-    def piece(self) -> tuple[int, int] | None:
-        """`tile` as (i, n), 0 <= i <= n, or None; ValueError for options that do not go together."""
-        tile, resume = self.tile, self.resume
-        if resume is not None:
-            instance("resume", resume, bool)
-        if (tile is not None or resume) and not is_path(self.out):
-            name, given = ("tile", tile) if tile is not None else ("resume", resume)
-            raise ValueError(
-                f'{name} is {" ".join(repr(given).split()):.60} but out is no path; give out="image.h5": tiles are '
-                "kept beside it"
-            )
-        if tile is None:
-            return None
-        if resume is False:
-            raise ValueError(
-                "tile and resume=False do not go together: a piece would delete the tiles of the other pieces"
-            )
-        parts: Any = tile
-        if not isinstance(parts, (tuple, list)) or len(parts) != 2:
-            raise ValueError(f"tile is {' '.join(repr(tile).split()):.60}; wanted (i, n): piece i of n")
-        i, n = count("tile[0]", parts[0], least=0), count("tile[1]", parts[1])
-        if i > n:
-            raise ValueError(f"tile is {tile!r}; pieces of {n} are numbered 1 to {n}")
-        return i, n

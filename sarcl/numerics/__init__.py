@@ -13,6 +13,7 @@ For other folders:
     polynomials             Lagrange polynomials, Chebyshev nodes
     pulse_geometry          antenna positions per pulse, as kernels/geometry.clh reads them
     range_profiles          samples in frequency to oversampled range profiles and back
+    run_options             options that every verb has
     shared_tile             tiles of a grid that a work-group sums in local memory
     tile_constants          records of tiles and pulses on a device: what the points of a tile share for a pulse
     tiles                   points cut into tiles, as kernels/geometry.clh reads them
@@ -37,6 +38,7 @@ __all__ = [
     "polynomials",
     "pulse_geometry",
     "range_profiles",
+    "run_options",
     "shared_tile",
     "tile_constants",
     "tiles",

@@ -92,6 +92,16 @@ ECHO_PULSE = 50.0  # per pulse and polarisation
 ECHO_SAMPLE = 0.03  # per sample
 ECHO_POINT, ECHO_FACET = 0.02, 0.16  # per scatterer
 
+# Forecasts of echoes, in us of one core (2026-11-26): 1e5 points and 256 pulses, the scenes of sarcl/experiments/demo.py
+# (6e5 and 2.5e6 pieces), a terrain of 1.6e6 pieces and 8 pulses, a car of 1440 pieces and 96 pulses.
+TILED_POINT = 0.3  # per point: order, tiles, images of the kernel
+SPREAD_POINT, SPREAD_PIECE = 0.006, 0.02  # per scatterer and pulse: what echoes of many take beside ECHO_PULSE
+CUT_PIECE = 1.6  # per piece: cutting, judging and tiling it
+LIT_SHARE = 15.0  # per piece of a rough facet: its illuminated shares at the viewpoints along the track
+# Per piece and pulse, of facets whose lit parts are computed: which parts these are, and adding them; 0.25 and 0 on open
+# ground, 1.4 and 1.6 for the car
+CLIPPED_PIECE, LIT_PIECE = 0.8, 0.8
+
 # Spectral echoes, in us (2026-11-22).
 LIT_PART = 20.0  # per pulse, of a facet past some ten others (2026-11-26)
 SPECTRAL_POINT, SPECTRAL_FACET = 0.6, 0.05  # per scatterer and function of aspect: amplitudes, weights of antennas

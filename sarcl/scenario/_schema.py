@@ -77,9 +77,7 @@ _CALLS: dict[str, dict[str, str]] = {
     "scene": {
         kind: f"scene.scene:Scene.{kind}" for kind in ("points", "from_mesh", "from_heights", "from_dem", "facets")
     },  # and all shapes
-    "grid": {
-        kind: f"model.image_grid:ImageGrid.{kind}" for kind in ("plane", "points", "on_terrain", "zero_doppler")
-    },
+    "grid": {kind: f"model.image_grid:ImageGrid.{kind}" for kind in ("plane", "points", "on_terrain", "zero_doppler")},
     "echo": {"": "verbs:echo"},
     "spectral_echo": {"": "verbs:spectral_echo"},
     "fullwave_echo": {"": "verbs:fullwave_echo"},

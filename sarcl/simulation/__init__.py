@@ -5,9 +5,12 @@ For other folders:
     echo               echo(): echoes of points and facets, to a stated tolerance
     echo_check         random samples recomputed exactly
     echo_forecast      plan_echo(): rows, bytes, seconds and error before the work
+    echo_request       what is asked of all channels alike: arguments, checked
     echo_output        destination of samples: memory or a file
     echo_sampling      rows and frequencies that echoes are written to
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
+    scene_plan         shares of the tolerance for the parts of a scene, and how its facets are cut within them
+    scene_preparation  a scene cut, culled and illuminated, and put on the device
     spreading          plan, tiles and sums that points and facets share
     channels/          echoes of the channels of an array
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
@@ -28,8 +31,11 @@ __all__ = [
     "echo_check",
     "echo_forecast",
     "echo_output",
+    "echo_request",
     "echo_sampling",
     "scene_echoes",
+    "scene_plan",
+    "scene_preparation",
     "spectral",
     "spreading",
 ]

@@ -27,6 +27,16 @@ def check_name(out: Any) -> None:
         raise TypeError(f"out is a {type(out).__name__}; give the name of a file such as 'raw.h5', or None")
 
 
+def bytes_of(shape: tuple[int, ...]) -> float:
+    """Bytes of samples (n_pulses, ..., n_samples), and of the geometry of their rows."""
+    return float(np.prod(shape[:-1], dtype=float)) * (8.0 * shape[-1] + ROW_BYTES)
+
+
+def pulses_at_once(shape: tuple[int, ...], out: Any, budget: float) -> int:
+    """Pulses whose samples are kept in memory together, of an output to memory or to the file `out`."""
+    return shape[0] if out is None else max(1, int(SHARE * budget / (8.0 * np.prod(shape[1:], dtype=float))))
+
+
 class EchoOutput:
     """Samples (n_pulses, ..., n_samples), complex64; a row is the last axis.
 
@@ -38,6 +48,7 @@ class EchoOutput:
         check_name(out)
         self.shape, self.writer, self.whole = shape, None, np.zeros(0, np.complex64)
         self.a_pulse = int(np.prod(shape[1:-1], dtype=np.int64))
+        self.pulses = pulses_at_once(shape, out, budget)
         n_rows = shape[0] * self.a_pulse
         nbytes = 8.0 * n_rows * shape[-1]
         text = f"{n_rows} rows of {shape[-1]} samples: {size_text(nbytes)}"
@@ -51,9 +62,7 @@ class EchoOutput:
             )
         if out is not None:
             self.writer = formats.writer_functions(out, "phase history").EchoWriter(out, n_rows, shape[-1])
-            self.pulses = max(1, int(SHARE * budget / (nbytes / shape[0])))
             return
-        self.pulses = shape[0]
         try:
             self.whole = np.zeros(shape, np.complex64)
         except (MemoryError, ValueError):

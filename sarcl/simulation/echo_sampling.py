@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
@@ -93,6 +94,26 @@ def _check_seen(antennas: np.ndarray, point: np.ndarray) -> None:
 def _rounded(errors: np.ndarray) -> float:
     """The largest modulus, to three digits."""
     return float(f"{np.abs(errors).max():.3g}")
+
+
+def row_fields(
+    track: Trajectory, receiver: Trajectory | None, reference_range: np.ndarray, polarizations: Sequence[str]
+) -> dict[str, Any]:
+    """Fields of a PhaseHistory that has a row per pulse and polarisation, pulse by pulse."""
+    n, back = len(polarizations), track if receiver is None else receiver
+
+    def every(values: Any) -> Any:
+        return values if n == 1 or values is None else np.repeat(values, n, axis=0)
+
+    return {
+        "tx": every(track.positions),
+        "rx": None if receiver is None else every(back.positions),
+        "reference_range": every(reference_range),
+        "time": every(track.times),
+        "polarization": np.tile(polarizations, len(track)),
+        "tx_velocity": every(track.velocities),
+        "rx_velocity": every(back.velocities),
+    }
 
 
 def window(

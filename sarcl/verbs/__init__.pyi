@@ -21,13 +21,12 @@ from ..model.phase_history import PhaseHistory
 from ..model.radar import Radar
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
-from ..numerics.run_options import Progress as BackprojectProgress
+from ..numerics.run_options import Progress
 from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
 from ..scene.scene import Scene
-from ..simulation.echo import Polarization
-from ..simulation.echo import Skip as EchoSkip
-from ..simulation.scene_echoes import Progress as EchoProgress
+from ..simulation.echo_options import Skip as EchoSkip
+from ..simulation.scene_options import Polarization
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -37,52 +36,52 @@ HOMES: dict[str, str]
 class EchoKeywords(TypedDict, total=False):
     """Options of `echo`, for functions that hand them on."""
 
+    channels: Literal["simultaneous", "separated"]
+    receive: Literal["reference", "own", "all"]
+    skip: bool | Collection[EchoSkip]
     receiver: Trajectory | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
     vertical: ArrayLike | None
     range_window: ArrayLike | None
     reference: ArrayLike | None
     array: AntennaArray | None
-    channels: Literal["simultaneous", "separated"]
-    receive: Literal["reference", "own", "all"]
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    skip: bool | Collection[EchoSkip]
     compressed: bool
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
     out: PathLike | None
-    tolerance: float
     check: bool | None
+    tolerance: float
     device: DeviceChoice | None
-    progress: EchoProgress | None
+    progress: Progress | None
 
 class SpectralEchoKeywords(TypedDict, total=False):
     """Options of `spectral_echo`, for functions that hand them on."""
 
     variant: Literal["exact", "saras"]
+    ripple: bool
     receiver: Trajectory | None
+    array: AntennaArray | None
+    range_window: ArrayLike | None
+    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
+    max_bytes: float | None
+    tolerance: float
+    check: bool | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
     vertical: ArrayLike | None
-    range_window: ArrayLike | None
     reference: ArrayLike | None
-    array: AntennaArray | None
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]]
     compressed: bool
-    ripple: bool
     max_edge: float | Literal["auto"] | None
-    max_bytes: float | None
     out: PathLike | None
-    tolerance: float
-    check: bool | None
     device: DeviceChoice | None
-    progress: EchoProgress | None
+    progress: Progress | None
 
 class FullwaveEchoKeywords(TypedDict, total=False):
     """Options of `fullwave_echo`, for functions that hand them on."""
@@ -101,7 +100,7 @@ class FullwaveEchoKeywords(TypedDict, total=False):
     check: bool
     model_error: bool
     device: DeviceChoice | None
-    progress: Callable[[str, int, int], None] | None
+    progress: Progress | None
 
 class BackprojectKeywords(TypedDict, total=False):
     """Options of `backproject`, for functions that hand them on."""
@@ -122,7 +121,7 @@ class BackprojectKeywords(TypedDict, total=False):
     tolerance: float
     max_bytes: float | None
     check: bool | None
-    progress: BackprojectProgress | None
+    progress: Progress | None
 
 class PolarFormatKeywords(TypedDict, total=False):
     """Options of `polar_format`, for functions that hand them on."""
@@ -135,7 +134,7 @@ class PolarFormatKeywords(TypedDict, total=False):
     max_bytes: float | None
     check: bool | None
     device: DeviceChoice | None
-    progress: BackprojectProgress | None
+    progress: Progress | None
 
 class RangeDopplerKeywords(TypedDict, total=False):
     """Options of `range_doppler`, for functions that hand them on."""
@@ -156,34 +155,34 @@ class RangeDopplerKeywords(TypedDict, total=False):
     weights: ArrayLike | None
     out: PathLike | None
     device: DeviceChoice | None
-    progress: BackprojectProgress | None
+    progress: Progress | None
 
 def echo(
     scene: Scene,
     waveform: Waveform,
     track: Trajectory,
     *,
+    channels: Literal["simultaneous", "separated"] = "simultaneous",
+    receive: Literal["reference", "own", "all"] = "reference",
+    skip: bool | Collection[EchoSkip] = True,
     receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
     range_window: ArrayLike | None = None,
     reference: ArrayLike | None = None,
     array: AntennaArray | None = None,
-    channels: Literal["simultaneous", "separated"] = "simultaneous",
-    receive: Literal["reference", "own", "all"] = "reference",
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    skip: bool | Collection[EchoSkip] = True,
     compressed: bool = True,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
     out: PathLike | None = None,
-    tolerance: float = 0.001,
     check: bool | None = None,
+    tolerance: float = 0.001,
     device: DeviceChoice | None = None,
-    progress: EchoProgress | None = None,
+    progress: Progress | None = None,
 ) -> PhaseHistory:
     """Echoes s_p(f) = sum_k a_k(p) W(f) exp(-j 2 pi f (tau_k(p) - tau_ref(p))) of every pulse, compressed. Options:
     docs/guide/options.md."""
@@ -194,26 +193,26 @@ def spectral_echo(
     track: Trajectory,
     *,
     variant: Literal["exact", "saras"] = "exact",
+    ripple: bool = False,
     receiver: Trajectory | None = None,
+    array: AntennaArray | None = None,
+    range_window: ArrayLike | None = None,
+    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
+    max_bytes: float | None = None,
+    tolerance: float = 0.01,
+    check: bool | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
     vertical: ArrayLike | None = None,
-    range_window: ArrayLike | None = None,
     reference: ArrayLike | None = None,
-    array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    skip: bool | Collection[Literal["zero reflectivity", "facing away", "range window"]] = True,
     compressed: bool = True,
-    ripple: bool = False,
     max_edge: float | Literal["auto"] | None = "auto",
-    max_bytes: float | None = None,
     out: PathLike | None = None,
-    tolerance: float = 0.01,
-    check: bool | None = None,
     device: DeviceChoice | None = None,
-    progress: EchoProgress | None = None,
+    progress: Progress | None = None,
 ) -> PhaseHistory:
     """The samples of `echo` for a straight track of evenly spaced pulses, by two-dimensional Fourier transforms.
     Options: docs/guide/options.md."""
@@ -237,7 +236,7 @@ def fullwave_echo(
     check: bool = False,
     model_error: bool = True,
     device: DeviceChoice | None = None,
-    progress: Callable[[str, int, int], None] | None = None,
+    progress: Progress | None = None,
 ) -> PhaseHistory:
     """Echoes of closed bodies by a solution of Maxwell's equations on a grid (FDTD): all reflections, diffraction,
     creeping waves and resonances. Options: docs/guide/options.md."""
@@ -263,7 +262,7 @@ def backproject(
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
     Options: docs/guide/options.md."""
@@ -289,7 +288,7 @@ def backproject(
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image | None:
     """Focus echoes on a grid: I(x) = sum_p v_p(x) sum_n w_pn s_p(f_n) exp(+j 2 pi f_n (tau(x, p) - tau_ref(p))).
     Options: docs/guide/options.md."""
@@ -306,7 +305,7 @@ def polar_format(
     max_bytes: float | None = None,
     check: bool | None = None,
     device: DeviceChoice | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes on a plane with plane wavefronts: I(x) = sum_p sum_n w_pn s_pn exp(+j 2 pi K_pn.(x - c)).
     Options: docs/guide/options.md."""
@@ -330,7 +329,7 @@ def range_doppler(
     weights: ArrayLike | None = None,
     out: PathLike | None = None,
     device: DeviceChoice | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Image:
     """Focus echoes of a near-straight, evenly sampled track on a grid of zero-Doppler times and slant ranges.
     Options: docs/guide/options.md."""
@@ -360,6 +359,6 @@ def plan(
     tolerance: float = 0.001,
     max_bytes: float | None = None,
     check: bool | None = None,
-    progress: BackprojectProgress | None = None,
+    progress: Progress | None = None,
 ) -> Forecast[Image]:
     """Forecast of a verb: plan(verb, ...) with the arguments of `verb(...)`, before any work."""

@@ -9,7 +9,7 @@ import pytest
 from helpers.cases import noise_on
 
 import sarcl
-import sarcl.simulation.echo as echo_module
+from sarcl.simulation import echo_request
 from sarcl.base import host_memory
 from sarcl.base.errors import ToleranceUnreachable
 from sarcl.opencl.choose_device import open_device
@@ -46,17 +46,17 @@ def near_facets():
 @pytest.mark.slow
 def test_facets_may_be_cut_in_268_mb_whatever_max_bytes_is(near_facets):
     with pytest.raises(ToleranceUnreachable, match=r"more than 524,288 .*max_bytes, 268 MB"):
-        sarcl.plan_echo(*near_facets, max_bytes=1e7, tolerance=1e-5)
+        sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=1e-5)
 
 
 def test_facets_are_cut_within_max_bytes_or_a_quarter_of_the_memory(near_facets, monkeypatch):
-    monkeypatch.setattr(echo_module, "LEAST_HOST", 1e6)
+    monkeypatch.setattr(echo_request, "LEAST_HOST", 1e6)
     with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 .*max_bytes, 10 MB.*or a larger max_bytes"):
-        sarcl.plan_echo(*near_facets, max_bytes=1e7, tolerance=1e-4)
-    sarcl.plan_echo(*near_facets, max_bytes=1e7, tolerance=0.1)
+        sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=1e-4)
+    sarcl.plan(sarcl.echo, *near_facets, max_bytes=1e7, tolerance=0.1)
     monkeypatch.setattr(host_memory, "installed", lambda: 4e7)
     with pytest.raises(ToleranceUnreachable, match=r"more than 19,531 "):
-        sarcl.plan_echo(*near_facets, tolerance=1e-4)
+        sarcl.plan(sarcl.echo, *near_facets, tolerance=1e-4)
 
 
 def test_masked_values_are_refused_wherever_samples_come_from(tmp_path):

@@ -337,7 +337,7 @@ def test_a_plan_of_spectral_echo_that_takes_longer_than_echo_is_refused(monkeypa
     for name in ("response_error", "transfer_tables"):
         monkeypatch.setattr(_azimuth_transfer, name, lambda *given: pytest.fail("responses were transformed"))
     says = r"seen over \d{6,} pulse intervals, of which the track has 7; .* echo takes about .* in all: use echo"
-    forecast = sarcl.plan_echo(*few_pulses_far_away())
+    forecast = sarcl.plan(sarcl.echo, *few_pulses_far_away())
     assert forecast.spectral_seconds is None and re.search(says, forecast.spectral_refusal)
     for variant in ("exact", "saras"):
         with pytest.raises(ValueError, match=says):

@@ -46,9 +46,9 @@ def grid():
 
 FORECASTS = {
     "plan": lambda **o: sarcl.plan(raw(), grid(), **o),
-    "plan_echo": lambda **o: sarcl.plan_echo(POINTS, CHIRP, TRACK, **o),
+    "plan_echo": lambda **o: sarcl.plan(sarcl.echo, POINTS, CHIRP, TRACK, **o),
     "plan_spectral_echo": lambda **o: plan_spectral_echo(POINTS, CHIRP, TRACK, **o),
-    "plan_fullwave_echo": lambda **o: sarcl.plan_fullwave_echo(sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
+    "plan, fullwave_echo": lambda **o: sarcl.plan(sarcl.fullwave_echo, sarcl.shapes.box((1, 1, 1)), CHIRP, TRACK, **o),
     "plan, polar_format": lambda **o: sarcl.plan(sarcl.polar_format, raw(), grid(), **o),
     "plan, range_doppler": lambda **o: sarcl.plan(sarcl.range_doppler, raw(), side="right", **o),
     **{
@@ -75,7 +75,7 @@ def test_misspelt_options_are_refused(name, option):
 
 def test_the_most_similar_option_is_named():
     with pytest.raises(TypeError, match="echo has unknown option 'tolerence'; did you mean 'tolerance'"):
-        sarcl.plan_echo(POINTS, CHIRP, TRACK, tolerence=1e-5)
+        sarcl.plan(sarcl.echo, POINTS, CHIRP, TRACK, tolerence=1e-5)
 
 
 def test_options_of_the_run_alone_are_taken_by_its_forecast(tmp_path):
@@ -83,7 +83,7 @@ def test_options_of_the_run_alone_are_taken_by_its_forecast(tmp_path):
         pass
 
     runs = {"check": True, "progress": progress, "out": tmp_path / "raw.h5"}
-    assert sarcl.plan_echo(POINTS, CHIRP, TRACK, tolerance=1e-2, **runs).n_rows == 16
+    assert sarcl.plan(sarcl.echo, POINTS, CHIRP, TRACK, tolerance=1e-2, **runs).n_rows == 16
     assert scenario.loads(TEXT + GRID).plan_focus(raw(), **runs | {"out": tmp_path / "image.h5"}).method == "direct"
     polar = scenario.loads(TEXT + GRID + "[polar_format]").plan_focus(raw(), **runs | {"out": tmp_path / "image.h5"})
     assert polar.method == "polar format"

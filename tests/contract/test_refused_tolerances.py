@@ -29,10 +29,9 @@ VERBS = {
     "polar_format": lambda t: sarcl.polar_format(RAW, GRID, tolerance=t),
     "range_doppler": lambda t: sarcl.range_doppler(RAW, tolerance=t),
     "echo": lambda t: sarcl.echo(POINT, CHIRP, TRACK, tolerance=t),
-    "plan_echo": lambda t: sarcl.plan_echo(POINT, CHIRP, TRACK, tolerance=t),
+    "plan_echo": lambda t: sarcl.plan(sarcl.echo, POINT, CHIRP, TRACK, tolerance=t),
     "spectral_echo": lambda t: sarcl.spectral_echo(POINT, CHIRP, TRACK, tolerance=t),
     "fullwave_echo": lambda t: sarcl.fullwave_echo(BODY, CHIRP, TRACK, tolerance=t),
-    "plan_fullwave_echo": lambda t: sarcl.plan_fullwave_echo(BODY, CHIRP, TRACK, tolerance=t),
     "beam": lambda t: sarcl.beam(sarcl.AntennaArray.linear(3, spacing=0.015), 1e10, **TOWARDS, tolerance=t),
 }
 

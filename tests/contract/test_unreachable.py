@@ -244,7 +244,7 @@ def interpolated(verb=sarcl.echo):
 
 PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
-    "planning of interpolated channels": ("sarcl.simulation.scene_echoes.plan_scene", interpolated),
+    "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
     "a scene made ready": ("sarcl.simulation.channels.array_echo.prepare_scene", interpolated),
     "forecast of echoes": (
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
@@ -312,17 +312,17 @@ def test_what_progress_raises_comes_out_of_interpolated_channels():
 
 def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_any_work(monkeypatch):
     assert "array positions" in interpolated().report.plan
-    from sarcl.simulation import scene_echoes
+    from sarcl.simulation import scene_plan
     from sarcl.simulation.channels._interpolated import InterpolatedChannels
 
-    plan = scene_echoes.plan_scene
+    plan = scene_plan.plan_scene
 
     def tight(order, *rest):
         if order.tolerance < 1e-3:
             raise ToleranceUnreachable(order.tolerance, None, "test")
         return plan(order, *rest)
 
-    monkeypatch.setattr(scene_echoes, "plan_scene", tight)
+    monkeypatch.setattr(scene_plan, "plan_scene", tight)
     monkeypatch.setattr(InterpolatedChannels, "fill", broken)
     assert "array positions" not in interpolated().report.plan
 

@@ -148,4 +148,4 @@ def test_channels_of_an_array_and_forecasts_follow_the_same_rule():
     one = sarcl.echo(scene, CHIRP, track, reference=x)
     first = (raw.tx_channel == 0) & (raw.rx_channel == 0)
     assert np.abs(raw.tx[first] - one.tx).max() < 1e-8 and np.abs(raw.rx[first] - one.rx).max() < 1e-8
-    assert sarcl.plan_echo(scene, CHIRP, track, reference=x).plan["receiver"] == "at the echo's arrival"
+    assert sarcl.plan(sarcl.echo, scene, CHIRP, track, reference=x).plan["receiver"] == "at the echo's arrival"

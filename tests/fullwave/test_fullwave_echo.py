@@ -18,6 +18,7 @@ import sarcl
 from sarcl import shapes
 from sarcl.base import host_memory
 from sarcl.base.constants import SPEED_OF_LIGHT
+from sarcl.base.report import root_sum_square
 from sarcl.fullwave import runs
 from sarcl.fullwave.echoes import _fullwave_task, _grid_choice
 from sarcl.fullwave.echoes._anchor_files import AnchorFiles
@@ -37,6 +38,11 @@ def around(*degrees, height=0.0, distance=40.0):
     """Antennas about the z axis."""
     angle = np.deg2rad(degrees)
     return sarcl.Trajectory(None, np.stack([distance * np.cos(angle), distance * np.sin(angle), 0 * angle + height], 1))
+
+
+def plan(*subjects, **options):
+    """Forecast of full-wave echoes."""
+    return sarcl.plan(sarcl.fullwave_echo, *subjects, **options)
 
 
 def samples(raw):
@@ -99,11 +105,13 @@ def test_the_error_of_the_grid_is_predicted_within_a_factor_of_three(sphere):
 
 
 def test_the_report_says_what_was_computed(sphere):
-    plan = sphere.report.plan
-    assert plan["anchors"] == [0, 1] and plan["runs"] == 2 and plan["cells"] == 14
+    choices = sphere.report.plan
+    assert choices["anchors"] == [0, 1] and choices["runs"] == 2 and choices["cells"] == 14
     assert sphere.report.tolerance == 3e-2 and sphere.report.predicted_error <= 3e-2
-    assert sphere.report.contributions_done == plan["runs"] * plan["steps"] * np.prod(
-        [int(n) for n in plan["grid"].split(" x ")]
+    assert [term.name for term in sphere.report.error_terms] == ["waveform forming"]
+    assert sphere.report.predicted_error == root_sum_square(sphere.report.error_terms) > 0
+    assert sphere.report.contributions_done == choices["runs"] * choices["steps"] * np.prod(
+        [int(n) for n in choices["grid"].split(" x ")]
     )
     assert "predicted for the model itself" in str(sphere.report)
 
@@ -177,17 +185,16 @@ def test_the_base_of_a_cone_lies_on_nodes_and_a_sphere_in_the_middle_of_its_grid
     ],
 )  # fmt: skip
 def test_what_the_grid_cannot_hold_is_refused_by_plan_and_run_alike(scene, options, error, message):
-    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
-        if "out" not in options or function is sarcl.fullwave_echo:
-            with pytest.raises(error, match=message):
-                function(scene, CHIRP, around(20), **options)
+    for function in (sarcl.fullwave_echo, plan):
+        with pytest.raises(error, match=message):
+            function(scene, CHIRP, around(20), **options)
 
 
 def test_a_plate_that_the_grid_of_the_model_error_does_not_resolve_is_refused_before_any_run(monkeypatch):
     done = pretend(monkeypatch)
     plate = shapes.box((0.3, 0.3, 0.03), rotation=(0.5, 0.2, 0))  # 1.8 cells; 1.2 of the larger ones
     thin = shapes.box((0.3, 0.3, 0.018), rotation=(0.5, 0.2, 0))
-    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
+    for function in (sarcl.fullwave_echo, plan):
         function(plate, CHIRP, around(20), cells=14)
         with pytest.raises(ValueError, match=r"model_error takes a run with cells .* model_error=False, or cells=\d+"):
             function(thin, CHIRP, around(20), cells=14)
@@ -216,15 +223,15 @@ STRIP_CHIRP = sarcl.Waveform.chirp(center=0.9e9, bandwidth=200e6, duration=2e-8)
 def test_a_strip_thinner_than_a_cell_runs_up_to_a_tenth_of_a_wavelength_and_is_said(monkeypatch):
     """With 45 cells per wavelength its thickness is half a cell, and its width 3.6 cells, more than RIM."""
     done = pretend(monkeypatch)
-    for function in (sarcl.fullwave_echo, sarcl.plan_fullwave_echo):
+    for function in (sarcl.fullwave_echo, plan):
         got = function(finned(0.024, 0.0036), STRIP_CHIRP, around(10), cells=45)
-        said = (got.plan if function is sarcl.plan_fullwave_echo else got.report.plan)["strips"]
+        said = (got.plan if function is plan else got.report.plan)["strips"]
         assert said.endswith("m^2 thinner than a cell, as sheets")
         assert np.isclose(float(said.split()[0]), 0.3 * 0.024, rtol=0.1)
         with pytest.raises(ValueError, match="too thin for cells of"):
             function(finned(0.048, 0.0036), STRIP_CHIRP, around(10), cells=45)
     assert len(done) == 2
-    assert "strips" not in sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), cells=8).plan
+    assert "strips" not in plan(BOX, CHIRP, around(20), cells=8).plan
 
 
 @pytest.mark.slow
@@ -260,7 +267,7 @@ def test_scenes_of_metal_and_dielectric_boxes_are_forecast_and_run(monkeypatch, 
     rng = np.random.default_rng(seed)
     metal = shapes.box((0.2, 0.2, 0.2), position=rng.uniform(-0.3, 0.3, 3))
     block = shapes.box((0.1, 0.1, 0.1), position=rng.uniform(-0.3, 0.3, 3), material=sarcl.Material(2))
-    forecast = sarcl.plan_fullwave_echo(metal + block, CHIRP, around(20))
+    forecast = plan(metal + block, CHIRP, around(20))
     raw = sarcl.fullwave_echo(metal + block, CHIRP, around(20))
     assert forecast.plan["grid"] == raw.report.plan["grid"] and forecast.plan["cells"] == raw.report.plan["cells"]
 
@@ -390,7 +397,7 @@ def test_a_scenario_describes_full_wave_echoes(monkeypatch):
     done = pretend(monkeypatch)
     scenario = sarcl.scenario.loads(SCENARIO)
     forecast, raw = scenario.plan(), scenario.simulate()
-    assert len(done) == 2 == forecast.runs and raw.report.plan["anchors"] == [0, 2]
+    assert len(done) == 2 == forecast.plan["runs"] and raw.report.plan["anchors"] == [0, 2]
     assert (raw.n_rows, raw.n_samples) == (forecast.n_rows, forecast.n_samples) == (6, 64)
     assert sarcl.scenario.loads(scenario.dumps()).tables == scenario.tables
     with pytest.raises(ValueError, match=r"f\.toml:\d+: \[radar\] goes with \[echo\], .* leave \[radar\] out"):
@@ -412,19 +419,56 @@ def test_progress_counts_steps_of_all_runs():
 
 def test_the_forecast_says_memory_steps_and_runs_before_the_work(monkeypatch):
     monkeypatch.setattr(_fullwave_task.runs, "run", None)
-    forecast = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20, 65), polarization="all", cells=8, out="nowhere/raw.h5")
-    assert (forecast.n_rows, forecast.n_samples, forecast.runs) == (8, 64, 4)
-    assert forecast.plan["grid"] == "38 x 42 x 48" and 1e6 < forecast.run_bytes < 2e7
-    assert forecast.seconds > forecast.runs * forecast.run_seconds
-    assert "about 4 runs of 38 x 42 x 48 cells" in str(forecast)
+    forecast = plan(BOX, CHIRP, around(20, 65), polarization="all", cells=8, out="nowhere/raw.h5")
+    assert (forecast.method, forecast.n_rows, forecast.n_samples, forecast.plan["runs"]) == ("full wave", 8, 64, 4)
+    assert forecast.plan["grid"] == "38 x 42 x 48" and 1e6 < forecast.plan["run_bytes"] < forecast.bytes < 2e7
+    assert forecast.seconds > forecast.planning + forecast.plan["runs"] * forecast.plan["run_seconds"]
+    assert "about 4 runs of 38 x 42 x 48 cells" in str(forecast) and forecast.model_error is None
+
+
+def test_the_forecast_bounds_the_error_that_anchors_reach_and_knows_none_of_given_ones():
+    """No tolerance bounds the error of the grid."""
+    track = around(20, 30, 50)
+    forecast = plan(BOX, CHIRP, track, cells=8, model_error=False)
+    assert forecast.predicted_error == root_sum_square(forecast.error_terms) <= 3e-2
+    assert [(term.name, term.remedy) for term in forecast.error_terms] == [("waveform forming", "a smaller tolerance")]
+    given = plan(BOX, CHIRP, track, cells=8, anchors=2)
+    assert np.isnan(given.predicted_error) and "error known after the run" in str(given)
+    assert plan(BOX, CHIRP, around(20), cells=8, anchors=1).predicted_error == 0
+    raw = forecast.run()
+    assert raw.report.predicted_error <= forecast.predicted_error and forecast.predicted_error > 0
+
+
+def test_a_forecast_runs_its_own_plan_which_cuts_the_bodies_once(monkeypatch):
+    track, given = around(20, 65), {"cells": 12, "polarization": "all"}
+    box = shapes.box((0.1, 0.15, 0.1), material=sarcl.Material(eps_r=2 - 0.1j))
+    whole = sarcl.fullwave_echo(box, CHIRP, track, **given)
+    cuts, cut = [], runs.target_of
+    monkeypatch.setattr(_fullwave_task.runs, "target_of", lambda *args: (cuts.append(args), cut(*args))[1])
+    forecast = plan(box, CHIRP, track, **given)
+    assert len(cuts) == 2  # by the grid, and by larger cells
+    for raw in (forecast.run(), forecast.run()):
+        assert np.array_equal(np.asarray(raw.samples), np.asarray(whole.samples))
+        for name in ("predicted_error", "error_terms", "model_error", "contributions_done"):
+            assert getattr(raw.report, name) == getattr(whole.report, name)
+        assert set(raw.report.seconds) == {"plan", "runs", "model error"}
+    assert len(cuts) == 3  # and with the conductivity at the upper end of the band
+
+
+def test_out_is_checked_by_the_run_and_not_written_by_the_forecast(tmp_path, monkeypatch):
+    pretend(monkeypatch)
+    forecast = plan(BOX, CHIRP, around(20), cells=8, out=tmp_path / "nowhere" / "raw.h5")
+    assert not list(tmp_path.iterdir())
+    with pytest.raises(FileNotFoundError):
+        forecast.run()
 
 
 def test_a_run_of_half_the_frequencies_takes_between_half_and_all_of_the_time():
     options = {"polarization": "all", "cells": 8, "model_error": False, "range_window": (-100, 100)}
-    whole = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
-    halves = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), max_bytes=0.75 * whole.run_bytes, **options)
-    assert halves.runs == 2 * whole.runs
-    assert 0.5 * whole.run_seconds < halves.run_seconds < whole.run_seconds
+    whole = plan(BOX, CHIRP, around(20), **options)
+    halves = plan(BOX, CHIRP, around(20), max_bytes=0.75 * whole.plan["run_bytes"], **options)
+    assert halves.plan["runs"] == 2 * whole.plan["runs"]
+    assert 0.5 * whole.plan["run_seconds"] < halves.plan["run_seconds"] < whole.plan["run_seconds"]
 
 
 def test_the_report_says_which_conductivity_a_complex_permittivity_becomes(monkeypatch):
@@ -434,24 +478,25 @@ def test_the_report_says_which_conductivity_a_complex_permittivity_becomes(monke
     given = box + shapes.box((0.1, 0.1, 0.1), position=(1, 0, 0)), CHIRP, around(20)
     said = "eps_r 3-0.05j as 0.0135 S/m, exact at 1.25 GHz"
     raw = sarcl.fullwave_echo(*given, cells=12, model_error=False)
-    assert raw.report.plan["losses"] == sarcl.plan_fullwave_echo(*given, cells=12).plan["losses"] == said
+    assert raw.report.plan["losses"] == plan(*given, cells=12).plan["losses"] == said
     assert "losses" not in sarcl.fullwave_echo(BOX, CHIRP, around(20), cells=8, model_error=False).report.plan
 
 
 def test_a_forecast_says_the_memory_it_assumed_which_is_not_what_is_free(monkeypatch):
     """Drivers of CPUs give less memory while other programs take some."""
     options = {"cells": 8, "range_window": (-100, 100), "device": "cpu"}
-    plain = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
-    assert plain.max_bytes == host_memory.installed() / 2 and plain.plan["memory"] == "0.5 of what is installed"
+    plain = plan(BOX, CHIRP, around(20), **options).plan
+    assert plain["max_bytes"] == host_memory.installed() / 2 and plain["memory"] == "0.5 of what is installed"
     device = open_device("cpu")
-    monkeypatch.setattr(device, "info", replace(device.info, memory=int(1.5 * plain.run_bytes)))
-    assert sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options | {"device": device}).runs == plain.runs
-    monkeypatch.setattr(host_memory, "installed", lambda: 1.5 * plain.run_bytes)
-    less = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options)
-    assert less.plan["parts"] > plain.plan["parts"] == 1 and less.runs == less.plan["parts"] * plain.runs
-    assert "with at most" in str(less) and "(max_bytes, 0.5 of what is installed)" in str(less)
-    again = sarcl.plan_fullwave_echo(BOX, CHIRP, around(20), **options, max_bytes=plain.max_bytes)
-    assert (again.runs, again.run_bytes, again.plan["memory"]) == (plain.runs, plain.run_bytes, "as given")
+    monkeypatch.setattr(device, "info", replace(device.info, memory=int(1.5 * plain["run_bytes"])))
+    assert plan(BOX, CHIRP, around(20), **options | {"device": device}).plan["runs"] == plain["runs"]
+    monkeypatch.setattr(host_memory, "installed", lambda: 1.5 * plain["run_bytes"])
+    forecast = plan(BOX, CHIRP, around(20), **options)
+    less = forecast.plan
+    assert less["parts"] > plain["parts"] == 1 and less["runs"] == less["parts"] * plain["runs"]
+    assert "with at most" in str(forecast) and "(max_bytes, 0.5 of what is installed)" in str(forecast)
+    again = plan(BOX, CHIRP, around(20), **options, max_bytes=plain["max_bytes"]).plan
+    assert (again["runs"], again["run_bytes"], again["memory"]) == (plain["runs"], plain["run_bytes"], "as given")
 
 
 @pytest.mark.parametrize(
@@ -463,14 +508,14 @@ def test_cells_are_chosen_by_permittivity_and_tolerance_and_said(monkeypatch, ep
     """12 of a vacuum wavelength in conductors, and 10 sqrt(3e-2/tolerance) of one in the body, from 8 to 20."""
     pretend(monkeypatch)
     box = shapes.box((0.02, 0.03, 0.02), material="metal" if eps_r is None else sarcl.Material(eps_r))
-    said = sarcl.plan_fullwave_echo(box, CHIRP, around(20), tolerance=tolerance).plan
+    said = plan(box, CHIRP, around(20), tolerance=tolerance).plan
     raw = sarcl.fullwave_echo(box, CHIRP, around(20), tolerance=tolerance, model_error=False)
     assert cells <= raw.report.plan["cells"] <= 1.07 * cells and raw.report.plan["cells"] == said["cells"]
 
 
 def test_the_log_is_quiet_without_files(caplog):
     caplog.set_level(logging.WARNING)
-    sarcl.plan_fullwave_echo(BOX, CHIRP, around(20))
+    plan(BOX, CHIRP, around(20))
     assert not caplog.records
 
 
@@ -527,7 +572,7 @@ def test_frequencies_that_do_not_fit_into_memory_take_runs_of_their_own():
     whole = sarcl.fullwave_echo(BOX, CHIRP, around(20), **options)
     parts = sarcl.fullwave_echo(BOX, CHIRP, around(20), max_bytes=6.8e6, **options)
     assert whole.report.plan["runs"] == 1 < parts.report.plan["runs"] < 8
-    assert parts.report.plan["bytes"] <= 6.8e6 < whole.report.plan["bytes"]
+    assert parts.report.plan["run_bytes"] <= 6.8e6 < whole.report.plan["run_bytes"]
     assert difference(np.asarray(parts.samples), np.asarray(whole.samples)) < 1e-5
 
 

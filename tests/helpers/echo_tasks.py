@@ -206,7 +206,7 @@ def planned(draw: Draw) -> None:
     track = aimed(track, center, options)
     said = made = None
     try:
-        forecast = sarcl.plan_echo(scene, waveform, track, **options)
+        forecast = sarcl.plan(sarcl.echo, scene, waveform, track, **options)
         finite([forecast.seconds, forecast.bytes], "forecast")
         str(forecast)
     except sarcl.ToleranceUnreachable as exc:

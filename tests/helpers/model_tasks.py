@@ -217,8 +217,12 @@ def fullwave(draw: Draw) -> None:
     scene = draw.pick(sarcl.shapes.box(size), sarcl.shapes.cylinder(size[0], size[1]), sarcl.shapes.plate(size[:2]))
     track = inputs.track(draw, n, wavelength * draw.log(3, 1e6))
     chirp = sarcl.Waveform.chirp(center=center, bandwidth=center * draw.log(1e-3, 0.5), duration=100 / center)
-    found = sarcl.plan_fullwave_echo(scene, chirp, track, **draw.pick({}, {"polarization": "all"}, {"cells": 12}))
-    finite([found.seconds, found.run_bytes, found.bytes, found.runs], "forecast")
+    found = sarcl.plan(
+        sarcl.fullwave_echo, scene, chirp, track, **draw.pick({}, {"polarization": "all"}, {"cells": 12})
+    )
+    finite(
+        [found.seconds, found.bytes, *(found.plan[name] for name in ("runs", "run_bytes", "run_seconds"))], "forecast"
+    )
     str(found)
 
 

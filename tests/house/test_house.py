@@ -138,7 +138,7 @@ def test_planning_echoes_is_quiet_about_the_few_pulses_it_makes(caplog):
     sarcl.echo(cloud, chirp, short)
     loud = [r.name for r in caplog.records]
     caplog.clear()
-    sarcl.plan_echo(cloud, chirp, short)
+    sarcl.plan(sarcl.echo, cloud, chirp, short)
     assert loud and not caplog.records
 
 
@@ -290,7 +290,7 @@ def test_warnings_point_at_the_line_that_called_the_library():
         "polar_format": (lambda: sarcl.polar_format(raw, wide, check=False), _here()),
         "echo of an array": (lambda: sarcl.echo(POINT, LONG, TRACK, **ARRAY), _here()),
         "echo of a mesh": (lambda: sarcl.echo(scene, sphere_wave, TRACK, tolerance=1e-2, shadows=False), _here()),
-        "plan_echo": (lambda: sarcl.plan_echo(POINT, LONG, TRACK, **ARRAY), _here()),
+        "plan_echo": (lambda: sarcl.plan(sarcl.echo, POINT, LONG, TRACK, **ARRAY), _here()),
         "Scenario.simulate": (lambda: scenario.simulate(), _here()),
     }
     for name, (call, line) in calls.items():

@@ -20,11 +20,11 @@ def body(request):
 
 def test_it_is_planned_with_cells_that_leave_strips_of_a_tenth_of_a_wavelength(body):
     assert np.allclose(body.bounds[1] - body.bounds[0], [15.056, 14.803, 3.127], atol=1e-3)
-    said = sarcl.plan_fullwave_echo(body, CHIRP, TRACK, cells=CELLS, anchors=1).plan["strips"]
+    said = sarcl.plan(sarcl.fullwave_echo, body, CHIRP, TRACK, cells=CELLS, anchors=1).plan["strips"]
     assert said.endswith("m^2 thinner than a cell, as sheets") and 1 < float(said.split()[0]) < 20
     for cells in (12, 40):
         with pytest.raises(ValueError, match="too thin for cells of"):
-            sarcl.plan_fullwave_echo(body, CHIRP, TRACK, cells=cells, anchors=1)
+            sarcl.plan(sarcl.fullwave_echo, body, CHIRP, TRACK, cells=cells, anchors=1)
 
 
 @pytest.mark.slow

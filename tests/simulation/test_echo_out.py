@@ -107,7 +107,7 @@ def test_a_forecast_equals_the_run(name):
     array = ARRAYS[name].get("array")
     options = ARRAYS[name] | ({"array": array.mirrored(60, 120)} if array is not None else {})
     options |= {"reference": (0, 0, 0), "range_window": WINDOW, "tolerance": 1e-2}
-    told = sarcl.plan_echo(SCENE, TONE, passing(120), **options)
+    told = sarcl.plan(sarcl.echo, SCENE, TONE, passing(120), **options)
     raw = sarcl.echo(SCENE, TONE, passing(120), **options)
     assert (told.n_rows, told.n_samples) == raw.samples.shape
     assert told.bytes >= raw.samples.nbytes and told.seconds > 0
@@ -122,7 +122,7 @@ def test_a_forecast_includes_later_plans_of_carriers():
     tone = sarcl.Waveform.tone(center=F0, duration=1 / 40e6)
     with pytest.warns(sarcl.SarclWarning, match="centre frequency jumps"):
         raw = sarcl.echo(SCENE, tone, passing(120), array=array, reference=(0, 0, 0), range_window=WINDOW)
-        told = sarcl.plan_echo(SCENE, tone, passing(120), array=array, reference=(0, 0, 0), range_window=WINDOW)
+        told = sarcl.plan(sarcl.echo, SCENE, tone, passing(120), array=array, reference=(0, 0, 0), range_window=WINDOW)
     assert (told.n_rows, told.n_samples) == raw.samples.shape
 
 
@@ -134,7 +134,7 @@ def test_a_forecast_looks_where_there_is_something_to_see():
     beam = sarcl.Antenna.gaussian(width=(0.02, 0.02))
     options = {"antenna": beam, "reference": (0, 0, 0), "range_window": (-40, 40)}
     chirp = sarcl.Waveform.chirp(center=F0, bandwidth=100e6, duration=1e-6)
-    told = sarcl.plan_echo(SCENE, chirp, track, **options)
+    told = sarcl.plan(sarcl.echo, SCENE, chirp, track, **options)
     assert told.n_rows == sarcl.echo(SCENE, chirp, track, **options).n_rows
 
 
@@ -172,15 +172,15 @@ for call in (
 
 def test_a_forecast_refuses_what_echo_refuses():
     with pytest.raises(ValueError, match="tolerance"):
-        sarcl.plan_echo(SCENE, TONE, passing(), tolerance=0)
+        sarcl.plan(sarcl.echo, SCENE, TONE, passing(), tolerance=0)
     with pytest.raises(ValueError, match="plan names 3 pulses"):
-        sarcl.plan_echo(SCENE, TONE, passing(12), array=line(3).mirrored(1, 3), range_window=WINDOW)
+        sarcl.plan(sarcl.echo, SCENE, TONE, passing(12), array=line(3).mirrored(1, 3), range_window=WINDOW)
     with pytest.raises(TypeError, match="track"):
-        sarcl.plan_echo(SCENE, TONE, None)
+        sarcl.plan(sarcl.echo, SCENE, TONE, None)
     with pytest.raises(ValueError, match="plan names 8 pulses but the track has 120"):
-        sarcl.plan_echo(SCENE, TONE, passing(120), array=line(3).mirrored(4, 8), range_window=WINDOW)
+        sarcl.plan(sarcl.echo, SCENE, TONE, passing(120), array=line(3).mirrored(4, 8), range_window=WINDOW)
     with pytest.raises(ValueError, match="reference"):
-        sarcl.plan_echo(SCENE, TONE, passing(), reference=(0, 0))
+        sarcl.plan(sarcl.echo, SCENE, TONE, passing(), reference=(0, 0))
 
 
 def test_dry_run_says_what_simulating_takes_and_writes_nothing(tmp_path, monkeypatch, capsys):

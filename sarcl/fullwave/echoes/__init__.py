@@ -3,19 +3,21 @@
 For other folders:
 
     fullwave_echo      fullwave_echo(): echoes of closed bodies, to a stated tolerance
-    fullwave_forecast  plan_fullwave_echo(): memory, seconds, number of runs before the work
+    fullwave_options   options of fullwave_echo
 
 For this folder alone:
 
     _anchor_files      echoes of finished anchors in files, so that a killed run can be continued
-    _anchor_runs       runs of the grid for the anchors of one polarisation that is sent
+    _anchor_runs       runs of the grid for the anchors of one polarisation that is sent, and their counts
+    _antenna_geometry  range window, angles and least distance of antennas about a scene
     _closed_bodies     refusals of scenes that are not closed bodies of smooth facets
-    _formed_samples    samples of all pulses from the runs of anchors, with their report
-    _fullwave_task     one task of fullwave_echo: geometry, frequencies, grid, runs
+    _forecast          memory, seconds, number of runs before the work
+    _formed_samples    samples of all pulses from the runs of anchors, with their errors and report
+    _fullwave_task     the task of fullwave_echo: geometry, frequencies, grid, bodies cut by it
     _grid_choice       the grid: cells that carry the band, and memory
     _model_error       the grid's own error, predicted from a run with larger cells
     _run_progress      progress of several runs
     _run_speed         speed of a device with runs, measured on a small grid
 """
 
-__all__ = ["fullwave_echo", "fullwave_forecast"]
+__all__ = ["fullwave_echo", "fullwave_options"]

@@ -1,4 +1,4 @@
-"""Samples of all pulses from the runs of anchors, with what the report says of them."""
+"""Samples of all pulses from the runs of anchors, with their report."""
 
 from __future__ import annotations
 
@@ -7,58 +7,59 @@ from typing import Any
 
 import numpy as np
 
-from ...base.report import Report
+from ...base.report import SMALLER_TOLERANCE, ErrorTerm, Report, root_sum_square
+from ...base.stage_timer import Clock
 from ...base.validation import array, choice, count, ndim
 from ..anchors import Anchored, anchored
 from ._anchor_files import AnchorFiles
-from ._anchor_runs import AnchorRuns
+from ._anchor_runs import AnchorRuns, RunCounts
 from ._fullwave_task import FullwaveTask
-from ._model_error import coarse_task, grid_error
+from ._model_error import grid_error
 from ._run_progress import RunProgress
+from .fullwave_options import FullwaveOptions
 
 
 @dataclass(frozen=True, eq=False)
 class FormedSamples:
     """Echoes of all pulses, phase zero at the scene's centre, without the waveform's spectrum: complex64
-    (P, polarisations, F); their report; files of finished anchors, where there are any.
+    (P, polarisations, F); and their report.
     """
 
     samples: np.ndarray
     report: Report
-    measured_error: float | None
-    files: AnchorFiles | None
 
 
-def formed_samples(task: FullwaveTask, anchors: Any, out: Any, *, check: bool, model_error: bool) -> FormedSamples:
+def formed_samples(
+    task: FullwaveTask, coarse: FullwaveTask | None, anchors: str | int | np.ndarray, files: AnchorFiles | None,
+    clock: Clock,
+) -> FormedSamples:  # fmt: skip
     """Runs the anchors of every polarisation that is sent, and forms the samples.
 
-    out  the file beside which finished anchors are kept, or None;  check, model_error  see fullwave_echo
+    coarse  the task on larger cells that predicts the error of the grid, or None;  files  for finished anchors, or None
     """
-    request, n_pulses = task.request, len(task.tx)
-    anchors = checked_anchors(anchors, n_pulses)
-    task.warn_of_gaps()
-    if model_error:
-        coarse_task(task)  # what it refuses is refused before the runs
-    files = None if out is None else AnchorFiles(out, task.fingerprint())
-    samples = np.empty((n_pulses, len(request.polarizations), len(task.frequencies)), np.complex64)
-    progress = RunProgress(request.report, 1, task.cost.steps)
-    sums = _Sums()
-    for sent, which in task.sendings():
-        twins = task.twins(sent)
-        runs = AnchorRuns(task, sent, [request.polarizations[i][0] for i in which], files, progress, twins)
+    options, n_pulses = task.options, len(task.tx)
+    samples = np.empty((n_pulses, len(task.polarizations), len(task.frequencies)), np.complex64)
+    progress = RunProgress(options.progress, 1, task.cost.steps)
+    sums, counts = ErrorSums(), RunCounts()
+    for sent, indices in task.sendings:
+        twins = task.twins[sent]
+        runs = AnchorRuns(
+            task, sent, [task.polarizations[i][0] for i in indices], files=files, progress=progress, twins=twins,
+            counts=counts,
+        )  # fmt: skip
         mirror = np.array([twins[p].pulse if p in twins else -1 for p in range(n_pulses)])
-        made = anchored(runs, task.along, anchors=anchors, tolerance=request.tolerance, mirror=mirror)
-        request.clock.lap("runs")
-        samples[:, which] = made.samples
-        sums.add(task, runs, made)
-        if model_error:
-            sums.add_grid_error(task, runs, made)
-            request.clock.lap("model error")
-        if check:
-            sums.add_check(task, runs, made)
-            request.clock.lap("check")
+        echoes = anchored(runs, task.along, anchors=anchors, tolerance=options.tolerance, mirror=mirror)
+        clock.lap("runs")
+        samples[:, indices] = echoes.samples
+        sums.add(task, sent, echoes)
+        if coarse:
+            sums.add_grid_error(task, coarse, runs)
+            clock.lap("model error")
+        if options.check:
+            sums.add_check(task, runs, echoes)
+            clock.lap("check")
     progress.finish()
-    return FormedSamples(samples, sums.report(task), sums.measured, files)
+    return FormedSamples(samples, _report(task, sums, counts, clock))
 
 
 def checked_anchors(asked: Any, n_pulses: int) -> str | int | np.ndarray:
@@ -79,78 +80,92 @@ def checked_anchors(asked: Any, n_pulses: int) -> str | int | np.ndarray:
     return pulses
 
 
-class _Sums:
-    """What the report says, added up over the polarisations that are sent; errors are weighted by energy."""
+def error_terms(forming: float, options: FullwaveOptions) -> tuple[ErrorTerm, ...]:
+    """Terms of the error of samples: that of waveform forming alone."""
+    remedy = SMALLER_TOLERANCE if isinstance(options.anchors, str) else "more anchors"
+    return (ErrorTerm("waveform forming", forming, remedy),)
+
+
+class ErrorSums:
+    """Squares of errors, weighted by energy, and energies, added up over the polarisations that are sent.
+
+    anchors  pulses of the anchors, for each polarisation that is sent
+    power    energy of the samples;  forming, checked  squares of their errors by waveform forming, predicted, measured
+    grid     squares of errors of the grid, and grid_power the energy of the samples that they belong to
+    """
 
     def __init__(self) -> None:
         self.anchors: dict[str, list[int]] = {}
-        self.runs, self.mirrored, self.steps, self.seconds, self.left = 0, 0, 0, 0.0, 0.0
         self.power, self.forming, self.checked = 0.0, 0.0, 0.0
         self.grid = self.grid_power = 0.0
         self.has_grid = self.has_check = False
 
-    def add(self, task: FullwaveTask, runs: AnchorRuns, made: Anchored) -> None:
-        power = float((np.abs(made.samples * np.abs(task.spectrum)) ** 2).sum())
-        self.anchors[runs.sent] = [int(p) for p in made.pulses]
+    def add(self, task: FullwaveTask, sent: str, echoes: Anchored) -> None:
+        """Add the echoes of a polarisation that is sent."""
+        power = float((np.abs(echoes.samples * np.abs(task.spectrum)) ** 2).sum())
+        self.anchors[sent] = [int(p) for p in echoes.pulses]
         self.power += power
         if np.ptp(task.along):  # else one run is that of every pulse
-            self.forming += made.predicted_error**2 * power
-        self._count(runs)
+            self.forming += echoes.predicted_error**2 * power
 
-    def _count(self, runs: AnchorRuns) -> None:
-        self.runs, self.steps, self.seconds = (
-            self.runs + runs.runs,
-            self.steps + runs.steps,
-            self.seconds + runs.seconds,
-        )
-        self.left, self.mirrored = max(self.left, runs.left), self.mirrored + runs.mirrored
-
-    def add_grid_error(self, task: FullwaveTask, runs: AnchorRuns, made: Anchored) -> None:
+    def add_grid_error(self, task: FullwaveTask, coarse: FullwaveTask, runs: AnchorRuns) -> None:
+        """Add the error of the grid, predicted at the middle anchor."""
         middle = (task.along[0] + task.along[-1]) / 2
         pulse = min(self.anchors[runs.sent], key=lambda p: abs(task.along[p] - middle))
-        wrong, power = grid_error(task, pulse, runs.sent, runs.received, runs(pulse), runs.progress)
-        self.grid, self.grid_power, self.has_grid = self.grid + wrong, self.grid_power + power, True
+        error, power = grid_error(task, coarse, pulse, runs)
+        self.grid, self.grid_power, self.has_grid = self.grid + error, self.grid_power + power, True
 
-    def add_check(self, task: FullwaveTask, runs: AnchorRuns, made: Anchored) -> None:
-        """One run at the pulse that is farthest from every anchor; its error counts for all pulses."""
-        at = np.abs(task.along[:, None] - task.along[self.anchors[runs.sent]]).min(axis=1)
-        pulse = int(np.argmax(at))
-        wanted = task.formed(pulse, runs.sent, runs.received, np.array([pulse]), runs.progress)[0][0][0]
-        wrong = float((np.abs((made.samples[pulse] - wanted) * np.abs(task.spectrum)) ** 2).sum())
-        self.checked, self.has_check = self.checked + len(task.tx) * wrong, True
+    def add_check(self, task: FullwaveTask, runs: AnchorRuns, echoes: Anchored) -> None:
+        """Add the error at the pulse that is farthest from every anchor, by a run; it counts for all pulses."""
+        distance = np.abs(task.along[:, None] - task.along[self.anchors[runs.sent]]).min(axis=1)
+        pulse = int(np.argmax(distance))
+        exact = task.formed(pulse, runs.sent, runs.received, np.array([pulse]), runs.progress)[0][0][0]
+        error = float((np.abs((echoes.samples[pulse] - exact) * np.abs(task.spectrum)) ** 2).sum())
+        self.checked, self.has_check = self.checked + len(task.tx) * error, True
 
     @property
-    def measured(self) -> float | None:
-        """Relative error of the samples, measured."""
+    def forming_error(self) -> float:
+        """Relative error of the samples by waveform forming, predicted."""
+        return float(np.sqrt(self.forming / self.power)) if self.power else 0.0
+
+    @property
+    def measured_error(self) -> float | None:
+        """Relative error of the samples by waveform forming, measured."""
         return float(np.sqrt(self.checked / self.power)) if self.has_check and self.power else None
 
-    def report(self, task: FullwaveTask) -> Report:
-        lists = list(self.anchors.values())
-        said: dict[str, object] = {
-            "model": "full wave on a grid (FDTD)",
-            "anchors": lists[0] if all(x == lists[0] for x in lists) else self.anchors,
-            "runs": self.runs,
-            "mirrored": self.mirrored,
-            "cells": float(f"{task.carried_cells:.4g}"),
-            "cell_m": float(f"{task.lattice.cell:.4g}"),
-            "grid": " x ".join(map(str, task.lattice.shape)),
-            "steps": int(self.steps / self.runs) if self.runs else 0,
-            "left": float(f"{self.left:.1e}"),
-            "bytes": round(task.cost.bytes(task.parts()[0].stop)),
-            "max_bytes": round(task.max_bytes),
-            "parts": len(task.parts()),
-            "seconds_per_run": float(f"{self.seconds / max(self.runs, 1):.3g}"),
-            **task.strips,
-            **task.losses,
-            **task.motion,
-        }
-        return Report(
-            plan=said,
-            tolerance=task.request.tolerance,
-            predicted_error=float(np.sqrt(self.forming / self.power)) if self.power else 0.0,
-            measured_error=self.measured,
-            contributions_done=int(self.steps * np.prod(task.lattice.shape)),
-            seconds=task.request.clock.seconds,
-            device=task.device.info.name,
-            model_error=float(np.sqrt(self.grid / self.grid_power)) if self.has_grid and self.grid_power else None,
-        )
+    @property
+    def model_error(self) -> float | None:
+        """Relative error of the grid, predicted."""
+        return float(np.sqrt(self.grid / self.grid_power)) if self.has_grid and self.grid_power else None
+
+
+def _report(task: FullwaveTask, sums: ErrorSums, counts: RunCounts, clock: Clock) -> Report:
+    pulses = list(sums.anchors.values())
+    plan: dict[str, object] = {
+        "model": "full wave on a grid (FDTD)",
+        "anchors": pulses[0] if all(p == pulses[0] for p in pulses) else sums.anchors,
+        "runs": counts.runs,
+        "mirrored": counts.mirrored,
+        **task.grid_choices,
+        "steps": int(counts.steps / counts.runs) if counts.runs else 0,
+        "left": float(f"{counts.left:.1e}"),
+        "run_bytes": round(task.run_bytes),
+        "max_bytes": round(task.max_bytes),
+        "parts": len(task.parts),
+        "run_seconds": float(f"{counts.seconds / max(counts.runs, 1):.3g}"),
+        **task.strips,
+        **task.losses,
+        **task.motion,
+    }
+    terms = error_terms(sums.forming_error, task.options)
+    return Report(
+        plan=plan,
+        tolerance=task.options.tolerance,
+        predicted_error=root_sum_square(terms),
+        error_terms=terms,
+        measured_error=sums.measured_error,
+        contributions_done=counts.steps * task.n_cells,
+        seconds=clock.seconds,
+        device=task.device.info.name,
+        model_error=sums.model_error,
+    )

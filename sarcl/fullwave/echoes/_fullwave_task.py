@@ -2,17 +2,16 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, replace
+from functools import cached_property
 from typing import Any
 
 import numpy as np
 
-from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
 from ...base.fingerprint import checksum, kernels, leaves
-from ...base.validation import array as numbers
+from ...base.validation import array
 from ...base.vectors import unit
 from ...base.version import __version__
 from ...model.trajectory import Trajectory
@@ -22,19 +21,20 @@ from ...opencl.device import Device
 from ...scattering.physical_optics import polarisation
 from ...scene.scene import Scene
 from ...simulation import echo_sampling
-from ...simulation.scene_echoes import EchoRequest
+from ...simulation.echo import echo_request
 from .. import runs
 from ..lattice import Lattice
 from ..target import Target
+from ._antenna_geometry import angle_along, check_outside, window_of
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
 from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
 from ._run_progress import RunProgress
+from .fullwave_options import FullwaveOptions
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
 # wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the
 # quarter of a wavelength at which strips on a body resonate. Wider parts are plates or masts, and refused
 STRIP = 0.1
-UNFINISHED = 1e-2  # of the currents: a warning where more would follow after the end of a run
 LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decayed to a part of 1e-5
 
 
@@ -42,6 +42,7 @@ LEAST_TOLERANCE = 1e-4  # fields in float32, and currents until they have decaye
 class FullwaveTask:
     """What is computed, and on which grid.
 
+    options           as they were asked for;  polarizations, vertical  names, and a unit vector (3,)
     band              lowest and highest frequency of the waveform, Hz
     track, receiver   antennas while pulses are on their way;  motion  what the report says of them
     reference_range   m (P,);  window  m (near, far);  frequencies  Hz (F,);  step  Hz
@@ -52,7 +53,10 @@ class FullwaveTask:
     exact             frequency, Hz, at which a complex eps_r is that of the grid; None: the waveform's centre
     """
 
-    request: EchoRequest
+    options: FullwaveOptions
+    device: Device
+    polarizations: tuple[str, ...]
+    vertical: np.ndarray
     scene: Scene
     waveform: Waveform
     band: tuple[float, float]
@@ -63,7 +67,6 @@ class FullwaveTask:
     window: tuple[float, float]
     frequencies: np.ndarray
     step: float
-    compressed: bool
     cells: float
     lattice: Lattice
     cost: runs.RunCost
@@ -71,14 +74,6 @@ class FullwaveTask:
     along: np.ndarray
     strip: float
     exact: float | None = None
-    _targets: list[Target] = field(default_factory=list)
-    _twins: dict[str, dict[int, runs.Twin]] = field(default_factory=dict)
-    _unfinished: list[int] = field(default_factory=list)  # the pulse of the run that was warned of
-
-    @property
-    def device(self) -> Device:
-        """Where the grid is."""
-        return self.request.device
 
     @property
     def tx(self) -> np.ndarray:
@@ -101,6 +96,20 @@ class FullwaveTask:
         return SPEED_OF_LIGHT / self.band[1] / self.lattice.cell
 
     @property
+    def n_cells(self) -> int:
+        """Cells of the grid."""
+        return int(np.prod(self.lattice.shape))
+
+    @property
+    def grid_choices(self) -> dict[str, object]:
+        """What plans of reports and forecasts say of the grid."""
+        return {
+            "cells": float(f"{self.carried_cells:.4g}"),
+            "cell_m": float(f"{self.lattice.cell:.4g}"),
+            "grid": " x ".join(map(str, self.lattice.shape)),
+        }
+
+    @property
     def losses(self) -> dict[str, object]:
         """What the report says of complex permittivities, which become conductivities."""
         return losses_said(self.scene, self.waveform.center)
@@ -110,30 +119,28 @@ class FullwaveTask:
         """rad/m (F,)."""
         return 2 * np.pi * self.frequencies / SPEED_OF_LIGHT
 
+    @cached_property
     def target(self) -> Target:
-        """The bodies on the grid."""
-        if not self._targets:
-            middle = self.waveform.center
-            try:
-                parts = parts_of(self.scene, middle, self.exact)
-                k = 2 * np.pi * middle / SPEED_OF_LIGHT
-                self._targets.append(runs.target_of(self.lattice, parts, k, self.strip))
-            except TooThin as thin:
-                if thin.cell is None:
-                    raise
-                needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / thin.cell) / 10
-                raise TooThin(f"{thin}: cells={needed:g}, which are {self.cells:g} now", thin.cell) from None
-        return self._targets[0]
+        """The bodies, cut by the grid when it is first used. TooThin, a ValueError: parts that cells do not resolve."""
+        middle = self.waveform.center
+        try:
+            parts = parts_of(self.scene, middle, self.exact)
+            return runs.target_of(self.lattice, parts, 2 * np.pi * middle / SPEED_OF_LIGHT, self.strip)
+        except TooThin as thin:
+            if thin.cell is None:
+                raise
+            needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / thin.cell) / 10
+            raise TooThin(f"{thin}: cells={needed:g}, which are {self.cells:g} now", thin.cell) from None
 
     @property
     def strips(self) -> dict[str, object]:
         """What the report says of parts of conductors that are thinner than a cell."""
-        area = self.target().strip_area
+        area = self.target.strip_area
         return {"strips": f"{area:.2g} m^2 thinner than a cell, as sheets"} if area else {}
 
     def warn_of_gaps(self) -> None:
         """SarclWarning where gaps between conductors are narrower than a cell: closed, or with one layer of nodes."""
-        if (gap := self.target().gap) is not None:
+        if (gap := self.target.gap) is not None:
             needed = np.ceil(10 * SPEED_OF_LIGHT / self.band[1] / (runs.RESOLVED * gap)) / 10
             warn(
                 f"bodies have gaps of about {gap:.2g} m, narrower than cells of {self.lattice.cell:.3g} m: the grid "
@@ -142,45 +149,39 @@ class FullwaveTask:
                 "the mesh"
             )
 
-    def warn_of_unfinished(self, pulse: int, ended: runs.RunEnd) -> None:
-        """SarclWarning, once per task, where currents had not decayed when a run ended; none where a gap, which has
-        been warned of, is the reason.
-        """
-        if ended.left > UNFINISHED and self.target().gap is None and not self._unfinished:
-            self._unfinished.append(pulse)
-            warn(
-                f"the run of pulse {pulse} ended after {ended.steps} steps, and {ended.left:.1e} of the currents would "
-                "have followed: the bodies resonate, and that part of the echo is missing; report.plan['left'] is the "
-                "largest of all runs"
-            )
-
-    def sendings(self) -> Iterator[tuple[str, list[int]]]:
+    @property
+    def sendings(self) -> list[tuple[str, list[int]]]:
         """The polarisations that are sent, and the indices of the polarisations whose echoes they give."""
-        names = self.request.polarizations
-        for sent in "HV":
-            which = [i for i, name in enumerate(names) if name[1] == sent]
-            if which:
-                yield sent, which
+        indices = {sent: [i for i, name in enumerate(self.polarizations) if name[1] == sent] for sent in "HV"}
+        return [(sent, own) for sent, own in indices.items() if own]
 
     def senses(self, antennas: np.ndarray) -> dict[str, np.ndarray]:
         """Unit vectors of H and V, (P, 3) each, of antennas (P, 3) that look at the target."""
-        h, v = polarisation(self.centre - antennas, tuple(self.request.vertical.tolist()))
+        h, v = polarisation(self.centre - antennas, tuple(self.vertical.tolist()))
         return {"H": h, "V": v}
 
+    @property
+    def run_bytes(self) -> float:
+        """Memory of one run on the device."""
+        return float(self.cost.bytes(self.parts[0].stop))
+
+    @property
     def parts(self) -> list[slice]:
         """Frequencies whose phasors fit into memory together: a run for each part."""
         n, most = len(self.frequencies), self.cost.frequencies(self.max_bytes)
         each = -(-n // -(-n // most))
         return [slice(first, min(first + each, n)) for first in range(0, n, each)]
 
-    def twins(self, sent: str) -> dict[int, runs.Twin]:
-        """For pulses, the pulse that the run of their anchor serves too, by mirror symmetry."""
-        if sent not in self._twins:
-            radius = float(np.linalg.norm(self.scene.bounds[1] - self.scene.bounds[0])) / 2
-            self._twins[sent] = runs.mirror_twins(
-                self.lattice, self.target(), self.tx, self.senses(self.tx)[sent], float(self.wavenumbers[-1]), radius
-            )
-        return self._twins[sent]
+    @cached_property
+    def twins(self) -> dict[str, dict[int, runs.Twin]]:
+        """For each polarisation that is sent, and for pulses, the pulse that the run of their anchor serves too, by
+        mirror symmetry."""
+        radius = float(np.linalg.norm(self.scene.bounds[1] - self.scene.bounds[0])) / 2
+        senses, k = self.senses(self.tx), float(self.wavenumbers[-1])
+        return {
+            sent: runs.mirror_twins(self.lattice, self.target, self.tx, senses[sent], k, radius)
+            for sent, _ in self.sendings
+        }
 
     def formed(
         self, pulse: int, sent: str, received: list[str], pulses: np.ndarray, progress: RunProgress,
@@ -195,11 +196,11 @@ class FullwaveTask:
         out = [np.empty(shape, np.complex64) for _ in range(1 + (twin is not None))]
         path = half_path(tx, rx, runs.centre_of(self.lattice)) - half_path(tx, rx, self.centre)
         steps, left = 0, 0.0
-        for some in self.parts():
+        for some in self.parts:
             found, ended = runs.run(
-                self.device, self.lattice, self.target(), self.band, self.wavenumbers[some],
+                self.device, self.lattice, self.target, self.band, self.wavenumbers[some],
                 anchor=(self.tx[pulse], self.senses(self.tx[pulse])[sent]), twin=twin, tx=tx, rx=rx,
-                received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.request.tolerance,
+                received=np.stack([senses[name] for name in received]), tolerance=LEFT * self.options.tolerance,
                 most_steps=int(runs.MOST_STEPS * self.cost.steps), max_bytes=self.max_bytes, progress=progress,
             )  # fmt: skip
             turn = np.exp(-2j * np.outer(path, self.wavenumbers[some]))[:, None]
@@ -213,7 +214,7 @@ class FullwaveTask:
     def spectrum(self) -> np.ndarray:
         """The waveform's spectrum, after its matched filter where samples are compressed (F,)."""
         pulse = self.waveform.pulse_spectrum(self.frequencies)
-        return np.asarray(np.abs(pulse) ** 2 if self.compressed else pulse)
+        return np.asarray(np.abs(pulse) ** 2 if self.options.compressed else pulse)
 
     def factors(self, some: slice) -> np.ndarray:
         """Factors of formed echoes: the spectrum, and the phase from the centre to the reference range, (n, F)."""
@@ -225,11 +226,11 @@ class FullwaveTask:
         parts: dict[str, Any] = {
             "sarcl": f"{__version__}, kernels {kernels()}",
             "bodies": [self.scene.triangles, self.scene.material, self.scene.materials],
-            "antennas": [self.tx, self.rx, self.request.vertical],
-            "polarizations": ", ".join(self.request.polarizations),
+            "antennas": [self.tx, self.rx, self.vertical],
+            "polarizations": ", ".join(self.polarizations),
             "frequencies": self.frequencies,
-            "grid": [self.cells, self.band, self.lattice, len(self.parts())],
-            "end of runs": self.request.tolerance,
+            "grid": [self.cells, self.band, self.lattice, len(self.parts)],
+            "end of runs": self.options.tolerance,
         }
         return checksum(*leaves(parts))
 
@@ -239,83 +240,55 @@ class FullwaveTask:
         """
         lattice, cost = grid_choice(self.scene, self.band, self.cells / ratio, self.max_bytes, finer)
         strip = self.strip * lattice.cell / self.lattice.cell + runs.RIM * lattice.cell
-        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip, _targets=[], _twins={})
+        return replace(self, cells=self.cells / ratio, lattice=lattice, cost=cost, strip=strip)
 
-    def with_losses_of(self, frequency: float) -> FullwaveTask:
-        """The same task with conductivities that have the losses of each complex eps_r at another frequency, Hz."""
-        return replace(self, exact=frequency, _targets=[], _twins={})
+    @cached_property
+    def with_upper_losses(self) -> FullwaveTask:
+        """The same task with conductivities that have the losses of each complex eps_r at the upper end of the band."""
+        return replace(self, exact=self.band[1])
 
 
-def fullwave_task(
-    scene: Scene, waveform: Waveform, track: Trajectory, request: EchoRequest, *, receiver: Trajectory | None = None,
-    reference: Any = None, range_window: Any = None, compressed: bool = True, cells: Any = "auto",
-    max_bytes: float | None = None,
-) -> FullwaveTask:  # fmt: skip
-    """Checks the arguments of fullwave_echo, and chooses the grid. ValueError, MemoryError: what does not fit."""
+def fullwave_task(scene: Scene, waveform: Waveform, track: Trajectory, options: FullwaveOptions) -> FullwaveTask:
+    """The task of fullwave_echo, on a grid that is chosen. ValueError, MemoryError: what does not fit."""
+    tolerance = options.tolerance
+    request = echo_request(
+        scene, (), polarization=options.polarization, vertical=options.vertical, max_bytes=options.max_bytes,
+        tolerance=tolerance, device=options.device,
+    )  # fmt: skip
     check_bodies(scene)
     band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
-    cells = check_cells(chosen_cells(cells, scene, band[1], request.tolerance), band)
+    cells = check_cells(chosen_cells(options.cells, scene, band[1], tolerance), band)
     check_wavelengths(scene, cells, band[1])
-    if request.tolerance < LEAST_TOLERANCE:
-        raise ToleranceUnreachable(request.tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
-    point = scene.center if reference is None else numbers("reference", reference, np.float64, (3,))
-    track, receiver, motion = echo_sampling.in_flight(track, receiver, scene, point)
+    if tolerance < LEAST_TOLERANCE:
+        raise ToleranceUnreachable(tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
+    point = scene.center if options.reference is None else array("reference", options.reference, np.float64, (3,))
+    track, receiver, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     tx, rx = track.positions, echo_sampling.receiver_positions(track, receiver)
-    _check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
+    check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
     reference_range = half_path(tx, rx, point)
-    window = _window(scene, waveform, tx, rx, reference_range, range_window)
-    frequency, step, n_samples = echo_sampling.sampling(waveform, *window, compressed)
-    budget = request.budget if max_bytes is not None else default_bytes(request.device)
-    lattice, cost = grid_choice(scene, band, cells, budget)
+    window = window_of(scene, waveform, tx, rx, reference_range, options.range_window)
+    frequency, step, n_samples = echo_sampling.sampling(waveform, *window, options.compressed)
+    max_bytes = default_bytes(request.device) if options.max_bytes is None else request.budget
+    lattice, cost = grid_choice(scene, band, cells, max_bytes)
     return FullwaveTask(
-        request, scene, waveform, band, track, receiver, motion, reference_range, window,
-        frequency + step * np.arange(n_samples), step, compressed, cells, lattice, cost, budget,
-        _along(unit(tx - scene.center)), STRIP * SPEED_OF_LIGHT / band[1],
-    )  # fmt: skip
-
-
-def _along(directions: np.ndarray) -> np.ndarray:
-    """Angle along a path of unit vectors (P, 3), rad (P,)."""
-    here, after = directions[:-1], directions[1:]
-    turn = np.arctan2(np.linalg.norm(np.cross(here, after), axis=1), (here * after).sum(axis=1))
-    return np.concatenate([[0.0], np.cumsum(turn)])
-
-
-def _check_outside(scene: Scene, antennas: dict[str, np.ndarray]) -> None:
-    """ValueError where an antenna is so near that the sphere about the scene's box holds it."""
-    radius = float(np.linalg.norm(scene.bounds[1] - scene.bounds[0])) / 2
-    for name, places in antennas.items():
-        distance = np.linalg.norm(places - scene.center, axis=1)
-        if not (distance > radius).all():
-            at = int(np.argmin(distance))
-            raise ValueError(
-                f"{name} position {at} is {distance[at]:.4g} m from the scene's centre, and the scene reaches "
-                f"{radius:.4g} m from it; fullwave_echo takes the wave at the scene as plane: give antennas outside"
-            )
-
-
-def _window(
-    scene: Scene, waveform: Waveform, tx: np.ndarray, rx: np.ndarray, reference_range: np.ndarray, asked: Any
-) -> tuple[float, float]:
-    """The range window, m: as asked, or the smallest that holds the scene's box, and waves that creep round it, plus
-    10 %.
-
-    A wave that touches a body at its sides, creeps over its back and returns has gone a quarter of the box's girth
-    farther than the box's centre: pi/2 radii for a sphere, less than the 2 radii of its box.
-    """
-    box = echo_sampling.window(scene, waveform, tx, rx, reference_range, None)
-    if asked is None:
-        size = np.sort(scene.bounds[1] - scene.bounds[0])
-        late = float(size[1] + size[2]) / 2
-        late += float((half_path(tx, rx, scene.center) - reference_range).max())
-        half = max(box[1], 1.1 * late)
-        return -half, half
-    near, far = echo_sampling.window(scene, waveform, tx, rx, reference_range, asked)
-    ends = np.array([half_path(tx, rx, corner) - reference_range for corner in corners(scene.bounds)])
-    if near > ends.min() or far < ends.max():
-        raise ValueError(
-            f"range_window ({near:g}, {far:g}) m does not hold the scene, from {ends.min():.4g} to {ends.max():.4g} m "
-            "about the reference: echoes outside would appear at a wrong range, because fullwave_echo leaves out no "
-            "part of a body; give a wider window, or none"
-        )
-    return near, far
+        options=options,
+        device=request.device,
+        polarizations=request.polarizations,
+        vertical=request.vertical,
+        scene=scene,
+        waveform=waveform,
+        band=band,
+        track=track,
+        receiver=receiver,
+        motion=motion,
+        reference_range=reference_range,
+        window=window,
+        frequencies=frequency + step * np.arange(n_samples),
+        step=step,
+        cells=cells,
+        lattice=lattice,
+        cost=cost,
+        max_bytes=max_bytes,
+        along=angle_along(unit(tx - scene.center)),
+        strip=STRIP * SPEED_OF_LIGHT / band[1],
+    )

@@ -24,9 +24,9 @@ import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import TooThin
+from ._anchor_runs import AnchorRuns
 from ._closed_bodies import parts_of
 from ._fullwave_task import FullwaveTask
-from ._run_progress import RunProgress
 
 RATIO = 1.5  # of the cells, about: such a run takes a fifth of the time, 1.5^-4
 FINER = 1.15  # by which its cells may be smaller, so that flat sides lie on nodes
@@ -36,51 +36,55 @@ LOSS = 0.05  # of a permittivity, imaginary over real part, from which on a body
 MOST_PULSES = 32  # at which echoes are compared
 
 
-def grid_error(
-    task: FullwaveTask, pulse: int, sent: str, received: list[str], echoes: np.ndarray, progress: RunProgress
-) -> tuple[float, float]:
-    """Predicted power of the error of samples (P, Q, F) formed from one anchor at a pulse, and their power.
-
-    echoes  formed from this anchor
-    """
+def grid_error(task: FullwaveTask, coarse: FullwaveTask, pulse: int, runs: AnchorRuns) -> tuple[float, float]:
+    """Predicted power of the error of the samples (P, Q, F) formed from the anchor at a pulse, and their power."""
+    echoes = runs(pulse)
     n = len(echoes)
-    some = np.unique(np.append(np.linspace(0, n - 1, min(MOST_PULSES, n)).round().astype(int), pulse))
-    larger = coarse_task(task)
-    ratio = larger.lattice.cell / task.lattice.cell
-    (coarse,), _ = larger.formed(pulse, sent, received, some, progress)
+    pulses = np.unique(np.append(np.linspace(0, n - 1, min(MOST_PULSES, n)).round().astype(int), pulse))
+
+    def formed(other: FullwaveTask) -> np.ndarray:
+        return other.formed(pulse, runs.sent, runs.received, pulses, runs.progress)[0][0]
+
+    coarse_echoes = formed(coarse)
     weight = np.abs(task.spectrum)
-    weighted = echoes[some] * weight
-    error = float(np.linalg.norm(coarse * weight - weighted)) / (ratio ** order(task) - 1)
+    weighted = echoes[pulses] * weight
+    ratio = coarse.lattice.cell / task.lattice.cell
+    error = float(np.linalg.norm(coarse_echoes * weight - weighted)) / (ratio ** order(task) - 1)
     losses = 0.0
     if task.losses:
         upper, centre = task.band[1], task.waveform.center
-        (other,), _ = larger.with_losses_of(upper).formed(pulse, sent, received, some, progress)
         share = (task.frequencies - centre) / (upper - centre)
-        losses = float(np.linalg.norm((other - coarse) * share * weight))
+        losses = float(np.linalg.norm((formed(coarse.with_upper_losses) - coarse_echoes) * share * weight))
     return error**2 + losses**2, float(np.linalg.norm(weighted)) ** 2
 
 
 def coarse_task(task: FullwaveTask) -> FullwaveTask:
-    """The task on larger cells, whose bodies are cut. TooThin, a ValueError, where they do not resolve a part."""
-    larger = task.coarser(RATIO, FINER)
+    """The task on larger cells."""
+    return task.coarser(RATIO, FINER)
+
+
+def check_thickness(coarse: FullwaveTask, cells: float) -> None:
+    """Cut the bodies by the larger cells. TooThin, a ValueError, where these do not resolve a part.
+
+    cells  per shortest wavelength of the task itself
+    """
     try:
-        larger.target()
+        _ = coarse.target
     except TooThin as thin:
         remedy = "give model_error=False"
         if thin.cell is not None:
-            needed = np.ceil(10 * RATIO * SPEED_OF_LIGHT / task.band[1] / thin.cell) / 10
-            remedy += f", or cells={needed:g}, which are {task.cells:g} now"
+            needed = np.ceil(10 * RATIO * SPEED_OF_LIGHT / coarse.band[1] / thin.cell) / 10
+            remedy += f", or cells={needed:g}, which are {cells:g} now"
         raise TooThin(
-            f"report.model_error takes a run with cells of {larger.lattice.cell:.3g} m, for which parts of the bodies "
+            f"report.model_error takes a run with cells of {coarse.lattice.cell:.3g} m, for which parts of the bodies "
             f"are too thin; {remedy}",
             thin.cell,
         ) from thin
-    return larger
 
 
 def order(task: FullwaveTask) -> float:
     """The power of the size of cells with which the error falls: the least of those of the materials and of sheets."""
-    orders = [SHEETS] if task.target().strip_area else []
+    orders = [SHEETS] if task.target.strip_area else []
     for _, eps in parts_of(task.scene, task.waveform.center):
         orders.append(CONDUCTOR if eps is None else LOSSY if -eps.imag > LOSS * eps.real else DIELECTRIC)
     return min(orders)

@@ -10,13 +10,13 @@ STAGE = "full-wave runs"
 class RunProgress:
     """Reports steps done of all that are expected; more runs than expected enlarge the total.
 
-    report  called as report(stage, done, total);  runs, steps  expected, and the steps of each
+    report  called as report(stage, done, total), or None;  runs, steps  expected, and the steps of each
     """
 
-    def __init__(self, report: Callable[[str, int, int], None], runs: int, steps: int) -> None:
-        self._report, self._runs, self._steps = report, runs, max(steps, 1)
+    def __init__(self, report: Callable[[str, int, int], None] | None, runs: int, steps: int) -> None:
+        self._report, self._runs, self._steps = report or _silent, runs, max(steps, 1)
         self._finished, self._share = 0, 0.0  # runs that are done, and the part of the one that runs
-        report(STAGE, 0, runs * self._steps)
+        self._report(STAGE, 0, runs * self._steps)
 
     def __call__(self, steps: int, expected: int) -> None:
         """A run has done so many steps of those that it expects now."""
@@ -36,3 +36,7 @@ class RunProgress:
         """No run follows."""
         total = max(self._finished, 1) * self._steps
         self._report(STAGE, total, total)
+
+
+def _silent(stage: str, done: int, total: int) -> None:
+    """Progress that nobody asked for."""

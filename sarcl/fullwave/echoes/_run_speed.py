@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 import time
 from dataclasses import dataclass
 from typing import Any
@@ -14,15 +15,10 @@ from ..lattice import Lattice
 from ..runs import ABSORBER
 from ..target import Target
 
-CELLS, LISTED, FREQUENCIES = (
-    96,
-    40_000,
-    32,
-)  # the small grid: cells per side, edges in its list, frequencies of their sums
+CELLS = 96  # of the small grid, per side
+LISTED, FREQUENCIES = 40_000, 32  # edges in its list, frequencies of their sums
 BLOCK = 8  # steps at a time, as in a run
 REPEATS = 3  # timings, of which the fastest counts: the first builds the kernels
-
-_known: dict[str, RunSpeed] = {}
 
 
 @dataclass(frozen=True)
@@ -33,15 +29,9 @@ class RunSpeed:
     sums: float
 
 
+@functools.lru_cache(maxsize=16)
 def run_speed(device: Device) -> RunSpeed:
-    """The speed of a device, measured once per process: about a second."""
-    name = f"{device.info.name} {device.info.vector_width}"
-    if name not in _known:
-        _known[name] = _measured(device)
-    return _known[name]
-
-
-def _measured(device: Device) -> RunSpeed:
+    """The speed of a device, measured once per process: some tenths of a second."""
     grid = Lattice(0.01, (CELLS, CELLS, CELLS), np.zeros(3))
     fields = Fields(device, grid, Target.nothing(), absorber=ABSORBER)
     step = _seconds(device, lambda: fields.advance(BLOCK)) / BLOCK

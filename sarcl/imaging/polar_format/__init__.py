@@ -2,7 +2,7 @@
 
 For other folders:
 
-    polar_format   polar_format(): the image, and the error of plane wavefronts; plan_polar_format()
+    polar_format   polar_format(): the image, its plan, and the error of plane wavefronts
 
 For this folder alone:
 

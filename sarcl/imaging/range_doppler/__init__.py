@@ -2,7 +2,7 @@
 
 For other folders:
 
-    range_doppler     range_doppler(): the image, and its error against backprojection; plan_range_doppler()
+    range_doppler     range_doppler(): the image, its plan, and its error against backprojection
 
 For this folder alone:
 
@@ -18,6 +18,7 @@ For this folder alone:
     _host_rows        rows with weights and one reference range, made on the host
     _looks            two looks of an image along the track
     _map_drift        Doppler rate from the displacement of two looks
+    _options          options of range_doppler
     _plan             rows, columns, Doppler bins, range blocks and the predicted error
     _range_window     slant ranges that lie in the range window of every row
     _task             arguments checked; track, ground, extent and plan of one image

@@ -4,6 +4,7 @@ For other folders:
 
     checkpoint     when finished tiles are written, and when they are removed
     dask_workers   tiles computed by the workers of a dask.distributed cluster
+    fill_bands     the bands of an image, focused by workers into an output or into tile files
     image_output   destination of pixels: memory, an array of the caller's, or a file
     tile_files     finished tiles in files beside the image, so that a stopped run can be continued
     workers        one device, or several that take their shares
@@ -14,4 +15,4 @@ For this folder alone:
     _fingerprint   everything an image's pixels depend on, as text and checksums
 """
 
-__all__ = ["checkpoint", "dask_workers", "image_output", "tile_files", "workers"]
+__all__ = ["checkpoint", "dask_workers", "fill_bands", "image_output", "tile_files", "workers"]

@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from ...base.constants import SPEED_OF_LIGHT
+from ...base.forecast import Forecast
 from ...base.report import Report
 from ...base.version import __version__
 from ...fullwave.echoes.fullwave_echo import fullwave_echo
-from ...fullwave.echoes.fullwave_forecast import FullwaveForecast, plan_fullwave_echo
 from ...model.phase_history import PhaseHistory
 from ...model.store import read
 from ...model.trajectory import Trajectory
@@ -89,13 +89,13 @@ class Lab:
             device=self.device, progress=self.progress, **self.window(scene), **options,
         )  # fmt: skip
 
-    def forecast(self, name: str) -> FullwaveForecast:
+    def forecast(self, name: str) -> Forecast[PhaseHistory]:
         """Memory, seconds and runs of the echoes of a target in full size, with FULL_BYTES for a run."""
         scene = _targets.find(name).scene()
-        return plan_fullwave_echo(
+        return fullwave_echo.planned(
             scene, CHIRP, Radar().track, polarization=BOTH, cells=CELLS[False], tolerance=TOLERANCE,
             max_bytes=FULL_BYTES, device=self.device, **self.window(scene),
-        )  # fmt: skip
+        ).forecast()  # fmt: skip
 
     def _optics(self, name: str) -> PhaseHistory:
         """HH of a target by physical optics, with shadows; VH is zero."""

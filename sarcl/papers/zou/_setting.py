@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from typing import Any
+
 import numpy as np
 
 from ...analysis.point_response import PointResponse, measure
@@ -94,11 +96,14 @@ def _table(out: Section, lab: Lab) -> None:
         scene, needs = lab.scene(target.name), lab.forecast(target.name)
         size = np.diff(scene.bounds, axis=0)[0]
         made.append([target.name, target.printed, " x ".join(f"{v:.3g}" for v in size), len(scene.triangles)])
+        plan: Any = needs.plan
         full.append([
-            target.name, needs.plan["grid"], needs.plan["steps"], f"{needs.run_bytes / 2**30:.1f}", needs.runs,
-            f"{needs.run_seconds / 60:.0f}", f"{needs.seconds / 3600:.1f}",
+            target.name, plan["grid"], plan["steps"], f"{plan['run_bytes'] / 2**30:.1f}", plan["runs"],
+            f"{plan['run_seconds'] / 60:.0f}", f"{needs.seconds / 3600:.1f}",
         ])  # fmt: skip
-        out.keep(**{target.name: {"run_bytes": needs.run_bytes, "runs": needs.runs, "seconds": needs.seconds}})
+        out.keep(**{
+            target.name: {"run_bytes": plan["run_bytes"], "runs": plan["runs"], "seconds": needs.seconds}
+        })  # fmt: skip
     out.draw(html.table(
         ["target", "table 2", "here: ground range x azimuth x height, m", "facets"], made, "Targets of table 2.",
         text=True,
@@ -107,6 +112,6 @@ def _table(out: Section, lab: Lab) -> None:
         ["target", "cells of the grid", "time steps", "GiB per run", "runs", "minutes per run", "hours"], full,
         f"What the sizes of the paper take with at least {CELLS[False]} cells per shortest wavelength and "
         f"{FULL_BYTES / 1e9:g} GB for a run, forecast for this machine at its present speed "
-        "(sarcl.plan_fullwave_echo). Figure 8 takes 18 runs more for cuboid and "
+        "(sarcl.plan). Figure 8 takes 18 runs more for cuboid and "
         "sharp cone each.",
     ))  # fmt: skip

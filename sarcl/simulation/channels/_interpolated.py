@@ -8,6 +8,7 @@ elements, and some twenty pairs of positions for 450 transmitting by 450 receivi
 
 from __future__ import annotations
 
+from collections.abc import Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -17,14 +18,16 @@ from ...base.boxes import corners
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ...base.vectors import unit
+from ...model.waveform import Waveform
 from ...numerics import cost_model
+from ...numerics.pulse_geometry import PulseGeometry
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
-from ..scene_echoes import SceneEchoes, band_of
+from ..scene_echoes import Added, SceneEchoes, band_of
 from ..spreading import Band
 from ._chebyshev_positions import Positions, choose_positions
 from ._response_samples import ResponseSamples
-from ._separate import Added, ChannelLayout, active_channels, echoes_of
+from ._separate import ChannelLayout, active_channels, echoes_of
 
 SHARE = 0.3  # of the tolerance, for the interpolation
 FAR = 0.02  # of the distance: larger arrays are not interpolated
@@ -154,24 +157,19 @@ class InterpolatedChannels:
     def fill(self, scene: SceneEchoes, samples: np.ndarray, start: int, done: int, total: int) -> Added:
         """Add echoes to samples, as `SeparateChannels.fill` does."""
         layout, rows, added = self.layout, self.layout.rows, Added()
-        grid, frequencies = layout.grid, layout.frequencies
-        at = slice(start, start + len(samples))
-        band = band_of(layout.waveform, float(frequencies.mean()), grid.n * grid.step)
-        reach = SPEED_OF_LIGHT / (4 * grid.step)
-        echoes = np.empty((len(self.tx), len(self.rx), len(samples), samples.shape[3], grid.n), np.complex64)
-        for i, j in np.ndindex(echoes.shape[:2]):
-            tx = rows.tx_positions(self.tx.at[i], at)
-            rx = rows.rx_positions(self.tx.at[i] if self.own else self.rx.at[j], at)
-            path = _length(tx, self.center) + _length(rx, self.center)
-            reference = np.asarray(path / 2, np.float64)
-            geometry = layout.geometry(tx, rx, reference, frequencies, (-reach, reach))
+        frequencies = layout.frequencies
+        echoes = np.empty((len(self.tx), len(self.rx), len(samples), samples.shape[3], layout.grid.n), np.complex64)
+        for (i, j), geometry, band, rounded in self._pairs(start, len(samples)):
             before = done + added.counts.pairs
             echoes[i, j], at_position = echoes_of(scene, geometry, band, frequencies, start, before, total)
             added += at_position
-            rounded = np.asarray(path - 2 * reference, np.float64)
             if np.abs(rounded).max() * frequencies[-1] > 1e-9 * SPEED_OF_LIGHT:  # thousands of kilometres away
                 echoes[i, j] *= _phase(-rounded, frequencies)[:, None]
-        shared = None if self.own else self._rx_lengths(rows.rx_positions(rows.receivers, at))
+        shared = (
+            None
+            if self.own
+            else self._rx_lengths(rows.rx_positions(rows.receivers, slice(start, start + len(samples))))
+        )
         for channel, now, here in active_channels(layout.sent, start, len(samples)):
             if shared is None:
                 lengths = self._rx_lengths(rows.rx_positions(channel.offset[None], now))
@@ -179,12 +177,37 @@ class InterpolatedChannels:
                 lengths = shared[0][here], shared[1][here]
             self._add(scene, channel, now, echoes[:, :, here], samples[here], *lengths)
         scene.request.clock.lap("channels")
-        grown = tuple(replace(term, value=self.growth * term.value) for term in added.error_terms)
+        return replace(added, error_terms=self.between(added.error_terms))
+
+    def planned(self, scene: SceneEchoes, start: int, n: int) -> Added:
+        """The plan of the echoes of n pulses from `start` on, without these."""
+        added = Added()
+        for _, geometry, band, _ in self._pairs(start, n):
+            channel = scene.channel(geometry, band, self.layout.frequencies, start)
+            added += Added(channel.error_terms, channel.plan)
+        return replace(added, error_terms=self.between(added.error_terms))
+
+    def _pairs(self, start: int, n: int) -> Iterator[tuple[tuple[int, int], PulseGeometry, Waveform, np.ndarray]]:
+        """Pairs of positions: numbers, geometry of n pulses from `start` on, band, and rounding of the paths, m (n,)."""
+        layout, rows, at = self.layout, self.layout.rows, slice(start, start + n)
+        grid, frequencies = layout.grid, layout.frequencies
+        band = band_of(layout.waveform, float(frequencies.mean()), grid.n * grid.step)
+        reach = SPEED_OF_LIGHT / (4 * grid.step)
+        for i, j in np.ndindex(len(self.tx), len(self.rx)):
+            tx = rows.tx_positions(self.tx.at[i], at)
+            rx = rows.rx_positions(self.tx.at[i] if self.own else self.rx.at[j], at)
+            path = _length(tx, self.center) + _length(rx, self.center)
+            reference = np.asarray(path / 2, np.float64)
+            geometry = layout.geometry(tx, rx, reference, frequencies, (-reach, reach))
+            yield (i, j), geometry, band, np.asarray(path - 2 * reference, np.float64)
+
+    def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:
+        """Error terms of channels interpolated between positions where echoes have these."""
+        grown = tuple(replace(term, value=self.growth * term.value) for term in terms)
         at_positions = root_sum_square(grown)
         both = self.error + at_positions  # these two add up themselves, not their squares
         remaining = float(np.sqrt(both**2 - at_positions**2))
-        more = ErrorTerm("interpolation between channels", remaining, SMALLER_TOLERANCE)
-        return replace(added, error_terms=(*grown, more))
+        return *grown, ErrorTerm("interpolation between channels", remaining, SMALLER_TOLERANCE)
 
     def _rx_lengths(self, rx: np.ndarray) -> tuple[np.ndarray, np.ndarray]:
         """Lengths, m, from rx (n, m, 3) to the scene's centre, in extended precision, and to the reference point."""

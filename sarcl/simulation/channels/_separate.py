@@ -2,17 +2,18 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field, replace
-from typing import Any
+from collections.abc import Iterator
+from dataclasses import dataclass, replace
+from typing import NamedTuple
 
 import numpy as np
 
 from ...arrays.channels import Channel, Sampling
-from ...base.report import ErrorTerm, root_sum_square
+from ...base.report import ErrorTerm
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
-from ..scene_echoes import SceneEchoes, band_of
-from ..spreading import Band, Counts
+from ..scene_echoes import Added, SceneEchoes, band_of
+from ..spreading import Band
 from .channel_rows import ChannelRows
 
 
@@ -82,22 +83,20 @@ class ChannelLayout:
         return max(1.0, *(float(count.max()) for count in counts.values()))
 
 
-@dataclass(frozen=True)
-class Added:
-    """Echoes that were added to samples: terms of the largest predicted error, the plan of the last channel, counts."""
+class ChannelPlace(NamedTuple):
+    """One channel at one receiver, at consecutive pulses.
 
-    error_terms: tuple[ErrorTerm, ...] = ()
-    plan: dict[str, Any] = field(default_factory=dict)
-    counts: Counts = field(default_factory=Counts)
+    first   number of its first pulse in the track;  pulses  the pulses in a block;  samples  in a row
+    """
 
-    @property
-    def predicted_error(self) -> float:
-        """The largest of all channels."""
-        return root_sum_square(self.error_terms)
-
-    def __add__(self, other: Added) -> Added:
-        worst = max(self.error_terms, other.error_terms, key=root_sum_square)
-        return Added(worst, other.plan or self.plan, self.counts + other.counts)
+    channel: Channel
+    geometry: PulseGeometry
+    band: Waveform
+    frequencies: np.ndarray
+    first: int
+    pulses: slice
+    receiver: slice
+    samples: slice
 
 
 class SeparateChannels:
@@ -121,20 +120,40 @@ class SeparateChannels:
 
         done, total  pairs of scatterer and range profile, for progress
         """
-        layout, rows, added = self.layout, self.layout.rows, Added()
-        for channel, at, here in active_channels(layout.sent, start, len(samples)):
+        added, rows = Added(), self.layout.rows
+        for one in self._places(start, len(samples)):
+            spectrum = self.layout.spectrum(one.channel, one.frequencies) * scene.weights.factor(one.frequencies)
+            echoes, of_channel = echoes_of(
+                scene, one.geometry, one.band, one.frequencies, one.first, done + added.counts.pairs, total
+            )
+            added += of_channel
+            shaped = (echoes * spectrum.astype(np.complex64))[:, None]
+            rows.add(samples[one.pulses], one.channel, one.receiver, one.samples, shaped)
+        return added
+
+    def planned(self, scene: SceneEchoes, start: int, n: int) -> Added:
+        """The plan of the echoes of n pulses from `start` on, without these."""
+        added = Added()
+        for one in self._places(start, n):
+            channel = scene.channel(one.geometry, one.band, one.frequencies, one.first)
+            added += Added(channel.error_terms, channel.plan)
+        return added
+
+    def _places(self, start: int, n: int) -> Iterator[ChannelPlace]:
+        """Every channel at every receiver, where it is sent at some of the n pulses from `start` on."""
+        layout, rows = self.layout, self.layout.rows
+        for channel, at, here in active_channels(layout.sent, start, n):
             part, frequencies = layout.samples(channel)
-            spectrum = (layout.spectrum(channel, frequencies) * scene.weights.factor(frequencies)).astype(np.complex64)
             band = band_of(layout.waveform, channel.carrier, len(frequencies) * layout.grid.step)
             tx = rows.tx_positions(channel.offset, at)
             _, rx, reference = rows.ends(channel.offset, at)
             for j in range(rows.n_receivers):
                 geometry = layout.geometry(tx, rx[:, j], reference[:, j], frequencies)
-                before = done + added.counts.pairs
-                echoes, of_channel = echoes_of(scene, geometry, band, frequencies, at.start, before, total)
-                added += of_channel
-                rows.add(samples[here], channel, slice(j, j + 1), part, (echoes * spectrum)[:, None])
-        return added
+                yield ChannelPlace(channel, geometry, band, frequencies, at.start, here, slice(j, j + 1), part)
+
+    def between(self, terms: tuple[ErrorTerm, ...]) -> tuple[ErrorTerm, ...]:
+        """Error terms of the channels where their echoes have these: the same."""
+        return terms
 
     def describe(self) -> dict[str, int]:
         """Words and numbers for a report: none."""

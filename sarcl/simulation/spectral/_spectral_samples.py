@@ -10,7 +10,7 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...opencl import fft
 from ..echo_output import EchoOutput
-from ..scene_echoes import EchoRequest
+from ..echo_request import EchoRequest
 from ._map_part import MapPart
 from ._scratch import Scratch
 from ._spectral_part import SpectralPart

@@ -219,11 +219,11 @@ def test_an_empty_scene_and_one_out_of_the_beam(device):
 
 def test_the_forecast_of_echo_says_what_this_would_take(device):
     options = {"tolerance": 1e-3, "device": device, "skip": {"range window", "out of beam"}}
-    forecast = sarcl.plan_echo(points(), CHIRP, TRACK, **options)
+    forecast = sarcl.plan(sarcl.echo, points(), CHIRP, TRACK, **options)
     assert 0 < forecast.spectral_seconds < 60 and forecast.spectral_refusal == ""
     assert str(forecast).splitlines()[1].startswith("spectral_echo: about ")
     circle = sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.01, n_pulses=100)
-    refused = sarcl.plan_echo(points(ground=0), CHIRP, circle, **options)
+    refused = sarcl.plan(sarcl.echo, points(ground=0), CHIRP, circle, **options)
     assert refused.spectral_seconds is None and "are not straight" in refused.spectral_refusal
     assert "spectral" not in str(refused)
 

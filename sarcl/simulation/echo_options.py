@@ -1,0 +1,43 @@
+"""Options of echo."""
+
+from __future__ import annotations
+
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Literal
+
+from ..base.options import option
+from ..base.validation import choice
+from ..numerics import plan
+from .channels.channel_rows import CHANNELS, RECEIVE
+from .scene_options import SceneOptions
+
+Skip = Literal[
+    "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
+]  # fmt: skip
+SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class EchoOptions(SceneOptions):
+    """Options of `echo`."""
+
+    channels: Literal["simultaneous", "separated"] = option(
+        "simultaneous",
+        '"simultaneous": all channels of the array are added up, each after its own matched filter, a row for every '
+        'pulse and receiver; "separated": a row of its own for every pulse, sending element and receiver',
+        lambda name, value: choice(name, value, CHANNELS),
+    )
+    receive: Literal["reference", "own", "all"] = option(
+        "reference",
+        '"reference": at the array\'s reference point; "own": every element receives its own channel ("separated" '
+        'only); "all": every element receives all',
+        lambda name, value: choice(name, value, RECEIVE),
+    )
+    skip: bool | Collection[Skip] = option(
+        True,
+        'True, False or a set of reasons: "zero reflectivity", "facing away", "range window", "out of beam", "equal '
+        'channels" (of one carrier and position), "interpolated channels" (from echoes at a few positions of an array '
+        "to all its elements)",
+        lambda name, value: plan.skips(value, SKIPS),
+    )

@@ -1,0 +1,83 @@
+"""What is asked of all channels of echoes alike: options of the verbs that make echoes, for one device."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass, field
+from typing import Any
+
+import numpy as np
+
+from ..base import host_memory, wgs84
+from ..base.stage_timer import Clock
+from ..numerics import plan
+from ..numerics.run_options import Progress as Progress
+from ..opencl.choose_device import open_device
+from ..opencl.device import Device
+from ..opencl.memory_budget import budget
+from ..scene.scene import Scene
+from .scene_options import SceneOptions
+
+# Memory for facets that are cut: a share of the machine's, or max_bytes, but no less than the process takes anyway
+HOST_SHARE, LEAST_HOST = 0.25, 2.0**28
+
+
+@dataclass(frozen=True, eq=False)
+class EchoRequest:
+    """What is asked for, of every channel alike.
+
+    tolerance  of each channel;  vertical  (3,);  budget  bytes on the device;  host  bytes for facets that are cut
+    """
+
+    device: Device
+    tolerance: float
+    budget: float
+    host: float
+    skips: set[str]
+    polarizations: tuple[str, ...]
+    vertical: np.ndarray
+    max_edge: float | str | None
+    shadows: bool
+    seed: int
+    progress: Progress | None
+    clock: Clock = field(default_factory=Clock)
+
+    @classmethod
+    def of(cls, options: SceneOptions, scene: Scene) -> EchoRequest:
+        """The request of a verb's options for a scene; opens the device."""
+        device, most, asked = open_device(options.device), options.max_bytes, options.vertical
+        if asked is None:
+            asked = wgs84.vertical_at(scene.center)
+        return cls(
+            device=device,
+            tolerance=options.tolerance,
+            budget=budget(device, most),
+            host=max(LEAST_HOST, HOST_SHARE * host_memory.installed() if most is None else most),
+            skips=set(options.skip) if not isinstance(options.skip, bool) else set(),
+            polarizations=tuple(options.polarization),
+            vertical=np.array([0.0, 0.0, 1.0]) if asked is None else np.asarray(asked),
+            max_edge=options.max_edge,
+            shadows=options.shadows,
+            seed=options.seed,
+            progress=options.progress,
+        )
+
+    @property
+    def same(self) -> list[int]:
+        """Indices of the polarisations in which points send something back."""
+        return [i for i, name in enumerate(self.polarizations) if name[0] == name[1]]
+
+    @property
+    def gated(self) -> bool:
+        """Whether scatterers outside the range window are left out."""
+        return "range window" in self.skips
+
+    def report(self, stage: str, done: int, total: int) -> None:
+        """Call `progress`, where it is given."""
+        if self.progress:
+            self.progress(stage, done, total)
+
+
+def echo_request(scene: Scene, skips: tuple[str, ...], **options: Any) -> EchoRequest:
+    """The request of a verb with options of SceneOptions;  skips  the reasons that its `skip` may name."""
+    asked = plan.skips(options.pop("skip", True), skips)
+    return EchoRequest.of(SceneOptions(**options, skip=asked), scene)

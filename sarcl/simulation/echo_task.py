@@ -1,0 +1,70 @@
+"""One task of echo: its arguments, checked."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from ..base.validation import instance
+from ..model.trajectory import Trajectory
+from ..model.waveform import Waveform
+from ..scattering import antenna_weights
+from ..scattering.antenna_weights import AntennaWeights
+from ..scene.scene import Scene
+from . import echo_sampling
+from .echo_options import EchoOptions
+from .echo_request import EchoRequest
+
+
+@dataclass(frozen=True, eq=False)
+class EchoTask:
+    """Echoes to be computed.
+
+    original         the scene as it was given;  scene  with its random heights
+    given_track      the transmitter's as it was given
+    track, receiver  of the antennas while pulses are on their way;  motion  what the report says of that
+    point            the reference point, m (3,);  weights  of antennas and distances
+    """
+
+    options: EchoOptions
+    request: EchoRequest
+    original: Scene
+    scene: Scene
+    waveform: Waveform
+    given_track: Trajectory
+    track: Trajectory
+    receiver: Trajectory | None
+    point: np.ndarray
+    motion: dict[str, object]
+    weights: AntennaWeights
+
+
+def echo_task(scene: Scene, waveform: Waveform, track: Trajectory, options: EchoOptions) -> EchoTask:
+    """The task of these arguments; opens the device."""
+    check_subjects(scene, waveform, track)
+    request = EchoRequest.of(options, scene)
+    point = scene.center if options.reference is None else np.asarray(options.reference)
+    sends, hears, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
+    echo_sampling.receiver_positions(sends, hears)
+    real = scene.realized(request.seed)  # before the range window: it moves the corners of rough terrain
+    weights = antenna_weights.weights_of(options.antenna, options.radar, sends, hears, waveform, real.center)
+    return EchoTask(
+        options=options,
+        request=request,
+        original=scene,
+        scene=real,
+        waveform=waveform,
+        given_track=track,
+        track=sends,
+        receiver=hears,
+        point=point,
+        motion=motion,
+        weights=weights,
+    )
+
+
+def check_subjects(scene: object, waveform: object, track: object) -> None:
+    """TypeError for what is no scene, waveform or track."""
+    for name, value, kind in (("scene", scene, Scene), ("waveform", waveform, Waveform), ("track", track, Trajectory)):
+        instance(name, value, kind)

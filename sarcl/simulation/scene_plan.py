@@ -1,0 +1,160 @@
+"""How the tolerance of echoes is divided among the parts of a scene, and how finely its facets are cut within it."""
+
+from __future__ import annotations
+
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ..base.errors import ToleranceUnreachable
+from ..base.tolerances import reachable
+from ..model.waveform import Waveform
+from ..numerics.plan import LEAST_TOLERANCE, PROFILES
+from ..numerics.pulse_geometry import PulseGeometry
+from ..scattering.antenna_weight_error import weight_error as error_of_weights
+from ..scattering.antenna_weights import AntennaWeights, WeightError
+from ..scattering.facet_plan import MOST_FACETS
+from ..scattering.scatterers import samples_shadows as counts_shadows
+from ..scattering.subdivision import Subdivision, cell_edge, plan_cut
+from ..scene.scene import Scene
+from ._unseen_scene import refuse_unseen
+from .echo_request import EchoRequest
+from .spreading import PER_TILE, Band
+
+NODES = 0.3  # share of a tolerance: largest error of gains interpolated over the band, where there are enough nodes
+SHADOWS = 0.6  # share of a tolerance for shadows on rough facets, where they are counted in samples
+CUT_PROFILES = 1.5  # error of range profiles of cut facets, over the least of 64 of them: sums are longer than that
+
+
+@dataclass(frozen=True, eq=False)
+class SeenScene:
+    """A scene as the antennas of all channels see it.
+
+    original  as it was given;  scene  with its random heights;  waveform  over the band of all channels
+    margin    m: elements of an array stand up to this far from the antennas
+    """
+
+    original: Scene
+    scene: Scene
+    waveform: Waveform
+    antennas: PulseGeometry
+    weights: AntennaWeights
+    margin: float = 0.0
+
+
+@dataclass(frozen=True, eq=False)
+class ScenePlan:
+    """How a scene is prepared for its echoes: all that is known before its facets are cut and illuminated.
+
+    weight_error  of antennas and distances;  error_budget  the share of the tolerance that points have, and facets
+    subdivision   how facets are cut, None where there are none;  bands  of all samples that will be asked for
+    """
+
+    request: EchoRequest
+    seen: SeenScene
+    weight_error: WeightError
+    error_budget: float
+    subdivision: Subdivision | None
+    bands: tuple[Band, ...]
+
+    def describe(self) -> dict[str, Any]:
+        """Words and numbers for a forecast: those of a report that are known before the scene is prepared."""
+        facets = {} if self.subdivision is None else self.subdivision.plan.describe()
+        weights = self.seen.weights.describe(self.weight_error)
+        return {"model": "stop and go, single scattering", "method": "spread"} | facets | weights
+
+
+def planned_scene(request: EchoRequest, seen: SeenScene, bands: Iterable[Band]) -> ScenePlan:
+    """The plan of a scene.
+
+    ToleranceUnreachable where it cannot meet the tolerance; NothingSeen where bounds prove that no pulse sees the scene.
+    """
+    refuse_unseen(seen.scene, seen.weights, seen.waveform, seen.antennas, request.gated, seen.margin)
+    error_budget = share_of(request, seen, request.tolerance)
+    weight_error = error_of_weights(seen.weights, seen.scene, seen.waveform, request.polarizations, request.vertical)
+    bands = tuple(dict.fromkeys(bands))
+    return ScenePlan(request, seen, weight_error, error_budget, cut_within(request, seen, weight_error, bands), bands)
+
+
+def cut_within(
+    request: EchoRequest, seen: SeenScene, weight_error: WeightError, bands: tuple[Band, ...]
+) -> Subdivision | None:
+    """How facets are cut, None where there are none. ToleranceUnreachable in the caller's own numbers."""
+
+    def plan(tolerance: float, max_edge: float | str | None = request.max_edge) -> Subdivision | None:
+        return plan_scene(request, seen, weight_error, bands, tolerance, max_edge)
+
+    try:
+        return plan(request.tolerance)
+    except ToleranceUnreachable as refused:
+        scale, remedy = request.tolerance / refused.asked, None
+        above = request.tolerance if refused.best is None else max(refused.best * scale, request.tolerance)
+        if request.max_edge is None and _meets(lambda: plan(request.tolerance, "auto")):
+            remedy = "let echo cut them (max_edge='auto')"
+        raise refused.restated(request.tolerance, reachable(plan, above), remedy) from None
+
+
+def parts_of(scene: Scene) -> float:
+    """By how much a tolerance is divided among the scene's parts: errors of points and of facets are independent."""
+    return float(np.sqrt(2 if len(scene.positions) and len(scene.triangles) else 1))
+
+
+def share_of(request: EchoRequest, seen: SeenScene, tolerance: float) -> float:
+    """The share of a tolerance that points have, and facets, beside that of shadows that are counted in samples."""
+    left = np.sqrt(1 - SHADOWS**2) if samples_shadows(request, seen) else 1.0
+    return float(tolerance * left / parts_of(seen.scene))
+
+
+def samples_shadows(request: EchoRequest, seen: SeenScene) -> bool:
+    """Whether shadows on rough facets are counted in samples."""
+    cell = np.inf if request.max_edge is None else cell_edge(seen.waveform)
+    n_facets = len(seen.scene.triangles)
+    return request.shadows and bool(n_facets) and counts_shadows(seen.scene, cell, len(seen.antennas))
+
+
+def plan_scene(
+    request: EchoRequest, seen: SeenScene, weight_error: WeightError, bands: Iterable[Band], tolerance: float,
+    max_edge: float | str | None,
+) -> Subdivision | None:  # fmt: skip
+    """How a scene's facets are cut for `tolerance`, None where there are none.
+
+    ToleranceUnreachable where gains, facets, or samples of one of `bands` exceed their shares of it.
+    """
+    scene, antennas = seen.scene, seen.antennas
+    share, made = share_of(request, seen, tolerance), None
+    weight_error.check(share)
+    if len(scene.triangles):
+        terms = len(antennas) * sum(band.n_samples for band in bands) or np.inf
+        profiles = max((CUT_PROFILES * band.least_tolerance(min(PER_TILE), 0.0) for band in bands), default=0.0)
+        made = plan_cut(
+            scene, seen.waveform, antennas, request.polarizations, request.vertical, max_edge, share, weight_error,
+            request.host, profiles, terms,
+        )  # fmt: skip
+        left = share / made.gain - made.plan.predicted_error
+        if not made.plan.is_float64:  # pieces are not counted yet
+            _profiles_fit(bands, left, len(scene.triangles) * MOST_FACETS, share / made.gain)
+    n_points = len(scene.amplitudes)
+    if "zero reflectivity" in request.skips:
+        n_points = int(np.count_nonzero(scene.amplitudes))
+    if n_points and request.same:
+        left = share - weight_error.of(weight_error.nodes(NODES * share), share)
+        _profiles_fit(bands, left, n_points, share, LEAST_TOLERANCE)
+    return made
+
+
+def _profiles_fit(bands: Iterable[Band], left: float, n: int, share: float, least: float = 0.0) -> None:
+    """ToleranceUnreachable where range profiles of n scatterers need more than is `left` of a share of it."""
+    for band in bands:
+        needed = max(band.least_tolerance(n, left), least)
+        if left < needed:
+            raise ToleranceUnreachable(share, needed + (share - left), PROFILES, how="in complex64")
+
+
+def _meets(plan: Callable[[], object]) -> bool:
+    try:
+        plan()
+    except ToleranceUnreachable:
+        return False
+    return True

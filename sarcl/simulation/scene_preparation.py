@@ -1,0 +1,151 @@
+"""A scene cut, culled and illuminated for its echoes, and put on the device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+from typing import Any
+
+from ..base.errors import NothingSeen, ToleranceUnreachable, warn
+from ..base.report import ErrorTerm
+from ..base.tolerances import askable, rounded_up
+from ..scattering.antenna_weights import AntennaWeights
+from ..scattering.facets import FacetSet
+from ..scattering.mesh_quality import facet_error, speckle_contrast
+from ..scattering.scatterers import Points, facets_of, points_of
+from ..scattering.subdivision import Subdivision
+from ..scene.scene import Scene
+from ._facet_spreading import TiledFacets
+from ._point_spreading import tiled_points
+from .echo_request import EchoRequest
+from .scene_echoes import SceneEchoes
+from .scene_plan import SHADOWS, ScenePlan, parts_of, samples_shadows
+from .spreading import TiledScatterers
+
+LEAST = 1e-30  # largest amplitude of a scene below which echoes approach the smallest numbers of complex64
+LARGEST = 1e30  # amplitude whose sums and spectra still fit in complex64
+# Share of a tolerance for what is left out outside the beam: as little as this, since it may be a specular reflection
+UNSEEN = 1e-3
+
+
+def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) -> SceneEchoes:
+    """A scene prepared for its echoes as it was planned.
+
+    tiled  False: no scatterers are put on the device, for callers that do not spread them into range profiles
+    exact  False: shadows on facets are shares, by sampled rays
+    ToleranceUnreachable where these cannot meet the tolerance; NothingSeen where no scatterer is left.
+    """
+    request, seen, weights = plan.request, plan.seen, plan.seen.weights
+    if "out of beam" in request.skips:
+        weights = weights.culled(UNSEEN * plan.error_budget / plan.weight_error.peak_to_rms, seen.waveform)
+    points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
+    facets, subdivision, mesh_warnings = None, plan.subdivision, dict[str, Any]()
+    if subdivision is not None:
+        facet_plan, pieces = subdivision.apply(seen.scene, request.seed)
+        subdivision = replace(subdivision, plan=facet_plan)
+        # curves are recognised in facets as they were given, speckle follows from the facets that are added up
+        mesh_warnings = _warned(
+            facet_error.judge(seen.original, seen.antennas, seen.waveform),
+            speckle_contrast.judge(pieces.cells, seen.antennas, seen.waveform),
+        )
+        request.report("scene", 1, 3)
+        facets, left_out = facets_of(
+            pieces, seen.waveform, seen.antennas, shadows=request.shadows, skips=request.skips,
+            max_bytes=request.budget / 4, device=request.device, progress=request.report,
+            exact=exact and request.shadows, sampled=samples_shadows(request, seen),
+            accuracy=SHADOWS * request.tolerance / parts_of(seen.scene), margin=seen.margin,
+        )  # fmt: skip
+        skipped = {why: skipped.get(why, 0) + n for why, n in left_out.items()}
+    _check_left(request, points, facets, skipped)
+    if points is not None:
+        bounded(points.largest() * weights.peak)
+        weights.check_clearance(points.positions)
+    prepared = SceneEchoes(
+        request=request,
+        weights=weights,
+        weight_error=plan.weight_error,
+        subdivision=subdivision,
+        points=points,
+        facets=facets,
+        tiled_points=_tiled_points(plan, points, weights) if tiled else None,
+        tiled_facets=_tiled_facets(plan, subdivision, facets, weights) if tiled else (),
+        skipped=skipped,
+        mesh_warnings=mesh_warnings,
+        error_budget=plan.error_budget,
+        shadow_terms=_shadow_terms(request, seen.scene, facets),
+        n_pulses=len(seen.antennas),
+    )
+    request.clock.lap("scene")
+    prepared.check_plans(seen.antennas, plan.bands)
+    return prepared
+
+
+def _check_left(request: EchoRequest, points: Points | None, facets: FacetSet | None, skipped: dict[str, int]) -> None:
+    """NothingSeen where no scatterer is left that sends something back."""
+    if facets is None and points is not None and not request.same:
+        raise NothingSeen(
+            f"polarization is {request.polarizations}, in which points send back nothing: ask for 'HH' or 'VV', or "
+            "give facets"
+        )
+    if points is None and facets is None:
+        reasons = ", ".join(why for why, n in skipped.items() if n) or "the scene is empty"
+        raise NothingSeen(f"nothing is left to reflect: {reasons}; move the track or the scene")
+
+
+def _tiled_points(plan: ScenePlan, points: Points | None, weights: AntennaWeights) -> TiledScatterers | None:
+    """Points in tiles on the device, where any send something back."""
+    if points is None or not plan.request.same:
+        return None
+    return tiled_points(plan.request.device, points, plan.seen.antennas, plan.seen.waveform, weights)
+
+
+def _tiled_facets(
+    plan: ScenePlan, subdivision: Subdivision | None, facets: FacetSet | None, weights: AntennaWeights
+) -> tuple[TiledFacets, ...]:
+    """Facets in tiles on the device, partly lit ones apart from the others; none where their sums are in float64."""
+    if facets is None or subdivision is None or subdivision.plan.is_float64:
+        return ()
+    request, seen, rule = plan.request, plan.seen, subdivision.plan
+    return tuple(
+        TiledFacets(
+            request.device, part, rule, seen.antennas, seen.waveform, weights, request.polarizations, request.vertical
+        )
+        for part in facets.split()
+    )
+
+
+def _shadow_terms(request: EchoRequest, scene: Scene, facets: FacetSet | None) -> tuple[ErrorTerm, ...]:
+    """Errors of shadows on rough facets that are counted in samples. ToleranceUnreachable where they exceed their
+    share."""
+    if facets is None or not facets.samples_incoherent_alone or facets.illumination is None:
+        return ()
+    share, light = SHADOWS / parts_of(scene), facets.illumination
+    if light.error > share * request.tolerance:
+        raise ToleranceUnreachable(
+            request.tolerance, askable(rounded_up(1.05 * light.reached / share)),
+            "shadow edges on rough facets, counted in samples at single pulses",
+        )  # fmt: skip
+    remedy = "a smaller tolerance: it asks for "
+    return (
+        ErrorTerm("shadow edges", light.sampling, remedy + "more samples of each facet"),
+        ErrorTerm("motion of shadows", light.motion, remedy + "more viewpoints along the track"),
+    )
+
+
+def _warned(*judgements: facet_error.FacetError | speckle_contrast.Speckle) -> dict[str, Any]:
+    """Warn of meshes that are too coarse; returns what a report says of them."""
+    out: dict[str, Any] = {}
+    for judgement in judgements:
+        for number, text in enumerate(judgement.warnings()):
+            warn(text, f"{type(judgement).__name__} {number}")
+        out |= judgement.describe()
+    return out
+
+
+def bounded(largest: float) -> None:
+    """ValueError for amplitudes whose largest is too large for complex64, or so small that digits are lost."""
+    if 0 < largest < LEAST:
+        text = f"amplitudes reach {largest:g}; echoes in complex64 lose digits below {LEAST:g}"
+        raise ValueError(text + ": scale them up")
+    if largest > LARGEST:
+        text = f"amplitudes reach {largest:g}; echoes in complex64 hold up to {LARGEST:g}"
+        raise ValueError(text + ": scale them down")

@@ -1,0 +1,148 @@
+"""The plan of a scene's spectral echoes: parts that are transformed, and facets that are added pulse by pulse."""
+
+from __future__ import annotations
+
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from ...base.constants import SPEED_OF_LIGHT
+from ...base.errors import NotApplicable
+from ...base.report import SMALLER_TOLERANCE, ErrorTerm
+from ...numerics import cost_model
+from ...scattering.facets import FacetSet
+from ...scattering.scatterers import Points
+from ..echo_request import EchoRequest
+from ..scene_echoes import ChannelEchoes, SceneEchoes
+from ..scene_plan import planned_scene, share_of
+from ..scene_preparation import prepare_scene
+from ..spreading import Counts
+from ._planning_time import PlanningTime
+from ._scatterer_amplitudes import ScattererAmplitudes
+from ._spectral_part import SpectralPart, plan_part
+from ._straight_track import StraightTrack
+from .spectral_task import SpectralTask
+
+WINDOW_PULSES = 33  # pulses at which scatterers are compared with a range window that was asked for
+
+
+@dataclass(frozen=True, eq=False)
+class PlannedParts:
+    """The prepared scene, plans for its points and its facets, and the terms of the error of their sum.
+
+    direct  echoes of facets of which pulses see different parts, as `echo` adds them; None where there are none, and for
+            the variant "saras", whose shares of them change as slowly as amplitudes
+    """
+
+    task: SpectralTask
+    prepared: SceneEchoes
+    parts: list[SpectralPart]
+    direct: ChannelEchoes | None
+    error_terms: tuple[ErrorTerm, ...]
+
+    def describe(self) -> dict[str, Any]:
+        """Words of the plan of the part with the largest error; of facets added as `echo` does where there is no
+        other."""
+        if not self.parts and self.direct is not None:
+            return self.direct.plan
+        return max(self.parts, key=lambda part: part.predicted_error).describe()
+
+    def counts(self) -> Counts:
+        """Pairs of scatterer and pulse that are added up."""
+        n_pulses, n_direct = len(self.task.track), 0 if self.direct is None else len(self.direct.scene)
+        seen = sum(len(part.some) for part in self.parts) + n_direct
+        return Counts(len(self.prepared) * n_pulses, 0, 0, (len(self.prepared) - seen) * n_pulses)
+
+    def seconds(self) -> float:
+        """About the seconds of the echoes, planning not included."""
+        task, total = self.task, 0.0
+        n_pulses, n_samples = len(task.track), len(task.frequencies)
+        if self.direct is not None:
+            partly = self.direct.scene.shadow_words.get("partly lit facets", 0)
+            each = cost_model.LIT_PART * partly + cost_model.ECHO_FACET * len(self.direct.scene)
+            total += 1e-6 * each * n_pulses
+        for part in self.parts:
+            n, terms = len(part.some), len(part.expansion)
+            of_facets = isinstance(part.amplitudes.part, FacetSet)
+            amplitude = cost_model.SPECTRAL_FACET if of_facets else cost_model.SPECTRAL_POINT
+            total += 1e-6 * n * (terms * amplitude + cost_model.SPECTRAL_PLANES * of_facets)
+            for one in part.maps:
+                of_map = cost_model.SPECTRAL_SPREAD * len(one.azimuth)
+                of_map += cost_model.SPECTRAL_SAMPLE * one.grid.count * n_samples
+                total += 1e-6 * terms * len(task.request.polarizations) * one.nodes * of_map
+        return total
+
+
+def plan_parts(task: SpectralTask, request: EchoRequest, longest: float | None = None) -> PlannedParts:
+    """The plan of a task's echoes.
+
+    request  that of the task, with the clock of this plan;  longest  seconds that its responses may take (PlanningTime)
+    """
+    seen, exact = task.seen, task.variant == "exact"
+    request.report("scene", 0, 3)
+    prepared = prepare_scene(planned_scene(request, seen, ()), tiled=False, exact=exact)
+    steady, direct = prepared.by_light(seen.antennas, seen.waveform) if exact else (prepared.facets, None)
+    parts, terms = [], list(prepared.shadow_terms)
+    for scatterers in (prepared.points if request.same else None, steady):
+        if scatterers is not None:
+            part, term = _planned_part(task, prepared, scatterers, longest)
+            parts.append(part)
+            terms.append(term)
+    if task.options.range_window is not None and request.gated:
+        for part in parts:
+            _check_window(part, task.line, seen.antennas.reference_range, task.window)
+    channel = None
+    if direct is not None:
+        channel = direct.channel(seen.antennas, seen.waveform, task.frequencies)
+        terms.append(ErrorTerm("facets added pulse by pulse", channel.predicted_error, SMALLER_TOLERANCE))
+    request.clock.lap("plan")
+    return PlannedParts(task, prepared, parts, channel, tuple(terms))
+
+
+def _planned_part(
+    task: SpectralTask, prepared: SceneEchoes, scatterers: Points | FacetSet, longest: float | None
+) -> tuple[SpectralPart, ErrorTerm]:
+    """The plan of points or facets, and the term of its error."""
+    request, line, waveform = prepared.request, task.line, task.seen.waveform
+    band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
+    share = share_of(request, task.seen, request.tolerance)
+    straight = 4 * np.pi * band[1] / SPEED_OF_LIGHT * line.deviation
+    gain, fixed, random = 1.0, 0.0, False
+    of_facets = isinstance(scatterers, FacetSet)
+    if isinstance(scatterers, FacetSet) and prepared.subdivision is not None:
+        gain, fixed = prepared.subdivision.gain, prepared.subdivision.plan.predicted_error
+        random = not scatterers.is_mirror
+    amplitudes = ScattererAmplitudes(
+        scatterers, prepared.weights, line, request.polarizations, request.vertical,
+        share if task.variant == "exact" else None,
+    )  # fmt: skip
+    part = plan_part(
+        amplitudes, line, band, prepared.weights.pair is not None, random, task.variant,
+        share / gain - fixed - straight, request.tolerance, request.device,
+        PlanningTime.of_echo(
+            line.n_pulses, len(amplitudes.azimuth), len(task.frequencies), len(request.polarizations), of_facets, longest
+        ),
+    )  # fmt: skip
+    error = gain * (part.predicted_error + fixed + straight)
+    return part, ErrorTerm("facets" if of_facets else "points", error, SMALLER_TOLERANCE)
+
+
+def _check_window(
+    part: SpectralPart, line: StraightTrack, reference_range: np.ndarray, window: tuple[float, float]
+) -> None:
+    """NotApplicable where a scatterer lies outside the range window at a pulse that sees it."""
+    azimuth, slant_range = part.amplitudes.azimuth[part.some], part.amplitudes.slant_range[part.some]
+    low, high = part.seen
+    for p in np.unique(np.linspace(0, line.n_pulses - 1, WINDOW_PULSES).astype(int)).tolist():
+        lag = p * line.spacing - azimuth
+        distance = np.hypot(lag, slant_range)
+        seen = (lag >= low * distance) & (lag <= high * distance)
+        away = distance[seen] - reference_range[p]
+        outside = (away < window[0]) | (away > window[1])
+        if outside.any():
+            raise NotApplicable(
+                f"range_window ({window[0]:g}, {window[1]:g}) m cuts the scene: at pulse {p} scatterers lie at "
+                f"{away.min():.4g} to {away.max():.4g} m about the reference. Widen it, leave it out, or use echo, "
+                "which leaves out scatterers row by row"
+            )
