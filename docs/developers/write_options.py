@@ -293,10 +293,9 @@ def page(entries: list[Verb]) -> str:
 <!-- written by {COMMAND} -->
 
 Options are given by name: `sarcl.backproject(raw, grid, tolerance=1e-4)`. A misspelt option is refused, and the most
-similar one is named. `sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-4)` takes the same options. The tables have
-the first sentence on each option; `help(sarcl.backproject)` has all of it. In [scenario files](scenarios.md) options
-are keys of the verb's table, except those that are named below each table: they belong to a single run, or have tables
-of their own.
+similar one is named. `sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-4)` takes the same options, and
+`help(sarcl.backproject)` lists them too. In [scenario files](scenarios.md) options are keys of the verb's table, except
+those that are named below each table: they belong to a single run, or have tables of their own.
 
 ## Every verb
 
@@ -312,15 +311,10 @@ of their own.
 def _table(options: Iterable[Parameter]) -> str:
     text = "| option | type | default | meaning |\n|---|---|---|---|\n"
     for p in options:
-        cells = f"`{p.name}`", f"`{_requoted(p.type)}`", f"`{literal(p.default)}`", first_sentence(p.doc)
+        cells = f"`{p.name}`", f"`{_requoted(p.type)}`", f"`{literal(p.default)}`", " ".join(p.doc.split())
         text += f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
     alone = ", ".join(f"`{p.name}`" for p in options if not p.in_files)
     return text + (f"\nNot in scenario files: {alone}.\n" if alone else "")
-
-
-def first_sentence(text: str) -> str:
-    """The first sentence of the documentation of an option, in one line."""
-    return re.split(r"\.\s+(?=[A-Z])", " ".join(text.split()))[0]
 
 
 def flags(entries: list[Verb]) -> str:

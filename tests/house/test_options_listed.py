@@ -54,7 +54,7 @@ class MoreOptions(BackprojectOptions):
     """The options of backproject, and one more."""
 
     tolerance: float = option(0.5)
-    colour: Colour | None = option("red", 'the colour | that it has, "red"; at 100 % it\'s green. More of it')
+    colour: Colour | None = option("red", 'the colour | that it has, "red"; at 100 % it\'s green.\n    Or none')
 
 
 @verb(MoreOptions)
@@ -73,7 +73,7 @@ def test_another_record_changes_all_files(write, monkeypatch, tmp_path):
     assert f"from {__name__} import Colour\n" in text["__init__.pyi"]
     for lines in ('    colour: Colour | None = "red",\n', "    colour: Colour | None\n", "tolerance: float = 0.5,\n"):
         assert lines in text["__init__.pyi"]
-    meaning = 'the colour \\| that it has, "red"; at 100 % it\'s green'
+    meaning = 'the colour \\| that it has, "red"; at 100 % it\'s green. Or none'
     assert f'| `colour` | `Colour \\| None` | `"red"` | {meaning} |\n' in text["options.md"]
     assert "| `tolerance` | `float` | `0.5` | L2 error" in text["options.md"].partition("## backproject")[2]
     names = {}
