@@ -2,7 +2,7 @@
 
 sarcl/verbs/__init__.pyi  signatures of the verbs, for type checkers and editors
 docs/guide/options.md     tables of all options
-sarcl/cli/_flags.py       defaults and help of options for the parser of the command line, which must not import numpy
+sarcl/cli/_flags.py       defaults and words of options for the parser of the command line, which must not import numpy
 
 tests/house/test_options_listed.py fails while these differ from what this script makes.
 """
@@ -32,10 +32,9 @@ from sarcl.numerics.run_options import RunOptions
 
 COMMAND = "python docs/developers/write_options.py"
 STUB, PAGE, FLAGS = "sarcl/verbs/__init__.pyi", "docs/guide/options.md", "sarcl/cli/_flags.py"
-ON_COMMAND_LINE = ("echo", "backproject", "polar_format", "range_doppler")
+ON_COMMAND_LINE = ("backproject", "polar_format", "range_doppler")
 PIECE = "tile"  # with this option a verb returns None while other pieces are missing
 WIDTH = 120
-EMPTY = inspect.Parameter.empty
 
 
 @dataclass(frozen=True)
@@ -45,7 +44,7 @@ class Parameter:
     name: str
     type: str
     module: str
-    default: Any = EMPTY
+    default: Any = inspect.Parameter.empty
     doc: str = ""
     in_files: bool = True
 
@@ -91,16 +90,8 @@ def read(name: str) -> Verb:
         for p in signature.parameters.values()
         if p.kind is p.POSITIONAL_OR_KEYWORD
     ]
-    if hasattr(verb, "options"):
-        options = options_of(verb.options)
-    else:  # not yet a verb
-        options = [
-            Parameter(p.name, p.annotation, verb.__module__, p.default)
-            for p in signature.parameters.values()
-            if p.kind is p.KEYWORD_ONLY
-        ]
     doc, result = inspect.getdoc(verb) or "", str(signature.return_annotation)
-    return Verb(name, doc, verb.__module__, result, tuple(subjects), tuple(options))
+    return Verb(name, doc, verb.__module__, result, tuple(subjects), tuple(options_of(verb.options)))
 
 
 def options_of(record: Any) -> list[Parameter]:
@@ -302,10 +293,9 @@ def page(entries: list[Verb]) -> str:
 <!-- written by {COMMAND} -->
 
 Options are given by name: `sarcl.backproject(raw, grid, tolerance=1e-4)`. A misspelt option is refused, and the most
-similar one is named. `sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-4)` takes the same options. The tables have
-the first sentence on each option; `help(sarcl.backproject)` has all of it. In [scenario files](scenarios.md) options
-are keys of the verb's table, except those that are named below each table: they belong to a single run, or have tables
-of their own.
+similar one is named. `sarcl.plan(sarcl.backproject, raw, grid, tolerance=1e-4)` takes the same options, and
+`help(sarcl.backproject)` lists them too. In [scenario files](scenarios.md) options are keys of the verb's table, except
+those that are named below each table: they belong to a single run, or have tables of their own.
 
 ## Every verb
 
@@ -321,15 +311,10 @@ of their own.
 def _table(options: Iterable[Parameter]) -> str:
     text = "| option | type | default | meaning |\n|---|---|---|---|\n"
     for p in options:
-        cells = f"`{p.name}`", f"`{_requoted(p.type)}`", f"`{literal(p.default)}`", first_sentence(p.doc)
+        cells = f"`{p.name}`", f"`{_requoted(p.type)}`", f"`{literal(p.default)}`", " ".join(p.doc.split())
         text += f"| {' | '.join(cell.replace('|', chr(92) + '|') for cell in cells)} |\n"
     alone = ", ".join(f"`{p.name}`" for p in options if not p.in_files)
     return text + (f"\nNot in scenario files: {alone}.\n" if alone else "")
-
-
-def first_sentence(text: str) -> str:
-    """The first sentence of the documentation of an option, in one line."""
-    return re.split(r"\.\s+(?=[A-Z])", " ".join(text.split()))[0]
 
 
 def flags(entries: list[Verb]) -> str:
@@ -364,8 +349,7 @@ def _dicts(values: dict[str, dict[str, str]]) -> str:
 def made(root: Path) -> dict[Path, str]:
     """The files as they should be now: path -> text."""
     entries = [read(name) for name in verbs.HOMES]
-    recorded = [entry for entry in entries if all(p.doc for p in entry.options)]  # not yet a verb: in the stub alone
-    return {root / STUB: stub(entries), root / PAGE: page(recorded), root / FLAGS: flags(recorded)}
+    return {root / STUB: stub(entries), root / PAGE: page(entries), root / FLAGS: flags(entries)}
 
 
 def main(root: Path) -> int:

@@ -7,29 +7,6 @@ from typing import Any
 
 # verb -> option -> its default
 DEFAULTS: dict[str, dict[str, Any]] = {
-    "echo": {
-        "channels": "simultaneous",
-        "receive": "reference",
-        "skip": True,
-        "receiver": None,
-        "polarization": "HH",
-        "vertical": None,
-        "range_window": None,
-        "reference": None,
-        "array": None,
-        "antenna": None,
-        "radar": None,
-        "shadows": True,
-        "seed": 0,
-        "compressed": True,
-        "max_edge": "auto",
-        "max_bytes": None,
-        "out": None,
-        "check": None,
-        "tolerance": 0.001,
-        "device": None,
-        "progress": None,
-    },
     "backproject": {
         "method": "auto",
         "beam": None,
@@ -83,10 +60,6 @@ DEFAULTS: dict[str, dict[str, Any]] = {
 
 # verb -> option -> the words that it takes, where it takes nothing else
 CHOICES: dict[str, dict[str, tuple[str, ...]]] = {
-    "echo": {
-        "channels": ("simultaneous", "separated"),
-        "receive": ("reference", "own", "all"),
-    },
     "backproject": {
         "method": ("auto", "direct", "factorized"),
         "mapping": ("corrected", "apparent", "channels"),

@@ -58,11 +58,12 @@ def case(name: str) -> Case:
     return Case({"raw": noise()} | ({} if name == "range_doppler" else {"grid": GRID}), {})
 
 
-VERBS = [name for name in verbs.HOMES if hasattr(getattr(verbs, name), "options")]
-FOCUSING = [name for name in VERBS if "scene" not in case(name).subjects]
+FOCUSING = [name for name in verbs.HOMES if "scene" not in case(name).subjects]
+MEASURED_PLAN = ("run_seconds",)  # of report.plan: how long a run of the grid took
+ESTIMATED_BY_RUN = ("fullwave_echo",)  # its forecast has the error that is allowed, its report the one that runs show
 
 
-@pytest.fixture(params=VERBS)
+@pytest.fixture(params=verbs.HOMES)
 def name(request):
     return request.param
 
@@ -75,12 +76,17 @@ def bits(result: Any) -> list[bytes]:
     return [np.asarray(values[:]).tobytes() for values in rows]
 
 
+def choices(result: Any) -> dict[str, Any]:
+    """What the plan of a result has decided."""
+    return {key: value for key, value in result.report.plan.items() if key not in MEASURED_PLAN}
+
+
 def test_a_run_of_the_forecast_is_the_verb_bit_by_bit_and_may_be_repeated(name):
     forecast = case(name).planned(name, check=False)
     wanted = case(name).result(name, check=False)
     for result in (forecast.run(), forecast.run()):
         assert bits(result) == bits(wanted)
-        assert dict(result.report.plan) == dict(wanted.report.plan)
+        assert choices(result) == choices(wanted)
 
 
 def test_a_run_plans_nothing_and_its_seconds_are_its_own(name, monkeypatch):
@@ -100,7 +106,11 @@ def test_the_predicted_error_is_the_root_of_the_sum_of_the_squares_of_its_terms(
     assert forecast.error_terms and forecast.predicted_error > 0
     assert forecast.predicted_error == pytest.approx(root_sum_square(forecast.error_terms), rel=1e-12)
     assert report.predicted_error == pytest.approx(root_sum_square(report.error_terms), rel=1e-12)
-    assert report.predicted_error == forecast.predicted_error and report.error_terms == forecast.error_terms
+    if name in ESTIMATED_BY_RUN:
+        assert [term.name for term in report.error_terms] == [term.name for term in forecast.error_terms]
+        assert report.predicted_error <= forecast.predicted_error
+    else:
+        assert report.predicted_error == forecast.predicted_error and report.error_terms == forecast.error_terms
     assert report.predicted_error <= report.tolerance
     assert all(term.name and term.remedy and term.value > 0 for term in report.error_terms)
 

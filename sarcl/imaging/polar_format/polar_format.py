@@ -39,8 +39,8 @@ class PolarFormatOptions(GridOptions):
 
     tolerance: float = option(
         1e-2,
-        "L2 error allowed against that sum, relative to the larger of the norm of I and the norm of samples that add "
-        "with random phases, sqrt(pixels sum |w s|^2)",
+        "L2 error allowed against the sum of plane waves, relative to the larger of the norm of I and the norm of "
+        "samples that add with random phases, sqrt(pixels sum |w s|^2)",
         lambda name, value: allowed_error(value),
     )
 

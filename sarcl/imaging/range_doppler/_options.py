@@ -74,9 +74,9 @@ class RangeDopplerOptions(FocusOptions):
     )
     beam: float | None = option(
         None,
-        "None: all rows contribute to every pixel. Else the azimuth beam, full angle in rad about the Doppler "
-        "centroid: rows that see a pixel outside it do not contribute. Its ends are tapered, beyond the angle without "
-        "a window along the track (the log and the report say how much that is), else within it",
+        "the azimuth beam, full angle in rad about the Doppler centroid: rows that see a pixel outside it do not "
+        "contribute; None: all rows contribute to every pixel. Its ends are tapered, beyond the angle without a window "
+        "along the track (the log and the report say how much that is), else within it",
         or_none(_beam),
     )
     doppler: Literal["geometry", "data"] | float = option(
@@ -93,7 +93,7 @@ class RangeDopplerOptions(FocusOptions):
     )
     doppler_rate: Literal["geometry", "data"] | float = option(
         "geometry",
-        'of the azimuth compression: "geometry", from the track; "data", from the displacement of two looks (map '
+        'that of the azimuth compression: "geometry", from the track; "data", from the displacement of two looks (map '
         "drift), which needs ground with contrast; or in Hz/s at the centre frequency, in the middle of the ranges and "
         "at the centroid. Effective velocities at all ranges are scaled alike. `tolerance` then refers to "
         "backprojection with ranges that have this rate",
