@@ -650,7 +650,9 @@ table(planned, lambda made: made, {
 
 
 def planned_echo(scene: Any, wave: Any = None, track: Any = None, **options: Any) -> Parts:
-    made = sarcl.plan(sarcl.echo, scene, chirp() if wave is None else wave, circle(60) if track is None else track, **options)
+    made = sarcl.plan(
+        sarcl.echo, scene, chirp() if wave is None else wave, circle(60) if track is None else track, **options
+    )
     numbers = made.n_rows, made.n_samples, made.bytes, made.contributions, made.predicted_error
     return {"plan": made.plan, "numbers": numbers}
 
