@@ -12,7 +12,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
-from helpers.annotations import namespace, stub, verb_signature
+from house.annotations import namespace, stub, verb_signature
 
 from sarcl import verbs
 from sarcl.base.forecast import Plan
@@ -157,3 +157,8 @@ def test_names_that_two_verbs_mean_differently_are_told_apart():
     skips = [stub()[1][name][0].parameters["skip"].annotation for name in ("echo", "backproject")]
     kinds = [namespace(verb.options)["Skip"] for verb in (verbs.echo, verbs.backproject)]
     assert skips == [bool | Collection[kind] for kind in kinds] and skips[0] != skips[1]
+
+
+def test_functions_of_the_stub_are_those_of_the_package():
+    assert set(stub()[1]) == {*verbs.HOMES, "plan"} == set(verbs.__all__)
+    assert all(getattr(verbs, name).__name__ == name for name in verbs.__all__)

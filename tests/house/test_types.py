@@ -16,7 +16,7 @@ from importlib.resources import files
 from pathlib import Path
 
 import pytest
-from helpers.annotations import hints_of, namespace, stub
+from house.annotations import hints_of, namespace, stub
 
 import sarcl
 from sarcl import motion, shapes
