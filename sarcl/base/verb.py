@@ -52,6 +52,8 @@ def verb(record: type[Options]) -> Callable[[Callable[..., Plan[R]]], Verb[R]]:
         names, known = [p.name for p in subjects], list(described(record))
 
         def planned(*args: Any, **given: Any) -> Plan[R]:
+            if len(args) > len(names):
+                raise TypeError(f"{plan.__name__} takes {', '.join(names)} by position; give options by name")
             for name in given:
                 if name not in known and name not in names:
                     raise TypeError(f"{plan.__name__} has {unknown(name, known, 'option')}")

@@ -78,8 +78,9 @@ def test_subjects_are_given_by_position_or_by_name():
 
 
 def test_options_are_given_by_name_alone():
-    with pytest.raises(TypeError):
-        throw("egg", "tree", ThrowOptions())
+    for value in (5, ThrowOptions()):
+        with pytest.raises(TypeError, match="throw takes ball, target by position; give options by name"):
+            throw("egg", "tree", value)
     with pytest.raises(TypeError, match="throw has unknown option 'options'"):
         throw("egg", "tree", options=ThrowOptions())
 
