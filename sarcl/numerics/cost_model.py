@@ -100,7 +100,8 @@ CUT_PIECE = 1.6  # per piece: cutting, judging and tiling it
 LIT_SHARE = 15.0  # per piece of a rough facet: its illuminated shares at the viewpoints along the track
 # Per piece and pulse, of facets whose lit parts are computed: which parts these are, and adding them (0.25 and 0 on open
 # ground, 1.4 and 1.6 for the car)
-CLIPPED_PIECE, LIT_PIECE = 0.8, 0.8
+CLIPPED_PIECE, LIT_PIECE = 0.5, 0.5
+JUDGED_FACET = 4.0  # per facet of a mesh or terrain: what its flat facets change of curves
 
 # Spectral echoes, in us (2026-11-22).
 LIT_PART = 20.0  # per pulse, of a facet past some ten others (2026-11-26)

@@ -10,12 +10,13 @@ from __future__ import annotations
 
 import time
 import warnings
+from collections.abc import Callable
 from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
 
-from ..base.errors import NotApplicable, NothingSeen, SarclWarning, ToleranceUnreachable, warned_once
+from ..base.errors import NotApplicable, NothingSeen, SarclWarning, ToleranceUnreachable
 from ..base.forecast import Forecast
 from ..base.report import SMALLER_TOLERANCE, ErrorTerm, root_sum_square
 from ..base.stage_timer import Clock
@@ -23,8 +24,9 @@ from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
 from .echo_output import bytes_of, pulses_at_once
-from .echo_plan import EchoPlan, PlannedEchoes
+from .echo_task import EchoTask
 from .echo_work import EchoWork
+from .planned_echoes import PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
@@ -33,7 +35,9 @@ from .spectral.spectral_task import spectral_task
 
 SHARE, LEAST = 0.06, 0.035  # of the modelled job, and seconds: preparing the scene may take the larger of these
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
+BUILDING = 0.1  # s: pulses that take longer have built kernels, perhaps, and are timed again
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
+JUDGING = 0.02  # of the modelled job: meshes are judged, and warned of, where that takes no more
 SPECTRAL_SHARE = 0.04  # of the modelled job: spectral_echo is planned where that takes no more
 
 
@@ -46,28 +50,30 @@ class Estimate(NamedTuple):
     contributions: float
 
 
-def forecast_of(plan: EchoPlan) -> Forecast[PhaseHistory]:
-    """The Forecast of a plan.
+def forecast_of(
+    task: EchoTask, planned: PlannedEchoes, clock: Clock, run_of: Callable[[PlannedEchoes], Callable[[], PhaseHistory]]
+) -> Forecast[PhaseHistory]:
+    """The Forecast of planned echoes.
 
+    clock   of planning;  run_of  gives the function that carries out a plan
     plan["contributions"]  about the number of pairs of scatterer, pulse and channel that will be added up
     plan["spectral_echo"]  about the seconds of `spectral_echo` instead, or why it refuses or was not planned
     """
-    clock, shape = Clock(plan.seconds), plan.channels.shape
-    with warned_once():
-        planned = plan.plan_scene(replace(plan.request(clock), progress=None))
-        work = EchoWork.of(planned)
-        if work.preparing <= max(SHARE * work.seconds, LEAST):
-            planned, prepared = planned.with_scene()
-            clock.lap("plan")
-            estimate = _timed(plan, planned, prepared, work)
-        else:
-            words = planned.scene.describe() | warn_of_curves(planned.scene)
-            clock.lap("plan")
-            estimate = Estimate(_allotted(planned), words, work.seconds, work.contributions)
+    work, shape = EchoWork.of(planned), planned.channels.shape
+    if work.preparing <= max(SHARE * work.seconds, LEAST):
+        planned, prepared = planned.with_scene()
+        clock.lap("plan")
+        estimate = _timed(task, planned, prepared, work)
+    else:
+        known = planned.scene.describe()
+        if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
+            known |= warn_of_curves(planned.scene)
+        clock.lap("plan")
+        estimate = Estimate(_allotted(planned), known, work.seconds, work.contributions)
     spent = sum(clock.seconds.values())
     seconds = spent + estimate.seconds
-    words = plan.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
-    words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(plan, work, seconds)}
+    words = planned.channels.words(planned.method, estimate.words)  # type: ignore[arg-type]
+    words |= {"contributions": estimate.contributions, "spectral_echo": _spectral(task, work, seconds)}
     return Forecast(
         method="pulse by pulse",
         plan=words,
@@ -78,13 +84,13 @@ def forecast_of(plan: EchoPlan) -> Forecast[PhaseHistory]:
         n_rows=int(np.prod(shape[:-1], dtype=np.int64)),
         n_samples=shape[-1],
         planning=spent,
-        run=replace(plan, seconds=clock.seconds, planned=planned).run,
+        run=run_of(planned),
     )
 
 
-def _timed(plan: EchoPlan, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
+def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: EchoWork) -> Estimate:
     """The errors of all pulses, and from a few of them the seconds and contributions of all."""
-    shape, method = plan.channels.shape, planned.method
+    shape, method = planned.channels.shape, planned.method
     n_pulses, most = shape[0], max(TIMED_SHARE * work.seconds, LEAST_TIMED)
     n = int(np.clip(most / (work.adding / n_pulses), 1, max(1, n_pulses // 8)))
     quiet = replace(prepared, request=replace(prepared.request, clock=Clock()))
@@ -95,12 +101,13 @@ def _timed(plan: EchoPlan, planned: PlannedEchoes, prepared: SceneEchoes, work: 
         return time.perf_counter() - begin, added
 
     for first in ((n_pulses - n) // 2, 0, n_pulses - n):  # elsewhere more may be seen
-        _, added = timed(first, 1)  # builds kernels, too
+        seconds, added = timed(first, n)
         if added.counts.contributing:
             break
-    seconds, added = timed(first, n)
+    if seconds > BUILDING:
+        seconds, added = timed(first, n)
     whole, room = added, prepared.request.budget
-    at_once = min(method.pulses(room), pulses_at_once(shape, plan.task.options.out, room))
+    at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
     if -(-n_pulses // at_once) * method.runs <= MOST_PLANS * n_pulses:
         whole = Added()
         for start in range(0, n_pulses, at_once):
@@ -123,9 +130,8 @@ def _allotted(planned: PlannedEchoes) -> tuple[ErrorTerm, ...]:
     return planned.method.between(tuple(terms))
 
 
-def _spectral(plan: EchoPlan, work: EchoWork, seconds: float) -> str:
+def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
     """About the seconds of spectral_echo with these arguments, or why it refuses them or was not planned."""
-    task = plan.task
     try:
         spectral = spectral_task(task.original, task.waveform, task.given_track, task.options)
         longest = SPECTRAL_SHARE * work.seconds

@@ -9,12 +9,13 @@ from typing import Literal
 from ..base.options import option
 from ..base.validation import choice
 from ..numerics import plan
-from .channels.channel_rows import CHANNELS, RECEIVE
 from .scene_options import SceneOptions
 
 Skip = Literal[
     "zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels"
 ]  # fmt: skip
+CHANNELS = ("simultaneous", "separated")
+RECEIVE = ("reference", "own", "all")
 SKIPS = ("zero reflectivity", "facing away", "range window", "out of beam", "equal channels", "interpolated channels")
 
 

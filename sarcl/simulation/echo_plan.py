@@ -2,80 +2,24 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
 
 from ..arrays.channels import is_single
-from ..base.errors import ToleranceUnreachable, confirm_tolerance, warned_once
+from ..base.errors import confirm_tolerance, warned_once
 from ..base.forecast import Forecast
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..model.phase_history import PhaseHistory
 from .channels.array_channels import ArrayChannels
-from .channels.array_channels import Method as ArrayMethod
 from .echo_check import worth_checking
+from .echo_forecast import forecast_of
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
+from .planned_echoes import Channels, Method, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
-from .scene_plan import ScenePlan, planned_scene
-from .scene_preparation import prepare_scene
-from .single_channel import SingleChannel, SingleEchoes
-
-Channels = SingleChannel | ArrayChannels
-Method = SingleEchoes | ArrayMethod
-
-
-@dataclass(frozen=True, eq=False)
-class PlannedEchoes:
-    """A method, and the plan of the scene for it.
-
-    scene   how the scene is prepared;  prepared  the scene, where that has been done
-    others  methods that are taken where the prepared scene cannot meet the tolerance, and what is asked of each
-    """
-
-    channels: Channels
-    method: Method
-    scene: ScenePlan
-    others: Sequence[tuple[Method, EchoRequest]]
-    prepared: SceneEchoes | None = None
-
-    @classmethod
-    def first_of(cls, channels: Channels, methods: Sequence[tuple[Any, EchoRequest]]) -> PlannedEchoes:
-        """The first of the methods whose plan can meet the tolerance; ToleranceUnreachable of the last one."""
-        (method, request), *others = methods
-        try:
-            return cls(channels, method, planned_scene(request, channels.seen, method.bands), others)
-        except ToleranceUnreachable:
-            if not others:
-                raise
-        return cls.first_of(channels, others)
-
-    def with_scene(self) -> tuple[PlannedEchoes, SceneEchoes]:
-        """The same with the scene prepared, and that scene."""
-        if self.prepared is not None:
-            return self, self.prepared
-        try:
-            prepared = prepare_scene(self.scene)
-        except ToleranceUnreachable:
-            if not self.others:
-                raise
-            return self.first_of(self.channels, self.others).with_scene()
-        return replace(self, prepared=prepared), prepared
-
-    def asked_by(self, request: EchoRequest) -> PlannedEchoes:
-        """The same with the clock and the progress function of another request."""
-
-        def renewed(old: EchoRequest) -> EchoRequest:
-            return replace(old, clock=request.clock, progress=request.progress)
-
-        return replace(
-            self,
-            scene=replace(self.scene, request=renewed(self.scene.request)),
-            others=[(method, renewed(old)) for method, old in self.others],
-            prepared=self.prepared and replace(self.prepared, request=renewed(self.prepared.request)),
-        )
+from .single_channel import SingleChannel
 
 
 @dataclass(frozen=True, eq=False)
@@ -111,9 +55,14 @@ class EchoPlan:
 
     def forecast(self) -> Forecast[PhaseHistory]:
         """Its Forecast."""
-        from .echo_forecast import forecast_of
+        clock = Clock(self.seconds)
 
-        return forecast_of(self)
+        def run_of(planned: PlannedEchoes) -> Callable[[], PhaseHistory]:
+            return replace(self, seconds=clock.seconds, planned=planned).run
+
+        with warned_once():
+            planned = self.plan_scene(replace(self.request(clock), progress=None))
+            return forecast_of(self.task, planned, clock, run_of)
 
     def run(self) -> PhaseHistory:
         """The echoes."""

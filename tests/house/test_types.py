@@ -27,8 +27,7 @@ from sarcl.model import antenna
 from sarcl.papers.farooq import range_zones
 from sarcl.scattering import facets
 from sarcl.scene import material
-from sarcl.simulation.channels import channel_rows
-from sarcl.simulation.echo_options import SKIPS, Skip
+from sarcl.simulation import echo_options
 from sarcl.simulation.scene_options import Polarization
 
 ROOT = Path(__file__).parents[2]
@@ -165,21 +164,21 @@ def test_options_of_a_shape_are_those_that_it_spells_out(shape):
 @pytest.mark.parametrize(
     ("literal", "words"),
     [
-        (Skip, SKIPS),
+        (echo_options.Skip, echo_options.SKIPS),
         (Polarization, facets.POLARIZATIONS),
         (focusing_task.Skip, focusing_task.SKIPS),
         (antenna.Kind, antenna.KINDS),
         (material.Diagram, material.DIAGRAMS),
         (map_aperture.MapKind, map_aperture.MAPPINGS),
-        ((sarcl.echo, "channels"), channel_rows.CHANNELS),
-        ((sarcl.echo, "receive"), channel_rows.RECEIVE),
+        ((sarcl.echo, "channels"), echo_options.CHANNELS),
+        ((sarcl.echo, "receive"), echo_options.RECEIVE),
         ((sarcl.map_aperture, "offset"), map_aperture.OFFSETS),
         ((sarcl.backproject, "method"), choose_method.METHODS),
         ((motion.perturbed, "frame"), motion.FRAMES),
         ((motion.sinusoidal, "frame"), motion.FRAMES),
         ((case.Case, "progression"), _array.PROGRESSIONS),
         ((case.Case, "path"), case.PATHS),
-        ((case.Case, "receive"), channel_rows.RECEIVE),
+        ((case.Case, "receive"), echo_options.RECEIVE),
     ],
 )
 def test_words_of_a_literal_are_those_that_are_accepted(literal, words):

@@ -18,8 +18,8 @@ from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...opencl.device import DeviceChoice
 from ...scene.scene import Scene
-from ...simulation.channels.channel_rows import RECEIVE
 from ...simulation.echo import echo
+from ...simulation.echo_options import RECEIVE
 from ._array import PROGRESSIONS, as_channels, groups_of, highest, make, size, subarrays
 
 RAW = "unmodified"

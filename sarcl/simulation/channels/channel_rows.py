@@ -12,9 +12,6 @@ from ...model.trajectory import Trajectory
 from ...numerics.pulse_geometry import PulseGeometry, half_path
 from .. import echo_sampling
 
-CHANNELS = ("simultaneous", "separated")
-RECEIVE = ("reference", "own", "all")
-
 
 class ChannelRows:
     """Rows of an array's echoes: (pulse, receiver) where channels are summed, else (pulse, transmitter, receiver).
