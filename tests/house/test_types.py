@@ -29,7 +29,7 @@ from sarcl.scattering import facets
 from sarcl.scene import material
 from sarcl.simulation.channels import channel_rows
 from sarcl.simulation.echo_options import SKIPS, Skip
-from sarcl.simulation.scene_options import Polarization
+from sarcl.simulation.track_options import Polarization
 
 ROOT = Path(__file__).parents[2]
 MODULES = {f"sarcl.{n}": getattr(sarcl, n) for n in sarcl.__all__ if inspect.ismodule(getattr(sarcl, n))}
