@@ -11,9 +11,8 @@ from ..model.waveform import Waveform
 from ..scene.scene import Scene
 from .echo_options import EchoOptions
 from .echo_plan import EchoPlan
-from .echo_request import echo_request as echo_request
 from .echo_task import echo_task
-from .scene_options import Polarization as Polarization
+from .track_options import Polarization as Polarization
 
 
 @verb(EchoOptions)

@@ -3,13 +3,11 @@
 from __future__ import annotations
 
 from dataclasses import dataclass, field
-from typing import Any
 
 import numpy as np
 
-from ..base import host_memory, wgs84
+from ..base import host_memory
 from ..base.stage_timer import Clock
-from ..numerics import plan
 from ..numerics.run_options import Progress as Progress
 from ..opencl.choose_device import open_device
 from ..opencl.device import Device
@@ -44,9 +42,7 @@ class EchoRequest:
     @classmethod
     def of(cls, options: SceneOptions, scene: Scene) -> EchoRequest:
         """The request of a verb's options for a scene; opens the device."""
-        device, most, asked = open_device(options.device), options.max_bytes, options.vertical
-        if asked is None:
-            asked = wgs84.vertical_at(scene.center)
+        device, most = open_device(options.device), options.max_bytes
         return cls(
             device=device,
             tolerance=options.tolerance,
@@ -54,7 +50,7 @@ class EchoRequest:
             host=max(LEAST_HOST, HOST_SHARE * host_memory.installed() if most is None else most),
             skips=set(options.skip) if not isinstance(options.skip, bool) else set(),
             polarizations=tuple(options.polarization),
-            vertical=np.array([0.0, 0.0, 1.0]) if asked is None else np.asarray(asked),
+            vertical=options.vertical_at(scene.center),
             max_edge=options.max_edge,
             shadows=options.shadows,
             seed=options.seed,
@@ -75,9 +71,3 @@ class EchoRequest:
         """Call `progress`, where it is given."""
         if self.progress:
             self.progress(stage, done, total)
-
-
-def echo_request(scene: Scene, skips: tuple[str, ...], **options: Any) -> EchoRequest:
-    """The request of a verb with options of SceneOptions;  skips  the reasons that its `skip` may name."""
-    asked = plan.skips(options.pop("skip", True), skips)
-    return EchoRequest.of(SceneOptions(**options, skip=asked), scene)

@@ -26,7 +26,7 @@ from ..numerics.windows import Window
 from ..opencl.device import DeviceChoice
 from ..scene.scene import Scene
 from ..simulation.echo_options import Skip as EchoSkip
-from ..simulation.scene_options import Polarization
+from ..simulation.track_options import Polarization
 
 _P = ParamSpec("_P")
 _R = TypeVar("_R")
@@ -39,21 +39,21 @@ class EchoKeywords(TypedDict, total=False):
     channels: Literal["simultaneous", "separated"]
     receive: Literal["reference", "own", "all"]
     skip: bool | Collection[EchoSkip]
-    receiver: Trajectory | None
-    polarization: Polarization | Literal["all"] | Sequence[Polarization]
-    vertical: ArrayLike | None
-    range_window: ArrayLike | None
-    reference: ArrayLike | None
     array: AntennaArray | None
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    compressed: bool
     max_edge: float | Literal["auto"] | None
     max_bytes: float | None
-    out: PathLike | None
     check: bool | None
+    receiver: Trajectory | None
+    polarization: Polarization | Literal["all"] | Sequence[Polarization]
+    vertical: ArrayLike | None
+    range_window: ArrayLike | None
+    reference: ArrayLike | None
+    compressed: bool
+    out: PathLike | None
     tolerance: float
     device: DeviceChoice | None
     progress: Progress | None
@@ -70,15 +70,15 @@ class SpectralEchoKeywords(TypedDict, total=False):
     max_bytes: float | None
     tolerance: float
     check: bool | None
-    polarization: Polarization | Literal["all"] | Sequence[Polarization]
-    vertical: ArrayLike | None
-    reference: ArrayLike | None
     antenna: Antenna | tuple[Antenna, Antenna] | None
     radar: Radar | None
     shadows: bool
     seed: int
-    compressed: bool
     max_edge: float | Literal["auto"] | None
+    polarization: Polarization | Literal["all"] | Sequence[Polarization]
+    vertical: ArrayLike | None
+    reference: ArrayLike | None
+    compressed: bool
     out: PathLike | None
     device: DeviceChoice | None
     progress: Progress | None
@@ -86,19 +86,19 @@ class SpectralEchoKeywords(TypedDict, total=False):
 class FullwaveEchoKeywords(TypedDict, total=False):
     """Options of `fullwave_echo`, for functions that hand them on."""
 
-    receiver: Trajectory | None
     polarization: Polarization | Literal["all"] | Sequence[Polarization]
-    vertical: ArrayLike | None
     range_window: ArrayLike | None
-    reference: ArrayLike | None
     cells: Literal["auto"] | float
     anchors: Literal["auto"] | int | Sequence[int]
-    compressed: bool
     max_bytes: float | None
     out: PathLike | None
     tolerance: float
     check: bool
     model_error: bool
+    receiver: Trajectory | None
+    vertical: ArrayLike | None
+    reference: ArrayLike | None
+    compressed: bool
     device: DeviceChoice | None
     progress: Progress | None
 
@@ -165,21 +165,21 @@ def echo(
     channels: Literal["simultaneous", "separated"] = "simultaneous",
     receive: Literal["reference", "own", "all"] = "reference",
     skip: bool | Collection[EchoSkip] = True,
-    receiver: Trajectory | None = None,
-    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
-    vertical: ArrayLike | None = None,
-    range_window: ArrayLike | None = None,
-    reference: ArrayLike | None = None,
     array: AntennaArray | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    compressed: bool = True,
     max_edge: float | Literal["auto"] | None = "auto",
     max_bytes: float | None = None,
-    out: PathLike | None = None,
     check: bool | None = None,
+    receiver: Trajectory | None = None,
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    range_window: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
+    out: PathLike | None = None,
     tolerance: float = 0.001,
     device: DeviceChoice | None = None,
     progress: Progress | None = None,
@@ -201,15 +201,15 @@ def spectral_echo(
     max_bytes: float | None = None,
     tolerance: float = 0.01,
     check: bool | None = None,
-    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
-    vertical: ArrayLike | None = None,
-    reference: ArrayLike | None = None,
     antenna: Antenna | tuple[Antenna, Antenna] | None = None,
     radar: Radar | None = None,
     shadows: bool = True,
     seed: int = 0,
-    compressed: bool = True,
     max_edge: float | Literal["auto"] | None = "auto",
+    polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
+    vertical: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
     out: PathLike | None = None,
     device: DeviceChoice | None = None,
     progress: Progress | None = None,
@@ -222,19 +222,19 @@ def fullwave_echo(
     waveform: Waveform,
     track: Trajectory,
     *,
-    receiver: Trajectory | None = None,
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = "HH",
-    vertical: ArrayLike | None = None,
     range_window: ArrayLike | None = None,
-    reference: ArrayLike | None = None,
     cells: Literal["auto"] | float = "auto",
     anchors: Literal["auto"] | int | Sequence[int] = "auto",
-    compressed: bool = True,
     max_bytes: float | None = None,
     out: PathLike | None = None,
     tolerance: float = 0.03,
     check: bool = False,
     model_error: bool = True,
+    receiver: Trajectory | None = None,
+    vertical: ArrayLike | None = None,
+    reference: ArrayLike | None = None,
+    compressed: bool = True,
     device: DeviceChoice | None = None,
     progress: Progress | None = None,
 ) -> PhaseHistory:

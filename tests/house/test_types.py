@@ -28,7 +28,7 @@ from sarcl.papers.farooq import range_zones
 from sarcl.scattering import facets
 from sarcl.scene import material
 from sarcl.simulation import echo_options
-from sarcl.simulation.scene_options import Polarization
+from sarcl.simulation.track_options import Polarization
 
 ROOT = Path(__file__).parents[2]
 MODULES = {f"sarcl.{n}": getattr(sarcl, n) for n in sarcl.__all__ if inspect.ismodule(getattr(sarcl, n))}

@@ -3,7 +3,6 @@
 For other folders:
 
     fullwave_echo      fullwave_echo(): echoes of closed bodies, to a stated tolerance
-    fullwave_options   options of fullwave_echo
 
 For this folder alone:
 
@@ -16,8 +15,9 @@ For this folder alone:
     _fullwave_task     the task of fullwave_echo: geometry, frequencies, grid, bodies cut by it
     _grid_choice       the grid: cells that carry the band, and memory
     _model_error       the grid's own error, predicted from a run with larger cells
+    _options           options of fullwave_echo
     _run_progress      progress of several runs
     _run_speed         speed of a device with runs, measured on a small grid
 """
 
-__all__ = ["fullwave_echo", "fullwave_options"]
+__all__ = ["fullwave_echo"]

@@ -15,8 +15,8 @@ from ._anchor_files import AnchorFiles
 from ._anchor_runs import AnchorRuns, RunCounts
 from ._fullwave_task import FullwaveTask
 from ._model_error import grid_error
+from ._options import FullwaveOptions
 from ._run_progress import RunProgress
-from .fullwave_options import FullwaveOptions
 
 
 @dataclass(frozen=True, eq=False)

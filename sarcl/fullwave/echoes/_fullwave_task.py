@@ -11,25 +11,25 @@ import numpy as np
 from ...base.constants import SPEED_OF_LIGHT
 from ...base.errors import ToleranceUnreachable, TooThin, warn
 from ...base.fingerprint import checksum, kernels, leaves
-from ...base.validation import array
 from ...base.vectors import unit
 from ...base.version import __version__
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import half_path
+from ...opencl.choose_device import open_device
 from ...opencl.device import Device
+from ...opencl.memory_budget import budget
 from ...scattering.physical_optics import polarisation
 from ...scene.scene import Scene
 from ...simulation import echo_sampling
-from ...simulation.echo import echo_request
 from .. import runs
 from ..lattice import Lattice
 from ..target import Target
 from ._antenna_geometry import angle_along, check_outside, window_of
 from ._closed_bodies import check_bodies, check_wavelengths, losses_said, parts_of
 from ._grid_choice import check_cells, chosen_cells, default_bytes, grid_choice
+from ._options import FullwaveOptions
 from ._run_progress import RunProgress
-from .fullwave_options import FullwaveOptions
 
 LEFT = 1 / 30  # of the tolerance: currents that may come after the end of a run
 # wavelengths, at the highest frequency: widest strip thinner than a cell that is a sheet on the grid, far from the
@@ -251,30 +251,27 @@ class FullwaveTask:
 def fullwave_task(scene: Scene, waveform: Waveform, track: Trajectory, options: FullwaveOptions) -> FullwaveTask:
     """The task of fullwave_echo, on a grid that is chosen. ValueError, MemoryError: what does not fit."""
     tolerance = options.tolerance
-    request = echo_request(
-        scene, (), polarization=options.polarization, vertical=options.vertical, max_bytes=options.max_bytes,
-        tolerance=tolerance, device=options.device,
-    )  # fmt: skip
+    device = open_device(options.device)
     check_bodies(scene)
     band = waveform.center - waveform.bandwidth / 2, waveform.center + waveform.bandwidth / 2
     cells = check_cells(chosen_cells(options.cells, scene, band[1], tolerance), band)
     check_wavelengths(scene, cells, band[1])
     if tolerance < LEAST_TOLERANCE:
         raise ToleranceUnreachable(tolerance, LEAST_TOLERANCE, "float32 fields", how="with fields in float32")
-    point = scene.center if options.reference is None else array("reference", options.reference, np.float64, (3,))
+    point = scene.center if options.reference is None else np.asarray(options.reference)
     track, receiver, motion = echo_sampling.in_flight(track, options.receiver, scene, point)
     tx, rx = track.positions, echo_sampling.receiver_positions(track, receiver)
     check_outside(scene, {"track": tx} if receiver is None else {"track": tx, "receiver": rx})
     reference_range = half_path(tx, rx, point)
     window = window_of(scene, waveform, tx, rx, reference_range, options.range_window)
     frequency, step, n_samples = echo_sampling.sampling(waveform, *window, options.compressed)
-    max_bytes = default_bytes(request.device) if options.max_bytes is None else request.budget
+    max_bytes = default_bytes(device) if options.max_bytes is None else budget(device, options.max_bytes)
     lattice, cost = grid_choice(scene, band, cells, max_bytes)
     return FullwaveTask(
         options=options,
-        device=request.device,
-        polarizations=request.polarizations,
-        vertical=request.vertical,
+        device=device,
+        polarizations=tuple(options.polarization),
+        vertical=options.vertical_at(scene.center),
         scene=scene,
         waveform=waveform,
         band=band,

@@ -24,7 +24,7 @@ from ._forecast import forecast_of, is_cut
 from ._formed_samples import FormedSamples, checked_anchors, formed_samples
 from ._fullwave_task import FullwaveTask, fullwave_task
 from ._model_error import check_thickness, coarse_task
-from .fullwave_options import FullwaveOptions
+from ._options import FullwaveOptions
 
 
 @verb(FullwaveOptions)

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Any, Literal
+from typing import Literal
 
 from numpy.typing import ArrayLike
 
@@ -12,43 +12,24 @@ from ...base.options import option
 from ...base.types import PathLike
 from ...base.validation import flag
 from ...base.validation import tolerance as allowed_error
-from ...model.trajectory import Trajectory
-from ...numerics.run_options import RunOptions
-from ...simulation.echo import Polarization
-from ...simulation.echo_output import check_name
-
-
-def _file_name(name: str, value: Any) -> Any:
-    """`value` where it is the name of a file or None."""
-    check_name(value)
-    return value
+from ...simulation.track_options import Polarization, TrackOptions, file_name, polarizations
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
-class FullwaveOptions(RunOptions):
+class FullwaveOptions(TrackOptions):
     """Options of `fullwave_echo`."""
 
-    receiver: Trajectory | None = option(
-        None,
-        "a track of as many pulses, default the transmitter's; its positions count as they are given",
-        in_files=False,
-    )
     polarization: Polarization | Literal["all"] | Sequence[Polarization] = option(
         "HH",
         '"HH", "HV", "VH" or "VV" (first received, then sent), a sequence of these, or "all": one row per pulse for '
         "each, pulse by pulse. One run of the grid gives all polarisations of one that is sent: HH and VH share theirs",
-    )
-    vertical: ArrayLike | None = option(
-        None,
-        "(3,), direction: H is perpendicular to it, V in a plane with it; default z, or in Earth-centred coordinates "
-        "the ellipsoid's normal at the scene's centre",
+        polarizations,
     )
     range_window: ArrayLike | None = option(
         None,
         "(near, far) m about the reference, which must hold the scene; default the smallest that holds the scene, and "
         "what creeps round its bodies, plus 10 %",
     )
-    reference: ArrayLike | None = option(None, "point of zero phase, m (3,), default the centre of the scene's box")
     cells: Literal["auto"] | float = option(
         "auto",
         'cells per shortest wavelength of the waveform\'s band, at least 8; "auto": 12 for conductors, and for '
@@ -58,7 +39,6 @@ class FullwaveOptions(RunOptions):
     anchors: Literal["auto"] | int | Sequence[int] = option(
         "auto", '"auto": as many as the tolerance needs; a number, spaced evenly; or pulse numbers'
     )
-    compressed: bool = option(True, "False keeps the pulse's own spectrum (see `sarcl.compress`)", flag)
     max_bytes: float | None = option(
         None,
         "memory for one run of the grid, default half the memory that is installed; frequencies that do not fit take "
@@ -68,7 +48,7 @@ class FullwaveOptions(RunOptions):
         None,
         "an HDF5 file of sarcl's (.h5) for the samples. Echoes of finished anchors are kept beside it, in OUT.anchors, "
         "until it is complete: after a kill, the same call continues from them",
-        _file_name,
+        file_name,
         in_files=False,
     )
     tolerance: float = option(
