@@ -286,6 +286,29 @@ table(lambda **options: echo(cloud(4000, 40.0), track=spotlight(circle()), toler
 })  # fmt: skip
 
 
+# ---- full wave
+
+
+def full_wave(material: Any = "metal", cells: float = 8, **options: Any) -> sarcl.PhaseHistory:
+    """A box of half a wavelength and more, in five pulses."""
+    box = sarcl.shapes.box((0.1, 0.15, 0.1), material=material)
+    wave = sarcl.Waveform.chirp(center=1.25e9, bandwidth=500e6, duration=2e-8)
+    track = circle(5, radius=40.0, height=15.0, arc=0.8)
+    return sarcl.fullwave_echo(box, wave, track, cells=cells, max_bytes=1e9, **options)
+
+
+def of_full_wave(raw: sarcl.PhaseHistory) -> dict[str, Any]:
+    parts = of_raw(raw)
+    return {**parts, "plan": {name: value for name, value in parts["plan"].items() if name != "run_seconds"}}
+
+
+table(full_wave, of_full_wave, {
+    "full wave": {"check": True, "polarization": ("HH", "VH")},
+    "full wave, three anchors": {"anchors": 3, "compressed": False, "model_error": False},
+    "full wave, lossy": {"material": lambda: sarcl.Material(eps_r=3 - 0.5j), "cells": 12, "anchors": 1},
+})  # fmt: skip
+
+
 # ---- arrays
 
 
