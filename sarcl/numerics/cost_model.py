@@ -98,8 +98,8 @@ TILED_POINT = 0.3  # per point: order, tiles, images of the kernel
 SPREAD_POINT, SPREAD_PIECE = 0.006, 0.02  # per scatterer and pulse: what echoes of many take beside ECHO_PULSE
 CUT_PIECE = 1.6  # per piece: cutting, judging and tiling it
 LIT_SHARE = 15.0  # per piece of a rough facet: its illuminated shares at the viewpoints along the track
-# Per piece and pulse, of facets whose lit parts are computed: which parts these are, and adding them (0.25 and 0 on open
-# ground, 1.4 and 1.6 for the car)
+# Per piece and pulse, of facets whose lit parts are computed: which parts these are, and adding them (0.25 and 0 on
+# open ground, 1.4 and 1.6 for the car)
 CLIPPED_PIECE, LIT_PIECE = 0.5, 0.5
 JUDGED_FACET = 4.0  # per facet of a mesh or terrain: what its flat facets change of curves
 
