@@ -10,8 +10,9 @@ import sarcl
 from sarcl.base.errors import NothingSeen
 from sarcl.base.report import root_sum_square
 from sarcl.scattering import scatterers
-from sarcl.simulation import echo_forecast, planned_echoes
-from sarcl.simulation.echo_work import pieces_of
+from sarcl.simulation import _echo_forecast as echo_forecast
+from sarcl.simulation import _planned_echoes as planned_echoes
+from sarcl.simulation._echo_work import pieces_of
 
 CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
 TRACK = sarcl.Trajectory.circle(radius=800.0, height=600.0, arc=0.02, n_pulses=48, prf=100.0)

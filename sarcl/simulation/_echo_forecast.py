@@ -23,10 +23,10 @@ from ..base.stage_timer import Clock
 from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
+from ._echo_work import EchoWork
+from ._planned_echoes import PlannedEchoes
 from .echo_output import bytes_of, pulses_at_once
 from .echo_task import EchoTask
-from .echo_work import EchoWork
-from .planned_echoes import PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
