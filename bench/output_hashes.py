@@ -17,7 +17,8 @@ machine with one driver, NumPy, SciPy and Python: the file records these, and --
 
 Left out because they depend on the clock: `report.seconds`, `Forecast.seconds`, the seconds in `Forecast.cheaper`, and
 those in the plan of a forecast. The clock also decides whether `check=None` measures an error (so every task says
-check=True or False), and how often finished tiles are written to "PATH.parts" before an image is complete (no pixel depends on it).
+check=True or False), and how often finished tiles are written to "PATH.parts" before an image is complete (no pixel
+depends on it).
 No plan depends on the clock: the planner's costs are constants in the code.
 
 Left out because it follows from names and comments of kernels too: the mark of the job ("job") in an image's file.
