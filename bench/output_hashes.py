@@ -16,8 +16,9 @@ numbers of the plan). Arrays are hashed with dtype and shape, floats to the last
 machine with one driver, NumPy, SciPy and Python: the file records these, and --compare refuses a file of others.
 
 Left out because they depend on the clock: `report.seconds`, `Forecast.seconds`, the seconds in `Forecast.cheaper`, and
-`EchoForecast.seconds`. The clock also decides whether `check=None` measures an error (so every task says check=True or
-False), and how often finished tiles are written to "PATH.parts" before an image is complete (no pixel depends on it).
+those in the plan of a forecast. The clock also decides whether `check=None` measures an error (so every task says
+check=True or False), and how often finished tiles are written to "PATH.parts" before an image is complete (no pixel
+depends on it).
 No plan depends on the clock: the planner's costs are constants in the code.
 
 Left out because it follows from names and comments of kernels too: the mark of the job ("job") in an image's file.
@@ -676,14 +677,15 @@ def planned_echo(scene: Any, wave: Any = None, track: Any = None, **options: Any
     made = sarcl.plan(
         sarcl.echo, scene, chirp() if wave is None else wave, circle(60) if track is None else track, **options
     )
-    numbers = made.n_rows, made.n_samples, made.bytes, made.contributions, made.predicted_error
-    return {"plan": made.plan, "numbers": numbers}
+    numbers = made.n_rows, made.n_samples, made.bytes, made.predicted_error
+    plan = {name: value for name, value in made.plan.items() if name != "spectral_echo"}  # it names seconds
+    return {"plan": plan, "numbers": numbers}
 
 
 table(planned_echo, lambda made: made, {
-    "plan_echo": {"scene": cloud},
-    "plan_echo facets": {"scene": solids, "tolerance": 1e-2},
-    "plan_echo array": {"scene": small_scene, "array": line, "receive": "all", "range_window": (-3.7, 3.7),
+    "plan echo": {"scene": cloud},
+    "plan echo facets": {"scene": solids, "tolerance": 1e-2},
+    "plan echo array": {"scene": small_scene, "array": line, "receive": "all", "range_window": (-3.7, 3.7),
                         "track": lambda: passing(60), "wave": lambda: sarcl.Waveform.tone(center=10e9, duration=5e-8)},
 })  # fmt: skip
 

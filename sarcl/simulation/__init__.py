@@ -4,11 +4,13 @@ For other folders:
 
     echo               echo(): echoes of points and facets, to a stated tolerance
     echo_check         random samples recomputed exactly
-    echo_forecast      plan_echo(): rows, bytes, seconds and error before the work
-    echo_request       what is asked of all channels alike: arguments, checked
+    echo_options       options of echo
     echo_output        destination of samples: memory or a file
+    echo_request       what is asked of all channels alike: options, for one device
     echo_sampling      rows and frequencies that echoes are written to
+    echo_task          one task of echo: its arguments, checked
     scene_echoes       a scene prepared for the kernels, and its echoes added channel by channel
+    scene_options      options that echo and spectral_echo share
     scene_plan         shares of the tolerance for the parts of a scene, and how its facets are cut within them
     scene_preparation  a scene cut, culled and illuminated, and put on the device
     spreading          plan, tiles and sums that points and facets share
@@ -17,11 +19,16 @@ For other folders:
 
 For this folder alone:
 
+    _echo_forecast     rows, bytes, seconds and errors of a plan of echoes, before the work
+    _echo_plan         the plan of echoes, and its run
+    _echo_work         how much work echoes are, by the numbers of pieces and pulses
     _exact_facets      few facets in few pulses and samples, added up in float64 on the host
     _facet_spreading   facets to range profiles
     _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
+    _planned_echoes    the method of echoes, and the plan of the scene for it
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
     _pulse_levels      what consecutive pulses see of facets, as the kernel reads it
+    _single_channel    echoes of one transmitting and one receiving antenna
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
 """
 
@@ -29,11 +36,13 @@ __all__ = [
     "channels",
     "echo",
     "echo_check",
-    "echo_forecast",
+    "echo_options",
     "echo_output",
     "echo_request",
     "echo_sampling",
+    "echo_task",
     "scene_echoes",
+    "scene_options",
     "scene_plan",
     "scene_preparation",
     "spectral",

@@ -9,8 +9,8 @@ from ..model.phase_history import PhaseHistory
 from ..model.trajectory import Trajectory
 from ..model.waveform import Waveform
 from ..scene.scene import Scene
+from ._echo_plan import EchoPlan
 from .echo_options import EchoOptions
-from .echo_plan import EchoPlan
 from .echo_task import echo_task
 from .track_options import Polarization as Polarization
 

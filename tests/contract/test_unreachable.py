@@ -246,7 +246,7 @@ def interpolated(verb=sarcl.echo):
 PLANTED = {
     "interpolated channels": ("sarcl.simulation.channels._interpolated.InterpolatedChannels.fill", interpolated),
     "planning of interpolated channels": ("sarcl.simulation.scene_plan.plan_scene", interpolated),
-    "a scene made ready": ("sarcl.simulation.planned_echoes.prepare_scene", interpolated),
+    "a scene made ready": ("sarcl.simulation._planned_echoes.prepare_scene", interpolated),
     "forecast of echoes": (
         "sarcl.simulation.channels._interpolated.InterpolatedChannels.fill",
         lambda: interpolated(functools.partial(sarcl.plan, sarcl.echo)),
@@ -329,7 +329,7 @@ def test_interpolated_channels_that_cannot_keep_the_tolerance_give_way_before_an
 
 
 def test_a_forecast_times_other_pulses_only_where_nothing_is_seen(monkeypatch):
-    from sarcl.simulation.single_channel import SingleEchoes
+    from sarcl.simulation._single_channel import SingleEchoes
 
     tried, fill = [], SingleEchoes.fill
 

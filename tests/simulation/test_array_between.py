@@ -301,8 +301,8 @@ def test_a_search_for_places_that_cannot_pay_is_short_and_small():
     scene = sarcl.Scene.points([[0.0, -1e4, 0], [0, 1e4, 0]])
     track = sarcl.Trajectory(np.arange(2), [[-5e5, 0, 0], [-5e5, 10, 0]])
     from sarcl.scattering.antenna_weights import weights_of
+    from sarcl.simulation.channels._channel_rows import ChannelRows
     from sarcl.simulation.channels._response_samples import ResponseSamples
-    from sarcl.simulation.channels.channel_rows import ChannelRows
 
     rows = ChannelRows(array, track, None, scene.center, "simultaneous", "reference", ("HH",))
     weights = weights_of(None, None, track, None, chirp, scene.center)

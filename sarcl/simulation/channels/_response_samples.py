@@ -17,7 +17,7 @@ from ...model.antenna_pattern import pattern_gain
 from ...scattering.antenna_weights import AntennaWeights
 from ...scene.scene import Scene
 from ...scene.triangles import centroids
-from .channel_rows import ChannelRows
+from ._channel_rows import ChannelRows
 
 PULSES, SCATTERERS = 33, 32  # largest numbers of pulses and of scatterers that responses are sampled at
 BLOCK = 256  # pulses per array operation: bounds the memory

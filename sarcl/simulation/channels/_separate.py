@@ -14,7 +14,7 @@ from ...model.waveform import Waveform
 from ...numerics.pulse_geometry import PulseGeometry
 from ..scene_echoes import Added, SceneEchoes, band_of
 from ..spreading import Band
-from .channel_rows import ChannelRows
+from ._channel_rows import ChannelRows
 
 
 @dataclass(frozen=True, eq=False)

@@ -19,9 +19,9 @@ from ..scene_echoes import SceneEchoes, band_of
 from ..scene_plan import SeenScene
 from ..scene_preparation import bounded
 from ..spreading import Counts
+from ._channel_rows import ChannelRows
 from ._interpolated import InterpolatedChannels
 from ._separate import ChannelLayout, SeparateChannels, active_channels
-from .channel_rows import ChannelRows
 
 EQUAL, INTERPOLATED = "equal channels", "interpolated channels"  # reasons to leave out contributions
 Method = SeparateChannels | InterpolatedChannels

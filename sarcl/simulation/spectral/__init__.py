@@ -3,7 +3,8 @@
 For other folders:
 
     spectral_echo           spectral_echo(): the samples of echo, to a stated tolerance
-    spectral_task           one task of spectral_echo: geometry, plans, seconds
+    spectral_parts          the plan of a scene: parts that are transformed, facets that are added pulse by pulse
+    spectral_task           one task of spectral_echo: its arguments, checked; what is refused
 
 For this folder alone:
 
@@ -21,10 +22,12 @@ For this folder alone:
     _planning_time          how long a plan may take
     _scatterer_amplitudes   amplitudes of points and facets, seen from places on the track
     _scratch                complex arrays in memory or in temporary files
+    _spectral_options       options of spectral_echo
     _spectral_part          points or facets: plan, and spectra along the track
+    _spectral_plan          the plan of spectral echoes, and its run
     _spectral_samples       from spectra along the track to samples
     _stationary_phase       the transfer function of SARAS, by stationary phase
     _straight_track         straight, evenly spaced tracks; azimuth and slant range of scatterers
 """
 
-__all__ = ["spectral_echo", "spectral_task"]
+__all__ = ["spectral_echo", "spectral_parts", "spectral_task"]

@@ -15,11 +15,12 @@ from ...base.tolerances import askable, rounded_up
 from ...opencl.device import Device
 from ...scattering.facets import FacetSet
 from ._aspect_expansion import AmplitudeSamples, AspectExpansion, expand, one_function
-from ._aspect_window import aspects
+from ._aspect_window import Aspects, aspects
 from ._aspects_seen import aspects_seen, check_doppler, check_spread, inner_aspects
 from ._azimuth_transfer import SAFETY as RESPONSE_SAFETY
 from ._azimuth_transfer import (
     TESTED,
+    AzimuthTransfer,
     SeenScatterers,
     compared_samples,
     doppler_grid,
@@ -27,7 +28,7 @@ from ._azimuth_transfer import (
     plan_transfer,
     response_error,
 )
-from ._edge_map import edge_map, places_of_edges
+from ._edge_map import EdgePlaces, edge_map, places_of_edges
 from ._facet_factors import FacetFactors
 from ._map_part import MapPart
 from ._map_plan import plan_map, range_wavenumbers, scatterers_per_cell, tile_of
@@ -127,89 +128,137 @@ class PartOnDevice:
     factors: PointFactors | FacetFactors
 
 
-def plan_part(
-    amplitudes: ScattererAmplitudes, track: StraightTrack, band: tuple[float, float], has_beam: bool,
-    is_random: bool, variant: str, tolerance: float, asked: float, device: Device, time: PlanningTime,
-) -> SpectralPart:  # fmt: skip
-    """The plan for points or facets whose error is at most `tolerance`.
+@dataclass(frozen=True, eq=False)
+class PartTask:
+    """Points or facets whose spectral echoes are to be planned.
 
-    variant    "exact" or "saras";  band  Hz, its limits
+    band       Hz, its limits;  variant  "exact" or "saras"
     has_beam   antennas limit the aspects at which scatterers are seen;  is_random  scatterers have random phases
-    asked      the whole tolerance, for messages;  time  that the plan may take
+    tolerance  that the plan may take;  asked  the whole tolerance, for messages;  time  that planning may take
     """
-    low, high, outside, main = aspects_seen(amplitudes, track, band, has_beam, OUTSIDE * tolerance)
-    check_doppler(track, band[1], main, has_beam)
+
+    amplitudes: ScattererAmplitudes
+    track: StraightTrack
+    band: tuple[float, float]
+    has_beam: bool
+    is_random: bool
+    variant: str
+    tolerance: float
+    asked: float
+    device: Device
+    time: PlanningTime
+
+
+@dataclass(frozen=True, eq=False)
+class Reach:
+    """Scatterers whose responses reach the track.
+
+    reached  by the beam, or between its hard edges (n,) bool;  ends  of responses along the track, m
+    edges    places of hard edges;  some  indices of these scatterers and of those that edges pick
+    """
+
+    reached: np.ndarray
+    ends: tuple[float, float]
+    edges: list[EdgePlaces]
+    some: np.ndarray
+
+
+def plan_part(task: PartTask) -> SpectralPart:
+    """The plan for points or facets whose error is at most the tolerance."""
+    amplitudes, track, band = task.amplitudes, task.track, task.band
+    low, high, outside, main = aspects_seen(amplitudes, track, band, task.has_beam, OUTSIDE * task.tolerance)
+    check_doppler(track, band[1], main, task.has_beam)
     check_spread(track, band[1], low, high)
-    nearest, farthest = float(amplitudes.slant_range.min()), float(amplitudes.slant_range.max())
+    expansion = _expansion(task, (low, high), main)
+    inner, hard = inner_aspects(amplitudes, track, (low, high), band[0])
+    parts = float(np.sqrt(1 + sum(hard)))  # maps whose errors add up
+    of_transfer, of_grid = TRANSFER * task.tolerance / parts, GRID * task.tolerance / parts
+    azimuth, ranges = amplitudes.azimuth, amplitudes.slant_range
+    nearest, farthest = float(ranges.min()), float(ranges.max())
     farthest = max(farthest, nearest * (1 + 1e-4))  # nodes over range need an interval
+    lags = -float(azimuth.max()), track.length - float(azimuth.min())
+    seen_aspects = aspects(*inner, (nearest, farthest), band, lags, of_transfer / 3, hard)
+    reach = _reach(task, seen_aspects, nearest)
+    factors, transfer = _transfer(task, seen_aspects, expansion, reach, of_transfer, outside)
+    grid = doppler_grid(transfer, track, reach.ends)
+    numbers = range_wavenumbers(transfer, grid)
+    tile, x, r = tile_of(task.device), azimuth[reach.reached], ranges[reach.reached]
+    per_cell = 0.0 if task.is_random else scatterers_per_cell(x, r, grid, numbers)
+    made = plan_map(of_grid, numbers, grid, (nearest, farthest), per_cell, tile, task.asked)
+    whole = np.flatnonzero(reach.reached[reach.some]) if reach.edges else slice(None)
+    maps = [MapPart(whole, x, r, lambda: transfer.range_weights(r), transfer, grid, numbers, made)]
+    for places in reach.edges:
+        maps.append(
+            edge_map(
+                seen_aspects, expansion.functions, factors[:TESTED], places, track, reach.some, of_transfer, of_grid,
+                task.is_random, tile, task.asked, task.time,
+            )
+        )  # fmt: skip
+    return SpectralPart(amplitudes, reach.some, expansion, tuple(maps), (low, high), outside)
+
+
+def _expansion(task: PartTask, limits: tuple[float, float], main: tuple[float, float]) -> AspectExpansion:
+    """Amplitudes as functions of aspect, between sines; main  those of the middle of the beam."""
+    amplitudes, track, (low, high) = task.amplitudes, task.track, limits
 
     def seen(some: np.ndarray, random: np.random.Generator) -> np.ndarray:
         return np.clip(amplitudes.sines(random.integers(0, track.n_pulses, len(some)) * track.spacing, some), low, high)
 
-    samples = AmplitudeSamples(amplitudes, amplitudes.size, band, seen, amplitudes.kinds)
-    if variant == "saras":
-        expansion = one_function(samples, float(np.clip(0.0, *main)))
-    else:
-        expansion = expand(samples, (low, high), EXPANSION * tolerance, asked)
-    azimuth, ranges = amplitudes.azimuth, amplitudes.slant_range
-    lags = -float(azimuth.max()), track.length - float(azimuth.min())
-    inner, hard = inner_aspects(amplitudes, track, (low, high), band[0])
-    parts = float(np.sqrt(1 + sum(hard)))  # maps whose errors add up
-    of_transfer, of_grid = TRANSFER * tolerance / parts, GRID * tolerance / parts
-    seen_aspects = aspects(*inner, (nearest, farthest), band, lags, of_transfer / 3, hard)
-    widest = max(abs(sine) for sine in seen_aspects.support)
-    if widest >= 1:
+    samples = AmplitudeSamples(amplitudes, amplitudes.size, task.band, seen, amplitudes.kinds)
+    if task.variant == "saras":
+        return one_function(samples, float(np.clip(0.0, *main)))
+    return expand(samples, limits, EXPANSION * task.tolerance, task.asked)
+
+
+def _reach(task: PartTask, seen_aspects: Aspects, nearest: float) -> Reach:
+    """The scatterers whose responses reach the track; nearest  slant range, m, of all."""
+    amplitudes, track = task.amplitudes, task.track
+    if max(abs(sine) for sine in seen_aspects.support) >= 1:
         raise NotApplicable(
             f"scatterers are seen from {nearest:.3g} m, where a Fresnel zone is so wide that spectral_echo would "
             "continue their responses beyond the direction of the track; use echo"
         )
-    ends = [azimuth + ranges * float(tangent(end)) for end in seen_aspects.support]
+    ends = [amplitudes.azimuth + amplitudes.slant_range * float(tangent(end)) for end in seen_aspects.support]
     reached = (ends[0] <= track.length) & (ends[1] >= 0)
     if amplitudes.edges is not None:
         reached &= amplitudes.edges.seen
-    reach = float(ends[0][reached].min()), float(ends[1][reached].max())
+    limits = float(ends[0][reached].min()), float(ends[1][reached].max())
     edges = places_of_edges(amplitudes, seen_aspects, track)
-    here = reached.copy()
+    is_picked = reached.copy()
     for places in edges:
-        here[places.picked] = True
-    some = np.flatnonzero(here)
+        is_picked[places.picked] = True
+    return Reach(reached, limits, edges, np.flatnonzero(is_picked))
+
+
+def _transfer(
+    task: PartTask, seen_aspects: Aspects, expansion: AspectExpansion, reach: Reach, of_transfer: float, outside: float
+) -> tuple[np.ndarray, AzimuthTransfer]:
+    """Factors (n, J) of the scatterers that responses are tried on, the strongest first; and the transfer functions.
+
+    of_transfer  error that these may have;  outside  error of what lies outside the beam
+    """
+    amplitudes, track, some = task.amplitudes, task.track, reach.some
+    azimuth, ranges = amplitudes.azimuth, amplitudes.slant_range
     drawn = some[np.linspace(0, len(some) - 1, min(len(some), MANY)).astype(int)]
     factors = np.stack([expansion.factors(drawn, j) for j in range(len(expansion))], axis=-1)
     factors = factors[:, np.abs(factors).sum(axis=(0, 2)).argmax()]
     groups = []
-    if has_beam or len(expansion) > 1:  # those of other ranges and elevations are other sums of the functions
+    if task.has_beam or len(expansion) > 1:  # those of other ranges and elevations are other sums of the functions
         apart = np.argsort(ranges[drawn], kind="stable")[spread_over(len(drawn), SPREAD)]
         groups.append(SeenScatterers(factors[apart], azimuth[drawn[apart]], ranges[drawn[apart]]))
-    if has_beam:
-        groups.append(_brightest(amplitudes, track, drawn, factors, band))
+    if task.has_beam:
+        groups.append(_brightest(amplitudes, track, drawn, factors, task.band))
     factors = factors[np.argsort(-np.abs(factors).sum(axis=1), kind="stable")]
-    if variant == "saras":
-        n_lags = lags_of(track, reach)
-        time.spend(compared_samples(1, len(expansion), n_lags), n_lags)
-        transfer = stationary_tables(seen_aspects, expansion.functions)
-        error = RESPONSE_SAFETY * response_error(transfer, expansion.functions, factors[:1], track, reach)
-        _check_saras(expansion.error, error, outside, (1 - GRID) * tolerance, asked)
-        transfer = replace(transfer, error=error)
-    else:
-        transfer = plan_transfer(
-            seen_aspects, expansion.functions, factors, track, reach, of_transfer, asked, time, groups
-        )  # fmt: skip
-    grid = doppler_grid(transfer, track, reach)
-    numbers = range_wavenumbers(transfer, grid)
-    tile = tile_of(device)
-    per_cell = 0.0 if is_random else scatterers_per_cell(azimuth[reached], ranges[reached], grid, numbers)
-    made = plan_map(of_grid, numbers, grid, (nearest, farthest), per_cell, tile, asked)
-    whole = np.flatnonzero(reached[some]) if edges else slice(None)
-    x, r = azimuth[reached], ranges[reached]
-    maps = [MapPart(whole, x, r, lambda: transfer.range_weights(r), transfer, grid, numbers, made)]
-    for places in edges:
-        maps.append(
-            edge_map(
-                seen_aspects, expansion.functions, factors[:TESTED], places, track, some, of_transfer, of_grid,
-                is_random, tile, asked, time,
-            )
-        )  # fmt: skip
-    return SpectralPart(amplitudes, some, expansion, tuple(maps), (low, high), outside)
+    if task.variant == "exact":
+        return factors, plan_transfer(
+            seen_aspects, expansion.functions, factors, track, reach.ends, of_transfer, task.asked, task.time, groups
+        )
+    n_lags = lags_of(track, reach.ends)
+    task.time.spend(compared_samples(1, len(expansion), n_lags), n_lags)
+    transfer = stationary_tables(seen_aspects, expansion.functions)
+    error = RESPONSE_SAFETY * response_error(transfer, expansion.functions, factors[:1], track, reach.ends)
+    _check_saras(expansion.error, error, outside, (1 - GRID) * task.tolerance, task.asked)
+    return factors, replace(transfer, error=error)
 
 
 def _brightest(

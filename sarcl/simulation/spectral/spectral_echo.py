@@ -9,8 +9,8 @@ from ...model.phase_history import PhaseHistory
 from ...model.trajectory import Trajectory
 from ...model.waveform import Waveform
 from ...scene.scene import Scene
-from .spectral_options import SpectralEchoOptions
-from .spectral_plan import SpectralEchoPlan
+from ._spectral_options import SpectralEchoOptions
+from ._spectral_plan import SpectralEchoPlan
 from .spectral_task import spectral_task
 
 

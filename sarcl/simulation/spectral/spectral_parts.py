@@ -20,7 +20,7 @@ from ..scene_preparation import prepare_scene
 from ..spreading import Counts
 from ._planning_time import PlanningTime
 from ._scatterer_amplitudes import ScattererAmplitudes
-from ._spectral_part import SpectralPart, plan_part
+from ._spectral_part import PartTask, SpectralPart, plan_part
 from ._straight_track import StraightTrack
 from .spectral_task import SpectralTask
 
@@ -117,14 +117,23 @@ def _planned_part(
         scatterers, prepared.weights, line, request.polarizations, request.vertical,
         share if task.variant == "exact" else None,
     )  # fmt: skip
-    n_polarizations, n_scatterers = len(request.polarizations), len(amplitudes.azimuth)
+    time = PlanningTime.of_echo(
+        line.n_pulses, len(amplitudes.azimuth), len(task.frequencies), len(request.polarizations), of_facets, longest
+    )
     part = plan_part(
-        amplitudes, line, band, prepared.weights.pair is not None, random, task.variant,
-        share / gain - fixed - straight, request.tolerance, request.device,
-        PlanningTime.of_echo(
-            line.n_pulses, n_scatterers, len(task.frequencies), n_polarizations, of_facets, longest
-        ),
-    )  # fmt: skip
+        PartTask(
+            amplitudes=amplitudes,
+            track=line,
+            band=band,
+            has_beam=prepared.weights.pair is not None,
+            is_random=random,
+            variant=task.variant,
+            tolerance=share / gain - fixed - straight,
+            asked=request.tolerance,
+            device=request.device,
+            time=time,
+        )
+    )
     error = gain * (part.predicted_error + fixed + straight)
     return part, ErrorTerm("facets" if of_facets else "points", error, SMALLER_TOLERANCE)
 

@@ -19,9 +19,9 @@ from ..echo_request import EchoRequest
 from ..echo_sampling import row_fields
 from ..scene_echoes import UNKNOWN_SHADOWS, ChannelEchoes
 from ..spreading import Counts
+from ._spectral_options import SpectralEchoOptions
 from ._spectral_samples import SpectralSamples
 from ._stationary_phase import chirp_ripple
-from .spectral_options import SpectralEchoOptions
 from .spectral_parts import PlannedParts, plan_parts
 from .spectral_task import SpectralTask
 

@@ -9,7 +9,7 @@ import numpy as np
 from ..numerics import cost_model
 from ..scattering.facet_kinds import coherent
 from ..scene.triangles import areas
-from .planned_echoes import PlannedEchoes
+from ._planned_echoes import PlannedEchoes
 from .scene_plan import ScenePlan, samples_shadows
 
 # Pieces per facet, over area / edge^2: isosceles right triangles that are bisected until their longest side is shorter

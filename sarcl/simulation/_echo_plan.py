@@ -11,15 +11,15 @@ from ..base.forecast import Forecast
 from ..base.report import Report
 from ..base.stage_timer import Clock
 from ..model.phase_history import PhaseHistory
+from ._echo_forecast import forecast_of
+from ._planned_echoes import Channels, Method, PlannedEchoes
+from ._single_channel import SingleChannel
 from .channels.array_channels import ArrayChannels
 from .echo_check import worth_checking
-from .echo_forecast import forecast_of
 from .echo_output import EchoOutput
 from .echo_request import EchoRequest
 from .echo_task import EchoTask
-from .planned_echoes import Channels, Method, PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
-from .single_channel import SingleChannel
 
 
 @dataclass(frozen=True, eq=False)

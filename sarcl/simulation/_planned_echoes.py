@@ -7,13 +7,13 @@ from dataclasses import dataclass, replace
 from typing import Any
 
 from ..base.errors import ToleranceUnreachable
+from ._single_channel import SingleChannel, SingleEchoes
 from .channels.array_channels import ArrayChannels
 from .channels.array_channels import Method as ArrayMethod
 from .echo_request import EchoRequest
 from .scene_echoes import SceneEchoes
 from .scene_plan import ScenePlan, planned_scene
 from .scene_preparation import prepare_scene
-from .single_channel import SingleChannel, SingleEchoes
 
 Channels = SingleChannel | ArrayChannels
 Method = SingleEchoes | ArrayMethod

@@ -23,14 +23,13 @@ from ..base.stage_timer import Clock
 from ..base.text import duration
 from ..model.phase_history import PhaseHistory
 from ..numerics import cost_model
+from ._echo_work import EchoWork
+from ._planned_echoes import PlannedEchoes
 from .echo_output import bytes_of, pulses_at_once
 from .echo_task import EchoTask
-from .echo_work import EchoWork
-from .planned_echoes import PlannedEchoes
 from .scene_echoes import Added, SceneEchoes
 from .scene_plan import SHADOWS, parts_of, samples_shadows
 from .scene_preparation import warn_of_curves
-from .spectral.spectral_parts import plan_parts
 from .spectral.spectral_task import spectral_task
 
 SHARE, LEAST = 0.06, 0.035  # of the modelled job, and seconds: preparing the scene may take the larger of these
@@ -140,6 +139,8 @@ def _spectral(task: EchoTask, work: EchoWork, seconds: float) -> str:
         n_points = len(task.scene.positions)
         if 1e-6 * (cost_model.SPECTRAL_PLAN + cost_model.SPECTRAL_PLAN_POINT * n_points) > longest:
             return f"not planned: that takes long beside echo, about {duration(seconds)}"
+        from .spectral.spectral_parts import plan_parts  # imports scipy
+
         with warnings.catch_warnings():
             warnings.simplefilter("ignore", SarclWarning)  # those of the mesh came with the plan of echo
             clock = Clock()
