@@ -14,6 +14,7 @@ For other folders:
     scene_plan         shares of the tolerance for the parts of a scene, and how its facets are cut within them
     scene_preparation  a scene cut, culled and illuminated, and put on the device
     spreading          plan, tiles and sums that points and facets share
+    track_options      options that every verb of echoes shares
     channels/          echoes of the channels of an array
     spectral/          spectral_echo(): echoes of straight tracks by Fourier transforms
 
@@ -47,4 +48,5 @@ __all__ = [
     "scene_preparation",
     "spectral",
     "spreading",
+    "track_options",
 ]
