@@ -15,7 +15,7 @@ from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import check_above, clear_of, facets_on
+from ..scene.terrain import above, check_above, clear_of, facets_on
 from ..visibility.illumination import ALL_DARK, lit
 from ..visibility.lit_parts import ON_PLANE, LitParts
 from ._random_surface import Pieces
@@ -74,7 +74,8 @@ def facets_of(
               they are illuminated, progress("scene", 3, 3) then
     """
     scene, n_pulses = pieces.scene, len(antennas.tx)
-    original, terrain = pieces.original, _terrain(pieces.original, antennas)
+    original = pieces.original
+    check_antennas_above(original, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = geometry.normals(scene.triangles)
     triangles = scene.triangles
@@ -101,19 +102,16 @@ def facets_of(
     by_samples = keep & ~clipped & shadows
     if shadows:
         _warn_of_reach(original.triangles)
-    solid = original.triangles
-    ground: tuple[np.ndarray, np.ndarray] | None = None
-    if terrain and by_samples.any():  # by its facets, where it may hide anything
-        on_pieces = terrain["on_heights"][pieces.of]
-        floor, solid = solid[terrain["on_heights"]], solid[~terrain["on_heights"]]
-        ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
-    if by_samples.any():
+    casters = Casters.of(original, antennas) if by_samples.any() else None
+    if casters is not None and not casters.hides_any:
+        by_samples = np.zeros(len(keep), bool)
+    if casters is not None and casters.hides_any:
         # of the surface without random heights: facets displaced along their normals would occlude their neighbours
         illumination = lit(
             scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
             two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
             accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
-            occluders=solid, ground=ground, device=device, progress=report_shadows,
+            occluders=casters.solid, ground=casters.ground_under(pieces.of), device=device, progress=report_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
@@ -152,14 +150,43 @@ def _warn_of_reach(triangles: np.ndarray) -> None:
         )
 
 
-def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
-    """Arguments of `lit` for a scene's terrain, where it is complete. ValueError for an antenna under it."""
-    on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
-    if scene.heights is None or on is None:
-        return {}
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """What casts shadows in a scene.
+
+    solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
+    hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
+    """
+
+    solid: np.ndarray
+    floor: np.ndarray
+    hidden_by_floor: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
+        """Those of a scene, its terrain by its facets where it is complete."""
+        on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
+        if scene.heights is None or on is None:
+            return cls(scene.triangles, scene.triangles[:0], np.zeros(len(scene.triangles), bool))
+        clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
+        return cls(scene.triangles[~on], scene.triangles[on], ~clear)
+
+    @property
+    def hides_any(self) -> bool:
+        """Whether any facet may be hidden: lines of sight steeper than all slopes of a terrain meet it once."""
+        return bool(len(self.solid) or self.hidden_by_floor.any())
+
+    def ground_under(self, of: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
+        """Argument `ground` of `lit` for pieces; `of`: the facet of the scene that each is a part of (k,)."""
+        return (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
+
+
+def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
+    """ValueError for an antenna under a scene's terrain, where that is complete."""
     for name, positions in zip(("track", "receiver"), antennas.ends, strict=False):
-        check_above(name, scene.heights, positions)
-    return {"heights": scene.heights, "on_heights": on}
+        if scene.heights is not None and above(scene.heights, positions).min() < 0:
+            if facets_on(scene.heights, scene.triangles) is not None:
+                check_above(name, scene.heights, positions)
 
 
 def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
