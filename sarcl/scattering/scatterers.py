@@ -21,6 +21,7 @@ from ..visibility.lit_parts import ON_PLANE, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
+from .rough_pieces import RoughFacets, RoughPieces
 
 # pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
 FEW_LOOKS = 2e6
@@ -61,7 +62,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
+    pieces: Pieces | RoughPieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
     max_bytes: float, device: Any, progress: Callable[[str, int, int], object], exact: bool, sampled: bool,
     accuracy: float, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
@@ -73,6 +74,11 @@ def facets_of(
     progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
               they are illuminated, progress("scene", 3, 3) then
     """
+    if isinstance(pieces, RoughPieces):
+        check_antennas_above(pieces.scene, antennas)
+        if not shadows or (sampled and not Casters.of(pieces.scene, antennas).hides_any):
+            return _rough_facets_of(pieces, antennas, shadows=shadows, skips=skips, progress=progress)
+        pieces = pieces.on_host
     scene, n_pulses = pieces.scene, len(antennas.tx)
     original = pieces.original
     check_antennas_above(original, antennas)
@@ -135,6 +141,28 @@ def facets_of(
         None if lit_parts is None else np.where(lit_parts.partly, np.cumsum(lit_parts.partly) - 1, -1)[kept],
         by_samples[kept], pieces.incoherent[kept] if pieces.incoherent.any() else None,
     ), left_out  # fmt: skip
+
+
+def _rough_facets_of(
+    pieces: RoughPieces, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
+    progress: Callable[[str, int, int], object],
+) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
+    """As `facets_of`, of pieces on a device that none hides: culled by the facets that they are parts of."""
+    scene, n_pulses = pieces.scene, len(antennas.tx)
+    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
+    keep = np.ones(len(scene.triangles), bool)
+    if "zero reflectivity" in skips:
+        keep &= scene.reflectivity != 0
+        left_out["zero reflectivity"] = pieces.number_of(~keep) * n_pulses
+    if "facing away" in skips:
+        away = keep & ~scene.two_sided & faces_away(pieces.bounds, geometry.normals(scene.triangles), antennas)
+        left_out["facing away"] = pieces.number_of(away) * n_pulses
+        keep &= ~away
+    progress("scene", 2, 3)
+    if shadows:
+        _warn_of_reach(scene.triangles)
+    progress("scene", 3, 3)
+    return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
 
 
 def _warn_of_reach(triangles: np.ndarray) -> None:
@@ -200,13 +228,15 @@ def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
     """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
 
+    centers  m (n, 3), of the facets, or corners of a box around them;  normals  (k, 3)
+
     n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene. Facets
     that are edge-on to one of two antennas still send back a part (physical_optics.py:lit_share).
     """
     edge_on = 0.0 if antennas.is_monostatic else 2 * EDGE_ON
     corners = boxes.box(centers)
     middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
-    out = np.zeros(len(centers), bool)
+    out = np.zeros(len(normals), bool)
     for ends in (antennas.tx, antennas.rx):
         look = ends - middle
         distance = np.linalg.norm(look, axis=1)

@@ -20,10 +20,12 @@ from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
+from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
 from ._kernel_images import sample_patches
+from ._piece_tiling import PieceTiling
 from ._pulse_levels import PulseLevels
-from .spreading import GROUP, Band, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
+from .spreading import GROUP, Band, Counts, HostTiling, TiledScatterers, Tiling, is_grouped, most_pulses, splits, terms
 
 KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
@@ -46,17 +48,23 @@ class TiledFacets(TiledScatterers):
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
         roots = np.stack([facets.roots(float(f)) for f in nodes])
         self.dispersive = not self.metal and bool(np.ptp(roots, axis=0).any())
-        positions = centroids(facets.triangles)
 
         def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
             ends, f = (antennas.tx[pulse], antennas.rx[pulse]), np.array([frequency])
             sent = facets.picked(some).amplitudes(*ends, f, polarizations, vertical)[0]
             return np.asarray(sent * weights.weights(positions[some], pulse, frequency)[:, None])
 
+        tiling: Tiling
+        if isinstance(facets, RoughFacets):
+            tiling = PieceTiling(facets.pieces, *facets.tiling_numbers(nodes, self.metal, self.dispersive))
+            positions = tiling.bounds  # no patches are sampled of random phases
+        else:
+            positions = centroids(facets.triangles)
+            tiling = HostTiling(
+                device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive)
+            )
         super().__init__(
-            device,
-            HostTiling(device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive)),
-            len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
+            device, tiling, len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
             lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
         )  # fmt: skip
 
@@ -202,8 +210,10 @@ class FacetSpreader:
             _, node_constants, n_nodes = self._constants(at, False)
         axes, node_axes = (device.upload(self.weights.packed_axes(rows)) for rows in (np.arange(start, stop), at))
         which_here, shares_here = device.upload(which), device.upload(shares)
-        seen = device.upload(np.stack([level[tiles.order] for level in levels.levels]))
         moments, between = device.upload(levels.moments), device.upload(levels.between)
+        seen = between
+        if self.facets.illumination is not None:
+            seen = device.upload(np.stack([level[tiles.order] for level in levels.levels]))
         parts = device.upload(self._parts(start, stop)) if self.partly else between
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)

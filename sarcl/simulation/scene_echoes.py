@@ -330,12 +330,13 @@ def prepare_scene(
     shadow_terms: tuple[ErrorTerm, ...] = ()
     held_facets: tuple[TiledFacets, ...] = ()
     if subdivision is not None:
-        facet_plan, pieces = subdivision.apply(scene, request.seed)
+        facet_plan, pieces = subdivision.apply(scene, request.seed, device if tiled else None)
         subdivision = replace(subdivision, plan=facet_plan)
+        cells, represents = pieces.sampled_cells(speckle_contrast.SAMPLED)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
         mesh_warnings = _warned(
             facet_error.judge(original_scene, antennas, waveform),
-            speckle_contrast.judge(pieces.cells, antennas, waveform),
+            speckle_contrast.judge(cells, antennas, waveform, represents),
         )
         request.report("scene", 1, 3)
         facets, left_out = facets_of(

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -90,13 +90,27 @@ class DeviceTiles:
     last: int
 
 
+class Tiling(Protocol):
+    """Scatterers that can be put into tiles on a device.
+
+    bounds  box of the positions, m (2, 3), and  center  its middle;  radius  m, the largest of the tiles of each size
+    order   neighbours follow one another (n,)
+    """
+
+    bounds: np.ndarray
+    center: np.ndarray
+    radius: dict[int, float]
+    order: np.ndarray
+
+    def __len__(self) -> int: ...
+
+    def tiles(self, per_tile: int) -> DeviceTiles:
+        """Tiles of `per_tile` scatterers on the device."""
+
+
 class HostTiling:
     """Scatterers put into tiles on the host, in Morton order. Tiles of one size stay on the device: those of the last
-    plan.
-
-    bounds  box of the positions, m (2, 3), and  center  its middle;  order  (n,)
-    radius  m, the largest of the tiles of each size
-    """
+    plan."""
 
     def __init__(
         self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]
@@ -137,7 +151,7 @@ class TiledScatterers:
     """Scatterers in tiles and on a device: prepared once, for all channels, receivers and pulses."""
 
     def __init__(
-        self, device: Device, tiling: HostTiling, n_coherent: int, patches: Callable[[np.ndarray], PatchSamples]
+        self, device: Device, tiling: Tiling, n_coherent: int, patches: Callable[[np.ndarray], PatchSamples]
     ) -> None:
         """n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all are
         patches  of the order of the tiling: samples from which the error of evenly spaced scatterers is measured
