@@ -21,6 +21,7 @@ from ..opencl.device import GROUP, Device
 from ..opencl.launch_numbers import launch_numbers
 from ..scene.scene import Scene
 from ..scene.triangles import areas, centroids, cut, edges, normals, refuse_many, too_many
+from ..visibility.illumination import Illumination
 from . import facet_kinds
 from ._random_surface import RANDOM_STREAMS, ROUND, Pieces, pieces_of, with_facets
 from .facet_plan import MOST_FACETS
@@ -44,6 +45,7 @@ class RoughPieces:
 
     cell    m, to which edges are cut, inf: not at all;  seed  of the random surface
     facets  m (k, 3, 3), parts of the scene's facets `of` (k,): large ones in several parts;  counts  of pieces (k,)
+    some    numbers, rising, of the pieces that count (n,); None: all of these facets
     """
 
     device: Device
@@ -53,6 +55,7 @@ class RoughPieces:
     facets: np.ndarray
     of: np.ndarray
     counts: np.ndarray
+    some: np.ndarray | None = None
 
     @classmethod
     def cut(cls, device: Device, scene: Scene, cell: float, seed: int) -> RoughPieces:
@@ -84,7 +87,7 @@ class RoughPieces:
         return device.info.fp64 and len(rough) > 0 and bool(within and rough.all())
 
     def __len__(self) -> int:
-        return int(self.counts.sum(dtype=np.int64))
+        return int(self.counts.sum(dtype=np.int64)) if self.some is None else len(self.some)
 
     @cached_property
     def bounds(self) -> np.ndarray:
@@ -106,8 +109,18 @@ class RoughPieces:
         return self if given.all() else self.rows(np.flatnonzero(given[self.of]))
 
     def rows(self, index: np.ndarray) -> RoughPieces:
-        """The pieces of facets `index` of these, in this order."""
-        return replace(self, facets=self.facets[index], of=self.of[index], counts=self.counts[index])
+        """All pieces of facets `index` of these, in this order."""
+        return replace(self, facets=self.facets[index], of=self.of[index], counts=self.counts[index], some=None)
+
+    def picked(self, some: np.ndarray) -> RoughPieces:
+        """Pieces of these numbers, rising, alone."""
+        return self if len(some) == len(self) else replace(self, some=some)
+
+    def cells(self) -> tuple[Scene, np.ndarray]:
+        """The pieces without random heights as a scene, and which of the scene's facets each is a part of (n,)."""
+        corners, row = self.corners()
+        of = self.of[row]
+        return with_facets(self.scene, corners, of), of
 
     def sampled_cells(self, most: int) -> tuple[Scene, float]:
         """About `most` of the pieces as a scene, drawn with all of their facet, and the number that each represents."""
@@ -127,7 +140,8 @@ class RoughPieces:
         corners = self.device.empty(72 * n)
         kernel = self.device.kernel(KERNELS, "piece_corners")
         self.device.run(kernel, in_groups(n / self.device.info.vector_width), None, n, facets, owners, paths, corners)
-        return self.device.download(corners, np.empty((n, 3, 3))), np.repeat(np.arange(len(self.counts)), self.counts)
+        row = np.repeat(np.arange(len(self.counts)), self.counts)
+        return self.device.download(corners, np.empty((n, 3, 3))), row if self.some is None else row[self.some]
 
     def placed(self, surfaces: np.ndarray, kinds: np.ndarray, stride: int) -> tuple[Any, Any]:
         """Buffers of the centres of pieces, m float64 (3, stride), and of their numbers as spread_facets.cl reads them,
@@ -161,8 +175,13 @@ class RoughPieces:
     def _listed(self) -> tuple[Any, Any, Any]:
         """Buffers of the facets, and of the facet and the path of each piece."""
         starts = np.cumsum(self.counts, dtype=np.int64) - self.counts
-        owners, paths = (self.device.empty(size * len(self)) for size in (4, 8))
-        return self._walk(1, self.device.upload(starts.astype(np.int32)), owners, owners, paths), owners, paths
+        n = int(self.counts.sum(dtype=np.int64))
+        owners, paths = (self.device.empty(size * n) for size in (4, 8))
+        facets = self._walk(1, self.device.upload(starts.astype(np.int32)), owners, owners, paths)
+        if self.some is not None:
+            listed = ((owners, np.empty(n, np.int32)), (paths, np.empty(n, np.uint64)))
+            owners, paths = (self.device.upload(self.device.download(*part)[self.some]) for part in listed)
+        return facets, owners, paths
 
     def _walk(self, listed: int, *buffers: Any) -> Any:
         """Run walk_pieces on its last four buffers; returns that of the facets."""
@@ -175,13 +194,17 @@ class RoughPieces:
 
 
 class RoughFacets(FacetSet):
-    """Pieces on a device as a set of facets that every pulse sees whole. What is asked of single pieces comes from the
-    device, and is kept."""
+    """Pieces on a device as a set of facets. What is asked of single pieces comes from the device, and stays."""
 
     pieces: RoughPieces
 
-    def __init__(self, pieces: RoughPieces) -> None:
-        vars(self).update(pieces=pieces, materials=pieces.scene.materials, illumination=None)
+    def __init__(
+        self, pieces: RoughPieces, illumination: Illumination | None = None, kept: np.ndarray | None = None
+    ) -> None:
+        """illumination  None: every pulse sees all of them;  kept  numbers of the pieces in it (k,)"""
+        vars(self).update(pieces=pieces, materials=pieces.scene.materials, illumination=illumination)
+        if kept is not None:
+            vars(self).update(kept=kept)
 
     def __len__(self) -> int:
         return len(self.pieces)
@@ -201,8 +224,9 @@ class RoughFacets(FacetSet):
             height = counter_rng.gaussian(places, pieces.seed) * scene.roughness[of]
             corners = corners + (height[:, None] * normals(corners))[:, None]
         return FacetSet(
-            corners, scene.reflectivity[of], scene.two_sided[of], scene.material[of], scene.materials, None,
-            np.arange(len(of)), ((real + 1j * imag) / np.sqrt(2)).astype(np.complex64),
+            corners, scene.reflectivity[of], scene.two_sided[of], scene.material[of], scene.materials,
+            self.illumination, vars(self).get("kept", np.arange(len(of))),
+            ((real + 1j * imag) / np.sqrt(2)).astype(np.complex64),
         )  # fmt: skip
 
     def __getattr__(self, name: str) -> Any:
@@ -215,20 +239,22 @@ class RoughFacets(FacetSet):
         """As of FacetSet: none is."""
         return False
 
-    def between(self, first: int, stop: int) -> FacetSet:
-        """As of FacetSet: every pulse sees all."""
-        return self
+    @property
+    def is_incoherent(self) -> np.ndarray:
+        """As of FacetSet: all are."""
+        return np.ones(len(self), bool)
 
-    def steady(self) -> tuple[FacetSet | None, FacetSet | None]:
-        """As of FacetSet: every pulse sees all."""
-        return self, None
+    def between(self, first: int, stop: int) -> FacetSet:
+        """As of FacetSet."""
+        light = self.illumination
+        return self if light is None else RoughFacets(self.pieces, light.between(first, stop), self.kept)
 
     def drawn(self, most: int, random: np.random.Generator) -> tuple[FacetSet, np.ndarray]:
         """Up to `most` pieces, and the number that each represents: as _facet_sampling.py draws them, half of them by
         their areas and half alike; first facets, then a piece of each."""
-        pieces, n = self.pieces, len(self)
-        if n <= most:
-            return self._host, np.ones(n)
+        pieces, n = self.pieces, int(self.pieces.counts.sum(dtype=np.int64))  # in shadow or not
+        if len(self) <= most:
+            return self._host.picked(np.arange(len(self))), np.ones(len(self))
         size = areas(pieces.facets)
         chance = 0.5 * pieces.counts / n + 0.5 * size / size.sum()
         facets = random.choice(len(chance), most, p=chance / chance.sum())

@@ -16,7 +16,7 @@ from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
 from ..scene.terrain import above, check_above, clear_of, facets_on
-from ..visibility.illumination import ALL_DARK, lit
+from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
@@ -75,9 +75,11 @@ def facets_of(
               they are illuminated, progress("scene", 3, 3) then
     """
     if isinstance(pieces, RoughPieces):
-        check_antennas_above(pieces.scene, antennas)
-        if not shadows or (sampled and not Casters.of(pieces.scene, antennas).hides_any):
-            return _rough_facets_of(pieces, antennas, shadows=shadows, skips=skips, progress=progress)
+        if not (shadows and exact) or sampled:
+            return _rough_facets_of(
+                pieces, antennas, shadows=shadows, skips=skips, max_bytes=max_bytes, accuracy=accuracy,
+                progress=progress,
+            )  # fmt: skip
         pieces = pieces.on_host
     scene, n_pulses = pieces.scene, len(antennas.tx)
     original = pieces.original
@@ -112,12 +114,9 @@ def facets_of(
     if casters is not None and not casters.hides_any:
         by_samples = np.zeros(len(keep), bool)
     if casters is not None and casters.hides_any:
-        # of the surface without random heights: facets displaced along their normals would occlude their neighbours
-        illumination = lit(
-            scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
-            two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
-            accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
-            occluders=casters.solid, ground=casters.ground_under(pieces.of), device=device, progress=report_shadows,
+        illumination = casters.light(
+            scene, pieces.of, by_samples, antennas, accuracy=accuracy, max_bytes=max_bytes, device=device,
+            progress=report_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
@@ -144,11 +143,13 @@ def facets_of(
 
 
 def _rough_facets_of(
-    pieces: RoughPieces, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
+    pieces: RoughPieces, antennas: PulseGeometry, *, shadows: bool, skips: set[str], max_bytes: float, accuracy: float,
     progress: Callable[[str, int, int], object],
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
-    """As `facets_of`, of pieces on a device that none hides: culled by the facets that they are parts of."""
+    """As `facets_of`, of pieces on a device: culled by the facets that they are parts of, unless shadows fall on
+    them."""
     scene, n_pulses = pieces.scene, len(antennas.tx)
+    check_antennas_above(scene, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     keep = np.ones(len(scene.triangles), bool)
     if "zero reflectivity" in skips:
@@ -159,10 +160,26 @@ def _rough_facets_of(
         left_out["facing away"] = pieces.number_of(away) * n_pulses
         keep &= ~away
     progress("scene", 2, 3)
+    casters = None
     if shadows:
         _warn_of_reach(scene.triangles)
+        casters = Casters.of(scene, antennas)
+    if casters is None or not casters.hides_any or not keep.any():
+        progress("scene", 3, 3)
+        return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
+
+    def report_shadows(done: int, total: int) -> None:
+        progress("shadows", done, total)
+
+    cut, of = pieces.cells()
+    illumination = casters.light(
+        cut, of, keep[of], antennas, accuracy=accuracy, max_bytes=max_bytes, device=pieces.device,
+        progress=report_shadows,
+    )  # fmt: skip
+    seen = np.flatnonzero(keep[of] & ~illumination.dark)
+    left_out["shadowed"] = (int(keep[of].sum()) - len(seen)) * n_pulses
     progress("scene", 3, 3)
-    return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
+    return RoughFacets(pieces.picked(seen), illumination, seen) if len(seen) else None, left_out
 
 
 def _warn_of_reach(triangles: np.ndarray) -> None:
@@ -204,9 +221,21 @@ class Casters:
         """Whether any facet may be hidden: lines of sight steeper than all slopes of a terrain meet it once."""
         return bool(len(self.solid) or self.hidden_by_floor.any())
 
-    def ground_under(self, of: np.ndarray) -> tuple[np.ndarray, np.ndarray] | None:
-        """Argument `ground` of `lit` for pieces; `of`: the facet of the scene that each is a part of (k,)."""
-        return (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
+    def light(
+        self, pieces: Scene, of: np.ndarray, wanted: np.ndarray, antennas: PulseGeometry, *, accuracy: float,
+        max_bytes: float, device: Any, progress: Callable[[int, int], None],
+    ) -> Illumination:  # fmt: skip
+        """Shares of pieces of a scene's facets `of` (k,), those `wanted` (k,), that antennas see past these casters.
+
+        The pieces are without random heights: displaced along their normals they would occlude their neighbours.
+        """
+        ground = (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
+        return lit(
+            pieces.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
+            two_sided=pieces.two_sided, wanted=wanted, tolerance=min(FINEST[0], FINEST[1] * accuracy),
+            accuracy=accuracy, weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles), max_bytes=max_bytes,
+            occluders=self.solid, ground=ground, device=device, progress=progress,
+        )  # fmt: skip
 
 
 def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:

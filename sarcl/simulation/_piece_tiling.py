@@ -18,10 +18,11 @@ class PieceTiling:
     def __init__(self, pieces: RoughPieces, surfaces: np.ndarray, kinds: np.ndarray) -> None:
         """surfaces, kinds  as `RoughPieces.placed` takes them"""
         self.pieces, self.device, self._numbers = pieces, pieces.device, (surfaces, kinds)
-        self.bounds, self.order = pieces.bounds, np.zeros(0, np.int64)
+        self.bounds = pieces.bounds
         self.center = self.bounds.mean(axis=0)
         largest = max(PER_TILE)
         self.stride = -(-len(pieces) // largest) * largest
+        self.order = np.minimum(np.arange(self.stride), len(pieces) - 1)
         self._placed: tuple[Any, Any] | None = self._place()
         self.radius = {n: float(self._bounds(n)[0][3].max()) for n in PER_TILE}
         self._on_device: DeviceTiles | None = None
