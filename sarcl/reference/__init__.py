@@ -11,6 +11,7 @@ For other folders:
     compress       the matched filter
     echo           the echo equation, term by term
     facet          echo of triangular facets by physical optics
+    facet_pieces   pieces of rough facets, and their random numbers
     fdtd           the steps of a Yee grid
     field          field of an array
     formed_echo    waveform forming: sums of currents, term by term
@@ -37,6 +38,7 @@ __all__ = [
     "compress",
     "echo",
     "facet",
+    "facet_pieces",
     "fdtd",
     "field",
     "formed_echo",

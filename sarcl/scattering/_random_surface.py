@@ -47,6 +47,13 @@ class Pieces:
     random: np.ndarray
     incoherent: np.ndarray
 
+    def __len__(self) -> int:
+        return len(self.height)
+
+    def sampled_cells(self, most: int) -> tuple[Scene, float]:
+        """The cells, of which each represents one: `speckle_contrast.judge` draws from them."""
+        return self.cells, 1.0
+
 
 def cell_edge(waveform: Waveform) -> float:
     """Length, m, of half a resolution cell in slant range, to which random facets are cut."""
@@ -59,7 +66,7 @@ def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
     MemoryError above 50 million facets.
     """
     triangles, cell_of = _cut(scene.triangles, np.where(facet_kinds.random(scene), ROUND * cell, np.inf))
-    cells = _with_facets(scene, triangles, cell_of)
+    cells = with_facets(scene, triangles, cell_of)
     rough, places = facet_kinds.rough(cells), centroids(triangles)
     height, random = np.zeros(len(places)), np.zeros(len(places), np.complex64)
     some = cells.roughness > 0
@@ -74,7 +81,7 @@ def pieces_of(scene: Scene, cell: float, edge: float, seed: int) -> Pieces:
         return Pieces(scene, cell_of, cells, cells, height, random, np.zeros(len(height), bool))
     divided = np.bincount(of, minlength=len(mirror)) > 1
     alone = np.flatnonzero(divided & rough)
-    pieces = _with_facets(cells, np.concatenate([triangles, cells.triangles[alone]]), np.concatenate([of, alone]))
+    pieces = with_facets(cells, np.concatenate([triangles, cells.triangles[alone]]), np.concatenate([of, alone]))
     random_of = np.concatenate([np.where(divided[of], 0, random[of]), random[alone]]).astype(np.complex64)
     incoherent = np.arange(len(random_of)) >= len(of)
     of = np.concatenate([of, alone])
@@ -100,7 +107,7 @@ def _cut(triangles: np.ndarray, longest: np.ndarray) -> tuple[np.ndarray, np.nda
     return np.concatenate([part for part, _ in made]), np.concatenate([of for _, of in made])
 
 
-def _with_facets(scene: Scene, triangles: np.ndarray, of: np.ndarray) -> Scene:
+def with_facets(scene: Scene, triangles: np.ndarray, of: np.ndarray) -> Scene:
     """The scene without points, its facets replaced by parts of them, m (n, 3, 3); `of`: which each belongs to (n,)."""
     if triangles is scene.triangles and not len(scene.positions):
         return scene

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
+from ..base.boxes import box
 from ..base.constants import SPEED_OF_LIGHT
 from ..base.vectors import unit
 from ..scene.material import DIAGRAMS, Material
@@ -65,6 +66,11 @@ class FacetSet:
 
     def __len__(self) -> int:
         return len(self.triangles)
+
+    @property
+    def bounds(self) -> np.ndarray:
+        """Box of the centroids, m (2, 3)."""
+        return box(centroids(self.triangles))
 
     def roots(self, frequency: float) -> np.ndarray:
         """1/sqrt(eps) of every material at one frequency, complex128; 0 of a perfect conductor."""

@@ -19,6 +19,7 @@ from ._facet_sampling import drawn
 from ._frequency_nodes import typical_power
 from .antenna_weights import AntennaWeights
 from .facets import FacetSet
+from .rough_pieces import RoughFacets
 
 ORDER = 4  # nodes that a cubic goes through
 SPACINGS = (64, 32, 16, 8, 4)  # pulses between nodes that are tried
@@ -82,11 +83,11 @@ def plan_pulse_nodes(
     frequency  the highest, Hz. For mirrors the spacing is also limited by MOST_TURN, whatever the samples say.
     """
     n_pulses = len(weights.geometry)
-    if len(part) * n_pulses < WORTH:
+    if len(part) * n_pulses < WORTH or n_pulses < least_pulses(min(SPACINGS)):
         return every(n_pulses)
-    some, share = drawn(areas(part.triangles), FACETS, np.random.default_rng(0))
-    sample, geometry = part.picked(some), weights.geometry
-    steep = steep_pulses(geometry, centroids(part.triangles), vertical)
+    sample, share = _sample(part, np.random.default_rng(0))
+    geometry = weights.geometry
+    steep = steep_pulses(geometry, part.bounds, vertical)
 
     def sampled(pulse: int) -> Sample:
         """H and V of facets near the vertical through an antenna turn fastest: other facets at every pulse."""
@@ -97,7 +98,7 @@ def plan_pulse_nodes(
 
     corner = float(np.maximum.reduce(edges(part.triangles)).max()) * 2 / 3 if part.is_mirror else 0.0
     for spacing in SPACINGS:
-        if n_pulses < 4 * spacing + 1:
+        if n_pulses < least_pulses(spacing):
             continue
         turn = 2 * np.pi * frequency / SPEED_OF_LIGHT * corner * _turning(weights, centroids(sample.triangles), spacing)
         if turn > MOST_TURN:
@@ -106,6 +107,18 @@ def plan_pulse_nodes(
         if SAFETY * error <= tolerance:
             return spaced(n_pulses, spacing, SAFETY * error)
     return every(n_pulses)
+
+
+def _sample(part: FacetSet, random: np.random.Generator) -> Sample:
+    if isinstance(part, RoughFacets):
+        return part.drawn(FACETS, random)
+    some, represents = drawn(areas(part.triangles), FACETS, random)
+    return part.picked(some), represents
+
+
+def least_pulses(spacing: int) -> int:
+    """Pulses that are enough for a cubic, and one interval beside it."""
+    return ORDER * spacing + 1
 
 
 def _turning(weights: AntennaWeights, places: np.ndarray, spacing: int) -> float:

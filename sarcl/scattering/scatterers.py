@@ -15,12 +15,13 @@ from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
 from ..scene import triangles as geometry
 from ..scene.scene import Scene
-from ..scene.terrain import check_above, clear_of, facets_on
-from ..visibility.illumination import ALL_DARK, lit
+from ..scene.terrain import above, check_above, clear_of, facets_on
+from ..visibility.illumination import ALL_DARK, Illumination, lit
 from ..visibility.lit_parts import ON_PLANE, LitParts
 from ._random_surface import Pieces
 from .facet_kinds import coherent
 from .facets import FacetSet
+from .rough_pieces import RoughFacets, RoughPieces
 
 # pairs of piece and pulse, up to which rough facets are clipped too: about ten seconds
 FEW_LOOKS = 2e6
@@ -61,7 +62,7 @@ def points_of(scene: Scene, skips: set[str], n_pulses: int) -> tuple[Points | No
 
 
 def facets_of(
-    pieces: Pieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
+    pieces: Pieces | RoughPieces, waveform: Waveform, antennas: PulseGeometry, *, shadows: bool, skips: set[str],
     max_bytes: float, device: Any, progress: Callable[[str, int, int], object], exact: bool, sampled: bool,
     accuracy: float, margin: float = 0.0,
 ) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
@@ -73,8 +74,16 @@ def facets_of(
     progress  called as progress("scene", 2, 3) when facets are culled, progress("shadows", pulses done, pulses) while
               they are illuminated, progress("scene", 3, 3) then
     """
+    if isinstance(pieces, RoughPieces):
+        if not (shadows and exact) or sampled:
+            return _rough_facets_of(
+                pieces, antennas, shadows=shadows, skips=skips, max_bytes=max_bytes, accuracy=accuracy,
+                progress=progress,
+            )  # fmt: skip
+        pieces = pieces.on_host
     scene, n_pulses = pieces.scene, len(antennas.tx)
-    original, terrain = pieces.original, _terrain(pieces.original, antennas)
+    original = pieces.original
+    check_antennas_above(original, antennas)
     left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
     normals = geometry.normals(scene.triangles)
     triangles = scene.triangles
@@ -101,19 +110,13 @@ def facets_of(
     by_samples = keep & ~clipped & shadows
     if shadows:
         _warn_of_reach(original.triangles)
-    solid = original.triangles
-    ground: tuple[np.ndarray, np.ndarray] | None = None
-    if terrain and by_samples.any():  # by its facets, where it may hide anything
-        on_pieces = terrain["on_heights"][pieces.of]
-        floor, solid = solid[terrain["on_heights"]], solid[~terrain["on_heights"]]
-        ground = floor, ~clear_of(terrain["heights"], scene.triangles, on_pieces, antennas.ends)
-    if by_samples.any():
-        # of the surface without random heights: facets displaced along their normals would occlude their neighbours
-        illumination = lit(
-            scene.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
-            two_sided=scene.two_sided, wanted=by_samples, tolerance=min(FINEST[0], FINEST[1] * accuracy),
-            accuracy=accuracy, weights=scene.reflectivity**2 * geometry.areas(scene.triangles), max_bytes=max_bytes,
-            occluders=solid, ground=ground, device=device, progress=report_shadows,
+    casters = Casters.of(original, antennas) if by_samples.any() else None
+    if casters is not None and not casters.hides_any:
+        by_samples = np.zeros(len(keep), bool)
+    if casters is not None and casters.hides_any:
+        illumination = casters.light(
+            scene, pieces.of, by_samples, antennas, accuracy=accuracy, max_bytes=max_bytes, device=device,
+            progress=report_shadows,
         )  # fmt: skip
         left_out["shadowed"] = int((by_samples & illumination.dark).sum()) * n_pulses
         keep &= ~(by_samples & illumination.dark)
@@ -139,6 +142,46 @@ def facets_of(
     ), left_out  # fmt: skip
 
 
+def _rough_facets_of(
+    pieces: RoughPieces, antennas: PulseGeometry, *, shadows: bool, skips: set[str], max_bytes: float, accuracy: float,
+    progress: Callable[[str, int, int], object],
+) -> tuple[FacetSet | None, dict[str, int]]:  # fmt: skip
+    """As `facets_of`, of pieces on a device: culled by the facets that they are parts of, unless shadows fall on
+    them."""
+    scene, n_pulses = pieces.scene, len(antennas.tx)
+    check_antennas_above(scene, antennas)
+    left_out = {"zero reflectivity": 0, "facing away": 0, "shadowed": 0}
+    keep = np.ones(len(scene.triangles), bool)
+    if "zero reflectivity" in skips:
+        keep &= scene.reflectivity != 0
+        left_out["zero reflectivity"] = pieces.number_of(~keep) * n_pulses
+    if "facing away" in skips:
+        away = keep & ~scene.two_sided & faces_away(pieces.bounds, geometry.normals(scene.triangles), antennas)
+        left_out["facing away"] = pieces.number_of(away) * n_pulses
+        keep &= ~away
+    progress("scene", 2, 3)
+    casters = None
+    if shadows:
+        _warn_of_reach(scene.triangles)
+        casters = Casters.of(scene, antennas)
+    if casters is None or not casters.hides_any or not keep.any():
+        progress("scene", 3, 3)
+        return RoughFacets(pieces.within(keep)) if keep.any() else None, left_out
+
+    def report_shadows(done: int, total: int) -> None:
+        progress("shadows", done, total)
+
+    cut, of = pieces.cells()
+    illumination = casters.light(
+        cut, of, keep[of], antennas, accuracy=accuracy, max_bytes=max_bytes, device=pieces.device,
+        progress=report_shadows,
+    )  # fmt: skip
+    seen = np.flatnonzero(keep[of] & ~illumination.dark)
+    left_out["shadowed"] = (int(keep[of].sum()) - len(seen)) * n_pulses
+    progress("scene", 3, 3)
+    return RoughFacets(pieces.picked(seen), illumination, seen) if len(seen) else None, left_out
+
+
 def _warn_of_reach(triangles: np.ndarray) -> None:
     """Warn where facets are so small beside all of the scene, m (k, 3, 3), that they count as lying in one plane."""
     low, high = boxes.box(triangles.reshape(-1, 3))
@@ -152,14 +195,55 @@ def _warn_of_reach(triangles: np.ndarray) -> None:
         )
 
 
-def _terrain(scene: Scene, antennas: PulseGeometry) -> dict[str, Any]:
-    """Arguments of `lit` for a scene's terrain, where it is complete. ValueError for an antenna under it."""
-    on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
-    if scene.heights is None or on is None:
-        return {}
+@dataclass(frozen=True, eq=False)
+class Casters:
+    """What casts shadows in a scene.
+
+    solid  facets that stand on a terrain, or all where there is none, m (n, 3, 3);  floor  the terrain's, m (m, 3, 3)
+    hidden_by_floor  facets of the scene that its terrain may hide from an antenna (k,) bool
+    """
+
+    solid: np.ndarray
+    floor: np.ndarray
+    hidden_by_floor: np.ndarray
+
+    @classmethod
+    def of(cls, scene: Scene, antennas: PulseGeometry) -> Casters:
+        """Those of a scene, its terrain by its facets where it is complete."""
+        on = None if scene.heights is None else facets_on(scene.heights, scene.triangles)
+        if scene.heights is None or on is None:
+            return cls(scene.triangles, scene.triangles[:0], np.zeros(len(scene.triangles), bool))
+        clear = clear_of(scene.heights, scene.triangles, on, antennas.ends)
+        return cls(scene.triangles[~on], scene.triangles[on], ~clear)
+
+    @property
+    def hides_any(self) -> bool:
+        """Whether any facet may be hidden: lines of sight steeper than all slopes of a terrain meet it once."""
+        return bool(len(self.solid) or self.hidden_by_floor.any())
+
+    def light(
+        self, pieces: Scene, of: np.ndarray, wanted: np.ndarray, antennas: PulseGeometry, *, accuracy: float,
+        max_bytes: float, device: Any, progress: Callable[[int, int], None],
+    ) -> Illumination:  # fmt: skip
+        """Shares of pieces of a scene's facets `of` (k,), those `wanted` (k,), that antennas see past these casters.
+
+        The pieces are without random heights: displaced along their normals they would occlude their neighbours.
+        """
+        ground = (self.floor, self.hidden_by_floor[of]) if len(self.floor) else None
+        return lit(
+            pieces.triangles, antennas.tx, None if antennas.is_monostatic else antennas.rx,
+            two_sided=pieces.two_sided, wanted=wanted, tolerance=min(FINEST[0], FINEST[1] * accuracy),
+            accuracy=accuracy, weights=pieces.reflectivity**2 * geometry.areas(pieces.triangles), max_bytes=max_bytes,
+            occluders=self.solid, ground=ground, device=device, progress=progress,
+        )  # fmt: skip
+
+
+def check_antennas_above(scene: Scene, antennas: PulseGeometry) -> None:
+    """ValueError for an antenna under a scene's terrain, where that is complete."""
     for name, positions in zip(("track", "receiver"), antennas.ends, strict=False):
-        check_above(name, scene.heights, positions)
-    return {"heights": scene.heights, "on_heights": on}
+        if scene.heights is not None and above(scene.heights, positions).min() < 0:
+            if facets_on(scene.heights, scene.triangles) is not None:
+                check_above(name, scene.heights, positions)
 
 
 def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
@@ -173,13 +257,15 @@ def samples_shadows(scene: Scene, cell: float, n_pulses: int) -> bool:
 def faces_away(centers: np.ndarray, normals: np.ndarray, antennas: PulseGeometry) -> np.ndarray:
     """True (k,) for facets that face away from the transmitter, or from the receiver, at every pulse.
 
+    centers  m (n, 3), of the facets, or corners of a box around them;  normals  (k, 3)
+
     n.u(p, x) <= n.u_mean + |u(p, x) - u_mean|: the last term is bounded over all pulses and the whole scene. Facets
     that are edge-on to one of two antennas still send back a part (physical_optics.py:lit_share).
     """
     edge_on = 0.0 if antennas.is_monostatic else 2 * EDGE_ON
     corners = boxes.box(centers)
     middle, radius = corners.mean(axis=0), float(np.linalg.norm(corners[1] - corners[0])) / 2
-    out = np.zeros(len(centers), bool)
+    out = np.zeros(len(normals), bool)
     for ends in (antennas.tx, antennas.rx):
         look = ends - middle
         distance = np.linalg.norm(look, axis=1)

@@ -10,12 +10,14 @@ import numpy as np
 from ..base.validation import number
 from ..model.waveform import Waveform
 from ..numerics.pulse_geometry import PulseGeometry
+from ..opencl.device import Device
 from ..scene.scene import Scene
 from ._facet_norm import longest_piece
 from ._random_surface import Pieces, pieces_of
 from ._random_surface import cell_edge as cell_edge
 from .antenna_weights import WeightError
 from .facet_plan import FacetPlan, plan_facets
+from .rough_pieces import RoughPieces
 
 
 @dataclass(frozen=True, eq=False)
@@ -34,11 +36,18 @@ class Subdivision:
         """Norm of the cut facets over that of the facets as they were given, both added with random phases."""
         return self.plan.gain
 
-    def apply(self, scene: Scene, seed: int) -> tuple[FacetPlan, Pieces]:
-        """The plan with the number of facets, and the pieces of the scene; `seed` of its random surface."""
-        edge = longest_piece(self.plan.max_edge) if self.cuts else np.inf
-        pieces = pieces_of(scene, self.cell, edge, seed)
-        return replace(self.plan, n_facets=len(pieces.height)), pieces
+    def apply(self, scene: Scene, seed: int, device: Device | None) -> tuple[FacetPlan, Pieces | RoughPieces]:
+        """The plan with the number of facets, and the pieces of the scene; `seed` of its random surface.
+
+        device  that cuts facets, where it can; None: the host does
+        """
+        pieces: Pieces | RoughPieces
+        if device is not None and not self.plan.is_float64 and RoughPieces.suits(device, scene):
+            pieces = RoughPieces.cut(device, scene, self.cell, seed)
+        else:
+            edge = longest_piece(self.plan.max_edge) if self.cuts else np.inf
+            pieces = pieces_of(scene, self.cell, edge, seed)
+        return replace(self.plan, n_facets=len(pieces)), pieces
 
 
 def plan_cut(

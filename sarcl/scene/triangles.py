@@ -68,13 +68,7 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
     Returns them (n, 3, 3), and which of the given triangles each is a part of (n,). MemoryError where n would exceed
     max_facets.
     """
-    too_many = (
-        f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
-        "take a smaller scene, a larger max_edge or a coarser resolution"
-    )
-    # no facet is larger than the equilateral one: most hopeless cuts end here, before they fill the memory
-    if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
-        raise MemoryError(too_many)
+    refuse_many(triangles, max_edge, max_facets)
     parts, rows, n = [triangles[:0]], [np.zeros(0, np.int64)], 0
     for block, corners in _blocks(triangles):
         row, lengths = np.arange(block.start, block.stop), edges(triangles[block])
@@ -85,10 +79,24 @@ def cut(triangles: np.ndarray, max_edge: float, max_facets: int) -> tuple[np.nda
             rows.append(row[short])
             n += len(short)
             if n + 2 * len(long) > max_facets:
-                raise MemoryError(too_many)
+                raise too_many(max_edge, max_facets)
             corners, lengths = _halves(corners.take(long, axis=2), lengths.take(long, axis=1))
             row = np.tile(row[long], 2)
     return np.concatenate(parts), np.concatenate(rows)
+
+
+def too_many(max_edge: float, max_facets: int) -> MemoryError:
+    """The error of a cut that would make too many facets."""
+    return MemoryError(
+        f"facets no longer than {max_edge:g} m would number more than {max_facets:,}; "
+        "take a smaller scene, a larger max_edge or a coarser resolution"
+    )
+
+
+def refuse_many(triangles: np.ndarray, max_edge: float, max_facets: int) -> None:
+    """MemoryError for most hopeless cuts, before they fill the memory: no facet is larger than the equilateral one."""
+    if np.sqrt(areas(triangles).sum() / (max_facets * np.sqrt(3) / 4)) > max_edge:
+        raise too_many(max_edge, max_facets)
 
 
 def bisect(triangles: np.ndarray, lengths: np.ndarray) -> tuple[np.ndarray, np.ndarray]:

@@ -20,10 +20,12 @@ from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.facet_plan import FacetPlan
 from ..scattering.facets import POLARIZATIONS, FacetSet, diagram_macros, vertical_axes
 from ..scattering.pulse_nodes import every, plan_pulse_nodes
+from ..scattering.rough_pieces import RoughFacets
 from ..scene.triangles import centroids
 from ._kernel_images import sample_patches
+from ._piece_tiling import PieceTiling
 from ._pulse_levels import PulseLevels
-from .spreading import GROUP, Band, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
+from .spreading import GROUP, Band, Counts, HostTiling, TiledScatterers, Tiling, is_grouped, most_pulses, splits, terms
 
 KERNELS = "spread_facets.cl"
 MOST_PULSES = 256  # pulses per block where amplitudes are interpolated: two blocks cannot share their nodes
@@ -46,16 +48,23 @@ class TiledFacets(TiledScatterers):
         self.metal = all(np.isinf(m.conductivity) for m in facets.materials)
         roots = np.stack([facets.roots(float(f)) for f in nodes])
         self.dispersive = not self.metal and bool(np.ptp(roots, axis=0).any())
-        positions = centroids(facets.triangles)
 
         def amplitudes(some: np.ndarray, pulse: int, frequency: float) -> np.ndarray:
             ends, f = (antennas.tx[pulse], antennas.rx[pulse]), np.array([frequency])
             sent = facets.picked(some).amplitudes(*ends, f, polarizations, vertical)[0]
             return np.asarray(sent * weights.weights(positions[some], pulse, frequency)[:, None])
 
+        tiling: Tiling
+        if isinstance(facets, RoughFacets):
+            tiling = PieceTiling(facets.pieces, *facets.tiling_numbers(nodes, self.metal, self.dispersive))
+            positions = tiling.bounds  # no patches are sampled of random phases
+        else:
+            positions = centroids(facets.triangles)
+            tiling = HostTiling(
+                device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive)
+            )
         super().__init__(
-            device, positions, lambda order: facets.planes(order, nodes, self.metal, self.dispersive),
-            len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
+            device, tiling, len(antennas) * len(nodes) * len(polarizations) if facets.is_mirror else 0,
             lambda order: sample_patches(positions, order, antennas, waveform, amplitudes),
         )  # fmt: skip
 
@@ -95,13 +104,13 @@ class FacetSpreader:
         self.basis = facet_plan.basis(frequencies).astype(np.float32)
         self._upload(vertical, tolerance)
         self.at_once, self.tiles_at_once = self._blocks(budget)
-        self.levels_at_once = max(2, int(budget / 8 / len(self.tiles.order)))
+        self.levels_at_once = max(2, int(budget / 8 / self.tiles.n_offsets))
 
     def _upload(self, vertical: np.ndarray, tolerance: float) -> None:
         """Kernels, and what all blocks of pulses share on the device."""
         device, held, plan, weights = self.device, self.held, self.plan, self.weights
         self.tiles = held.tiles(plan.per_tile)
-        tiles, nodes, bistatic = self.tiles.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
+        tiles, nodes, bistatic = self.tiles, held.facet_plan.nodes, not self.antennas.is_monostatic
         self.grouped = is_grouped(device)
         macros = {**plan.macros(bistatic), **weights.macros(len(nodes)), "TILE": tiles.per_tile}
         macros |= {
@@ -132,7 +141,7 @@ class FacetSpreader:
 
     def _blocks(self, budget: float) -> tuple[int, int]:
         """Pulses per block, and tiles whose amplitudes are held at once, that keep to the budget, bytes."""
-        device, tiles, lanes = self.device, self.tiles.tiles, self.device.info.vector_width
+        device, tiles, lanes = self.device, self.tiles, self.device.info.vector_width
         most, spacing = most_pulses(device), self.pulse_nodes.spacing
         if spacing > 1:
             most = max(most, MOST_PULSES)
@@ -193,7 +202,7 @@ class FacetSpreader:
         """Range profiles of a block of pulses on the device, as `SpreadSamples.of` takes them, and counts of pairs
         (3,): inside the window, of these from the front, and outside the beam."""
         start, stop = levels.start, levels.stop
-        device, held, tiles, used = self.device, self.tiles, self.tiles.tiles, stop - start
+        device, tiles, used = self.device, self.tiles, stop - start
         at, which, shares = self.pulse_nodes.of(start, stop)
         pulse, constants, n = self._constants(np.arange(start, stop), self.gated)
         node_constants, n_nodes = constants, n
@@ -201,12 +210,14 @@ class FacetSpreader:
             _, node_constants, n_nodes = self._constants(at, False)
         axes, node_axes = (device.upload(self.weights.packed_axes(rows)) for rows in (np.arange(start, stop), at))
         which_here, shares_here = device.upload(which), device.upload(shares)
-        seen = device.upload(np.stack([level[held.order] for level in levels.levels]))
         moments, between = device.upload(levels.moments), device.upload(levels.between)
+        seen = between
+        if self.facets.illumination is not None:
+            seen = device.upload(np.stack([level[tiles.order] for level in levels.levels]))
         parts = device.upload(self._parts(start, stop)) if self.partly else between
         rows = device.zeros(24 * self.splits * used * self.stride * self.channels)
         done = device.zeros(12 * self.splits * used)
-        n_offsets, each, ends = tiles.offsets.shape[1], 1, (1, 1) if device.is_cpu else None
+        n_offsets, each, ends = tiles.n_offsets, 1, (1, 1) if device.is_cpu else None
         if self.grouped:
             each, ends = GROUP, (GROUP, 1)
         size = min(self.tiles_at_once, tiles.n_tiles) * len(at) * tiles.per_tile
@@ -219,18 +230,18 @@ class FacetSpreader:
                     KERNELS, "facet_amplitudes", n=n_nodes, n_offsets=n_offsets, second=self.second,
                     range=self.weights.range, first=first,
                 ),
-                node_constants, held.offsets, held.planes, parts, self.nodes, self.up, self.patterns, node_axes,
-                self.reach, held.radius, made, marks,
+                node_constants, tiles.offsets, tiles.planes, parts, self.nodes, self.up, self.patterns, node_axes,
+                self.reach, tiles.radius, made, marks,
             )  # fmt: skip
             device.run(
                 self.spread, (each * used, self.splits), ends,
                 launch_numbers(
                     KERNELS, "spread_facets", n=n, n_used=used, n_tiles=tiles.n_tiles, n_offsets=n_offsets,
-                    first=first, n_here=here, last=held.last, flush=self.flush, stride=self.stride,
+                    first=first, n_here=here, last=tiles.last, flush=self.flush, stride=self.stride,
                     origin=self.stride // 2,
                 ),
-                pulse, constants, held.references, held.offsets, made, marks, which_here, shares_here, seen,
-                moments, between, axes, self.reach, held.radius, self.table, rows, done, steps=here / self.splits,
+                pulse, constants, tiles.references, tiles.offsets, made, marks, which_here, shares_here, seen,
+                moments, between, axes, self.reach, tiles.radius, self.table, rows, done, steps=here / self.splits,
             )  # fmt: skip
         counts = device.download(done, np.empty((3, self.splits, used), np.int32))
         return rows, counts.sum(axis=(1, 2), dtype=np.int64)
@@ -249,9 +260,9 @@ class FacetSpreader:
 
     def _constants(self, rows: np.ndarray, gated: bool) -> tuple[Any, Any, int]:
         """Packed antennas of pulses, the numbers that each shares with the tiles, and the pulses with blanks."""
-        device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles.tiles
+        device, lanes, tiles = self.device, self.device.info.vector_width, self.tiles
         packed = self.antennas.picked(rows).packed(self.held.center, self.plan.length, 0, len(rows), lanes)
         n = packed.shape[2]
-        pulse, held, whole = device.upload(packed), self.tiles, (0, tiles.n_tiles)
-        constants = self.constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
+        pulse, whole = device.upload(packed), (0, tiles.n_tiles)
+        constants = self.constants.compute(pulse, n, tiles.references, tiles.radius, whole, tiles.n_tiles, int(gated))
         return pulse, constants, n

@@ -18,7 +18,7 @@ from ..opencl.launch_numbers import launch_numbers
 from ..scattering.antenna_weights import AntennaWeights
 from ..scattering.scatterers import Points
 from ._kernel_images import sample_patches
-from .spreading import GROUP, Counts, TiledScatterers, is_grouped, most_pulses, splits, terms
+from .spreading import GROUP, Counts, HostTiling, TiledScatterers, is_grouped, most_pulses, splits, terms
 
 
 def tiled_points(
@@ -30,7 +30,7 @@ def tiled_points(
         return (weights.weights(points.positions[some], pulse, frequency) * points.amplitudes[some])[:, None]
 
     return TiledScatterers(
-        device, points.positions, points.planes, len(antennas),
+        device, HostTiling(device, points.positions, points.planes), len(antennas),
         lambda order: sample_patches(points.positions, order, antennas, waveform, amplitudes),
     )  # fmt: skip
 
@@ -47,8 +47,8 @@ def spread_points(
     on_progress is called with the number of pairs of point and pulse that are done.
     """
     device, lanes, n_samples = points.device, points.device.info.vector_width, samples.shape[1]
-    held = points.tiles(plan.per_tile)
-    tiles, bistatic, channels = held.tiles, not antennas.is_monostatic, len(nodes)
+    tiles = points.tiles(plan.per_tile)
+    bistatic, channels = not antennas.is_monostatic, len(nodes)
     grouped = is_grouped(device)
     macros = {**plan.macros(bistatic), **weights.macros(channels), "TILE": tiles.per_tile, "GROUPED": int(grouped)}
     tile_constants = TileConstants(device, plan, bistatic=bistatic)
@@ -72,7 +72,7 @@ def spread_points(
         n, used = packed.shape[2], stop - start
         pulse = device.upload(packed)
         whole = 0, tiles.n_tiles
-        constants = tile_constants.compute(pulse, n, held.references, held.radius, whole, tiles.n_tiles, int(gated))
+        constants = tile_constants.compute(pulse, n, tiles.references, tiles.radius, whole, tiles.n_tiles, int(gated))
         rows, done = device.zeros(24 * parts * used * stride * channels), device.zeros(8 * parts * used)
         axes = device.upload(weights.packed_axes(np.arange(start, stop)))
         size, ends = (used, parts), (1, 1) if device.is_cpu else None
@@ -82,11 +82,11 @@ def spread_points(
             kernel, size, ends,
             launch_numbers(
                 "spread_points.cl", "spread", n=n, n_used=used, n_tiles=tiles.n_tiles,
-                n_offsets=tiles.offsets.shape[1], second=second, range=weights.range, last=held.last, flush=flush,
+                n_offsets=tiles.n_offsets, second=second, range=weights.range, last=tiles.last, flush=flush,
                 stride=stride, origin=stride // 2,
             ),
-            pulse, constants, held.references, held.offsets, held.planes, ratios, patterns, axes, reach, held.radius,
-            table, rows, done, steps=tiles.n_tiles / parts,
+            pulse, constants, tiles.references, tiles.offsets, tiles.planes, ratios, patterns, axes, reach,
+            tiles.radius, table, rows, done, steps=tiles.n_tiles / parts,
         )  # fmt: skip
         device.finish()
         clock.lap("echo")

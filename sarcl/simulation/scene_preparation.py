@@ -40,10 +40,11 @@ def prepare_scene(plan: ScenePlan, *, tiled: bool = True, exact: bool = True) ->
     points, skipped = points_of(seen.scene, request.skips, len(seen.antennas))
     facets, subdivision, mesh_warnings = None, plan.subdivision, dict[str, Any]()
     if subdivision is not None:
-        facet_plan, pieces = subdivision.apply(seen.scene, request.seed)
+        facet_plan, pieces = subdivision.apply(seen.scene, request.seed, request.device if tiled else None)
         subdivision = replace(subdivision, plan=facet_plan)
+        cells, represents = pieces.sampled_cells(speckle_contrast.SAMPLED)
         # curves are recognised in facets as they were given, speckle follows from the facets that are added up
-        speckle = speckle_contrast.judge(pieces.cells, seen.antennas, seen.waveform)
+        speckle = speckle_contrast.judge(cells, seen.antennas, seen.waveform, represents)
         mesh_warnings = warn_of_curves(plan) | _warned(speckle)
         request.report("scene", 1, 3)
         facets, left_out = facets_of(

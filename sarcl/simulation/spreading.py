@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable
 from dataclasses import dataclass, replace
-from typing import Any
+from typing import Any, Protocol
 
 import numpy as np
 
@@ -72,48 +72,97 @@ class Band:
 class DeviceTiles:
     """Tiles of scatterers on a device.
 
+    per_tile, n_tiles            scatterers in a tile, and tiles
     order                        of the scatterers in whole tiles; the last scatterer fills up the last tile
     references, radius, offsets  of the tiles, and planes  of the scatterers' numbers: buffers
+    n_offsets                    distance of one plane of offsets or numbers from the next
     last                         scatterers in the last tile
     """
 
-    tiles: Tiles
+    per_tile: int
+    n_tiles: int
     order: np.ndarray
     references: Any
     radius: Any
     offsets: Any
     planes: Any
+    n_offsets: int
     last: int
 
 
-class TiledScatterers:
-    """Scatterers in Morton order, in tiles and on a device: prepared once, for all channels, receivers and pulses.
+class Tiling(Protocol):
+    """Scatterers that can be put into tiles on a device.
 
-    Tiles of one size stay on the device: those of the last plan. Every array here is computed at its first use.
+    bounds  box of the positions, m (2, 3), and  center  its middle;  radius  m, the largest of the tiles of each size
+    order   neighbours follow one another (n,)
     """
 
+    bounds: np.ndarray
+    center: np.ndarray
+    radius: dict[int, float]
+    order: np.ndarray
+
+    def __len__(self) -> int: ...
+
+    def tiles(self, per_tile: int) -> DeviceTiles:
+        """Tiles of `per_tile` scatterers on the device."""
+
+
+class HostTiling:
+    """Scatterers put into tiles on the host, in Morton order. Tiles of one size stay on the device: those of the last
+    plan."""
+
     def __init__(
-        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray], n_coherent: int,
-        patches: Callable[[np.ndarray], PatchSamples],
+        self, device: Device, positions: np.ndarray, planes: Callable[[np.ndarray], np.ndarray]
     ) -> None:  # fmt: skip
-        """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them
-        n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all are
-        patches     of the Morton order: samples from which the error of evenly spaced scatterers is measured
-        """
-        self.device, self.positions, self._planes, self._patches = device, positions, planes, patches
-        self._n_coherent = n_coherent
-        self.bounds, self._order = box(positions), morton_order(positions)
+        """positions  m (n, 3);  planes  of an order: the scatterers' numbers as the kernel reads them"""
+        self.device, self.positions, self._planes = device, positions, planes
+        self.bounds, self.order = box(positions), morton_order(positions)
         self.center = self.bounds.mean(axis=0)
         largest = max(PER_TILE)
         self._tiled_largest: tuple[Tiles, np.ndarray] | None = self._tiled(largest)
         tiles = self._tiled_largest[0]
-        self._radius = {n: float(tiles.radius.max()) if n == largest else tiles.radius_in_parts(n) for n in PER_TILE}
+        self.radius = {n: float(tiles.radius.max()) if n == largest else tiles.radius_in_parts(n) for n in PER_TILE}
         self._on_device: DeviceTiles | None = None
+
+    def __len__(self) -> int:
+        return len(self.positions)
+
+    def tiles(self, per_tile: int) -> DeviceTiles:
+        """Tiles of `per_tile` scatterers on the device."""
+        found = self._on_device
+        if found is None or found.per_tile != per_tile:
+            self._on_device = None  # frees the buffers of the other size first
+            largest, self._tiled_largest = self._tiled_largest, None  # what the device holds is not needed here
+            tiles, order = largest if largest and largest[0].per_tile == per_tile else self._tiled(per_tile)
+            upload = self.device.upload
+            found = self._on_device = DeviceTiles(
+                per_tile, tiles.n_tiles, order, upload(float_pairs.wide(tiles.references.T)),
+                upload(tiles.radius.astype(np.float32)), upload(tiles.offsets), upload(self._planes(order)),
+                len(order), per_tile - (len(order) - len(self)),
+            )  # fmt: skip
+        return found
+
+    def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
+        return tile_points(self.positions, self.center, per_tile, self.order)
+
+
+class TiledScatterers:
+    """Scatterers in tiles and on a device: prepared once, for all channels, receivers and pulses."""
+
+    def __init__(
+        self, device: Device, tiling: Tiling, n_coherent: int, patches: Callable[[np.ndarray], PatchSamples]
+    ) -> None:
+        """n_coherent  sums over all scatterers, of all pulses, that are not at random phases: 0 where all are
+        patches  of the order of the tiling: samples from which the error of evenly spaced scatterers is measured
+        """
+        self.device, self.tiling, self._n_coherent, self._patches = device, tiling, n_coherent, patches
+        self.center, self.tiles = tiling.center, tiling.tiles
         self._samples: PatchSamples | None = None
         self._image_errors: dict[tuple[Any, ...], float] = {}
 
     def __len__(self) -> int:
-        return len(self.positions)
+        return len(self.tiling)
 
     def plan(
         self, antennas: PulseGeometry, band: Band, tolerance: float, least_tolerance: float = LEAST_TOLERANCE
@@ -124,8 +173,8 @@ class TiledScatterers:
         def with_gain(gain: float) -> Plan:
             return cheapest(
                 tolerance,
-                self._radius.items(),
-                distance=antennas.distance(self.bounds),
+                self.tiling.radius.items(),
+                distance=antennas.distance(self.tiling.bounds),
                 frequency=float(antennas.frequency.max()) + band.bandwidth / 2,
                 bandwidth=band.bandwidth,
                 n_samples=band.n_samples,
@@ -160,30 +209,13 @@ class TiledScatterers:
                 lattice = "with scatterers that lie so evenly: the images of the interpolation kernel add up"
                 raise ToleranceUnreachable(tolerance, None, refused.limit, "take a larger tolerance", lattice) from None
 
-    def tiles(self, per_tile: int) -> DeviceTiles:
-        """Tiles of `per_tile` scatterers on the device."""
-        found = self._on_device
-        if found is None or found.tiles.per_tile != per_tile:
-            self._on_device = None  # frees the buffers of the other size first
-            largest, self._tiled_largest = self._tiled_largest, None  # what the device holds is not needed here
-            tiles, order = largest if largest and largest[0].per_tile == per_tile else self._tiled(per_tile)
-            upload = self.device.upload
-            found = self._on_device = DeviceTiles(
-                tiles, order, upload(float_pairs.wide(tiles.references.T)), upload(tiles.radius.astype(np.float32)),
-                upload(tiles.offsets), upload(self._planes(order)), per_tile - (len(order) - len(self)),
-            )  # fmt: skip
-        return found
-
-    def _tiled(self, per_tile: int) -> tuple[Tiles, np.ndarray]:
-        return tile_points(self.positions, self.center, per_tile, self._order)
-
     def _image_error(self, plan: Plan, band: Band) -> float:
         """Relative error of the images of a plan's kernel."""
         kernel = plan.interpolator
         key = kernel.taps, kernel.oversample, plan.length, band.n_samples, band.bandwidth
         if key not in self._image_errors:
             if self._samples is None:
-                self._samples = self._patches(self._order)
+                self._samples = self._patches(self.tiling.order)
             self._image_errors[key] = self._samples.error(kernel, plan.length, band.n_samples, band.bandwidth)
         return self._image_errors[key]
 

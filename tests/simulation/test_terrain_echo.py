@@ -147,6 +147,15 @@ def test_an_antenna_under_the_terrain_is_refused():
         sarcl.echo(scene, WAVE, sarcl.Trajectory([0.0], [[5.0, 5.0, -400.0]]), max_edge=5.0, tolerance=1e-1)
 
 
+def test_no_shadow_is_looked_for_on_terrain_below_lines_of_sight_steeper_than_its_slopes(monkeypatch, sampled):
+    monkeypatch.setattr(scatterers, "FEW_LOOKS", 0)
+    above, low = (
+        sarcl.echo(hills(height=1.5), WAVE, track(elevation, n=4), tolerance=3e-2) for elevation in (1.2, 0.15)
+    )
+    assert len(sampled) == 1 and low.report.contributions_skipped["shadowed"] > 0
+    assert above.report.contributions_skipped.get("shadowed", 0) == 0
+
+
 def test_other_ray_casters_are_refused():
     with pytest.raises(TypeError, match=r"shadows is .*optix"):
         sarcl.echo(hills(n=4), WAVE, track(n=4), shadows="optix")

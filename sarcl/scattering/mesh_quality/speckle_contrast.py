@@ -73,9 +73,10 @@ class Speckle:
         ]
 
 
-def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
+def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform, represents: float = 1.0) -> Speckle:
     """Speckle of a scene's facets after cutting: of rough ones, and of those that random heights displace.
 
+    represents  number of facets that each of these stands for
     With an antenna at the scene's centre, or forward scattering, there is no resolution cell and no verdict. TypeError
     names a wrong type.
     """
@@ -89,8 +90,8 @@ def judge(scene: Scene, antennas: PulseGeometry, waveform: Waveform) -> Speckle:
     triangles, material, roughness, reflectivity, two_sided = (
         getattr(scene, name) for name in ("triangles", "material", "roughness", "reflectivity", "two_sided")
     )
-    of_each = max(1.0, len(triangles) / SAMPLED)
-    if of_each > 1:  # of large scenes some represent the others: drawn, because facets may stand in rows
+    of_each = represents * max(1.0, len(triangles) / SAMPLED)
+    if len(triangles) > SAMPLED:  # of large scenes some represent the others: drawn, because facets may stand in rows
         drawn = np.random.default_rng(0).choice(len(triangles), SAMPLED, replace=False)
         triangles, material, roughness, reflectivity, two_sided = (
             values[drawn] for values in (triangles, material, roughness, reflectivity, two_sided)

@@ -1,0 +1,204 @@
+"""Pieces of rough facets: cut, placed and given their random numbers on a device."""
+
+from __future__ import annotations
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+import sarcl
+from sarcl.numerics.tiles import tile_points
+from sarcl.reference import facet_pieces
+from sarcl.scattering import rough_pieces
+from sarcl.scattering._random_surface import ROUND, cell_edge, pieces_of
+from sarcl.scattering.rough_pieces import RoughFacets, RoughPieces
+from sarcl.scene import triangles as geometry
+from sarcl.simulation._piece_tiling import PieceTiling
+
+COS, SHARP = sarcl.Material(diagram="cos"), sarcl.Material(eps_r=4.0, conductivity=1e-3, diagram="exp", width=0.5)
+CHIRP = sarcl.Waveform.chirp(center=9.6e9, bandwidth=150e6, duration=1e-6)
+RANDOM = np.random.default_rng(0)
+TRIANGLES = {
+    "one that is not cut": np.eye(3)[None] * 0.1,
+    "one": np.eye(3)[None] * 3,
+    "equilateral": np.array([[[0.0, 0, 0], [4, 0, 0], [2, 2 * np.sqrt(3), 0]]]),
+    "needles": RANDOM.uniform(-3, 3, (7, 3, 3)) * [1, 1e-3, 1e-6],
+    "many": RANDOM.uniform(-1, 1, (33, 3, 3)) + RANDOM.uniform(-9, 9, (33, 1, 3)),
+    "a large one beside small ones": np.concatenate([[[[0, 0, 0], [30, 0, 0], [0, 40, 5]]], RANDOM.random((5, 3, 3))]),
+}
+
+
+def scene(triangles, **options):
+    return sarcl.Scene.facets(triangles, **{"material": COS, **options})
+
+
+def terrain(n=12, **options):
+    axis = np.linspace(-9, 9, n + 1)
+    x, y = np.meshgrid(axis, axis)
+    return sarcl.Scene.from_heights(axis, axis, np.sin(x / 3) * np.cos(y / 4), **{"material": COS, **options})
+
+
+def track(n=8):
+    return sarcl.Trajectory.circle(radius=8e3, height=6e3, arc=0.001, n_pulses=n)
+
+
+def in_order(triangles):
+    rows = np.ascontiguousarray(triangles).reshape(len(triangles), -1)
+    return rows[np.lexsort(rows.T)]
+
+
+@pytest.mark.parametrize("name", TRIANGLES)
+def test_the_pieces_are_those_of_the_reference_to_the_last_bit(double, name):
+    pieces = RoughPieces.cut(double, scene(TRIANGLES[name]), 0.2, 0)
+    corners, row = pieces.corners()
+    wanted, of = facet_pieces.pieces(pieces.facets, ROUND * 0.2)
+    assert np.array_equal(corners, wanted) and np.array_equal(row, of)
+    assert np.array_equal(np.bincount(of, minlength=len(pieces.facets)), pieces.counts) and len(pieces) == len(wanted)
+
+
+@pytest.mark.parametrize("name", TRIANGLES)
+def test_pieces_cover_their_facets_and_are_those_that_the_host_cuts(double, name):
+    triangles = TRIANGLES[name]
+    pieces = RoughPieces.cut(double, scene(triangles), 0.3, 0)
+    corners, row = pieces.corners()
+    assert geometry.edges(corners).max() <= ROUND * 0.3
+    given = np.bincount(pieces.of[row], geometry.areas(corners), len(triangles))
+    assert np.allclose(given, geometry.areas(triangles), rtol=1e-9)
+    assert np.array_equal(in_order(corners), in_order(geometry.cut(triangles, ROUND * 0.3, 10**6)[0]))
+
+
+def test_facets_that_share_an_edge_are_cut_at_the_same_points_of_it(double):
+    a, b, c, d = np.array([[0.0, 0, 0], [7, 1, 2], [3, 5, 0], [2, -6, 1]])
+    sides = []
+    for side in (np.array([[a, b, c]]), np.array([[b, a, d]])):
+        corners = RoughPieces.cut(double, scene(side), 0.5, 0).corners()[0].reshape(-1, 3)
+        away = np.linalg.norm(np.cross(corners - a, b - a), axis=1) / np.linalg.norm(b - a)
+        sides.append(np.unique(corners[away < 1e-9], axis=0))
+    assert np.array_equal(*sides) and len(sides[0]) > 7 / 0.5
+
+
+def test_a_facet_of_a_million_pieces_is_cut_in_parts(double):
+    large = np.array([[[0.0, 0, 0], [400, 0, 0], [0, 300, 9]]])
+    pieces = RoughPieces.cut(double, scene(large), 0.4, 0)
+    assert len(pieces) == len(geometry.cut(large, ROUND * 0.4, 10**7)[0]) > 9e5
+    assert pieces.counts.max() <= 4 * rough_pieces.COARSE**2
+
+
+@pytest.mark.parametrize("width", [1e4, 1e-6])
+def test_too_many_pieces_are_refused_with_the_words_of_the_host(double, monkeypatch, width):
+    monkeypatch.setattr(rough_pieces, "MOST_FACETS", 5000)
+    long = scene(np.array([[[0.0, 0, 0], [1e4, 0, 0], [0, width, 0]]]))
+    on_host = lambda: geometry.cut(long.triangles, ROUND * 0.1, 5000)  # noqa: E731
+    texts = []
+    for cut in (lambda: RoughPieces.cut(double, long, 0.1, 0), on_host):
+        with pytest.raises(MemoryError) as refused:
+            cut()
+        texts.append(str(refused.value))
+    assert texts[0] == texts[1]
+
+
+@pytest.mark.parametrize("roughness", [0.0, 0.02])
+def test_numbers_of_pieces_are_those_that_the_host_writes(double, roughness):
+    index = np.arange(144).reshape(12, 12) % 2
+    one = terrain(material=index, materials=[COS, SHARP], roughness=roughness)
+    pieces = RoughPieces.cut(double, one, cell_edge(CHIRP), 5)
+    facets, nodes = RoughFacets(pieces), np.array([9.55e9, 9.65e9])
+    n, stride = len(pieces), -(-len(pieces) // 256) * 256
+    centers, planes = pieces.placed(*facets.tiling_numbers(nodes, False, True), stride)
+    centers = double.download(centers, np.empty((3, stride)))
+    wanted = facets._host.planes(np.r_[np.arange(n), np.repeat(n - 1, stride - n)], nodes, False, True)
+    planes = double.download(planes, np.empty(wanted.shape, np.float32))
+    corners = pieces.corners()[0]
+    wanted_centers = facet_pieces.centers(corners, np.full(n, roughness), 5)
+    assert np.abs(centers[:, :n].T - wanted_centers).max() < 1e-12 * roughness + 1e-14
+    assert (centers[:, n:] == centers[:, n - 1 : n]).all()
+    # sines of a polynomial, and logarithms of float32: errors 2e-6 beside the largest numbers
+    assert np.abs(planes - wanted).max() < 2e-6
+    random = facet_pieces.random_numbers(corners, 5)
+    assert np.sqrt(np.mean(np.abs(planes[11, :n] + 1j * planes[12, :n] - random) ** 2)) < 2e-7
+    exact = [*range(6, 11), *range(13, len(wanted))]
+    assert np.array_equal(planes[exact], wanted[exact]) and not planes[:6, n:].any()
+
+
+@pytest.mark.parametrize("per_tile", [64, 256])
+def test_tiles_hold_their_pieces(double, per_tile):
+    one = terrain(5) + scene(TRIANGLES["one that is not cut"])
+    pieces = RoughPieces.cut(double, one.moved((300.0, -2e3, 7.0)), 0.4, 0)
+    tiling = PieceTiling(pieces, *RoughFacets(pieces).tiling_numbers(np.array([9.6e9]), True, False))
+    tiles = tiling.tiles(per_tile)
+    assert tiling.tiles(per_tile) is tiles
+    wanted, order = tile_points(
+        geometry.centroids(pieces.corners()[0]), tiling.center, per_tile, np.arange(len(pieces))
+    )
+    assert (tiles.n_tiles, tiles.last) == (wanted.n_tiles, per_tile - (len(order) - len(pieces)))
+    assert tiles.last < per_tile
+    references = double.download(tiles.references, np.empty((2, 3, tiles.n_tiles), np.float32)).sum(axis=0, dtype=float)
+    assert np.abs(references.T - wanted.references).max() < 1e-12
+    assert tiling.radius[per_tile] == pytest.approx(wanted.radius.max(), rel=1e-12)
+    offsets = double.download(tiles.offsets, np.empty((6, tiles.n_offsets), np.float32))[:, : len(order)]
+    # positions of 2 km round by 2e-13 m, float32 pairs of offsets in the last of 48 bits
+    assert np.abs(offsets[:3].astype(float) + offsets[3:] - wanted.offsets[:3] - wanted.offsets[3:]).max() < 1e-12
+
+
+def test_samples_represent_all_pieces(double):
+    steps = np.concatenate([TRIANGLES["many"], 8 * TRIANGLES["many"][:3]])
+    pieces = RoughPieces.cut(double, scene(steps), 0.2, 0)
+    size = geometry.areas(steps).sum()
+    numbers, areas = [], []
+    for seed in range(20):
+        some, represents = RoughFacets(pieces).drawn(200, np.random.default_rng(seed))
+        numbers.append(represents.sum())
+        areas.append(represents @ geometry.areas(some.triangles))
+    # a mean over 4000 draws, of weights that differ by a factor of two at most
+    assert np.mean(numbers) == pytest.approx(len(pieces), rel=0.03)
+    assert np.mean(areas) == pytest.approx(size, rel=0.03)
+    cells, each = pieces.sampled_cells(1000)
+    assert len(cells.triangles) == 1000 and each == pytest.approx(len(pieces) / 1000)
+
+
+SCENES = {
+    "terrain": (terrain, False),
+    "random heights": (lambda: terrain(roughness=0.02), False),
+    "two-sided sheets": (lambda: scene(terrain().triangles, two_sided=True, reflectivity=0.3), False),
+    "terrain that hides nothing": (terrain, True),
+    "a box on terrain": (lambda: terrain() + sarcl.shapes.box((4, 4, 3), material=COS).moved((0, 0, 2.5)), True),
+    "random heights in shadow": (
+        lambda: terrain(roughness=0.02) + sarcl.shapes.box((4, 4, 3), material=COS).moved((0, 0, 2.5)), True,
+    ),
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", SCENES)
+def test_echoes_are_those_of_pieces_cut_on_the_host(double, monkeypatch, name):
+    monkeypatch.setattr("sarcl.scattering.scatterers.FEW_LOOKS", 0)  # shadows are shares
+    one, shadows = SCENES[name][0](), SCENES[name][1]
+    ask = {"tolerance": 2e-2 if shadows else 1e-4, "seed": 3, "device": double, "shadows": shadows, "check": True}
+    here = sarcl.echo(one, CHIRP, track(), **ask)
+    monkeypatch.setattr(RoughPieces, "suits", staticmethod(lambda device, scene: False))
+    there = sarcl.echo(one, CHIRP, track(), **ask)
+    assert here.report.measured_error <= here.report.predicted_error
+    assert np.linalg.norm(here.samples - there.samples) <= ask["tolerance"] / 10 * np.linalg.norm(there.samples)
+    assert here.report.contributions_done == there.report.contributions_done
+    assert here.report.contributions_skipped == there.report.contributions_skipped
+    assert (here.report.contributions_skipped["shadowed"] > 0) == ("box" in name or "shadow" in name)
+
+
+def test_facets_that_face_away_or_send_nothing_back_are_not_cut(double):
+    up = terrain().triangles
+    away = np.concatenate([up, up[:100, ::-1], up[:50]])
+    one = scene(away, two_sided=False, reflectivity=np.r_[np.ones(len(up) + 100), np.zeros(50)])
+    report = sarcl.echo(one, CHIRP, track(), shadows=False, device=double).report
+    each = len(pieces_of(one, cell_edge(CHIRP), np.inf, 0))
+    assert report.plan["facets"] == each
+    left = report.contributions_skipped
+    assert left["facing away"] == 8 * len(pieces_of(scene(up[:100]), cell_edge(CHIRP), np.inf, 0))
+    assert left["zero reflectivity"] == 8 * len(pieces_of(scene(up[:50]), cell_edge(CHIRP), np.inf, 0))
+    assert report.contributions_done + sum(left.values()) == 8 * each
+
+
+def test_scenes_with_mirrors_and_devices_without_float64_leave_it_to_the_host(double):
+    assert RoughPieces.suits(double, terrain())
+    assert not RoughPieces.suits(double.without_fp64(), terrain())
+    assert not RoughPieces.suits(double, terrain() + sarcl.shapes.plate((1, 1)))
+    assert not RoughPieces.suits(double, replace(terrain(), triangles=terrain().triangles + 2e9, heights=None))
