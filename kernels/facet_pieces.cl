@@ -150,11 +150,11 @@ __kernel void walk_pieces(walk_pieces_numbers given, __global const double *rest
             depth = is_leaf ? depth - zeros : depth;
             level = is_leaf ? (lv)0 : level;
             f = chosen_facet(is_leaf, whole, f);
-            is_done |= is_leaf & (depth < 0 | path == 1);
+            is_done |= is_leaf & ((depth < 0) | (path == 1));
         }
         // one cut further along the path, or beyond its end by first halves
-        lv cuts = is_leaf == 0 & is_done == 0;
-        lv grows = cuts & is_within == 0;
+        lv cuts = (is_leaf == 0) & (is_done == 0);
+        lv grows = cuts & (is_within == 0);
         path = grows ? path << 1 : path;
         depth = grows ? depth + 1 : depth;
         lv too_deep = depth > MOST_CUTS;
