@@ -93,9 +93,10 @@ class Looks:
         if partial is None:
             self._partial_looks.pop(place, None)
             return self.whole(place)
-        self._partial_looks[place] = partial.before, partial.after, partial.part, np.packbits(partial.facets)
+        looked = np.packbits(partial.facets | partial.known)
+        self._partial_looks[place] = partial.before, partial.after, partial.part, looked
         seen = self.whole(place, partial.facets)
-        return replace(seen, levels=np.where(partial.facets, seen.levels, partial.interpolated))
+        return replace(seen, levels=np.where(partial.facets, seen.levels, partial.levels))
 
     def again(self, place: int) -> np.ndarray:
         """The levels of a look that was taken."""
@@ -146,7 +147,7 @@ class Judge:
         if partial is None or not self._rate:
             self._rate = off / partly if partly else self._rate
         if partial is not None:
-            off += self._rate * float(self.weights @ (~partial.facets & (partial.interpolated % 255 != 0)))
+            off += self._rate * float(self.weights @ (~partial.facets & (partial.levels % 255 != 0)))
         self._sampling.append(off)
 
     def squares(

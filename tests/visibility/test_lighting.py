@@ -354,9 +354,14 @@ def refined(levels, at, limit):
             whole.append(place)
             made.pop(place, None)
             return levels[place]
-        seen.append(partial.facets.mean())
-        assert (np.abs(partial.interpolated - between_two(partial.before, partial.after, place)) <= 0.5).all()
-        made[place] = np.where(partial.facets, levels[place], partial.interpolated)
+        looked = partial.facets | partial.known
+        seen.append(looked.mean())
+        if looked.all():
+            whole.append(place)
+        even = between_two(partial.before, partial.after, place)
+        assert (np.abs(partial.levels - even) <= 0.5)[~looked].all() and not (partial.facets & partial.known).any()
+        assert (partial.levels == levels[place])[partial.known].all()
+        made[place] = np.where(partial.facets, levels[place], partial.levels)
         return made[place]
 
     def between_two(a, b, place):
