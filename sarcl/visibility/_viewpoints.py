@@ -51,11 +51,11 @@ def refine_viewpoints(
                  between those of two viewpoints around it (n,)
     limit()      mean square of differences that is left, on the average of all pulses
 
-    The first ones, every 128th from each of these on, and the last are taken. Between two of them, the one halfway is compared with
-    linear interpolation: where more than the limit would be left, both halves are refined in the same way. Facets with
-    the smallest differences are left out from there on: an eighth of them is looked at once more, in the halves'
-    middles, and if these differ, all are. Yields the index, the levels, and the mean square of differences from the
-    viewpoint before.
+    The first ones, every 128th from each of these on, and the last are taken. Between two of them, the one halfway is
+    compared with linear interpolation: where more than the limit would be left, both halves are refined in the same
+    way. Facets with the smallest differences are left out from there on: an eighth of them is looked at once more, in
+    the halves' middles, and if these differ, all are. Yields the index, the levels, and the mean square of differences
+    from the viewpoint before.
     """
     refined, start, levels = _Refinement(look, at, squares, limit), 0, look(0, None)
     yield start, levels, 0.0
