@@ -5,7 +5,8 @@
 // w is linear in e and linear in x. Where it has one sign at the corners of a box of antennas and at the corners of a facet,
 // it has that sign for all antennas in the box and all points of the facet.
 //   missed    all of one lies beyond some edge of the other, or within `slack` of it
-//   covered   the facet lies on the inner side of all edges of the occluder, and behind it
+//   covered   the facet lies on the inner side of all edges of the occluder, and behind it. Lines of sight then meet the
+//             occluder above the facet's plane, whether or not other parts of it reach below that
 //
 // source    docs/theory/shadows.md; as separating axes of convex polygons (Gottschalk, Lin and Manocha 1996), in perspective
 // symbols   receiver, slack, on_plane   see receiver_axes.clh;  eye  a corner of a box of antennas, m
@@ -113,12 +114,10 @@ __kernel void certain_shadows(certain_shadows_numbers given, __global const doub
         }
         missed &= apart;
         int covers = side && above && within;
+        double highest = max(side * solid[0].z, max(side * solid[1].z, side * solid[2].z));
 #pragma unroll
-        for (int i = 0; i < 3; i++) {
-            double high = side * solid[i].z;
-            covers &= high > 0 && high < MOST_HEIGHT * lowest && facing * dot3(normal, minus(facet[i], solid[0])) <= 0;
-        }
-        covered |= covers;
+        for (int i = 0; i < 3; i++) covers &= facing * dot3(normal, minus(facet[i], solid[0])) <= 0;
+        covered |= covers && highest > 0 && highest < MOST_HEIGHT * lowest;
         if (e == 0) first_side = side;
         covered &= side == first_side;  // both antennas look at one side of the facet
     }

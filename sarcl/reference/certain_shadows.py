@@ -31,7 +31,7 @@ def certain_shadow(
         others = side * _inside(flat, eyes, solid)
         beyond = [(from_edges <= IN_PLANE * slack).all(axis=(1, 2)).any() for from_edges in (insides, others)]
         elevated = (np.abs(eyes[:, 2]) > 1e-6 * np.linalg.norm(eyes, axis=1)).all()
-        between = (side * solid[:, 2] > 0).all() and np.abs(solid[:, 2]).max() < 0.99 * np.abs(eyes[:, 2]).min()
+        between = 0 < (side * solid[:, 2]).max() < 0.99 * np.abs(eyes[:, 2]).min()
         behind = (facing * ((flat - solid[0]) @ normal) <= 0).all()
         missed.append((facing != 0 and beyond[0]) or (side != 0 and beyond[1]))
         covered.append(facing and side and elevated and between and behind and (insides >= 0).all())

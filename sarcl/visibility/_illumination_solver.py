@@ -94,10 +94,12 @@ class IlluminationSolver:
         levels, partly, halves = np.zeros(self.facets.size, np.uint8), [], []
         by_rays = [np.zeros(0, bool)]
         most = self._more.count * PER_LINE // 2
+        both = list(range(len(viewpoints)))
         for index, hiders in self._chunks(some):
-            both = list(range(len(viewpoints)))
-            if some is None and self._more is not self._few:
-                # by each antenna: facets that both see a little of are not dark because few samples say so
+            rays = any(hider.by_rays(at) for hider in hiders for at in viewpoints)
+            if rays and some is None and self._more is not self._few:
+                # rays of more lines only where few tell that a facet is partly seen. By each antenna: facets that both
+                # see a little of are not dark because few samples say so
                 each = [
                     self._count(index, hiders, self._few, viewpoints, [i], slack).sum(axis=1, dtype=np.int32)
                     for i in both
@@ -111,7 +113,6 @@ class IlluminationSolver:
             between = (total > 0) & (total < 2 * most)
             partly.append(index[between])
             halves.append(seen[between])
-            rays = any(hider.by_rays(at) for hider in hiders for at in viewpoints)
             by_rays.append(np.full(len(partly[-1]), rays))
         none = np.zeros(0, np.int64), np.zeros((0, 2), np.uint16)
         return Look(

@@ -17,6 +17,9 @@ SAMPLING = 0.5  # of the error of amplitudes: share of counting samples, beside 
 MARGIN, LEAST = 0.95, 0.1
 RECENT = 2 * 7 + 2  # levels that are kept where they do not all fit: of the looks between which one lies, and theirs
 ROUNDED = 1 / (12 * 255**2)  # mean square of the rounding of levels to 1/255
+# Of each level: its share, and 1 for a facet that is partly seen
+SQUARES = np.square(np.arange(256) / 255).astype(np.float32)
+IS_PARTLY = (np.arange(256) % 255 != 0).astype(np.float32)
 
 
 @dataclass(eq=False)
@@ -93,9 +96,10 @@ class Looks:
         if partial is None:
             self._partial_looks.pop(place, None)
             return self.whole(place)
-        self._partial_looks[place] = partial.before, partial.after, partial.part, np.packbits(partial.facets)
+        looked = np.packbits(partial.facets | partial.known)
+        self._partial_looks[place] = partial.before, partial.after, partial.part, looked
         seen = self.whole(place, partial.facets)
-        return replace(seen, levels=np.where(partial.facets, seen.levels, partial.interpolated))
+        return replace(seen, levels=np.where(partial.facets, seen.levels, partial.levels))
 
     def again(self, place: int) -> np.ndarray:
         """The levels of a look that was taken."""
@@ -119,6 +123,7 @@ class Judge:
 
     def __init__(self, weights: np.ndarray) -> None:
         self.weights, self._rate = weights, 0.0
+        self._power = weights.astype(np.float32)
         self._sampling: list[float] = []
         self._whole: list[float] = []
 
@@ -140,13 +145,13 @@ class Judge:
 
     def note(self, look: Look, partial: PartialLook | None) -> None:
         """Note the norm of a look, and its sampling error: of facets that were left out as in the last whole look."""
-        self._whole.append(float(np.bincount(look.levels, self.weights, minlength=256) @ np.arange(256) ** 2) / 255**2)
+        self._whole.append(float(self._power @ SQUARES[look.levels]))
         partly = float(self.weights[look.partly].sum())
         off = look.spread(self.weights) + ROUNDED * partly
         if partial is None or not self._rate:
             self._rate = off / partly if partly else self._rate
         if partial is not None:
-            off += self._rate * float(self.weights @ (~partial.facets & (partial.interpolated % 255 != 0)))
+            off += self._rate * max(float(self._power @ IS_PARTLY[look.levels]) - partly, 0.0)
         self._sampling.append(off)
 
     def squares(

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 
@@ -20,14 +21,19 @@ DRAWN, FEW = 8, 2**13  # one in so many facets is looked at to learn whether the
 
 @dataclass(frozen=True, eq=False)
 class PartialLook:
-    """A look at some `facets`, (k,) bool. Levels of the others, `interpolated`, uint8 (k,), lie at `part`, 0 to 1,
-    between those of the viewpoints `before` and `after`."""
+    """A look at some facets: levels of the others lie at `part`, 0 to 1, between those of viewpoints `before` and
+    `after`.
+
+    facets  (k,) bool: to be looked at;  levels  uint8 (k,) of the others
+    known   (k,) bool: of the others, those that were looked at before, from the same viewpoint
+    """
 
     before: int
     after: int
     part: float
     facets: np.ndarray
-    interpolated: np.ndarray
+    levels: np.ndarray
+    known: np.ndarray
 
 
 LevelsAt = Callable[[int, PartialLook | None], np.ndarray]
@@ -45,16 +51,17 @@ def refine_viewpoints(
                  between those of two viewpoints around it (n,)
     limit()      mean square of differences that is left, on the average of all pulses
 
-    Every 128th viewpoint, the first ones and the last are taken. Between two of them, the one halfway is compared with
-    linear interpolation: where more than the limit would be left, both halves are refined in the same way. Facets with
-    the smallest differences are left out from there on: an eighth of them is looked at once more, in the halves'
-    middles, and if these differ, all are. Yields the index, the levels, and the mean square of differences from the
-    viewpoint before.
+    The first ones, every 128th from each of these on, and the last are taken. Between two of them, the one halfway is
+    compared with linear interpolation: where more than the limit would be left, both halves are refined in the same
+    way. Facets with the smallest differences are left out from there on: an eighth of them is looked at once more, in
+    the halves' middles, and if these differ, all are. Yields the index, the levels, and the mean square of differences
+    from the viewpoint before.
     """
     refined, start, levels = _Refinement(look, at, squares, limit), 0, look(0, None)
     yield start, levels, 0.0
-    taken = np.unique(np.concatenate([first, np.arange(STRIDE, len(at), STRIDE), [len(at) - 1]]))
-    for place in taken[taken > 0].tolist():
+    taken = np.unique(np.concatenate([[0], first, [len(at) - 1]]))
+    strides = [np.arange(a, b, STRIDE) for a, b in pairwise(taken.tolist())]
+    for place in np.concatenate([*strides, taken[-1:]])[1:].tolist():
         end = look(place, None)
         yield from refined.between(start, levels, place, end, _Selection(None, None, 0.0), 0.0)
         start, levels = place, end
@@ -119,7 +126,8 @@ class _Refinement:
             return self.look(middle, None), which
         even = between_levels(first, last, part)
         drawn = _some_of(which.doubtful)
-        found = self.look(middle, PartialLook(a, b, part, which.kept | drawn, even))
+        looked = which.kept | drawn
+        found = self.look(middle, PartialLook(a, b, part, looked, even, np.zeros_like(looked)))
         some = np.flatnonzero(drawn)
         off = self.squares(found, first, last, part, some)
         times = float(np.count_nonzero(which.doubtful)) / max(len(some), 1)
@@ -129,9 +137,8 @@ class _Refinement:
             kept[some[off > 0]] = True
             return found, _Selection(kept, None, settled)
         kept = which.kept | which.doubtful
-        everything = bool(kept.all())
-        found = self.look(middle, None if everything else PartialLook(a, b, part, kept, even))
-        return found, _Selection(None if everything else kept, None, which.settled)
+        found = self.look(middle, PartialLook(a, b, part, kept & ~looked, found, looked))
+        return found, _Selection(None if kept.all() else kept, None, which.settled)
 
     def _without_smallest(self, of: np.ndarray, settled: float, some: np.ndarray, off: np.ndarray) -> _Selection:
         """Of facets (k,) bool without those whose differences are the smallest: `off` of facets `some`, 0 of others."""

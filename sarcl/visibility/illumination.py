@@ -286,7 +286,7 @@ def _within(
         projected_width(triangles, e[len(e) // 2]) / max(shadow_length(bounds, e), 1e-300) for e in ends
     ]  # rad, by which an antenna turns while shadows move by the width of a facet
     _, coarse, _ = pulse_blocks(ends, bounds, [COARSE * width for width in widths])
-    coarse = coarse[:: int(np.clip(len(coarse) * len(triangles) / MUCH, 1, COARSEST))]
+    thinned = float(np.clip(len(coarse) * len(triangles) / MUCH, 1, COARSEST))
     while True:
         _, offered, turns = pulse_blocks(ends, bounds, [finer * tolerance * width for width in widths])
         # angle by which facets may turn towards an antenna before the next viewpoint; and those that are edge-on to one
@@ -294,6 +294,9 @@ def _within(
         edge_on = 0.0 if len(ends) == 1 else 2 * EDGE_ON
         slack = edge_on + 2 * np.convolve(turns, np.ones(2 * STRIDE + 1))[STRIDE : STRIDE + len(turns)]
         first = np.unique(np.searchsorted(offered, coarse, side="right") - 1)
+        if thinned > 1:
+            n = int(np.ceil(max(len(coarse) / thinned, len(offered) / STRIDE)))
+            first = first[np.unique(np.linspace(0, len(first) - 1, n + 1).round().astype(int))][1:-1]
         looks = Looks(solver, [end[offered] for end in ends], slack)
         lines = lines or judge.lines(looks.whole(len(offered) // 2), SAMPLING * accuracy)
         solver.take_lines(lines)

@@ -63,6 +63,19 @@ def test_the_kernel_decides_as_the_reference(device, seed):
     np.testing.assert_array_equal(states(device, facets, occluders, antennas), wanted)
 
 
+def test_a_wall_that_stands_below_the_facets_plane_covers_what_lies_behind_it(device):
+    facet = np.array([[0.5, 0.0, 0.03], [0.6, 0.0, 0.03], [0.5, 0.1, 0.03]])
+    walls = np.array([
+        [[0, -9, -0.5], [0, 9, -0.5], [0, 0.0, 9.0]],  # through the plane
+        [[0, -9, 0.03], [0, 9, 0.03], [0, 0.0, 9.0]],  # on it
+        [[-9, -9, 0.03], [9, -9, 0.03], [0, 9, 0.03]],  # in it, larger than the facet
+        [[0, -9, -9.0], [0, 9, -9.0], [0, 0, 0.01]],  # below it
+    ])  # fmt: skip
+    antennas = np.array([[-80, -1, 50], [-80, 0, 50], [-80, 1, 50.0]])[:, None]
+    found = states(device, np.broadcast_to(facet, (4, 3, 3)), walls, antennas)
+    assert found[:2].tolist() == [COVERED, COVERED] and (found[2:] != COVERED).all()
+
+
 def test_of_random_pairs_all_three_are_found(device):
     counts = sum(np.bincount(states(device, *pairs_of(seed)), minlength=3) for seed in range(12))
     assert (counts > 20).all(), counts

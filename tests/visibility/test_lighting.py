@@ -15,7 +15,7 @@ from sarcl.base.vectors import unit
 from sarcl.opencl.choose_device import open_device
 from sarcl.reference.shadow import hidden
 from sarcl.scene.triangles import areas, centroids, normals
-from sarcl.visibility import _frame, _illumination_solver
+from sarcl.visibility import _frame, _illumination_solver, illumination
 from sarcl.visibility._aspect_blocks import projected_width, pulse_blocks, shadow_length
 from sarcl.visibility._facet_samples import PER_LINE, sample_points
 from sarcl.visibility._illumination_solver import IlluminationSolver
@@ -354,9 +354,14 @@ def refined(levels, at, limit):
             whole.append(place)
             made.pop(place, None)
             return levels[place]
-        seen.append(partial.facets.mean())
-        assert (np.abs(partial.interpolated - between_two(partial.before, partial.after, place)) <= 0.5).all()
-        made[place] = np.where(partial.facets, levels[place], partial.interpolated)
+        looked = partial.facets | partial.known
+        seen.append(looked.mean())
+        if looked.all():
+            whole.append(place)
+        even = between_two(partial.before, partial.after, place)
+        assert (np.abs(partial.levels - even) <= 0.5)[~looked].all() and not (partial.facets & partial.known).any()
+        assert (partial.levels == levels[place])[partial.known].all()
+        made[place] = np.where(partial.facets, levels[place], partial.levels)
         return made[place]
 
     def between_two(a, b, place):
@@ -391,6 +396,13 @@ def test_where_levels_hardly_change_every_128th_block_and_halfway_are_looked_at(
     assert len(whole) < len(places)  # the others were looked at in part
     for n in (1, 2, 3):
         assert looked_at(levels[:n], at[:n], 1e-6)[0] == list(range(n))
+
+
+def test_few_looks_at_many_facets_are_spread_evenly(monkeypatch):
+    monkeypatch.setattr(illumination, "MUCH", 1.0)
+    found = lit(np.concatenate([ground(20), pole()]), circle(400), two_sided=False, accuracy=0.9)
+    gaps = np.diff(found.viewpoints)
+    assert 3 < len(gaps) < 40 and gaps.max() <= 1.5 * gaps.min()
 
 
 def test_facets_that_change_between_looks_alone_are_not_left_out():
@@ -463,6 +475,17 @@ def test_two_antennas_must_both_see_a_facet(device):
     halves = [lit(np.concatenate([plate, wall]), *e, tolerance=1 / 16).share(0)[0] / 255 for e in ((left,), (right,))]
     joint = lit(np.concatenate([plate, wall]), left, right, tolerance=1 / 16).share(0)[0] / 255
     assert 0.3 < min(halves) and max(halves) < 1 and joint == pytest.approx(sum(halves) - 1, abs=1.5 / 255)
+
+
+def test_from_near_a_facet_that_one_antenna_sees_whole_is_no_lighter_than_for_the_other(device):
+    plate = np.array([[[-1, -1, 0], [1, -1, 0], [0, 1, 0.0]]])
+    lid = np.array([[[-9, -9, 0.1], [0, -9, 0.1], [0, 9, 0.1]]])
+    solver = IlluminationSolver(device, np.concatenate([plate, lid, lid + np.array([0, 0, 20.0])]), two_sided=True)
+    solver.take_lines(64)
+    over, aside = np.array([0.0, 0.0, 5.0]), np.array([4.0, 0.0, 0.05])
+    alone, both = (solver.look(eyes) for eyes in ([over], [over, aside]))
+    assert both.by_rays.all() and solver.look([aside]).levels[0] == 255
+    assert both.levels[0] == alone.levels[0] == pytest.approx(255 * np.sqrt(0.5), abs=4)
 
 
 def test_facets_that_are_not_asked_for_cast_shadows_too():
