@@ -64,7 +64,7 @@ def forecast_of(
         clock.lap("plan")
         estimate = _timed(task, planned, prepared, work)
     else:
-        known = planned.scene.describe()
+        known = planned.scene.describe() | ({"facets": round(work.pieces)} if work.pieces else {})
         if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
             known |= warn_of_curves(planned.scene)
         clock.lap("plan")
