@@ -34,7 +34,7 @@ from .spectral.spectral_task import spectral_task
 
 SHARE, LEAST = 0.06, 0.035  # of the modelled job, and seconds: preparing the scene may take the larger of these
 TIMED_SHARE, LEAST_TIMED = 0.02, 4e-3  # of the modelled job, and seconds, of pulses that are timed
-BUILDING = 0.1  # s: pulses that take longer have built kernels, perhaps, and are timed again
+SLOWER = 4.0  # over the modelled seconds: pulses that take longer have built kernels or waited; they are timed again
 MOST_PLANS = 64  # channels and receivers whose plans are made: of more, those of the pulses that are timed
 JUDGING = 0.02  # of the modelled job: meshes are judged, and warned of, where that takes no more
 SPECTRAL_SHARE = 0.04  # of the modelled job: spectral_echo is planned where that takes no more
@@ -64,7 +64,7 @@ def forecast_of(
         clock.lap("plan")
         estimate = _timed(task, planned, prepared, work)
     else:
-        known = planned.scene.describe()
+        known = planned.scene.describe() | ({"facets": round(work.pieces)} if work.pieces else {})
         if 1e-6 * cost_model.JUDGED_FACET * len(planned.scene.seen.original.triangles) <= JUDGING * work.seconds:
             known |= warn_of_curves(planned.scene)
         clock.lap("plan")
@@ -94,17 +94,17 @@ def _timed(task: EchoTask, planned: PlannedEchoes, prepared: SceneEchoes, work: 
     n = int(np.clip(most / (work.adding / n_pulses), 1, max(1, n_pulses // 8)))
     quiet = replace(prepared, request=replace(prepared.request, clock=Clock()))
 
-    def timed(first: int, n: int) -> tuple[float, Added]:
+    def timed(first: int) -> tuple[float, Added]:
         block, begin = np.zeros((n, *shape[1:]), np.complex64), time.perf_counter()
         added = method.fill(quiet, block, first, 0, len(quiet) * n)
         return time.perf_counter() - begin, added
 
     for first in ((n_pulses - n) // 2, 0, n_pulses - n):  # elsewhere more may be seen
-        seconds, added = timed(first, n)
+        seconds, added = timed(first)
         if added.counts.contributing:
             break
-    if seconds > BUILDING:
-        seconds, added = timed(first, n)
+    if seconds > SLOWER * n * work.adding / n_pulses:
+        seconds = min(seconds, timed(first)[0])
     whole, room = added, prepared.request.budget
     at_once = min(method.pulses(room), pulses_at_once(shape, task.options.out, room))
     if -(-n_pulses // at_once) * method.runs <= MOST_PLANS * n_pulses:

@@ -21,12 +21,13 @@ class EchoWork(NamedTuple):
     """Work of echoes, in seconds of one core.
 
     tiling, cutting  of preparing points and facets;  adding  of their echoes
-    contributions    pairs of scatterer, pulse and channel
+    pieces           about the number of facets after cutting;  contributions  pairs of scatterer, pulse and channel
     """
 
     tiling: float
     cutting: float
     adding: float
+    pieces: float
     contributions: float
 
     @property
@@ -56,7 +57,9 @@ class EchoWork(NamedTuple):
         pulse = cost_model.ECHO_PULSE + cost_model.ECHO_SAMPLE * n_samples + cost_model.SPREAD_PIECE * (smooth + rough)
         adding = runs * (n_polarizations * pulse + cost_model.SPREAD_POINT * n_points) + lit
         contributions = float(runs * (n_points + smooth + rough))
-        return cls(1e-6 * cost_model.TILED_POINT * n_points, 1e-6 * cutting, 1e-6 * adding, contributions)
+        return cls(
+            1e-6 * cost_model.TILED_POINT * n_points, 1e-6 * cutting, 1e-6 * adding, smooth + rough, contributions
+        )
 
 
 def pieces_of(scene: ScenePlan) -> tuple[float, float]:

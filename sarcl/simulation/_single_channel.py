@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import functools
 from dataclasses import replace
 from typing import Any
 
@@ -35,13 +36,17 @@ class SingleChannel:
         self.window = near, far = echo_sampling.window(
             task.scene, task.waveform, tx, rx, self.reference_range, task.options.range_window
         )
-        first, self.step, n = echo_sampling.sampling(task.waveform, near, far, task.options.compressed)
-        self.frequencies = first + self.step * np.arange(n)
+        self.first, self.step, n = echo_sampling.sampling(task.waveform, near, far, task.options.compressed)
         antennas = PulseGeometry.sampled(
-            tx, rx, self.reference_range, first=first, step=self.step, n_samples=n, near=near, far=far
+            tx, rx, self.reference_range, first=self.first, step=self.step, n_samples=n, near=near, far=far
         )
         self.seen = SeenScene(task.original, task.scene, task.waveform, antennas, task.weights)
         self.shape: tuple[int, ...] = len(tx), len(task.request.polarizations), n
+
+    @functools.cached_property
+    def frequencies(self) -> np.ndarray:
+        """Frequencies of the samples, Hz (n,): made when samples have found room."""
+        return np.asarray(self.first + self.step * np.arange(self.shape[-1]))
 
     def methods(self, request: EchoRequest) -> list[tuple[SingleEchoes, EchoRequest]]:
         """The methods that may compute the echoes, cheapest first, and what is asked of each."""
@@ -69,7 +74,7 @@ class SingleChannel:
         """Fields of the PhaseHistory, beside its samples and report."""
         task = self.task
         rows = echo_sampling.row_fields(task.track, task.receiver, self.reference_range, task.request.polarizations)
-        return {"frequency": self.frequencies[0], "frequency_step": self.step, **rows}
+        return {"frequency": self.first, "frequency_step": self.step, **rows}
 
 
 class SingleEchoes:

@@ -23,7 +23,7 @@ from ._exact_facets import ExactFacets
 from ._facet_spreading import FacetSpreader, TiledFacets
 from ._point_spreading import spread_points
 from ._unseen_scene import OUTSIDE_BEAM, OUTSIDE_WINDOW
-from .echo_request import EchoRequest as EchoRequest
+from .echo_request import EchoRequest
 from .scene_plan import NODES
 from .spreading import Band, Counts, TiledScatterers
 
