@@ -128,6 +128,16 @@ def _focus(p: argparse.ArgumentParser) -> None:
         metavar="IMAGE",
         help=f"image to write, {images}; repeatable (default: RAW's name with .png, here)",
     )
+    _focus_grid(p)
+    _focus_method(p)
+    _focus_ground(p)
+    _focus_pieces(p)
+    _focus_rows(p)
+    _picture(p)
+
+
+def _focus_grid(p: argparse.ArgumentParser) -> None:
+    """Options of the grid."""
     where = p.add_argument_group("grid", "default: chosen from the data, and printed")
     where.add_argument("--grid", metavar="FILE.toml", help="take the grid from the [grid.*] table of a scenario file")
     where.add_argument("--center", nargs=3, type=float, metavar=("X", "Y", "Z"), help="centre of the grid, m")
@@ -141,6 +151,10 @@ def _focus(p: argparse.ArgumentParser) -> None:
     where.add_argument(
         "--x-axis", nargs=3, type=float, metavar=("X", "Y", "Z"), help="direction of columns (default 1 0 0)"
     )
+
+
+def _focus_method(p: argparse.ArgumentParser) -> None:
+    """Options of the method."""
     how = p.add_argument_group("focusing")
     usual, fast = (f"{DEFAULTS[verb]['tolerance']:g}" for verb in ("backproject", "polar_format"))
     how.add_argument(
@@ -172,6 +186,10 @@ def _focus(p: argparse.ArgumentParser) -> None:
     )
     how.add_argument("--wrap", action="store_true", help="repeat ranges outside the unambiguous swath")
     how.add_argument("--max-bytes", type=size, metavar="SIZE", help="memory for blocks on the device, e.g. 2G")
+
+
+def _focus_ground(p: argparse.ArgumentParser) -> None:
+    """Options of the ground that is seen, and of range_doppler."""
     earth = p.add_argument_group("echoes of orbits, and range_doppler", "docs/guide/range_doppler.md")
     earth.add_argument(
         "--heights",
@@ -192,6 +210,10 @@ def _focus(p: argparse.ArgumentParser) -> None:
     earth.add_argument(
         "--doppler-rate", type=doppler, metavar="HZ/S|data", help="Doppler rate (default: from the geometry)"
     )
+
+
+def _focus_pieces(p: argparse.ArgumentParser) -> None:
+    """Options of large images."""
     large = p.add_argument_group(
         "large images", "finished tiles of an IMAGE.h5 wait in IMAGE.h5.parts; --device all uses every device"
     )
@@ -203,12 +225,15 @@ def _focus(p: argparse.ArgumentParser) -> None:
         action=argparse.BooleanOptionalAction,
         help="keep finished tiles whatever ends the run (default: when it is killed), or --no-resume: start again",
     )
+
+
+def _focus_rows(p: argparse.ArgumentParser) -> None:
+    """Options that choose rows of the echoes."""
     rows = p.add_argument_group("data")
     rows.add_argument("--polarization", metavar="PQ", help="only rows of this polarisation, e.g. HV")
     rows.add_argument("--sum-polarizations", action="store_true", help="add rows of several polarisations coherently")
     rows.add_argument("--channel", type=int, metavar="N", help="only rows of this receive channel")
     rows.add_argument("--autofocus", action="store_true", help="apply the corrections a Gotcha file holds")
-    _picture(p)
 
 
 def _picture(p: argparse.ArgumentParser) -> None:
