@@ -17,6 +17,7 @@ For this folder alone:
     _exact_facets      few facets in few pulses and samples, added up in float64 on the host
     _facet_spreading   facets to range profiles
     _kernel_images     error of scatterers that lie so evenly that the images of the kernel add up
+    _piece_tiling      pieces of rough facets in tiles on the device that cuts them
     _point_spreading   points to range profiles: a nonuniform FFT of type 1
     _pulse_levels      what consecutive pulses see of facets, as the kernel reads it
     _unseen_scene      refusal of scenes outside every beam or range window, before anything is planned
