@@ -9,6 +9,7 @@ For other folders:
     facets                 facets ready for the kernel: subdivided, displaced, culled, illuminated
     physical_optics        phase integral, Fresnel coefficients and scattering matrix of a planar facet
     pulse_nodes            pulses at which amplitudes are computed, with cubic interpolation between them
+    rough_pieces           rough facets cut on a device, where the kernels read the pieces
     scatterers             from a scene to the points and facets that the kernels add
     subdivision            facets cut to the edge length of their plan
     mesh_quality/          warnings about meshes that are too coarse for their curves or for speckle
@@ -33,6 +34,7 @@ __all__ = [
     "mesh_quality",
     "physical_optics",
     "pulse_nodes",
+    "rough_pieces",
     "scatterers",
     "subdivision",
 ]

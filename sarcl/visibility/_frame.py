@@ -9,7 +9,7 @@ import numpy as np
 
 from ..base.boxes import box
 from ..opencl.device import Device
-from ..scene.triangles import edges, normals
+from ..scene.triangles import BLOCK, edges, normals
 from ._facet_samples import SampleLines
 
 # Height above a facet at which rays start, relative to the scene: float32 resolves 1e-7 of it. Coplanar neighbours, and
@@ -19,6 +19,11 @@ ONE_SIDED, ALL_SAMPLES = 1, 2  # bits of a facet's kind, as in the kernels
 FEW = 4096  # facets; in smaller scenes every facet gets all its samples
 # times the lower quartile of the edges: a shadow may fall wholly between the probes of facets longer than this
 LARGE = 4
+
+
+def box_of(*triangles: np.ndarray) -> np.ndarray:
+    """The box of all corners of triangles, m (k, 3, 3) each, one of them not empty: (2, 3)."""
+    return box(np.concatenate([box(some.reshape(-1, 3)) for some in triangles if len(some)]))
 
 
 @dataclass(frozen=True, eq=False)
@@ -59,14 +64,15 @@ class DeviceFacets:
         self.device, self.frame, self.size = device, frame, len(triangles)
         length = np.maximum.reduce(edges(triangles))
         large = length > LARGE * np.quantile(length, 0.25) if len(length) > FEW else np.ones(len(length), bool)
-        a = triangles[:, 0]
-        parts = (
-            (a - frame.center) * frame.unit,
-            (triangles[:, 1] - a) * frame.unit,
-            (triangles[:, 2] - a) * frame.unit,
-            normals(triangles) * STEP,
-        )
-        self.buffer = device.upload(np.concatenate(parts, axis=1, dtype=np.float32, casting="same_kind"))
+        rows = np.empty((len(triangles), 12), np.float32)
+        for first in range(0, len(triangles), BLOCK):  # so few at a time stay in the processor's cache
+            block = triangles[first : first + BLOCK]
+            a, out = block[:, 0], rows[first : first + BLOCK]
+            out[:, :3] = (a - frame.center) * frame.unit
+            out[:, 3:6] = (block[:, 1] - a) * frame.unit
+            out[:, 6:9] = (block[:, 2] - a) * frame.unit
+            out[:, 9:] = normals(block) * STEP
+        self.buffer = device.upload(rows)
         self.kind = device.upload((ONE_SIDED * one_sided + ALL_SAMPLES * large).astype(np.uint8))
 
 

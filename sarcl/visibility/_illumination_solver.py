@@ -11,7 +11,7 @@ import numpy as np
 from ..opencl.device import Device
 from ..opencl.launch_numbers import launch_numbers
 from ._facet_samples import FEWEST_LINES, MOST_LINES, PER_LINE, SampleLines
-from ._frame import DeviceFacets, Frame
+from ._frame import DeviceFacets, Frame, box_of
 from ._ray_casting import Occluders
 
 CHUNK = 2**16  # facets per call of the kernels: bounds the memory
@@ -60,7 +60,7 @@ class IlluminationSolver:
         self.device, k = device, len(triangles)
         solid = triangles if occluders is None else np.reshape(occluders, (-1, 3, 3))
         floor, over = (np.zeros((0, 3, 3)), np.zeros(k, bool)) if ground is None else ground
-        self.frame = frame = Frame.around(np.concatenate([triangles, solid, floor]).reshape(-1, 3))
+        self.frame = frame = Frame.around(box_of(triangles, solid, floor))
         self.facets = DeviceFacets(device, triangles, frame, np.broadcast_to(~np.asarray(two_sided), k))
         keep = np.ones(k, bool) if wanted is None else wanted
         hiders: list[tuple[Any, np.ndarray]] = []  # each with the facets that it may hide

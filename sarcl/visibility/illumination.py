@@ -13,7 +13,6 @@ from dataclasses import dataclass, field, replace
 import numpy as np
 
 from ..base import arguments
-from ..base.boxes import box
 from ..base.constants import EDGE_ON
 from ..base.errors import warn
 from ..base.validation import array, flags, ndim, number, sealed
@@ -23,6 +22,7 @@ from ..opencl.memory_budget import budget
 from ..scene.triangles import areas
 from ._aspect_blocks import STRIDE, blocks_around, projected_width, pulse_blocks, shadow_length
 from ._facet_samples import MOST_LINES
+from ._frame import box_of
 from ._illumination_solver import IlluminationSolver
 from ._levels_along_track import SAMPLING, Course, Judge, Looks, look_along
 from ._lit_shares import facet_shares as facet_shares
@@ -252,9 +252,9 @@ def lit(
     )  # fmt: skip
     power = np.asarray(areas(triangles) if weights is None else weights, np.float64)
     power = power * (1.0 if wanted is None else wanted)
-    solid = triangles if ground is None else np.concatenate([triangles, ground[0]])
+    bounds = box_of(triangles) if ground is None else box_of(triangles, ground[0])
     course, viewpoints, errors = _within(
-        accuracy, tolerance, solver, triangles, box(solid.reshape(-1, 3)), ends, power, max_bytes, progress
+        accuracy, tolerance, solver, triangles, bounds, ends, power, max_bytes, progress
     )
     blocks = blocks_around(viewpoints, len(tx))
     n_wanted = k if wanted is None else int(np.sum(wanted))
