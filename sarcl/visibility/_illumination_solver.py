@@ -78,7 +78,7 @@ class IlluminationSolver:
         self._more = self._few
 
     def take_lines(self, n: int) -> None:
-        """Take samples on n lines, 16 to 256, of facets that are partly seen on 16."""
+        """Take samples on n lines, 16 to 256, of each facet; by rays, of those that are partly seen on 16."""
         self._more = SampleLines.of_facets(self.device, min(n, MOST_LINES))
 
     def share(self, viewpoints: list[np.ndarray], slack: float = 0.0) -> np.ndarray:
