@@ -32,6 +32,7 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
+#include "tile_paths.clh"
 #include "range_phase.clh"
 #include "pixel_weights.clh"
 #if WEIGHT >= 2

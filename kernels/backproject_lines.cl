@@ -17,7 +17,7 @@
 //           beta      half path that a pixel along the line adds, m
 //           n_i, z_i  first sample of T for line i, and where A_i lies between samples; w_b weights, interp.clh's table form
 //           q         square of a pixel's offset from the reference pixel, m^2
-//           u, R0, a, w   as in range_phase.clh
+//           u, R0, a, w   as in tile_paths.clh
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM as in the headers
 //           SIDE      of a tile, a multiple of VW;  FINE samples of T per pixel (1, 2, 4 or 8)
 //           LINE_TAPS even; LINE_TERMS;  GROUP pulses
@@ -30,7 +30,7 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
 

@@ -24,7 +24,7 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
 #include "line_schedule.clh"

@@ -15,7 +15,7 @@
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "vec3_complex.clh"
 #include "pattern.clh"
 #include "gains.clh"

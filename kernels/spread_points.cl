@@ -16,6 +16,7 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
+#include "tile_paths.clh"
 #include "range_phase.clh"
 #include "spread_sums.clh"
 #include "vec3_complex.clh"

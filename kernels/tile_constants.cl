@@ -15,7 +15,7 @@
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 
 // u: the direction, in wide numbers
