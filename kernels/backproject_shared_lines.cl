@@ -18,7 +18,6 @@
 
 #undef VW
 #define VW 1
-#define RANGE 0
 #define BY_VALUE 1
 #include "common.clh"
 #include "doubleword.clh"

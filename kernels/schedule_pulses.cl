@@ -8,7 +8,6 @@
 
 #undef VW
 #define VW 1
-#define RANGE 0
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
