@@ -26,6 +26,7 @@ from .line_plan import LinePlan, steps
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
+N_WEIGHTS = 3  # buffers of kernels/backproject.cl with weights: any stand for them where there are none
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
 # pulses on the device: the packed array, its length with padding, and the number of pulses
@@ -80,7 +81,8 @@ class GatherKernel:
                 offset_step=0 if tiles.shared else tiles.per_tile // self.lanes, pixels=tiles.n_tiles * tiles.per_tile,
                 local_offset=offset, magic=self.magic, second=second,
             ),
-            source, self.table, pulse, constants, centers, offsets, image, on.missed, *weights, steps=used,
+            source, self.table, pulse, constants, centers, offsets, image, on.missed,
+            *(weights or (self.table,) * N_WEIGHTS), steps=used,
         )  # fmt: skip
 
 
