@@ -171,7 +171,8 @@ __kernel void backproject(backproject_numbers given, __global const float *restr
             if (APART && state == INSIDE)
                 add_pulse(0, HELD(held), pulse, p, n, pixels, row, stride, origin, HELD(taps), weights, re, im);
             else
-                add_pulse(APART || state == CROSSING, HELD(held), pulse, p, n, pixels, row, stride, origin, HELD(taps), weights, re, im);
+                add_pulse(APART || state == CROSSING, HELD(held), pulse, p, n, pixels, row, stride, origin, HELD(taps), weights,
+                          re, im);
         }
 #pragma unroll
         for (int r = 0; r < VECTORS; r++) {

@@ -244,8 +244,6 @@ backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table
     }
     if (item == 0) {
         skipped[tile] += missed;
-#if BEAM
-        skipped[given.n_tiles + tile] += unlit;
-#endif
+        if (BEAM) skipped[given.n_tiles + tile] += unlit;
     }
 }

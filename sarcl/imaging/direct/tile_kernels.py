@@ -17,6 +17,7 @@ from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
+from ..pixel_taper import WEIGHT_BUFFERS
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
@@ -26,7 +27,6 @@ from .line_plan import LinePlan, steps
 CHUNK = 64  # rows added in float32 before the compensated total; blocks of rows are multiples of it
 ENTRY = 24  # numbers that a pulse takes in the record of its group: N_ENTRY of kernels/line_schedule.clh
 NO_WEIGHTS = {"WEIGHT": 0}  # of pulses in the pixels: macros of kernels/pixel_weights.clh
-N_WEIGHTS = 3  # buffers of kernels/backproject.cl with weights: any stand for them where there are none
 VECTORS = 4  # vectors of pixels per work-item of the per-pixel kernel
 
 # pulses on the device: the packed array, its length with padding, and the number of pulses
@@ -82,7 +82,7 @@ class GatherKernel:
                 local_offset=offset, magic=self.magic, second=second,
             ),
             source, self.table, pulse, constants, centers, offsets, image, on.missed,
-            *(weights or (self.table,) * N_WEIGHTS), steps=used,
+            *(weights or WEIGHT_BUFFERS * (self.table,)), steps=used,
         )  # fmt: skip
 
 
