@@ -163,6 +163,7 @@ static inline fv level_at(__global const uchar *levels, __global const int *mome
     }
     return LOAD(0, out);
 }
+#define IS_LIT(level) (!SHADED || (level) > 0)
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
@@ -217,7 +218,7 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
             STORE(inside, 0, is_inside);
             if (SHADED) level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
             inside *= level;
-            STORE(level, 0, lit);
+            if (SHADED) STORE(level, 0, lit);
             int any_mark = 0;
 #pragma unroll
             for (int l = 0; l < VW; l++) {
@@ -226,7 +227,7 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                 front_count += counts && (marks[at_nearest * VW + l] & FRONT);
 #pragma unroll
                 for (int q = 0; q < PULSE_NODES; q++)
-                    any_mark |= counts && lit[l] > 0 ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
+                    any_mark |= counts && IS_LIT(lit[l]) ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
             }
             if (!GROUPED && !(any_mark & BRIGHT)) continue;  // items of a group go on together
 
