@@ -24,21 +24,16 @@
 
 // |T - x| - R0
 static inline dv difference(dv a, dv q, double R0, double inverse) {
-#if ORDER == 0
-    dv numerator = fma((dv)(-2 * R0), a, q);
-    return numerator / (sqrt(fma((dv)R0, (dv)R0, numerator)) + (dv)R0);
-#else
+    if (ORDER == 0) {
+        dv numerator = fma((dv)(-2 * R0), a, q);
+        return numerator / (sqrt(fma((dv)R0, (dv)R0, numerator)) + (dv)R0);
+    }
     dv w = fma(-a, a, q), bend = w * (dv)(0.5 * inverse);
-#if ORDER == 2
-    return bend - a;
-#elif ORDER == 3
-    return fma(bend, fma(a, (dv)inverse, (dv)1.0), -a);
-#else
+    if (ORDER == 2) return bend - a;
+    if (ORDER == 3) return fma(bend, fma(a, (dv)inverse, (dv)1.0), -a);
     dv t = a * (dv)inverse;
     dv next = fma((dv)(-0.25 * inverse * inverse), w, fma(t, t, t));
     return fma(bend, next + 1.0, -a);
-#endif
-#endif
 }
 
 // -1 in lanes whose point lies inside the range window of pulse p, else 0; decided in pairs, whatever the rest is done in
@@ -61,18 +56,14 @@ typedef struct {
 //   n_used      <= n                  pulses that are real; the rest pads the vectors
 //   positions   (3, pixels)           m; one tile after another
 //   image       (4, pixels)           totals re, im and their errors re, im
-//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; where WEIGHT is 1
+//   place       (n_used), taper (TAPER), aperture (2, pixels): start and inverse; not read where WEIGHT is 0
 //   skipped     (2, n_tiles)          pulses in whose window no point of the tile lies, and those in whose beam none does
 __kernel void backproject(backproject_numbers given, __global const double *restrict profiles,
                           __global const double *restrict table, __global const double *restrict pulse,
                           __global const double *restrict constants, __global const double *restrict tile,
                           __global const double *restrict positions, __global double *restrict image,
-                          __global int *restrict skipped
-#if WEIGHT == 1
-                          , __global const double *restrict place, __global const double *restrict taper,
-                          __global const double *restrict aperture
-#endif
-                          ) {
+                          __global int *restrict skipped, __global const double *restrict place,
+                          __global const double *restrict taper, __global const double *restrict aperture) {
     size_t k = given.first + get_global_id(1), i = k * get_global_size(0) + get_global_id(0), pixels = given.pixels;
     int n = given.n, n_used = given.n_used, n_tiles = given.n_tiles, stride = given.stride, origin = given.origin;
     __global const double *record = constants + get_global_id(1) * (size_t)n * N_CONST;
@@ -89,48 +80,45 @@ __kernel void backproject(backproject_numbers given, __global const double *rest
                 missed++;
                 continue;
             }
-#if BEAM
-            if (state == UNLIT) {
+            if (BEAM && state == UNLIT) {
                 unlit++;
                 continue;
             }
-#endif
             // phase in cycles, and position among samples, counted from sample `base`
             dv cycles, t, base, inside = 1;
-#if ORDER >= 0
-            dv a = fma((dv)record[C_UX], q.x, fma((dv)record[C_UX + 1], q.y, (dv)record[C_UX + 2] * q.z));
-            dv d = difference(a, qq, record[C_R0], record[C_INVERSE]);
-#if BISTATIC
-            a = fma((dv)record[C_RX], q.x, fma((dv)record[C_RX + 1], q.y, (dv)record[C_RX + 2] * q.z));
-            d = 0.5 * (d + difference(a, qq, record[C_RR], record[C_RINVERSE]));
-#endif
-            cycles = fma(d, (dv)record[C_KAPPA], (dv)record[C_CYCLES]);
-            cycles -= whole(cycles);
-            t = fma(d, (dv)record[C_SIGMA], (dv)record[C_FRAC]);
-            base = (dv)record[C_BASE];
-            if (state == CROSSING)
-#endif
-            {
+            if (ORDER >= 0) {
+                dv a = fma((dv)record[C_UX], q.x, fma((dv)record[C_UX + 1], q.y, (dv)record[C_UX + 2] * q.z));
+                dv d = difference(a, qq, record[C_R0], record[C_INVERSE]);
+                if (BISTATIC) {
+                    a = fma((dv)record[C_RX], q.x, fma((dv)record[C_RX + 1], q.y, (dv)record[C_RX + 2] * q.z));
+                    d = 0.5 * (d + difference(a, qq, record[C_RR], record[C_RINVERSE]));
+                }
+                cycles = fma(d, (dv)record[C_KAPPA], (dv)record[C_CYCLES]);
+                cycles -= whole(cycles);
+                t = fma(d, (dv)record[C_SIGMA], (dv)record[C_FRAC]);
+                base = (dv)record[C_BASE];
+            }
+            if (ORDER < 0 || state == CROSSING) {
                 int spread = 1;
                 pair R0, S0;
                 point u, v;
                 pair delta = half_path(pulse, n, p, spread, x, &R0, &u, &S0, &v);
-#if ORDER < 0
-                dv unused;
-                cycles = pair_split(pair_mul(delta, make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW))), &unused);
-                t = position_of(delta, make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW)), WRAP, &base);
-#endif
-#if !WRAP
-                // outside, the position moves to delay 0, which every profile has, so that whatever is read there exists
-                lv in = in_window(pulse, n, p, delta);
-                inside = in ? inside : (dv)0;
-                t = in ? t : (dv)0;
-                base = in ? base : (dv)0;
-#endif
-#if BEAM
-                dv along;
-                inside = beam_edge(pulse, n, p, spread, u, R0.hi, &along) >= 0 ? inside : (dv)0;
-#endif
+                if (ORDER < 0) {
+                    dv unused;
+                    cycles = pair_split(pair_mul(delta, make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW))), &unused);
+                    t = position_of(delta, make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW)), WRAP, &base);
+                }
+                if (!WRAP) {
+                    // outside, the position moves to delay 0, which every profile has, so that whatever is read there exists
+                    lv in = in_window(pulse, n, p, delta);
+                    inside = in ? inside : (dv)0;
+                    t = in ? t : (dv)0;
+                    base = in ? base : (dv)0;
+                }
+                if (BEAM) {
+                    dv along;
+                    inside = beam_edge(pulse, n, p, spread, u, R0.hi, &along) >= 0 ? inside : (dv)0;
+                }
             }
             dv w[TAPS], g, h, sine, cosine;
             lv j;
@@ -141,11 +129,11 @@ __kernel void backproject(backproject_numbers given, __global const double *rest
                 g *= inside;
                 h *= inside;
             }
-#if WEIGHT == 1
-            dv weight = taper_weight(taper, ((dv)place[p] - LOAD(i, aperture)) * LOAD(i, aperture + pixels));
-            g *= weight;
-            h *= weight;
-#endif
+            if (TAPERED) {
+                dv weight = taper_weight(taper, ((dv)place[p] - LOAD(i, aperture)) * LOAD(i, aperture + pixels));
+                g *= weight;
+                h *= weight;
+            }
             re = fma(g, cosine, fma(-h, sine, re));
             im = fma(g, sine, fma(h, cosine, im));
         }

@@ -17,7 +17,7 @@
 //           beta      half path that a pixel along the line adds, m
 //           n_i, z_i  first sample of T for line i, and where A_i lies between samples; w_b weights, interp.clh's table form
 //           q         square of a pixel's offset from the reference pixel, m^2
-//           u, R0, a, w   as in range_phase.clh
+//           u, R0, a, w   as in tile_paths.clh
 // macros    VW, FP64, BISTATIC, WRAP, TAPS, TERMS, ORDER, BEAM as in the headers
 //           SIDE      of a tile, a multiple of VW;  FINE samples of T per pixel (1, 2, 4 or 8)
 //           LINE_TAPS even; LINE_TERMS;  GROUP pulses
@@ -25,12 +25,11 @@
 //           LOCAL     1: every tile has profiles of its own, about its reference pixel (factorised); 0: pulses' own
 // reference: sarcl/reference/backproject.py:backproject
 
-#define RANGE 0
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
 
@@ -43,19 +42,13 @@
 #define AT_SIZE (SIDE * LINE_TAPS)
 
 DEFINE_WEIGHTS(line_weights, LINE_TAPS, LINE_TERMS)
-#if SLOPE
 DEFINE_SLOPES(line_slopes, LINE_TAPS, LINE_TERMS)
-#endif
 
-static inline fv lanes(void) {
-#if VW == 8
-    return (float8)(0, 1, 2, 3, 4, 5, 6, 7);
-#elif VW == 16
-    return (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15);
-#else
-    return 0;
-#endif
-}
+// The lanes' numbers.
+#define LANES_1 0
+#define LANES_8 (float8)(0, 1, 2, 3, 4, 5, 6, 7)
+#define LANES_16 (float16)(0, 1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 12, 13, 14, 15)
+static inline fv lanes(void) { return CAT(LANES_, VW); }
 
 // Weights W_b(i) of all lines of a pulse, and n_i; 0 where the samples of a line lie too far off to be stored, as for a
 // steep line, or have no spacing, as where the range is the same along a line.
@@ -72,12 +65,9 @@ INLINED int weigh_lines(group pulses, line_geometry line, __global const float *
         fv t = position * samples_of_T - (fv)(0.5f * (LINE_TAPS - 1)), first = nearest(t), z = t - first;
         farthest = fmax(farthest, largest(fabs(t)));
         n_i[v] = nearest_int(t);
-        fv weight[LINE_TAPS];
+        fv weight[LINE_TAPS], slope[LINE_TAPS];
         line_weights(z, weights, weight);
-#if SLOPE
-        fv slope[LINE_TAPS];
-        line_slopes(z, weights, slope);
-#endif
+        if (SLOPE) line_slopes(z, weights, slope);
         fv cycles = fma(centre, (fv)line.kappa, cycles_of(i, line.cycles_across, line.cycles_across_low) + line.cycles);
         cycles -= nearest(cycles);
         cycles -= cycles_of(first, line.fine_cycles, line.fine_cycles_low);
@@ -90,11 +80,11 @@ INLINED int weigh_lines(group pulses, line_geometry line, __global const float *
             sincos_cycles(of_tap, &sine, &cosine);
             STORE(weight[b] * cosine, v, W + PARTS * b * SIDE);
             STORE(weight[b] * sine, v, W + (PARTS * b + 1) * SIDE);
-#if SLOPE
-            fv per_metre = slope[b] * (samples_of_T * line.sigma);
-            STORE(per_metre * cosine, v, W + (PARTS * b + 2) * SIDE);
-            STORE(per_metre * sine, v, W + (PARTS * b + 3) * SIDE);
-#endif
+            if (SLOPE) {
+                fv per_metre = slope[b] * (samples_of_T * line.sigma);
+                STORE(per_metre * cosine, v, W + (PARTS * b + 2) * SIDE);
+                STORE(per_metre * sine, v, W + (PARTS * b + 3) * SIDE);
+            }
         }
     }
     return farthest <= (float)(FINE * (SIDE / 2 + VW) - LINE_TAPS);
@@ -152,43 +142,35 @@ INLINED int make_lines(group pulses, line_geometry line, int made, __global cons
 #define SUMS 1
 #define EACH(what) what(0)
 #endif
-#define BEGIN(v) fv re##v = 0, im##v = 0;
-#define ADD(v)                                               \
-    {                                                        \
-        fv t_re = LOAD(v, t), t_im = LOAD(v, t + MOST);       \
-        re##v = fma(t_re, w_re, fma(-t_im, w_im, re##v));    \
-        im##v = fma(t_re, w_im, fma(t_im, w_re, im##v));     \
-        ADD_SLOPE(v)                                         \
+#define BEGIN(v) fv re##v = 0, im##v = 0, slope_re##v = 0, slope_im##v = 0;
+#define ADD(v)                                                                      \
+    {                                                                               \
+        fv t_re = LOAD(v, t), t_im = LOAD(v, t + MOST);                              \
+        re##v = fma(t_re, w_re, fma(-t_im, w_im, re##v));                           \
+        im##v = fma(t_re, w_im, fma(t_im, w_re, im##v));                            \
+        if (SLOPE) {                                                                \
+            slope_re##v = fma(t_re, dw_re, fma(-t_im, dw_im, slope_re##v));         \
+            slope_im##v = fma(t_re, dw_im, fma(t_im, dw_re, slope_im##v));          \
+        }                                                                           \
     }
-#define END(v) re[v] = re##v, im[v] = im##v;
-#if SLOPE
-#define BEGIN_SLOPE(v) fv slope_re##v = 0, slope_im##v = 0;
-#define ADD_SLOPE(v)                                                       \
-    slope_re##v = fma(t_re, dw_re, fma(-t_im, dw_im, slope_re##v));        \
-    slope_im##v = fma(t_re, dw_im, fma(t_im, dw_re, slope_im##v));
-#define END_SLOPE(v) slope_re[v] = slope_re##v, slope_im[v] = slope_im##v;
-#else
-#define ADD_SLOPE(v)
-#endif
+#define END(v) re[v] = re##v, im[v] = im##v, slope_re[v] = slope_re##v, slope_im[v] = slope_im##v;
 
 // SUMS vectors of pixels of line r from pixel j0 on, both counted from 0: the `made` pulses of the group, then the rest_ij
 // that they share.
 INLINED void sum_line(group pulses, int r, int j0, int made, __local const float *T, __local const float *W,
                             __local const int *at, fv *re, fv *im) {
-    EACH(BEGIN)
-#if SLOPE
     fv slope_re[SUMS], slope_im[SUMS];
-    EACH(BEGIN_SLOPE)
-#endif
+    EACH(BEGIN)
     for (int p = 0; p < made; p++) {
         __local const float *w = W + p * W_SIZE + r;
         __local const int *at_line = at + p * AT_SIZE + r * LINE_TAPS;
 #pragma unroll
         for (int b = 0; b < LINE_TAPS; b++) {
-            fv w_re = (fv)w[PARTS * b * SIDE], w_im = (fv)w[(PARTS * b + 1) * SIDE];
-#if SLOPE
-            fv dw_re = (fv)w[(PARTS * b + 2) * SIDE], dw_im = (fv)w[(PARTS * b + 3) * SIDE];
-#endif
+            fv w_re = (fv)w[PARTS * b * SIDE], w_im = (fv)w[(PARTS * b + 1) * SIDE], dw_re = 0, dw_im = 0;
+            if (SLOPE) {
+                dw_re = (fv)w[(PARTS * b + 2) * SIDE];
+                dw_im = (fv)w[(PARTS * b + 3) * SIDE];
+            }
             __local const float *t = T + at_line[b] + j0;
             EACH(ADD)
         }
@@ -196,19 +178,16 @@ INLINED void sum_line(group pulses, int r, int j0, int made, __local const float
     EACH(END)
     line_geometry line = pulses.middle;
     fv i = (fv)(r - SIDE / 2), none = 0, centre = curvature_at(line, i, none, q_of_line(pulses, i));
-#if SLOPE
-    EACH(END_SLOPE)
     fv end = (fv)(SIDE / 2), q_end = q_of(pulses, i, end);
     fv in_position = 0.25f * (curvature_at(line, i, end, q_end) + curvature_at(line, i, -end, q_end)) - (fv)0.5f * centre;
-#endif
 #pragma unroll
     for (int v = 0; v < SUMS; v++) {
         fv j = lanes() + (fv)(j0 + v * VW - SIDE / 2), sine, cosine;
         fv rest = curvature_at(line, i, j, q_of(pulses, i, j)) - centre, cycles = rest * line.kappa;
-#if SLOPE
-        re[v] = fma(slope_re[v], rest - in_position, re[v]);
-        im[v] = fma(slope_im[v], rest - in_position, im[v]);
-#endif
+        if (SLOPE) {
+            re[v] = fma(slope_re[v], rest - in_position, re[v]);
+            im[v] = fma(slope_im[v], rest - in_position, im[v]);
+        }
         sincos_cycles(cycles - nearest(cycles), &sine, &cosine);
         fv rotated = fma(re[v], cosine, -im[v] * sine);
         im[v] = fma(re[v], sine, im[v] * cosine);
@@ -249,9 +228,7 @@ __kernel void backproject_lines(backproject_lines_numbers given, __global const 
     int tile = given.first + get_global_id(0), missed = 0, unlit = 0;
     int n_used = given.n_used, stride = given.stride, origin = given.origin;
     size_t pixels = given.pixels;
-#if LOCAL
-    profiles += 2 * (given.local_offset + (size_t)get_global_id(0) * n_used * stride);
-#endif
+    if (LOCAL) profiles += 2 * (given.local_offset + (size_t)get_global_id(0) * n_used * stride);
     profiles += 2 * origin;
     __global const float *records = constants + get_global_id(0) * (size_t)given.n * N_LINE;
     for (int start = 0; start < n_used; start += GROUP) {
@@ -298,10 +275,7 @@ __kernel void backproject_lines(backproject_lines_numbers given, __global const 
                 }
             }
     }
-#if !LOCAL
+    if (LOCAL) return;
     skipped[tile] += missed;
-#if BEAM
-    skipped[given.n_tiles + tile] += unlit;
-#endif
-#endif
+    if (BEAM) skipped[given.n_tiles + tile] += unlit;
 }

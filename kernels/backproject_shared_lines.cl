@@ -18,13 +18,12 @@
 
 #undef VW
 #define VW 1
-#define RANGE 0
 #define BY_VALUE 1
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
 #include "line_schedule.clh"
@@ -245,8 +244,6 @@ backproject_shared_lines(backproject_shared_lines_numbers given, tap_table table
     }
     if (item == 0) {
         skipped[tile] += missed;
-#if BEAM
-        skipped[given.n_tiles + tile] += unlit;
-#endif
+        if (BEAM) skipped[given.n_tiles + tile] += unlit;
     }
 }

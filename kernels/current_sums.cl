@@ -25,17 +25,25 @@
 
 // Paths of a work-item for the cells of a tile; no other item reads them.
 #if GROUP
-#define PATHS(name) __local fv name[TILE * GROUP]
-#define PATH(name, i) name[(i) * GROUP + (int)get_local_id(0)]
+#define PATHS __local fv
+#define PATH(i) ((i) * GROUP + (int)get_local_id(0))
+#define N_PATHS (TILE * GROUP)
 #else
-#define PATHS(name) fv name[TILE]
-#define PATH(name, i) name[i]
+#define PATHS fv
+#define PATH(i) (i)
+#define N_PATHS TILE
 #endif
+#define N_BACK (BISTATIC ? N_PATHS : 1)
 
 // D of a cell
 static inline fv longer(fv x, fv y, fv z, fv inverse, float4 cell) {
     fv m = fma(x, (fv)cell.x, fma(y, (fv)cell.y, fma(z, (fv)cell.z, (fv)(-cell.w) * inverse)));
     return (fv)(-2.0f) * m / ((fv)1.0f + sqrt(fmax(fma((fv)(-2.0f) * m, inverse, (fv)1.0f), (fv)0.0f)));
+}
+
+// Cycles by which the wave of a cell is late: its path in all, or on the way out and `back`, kappa and rho cycles/m.
+static inline fv late(float kappa, fv path, fv rho, fv back) {
+    return BISTATIC ? fma((fv)kappa, path, rho * back) : (fv)kappa * path;
 }
 
 static inline void wave(fv cycles, fv *re, fv *im) {
@@ -58,12 +66,13 @@ __kernel void current_sums(current_sums_numbers given, __global const float4 *re
     float travel_x = given.travel[0], travel_y = given.travel[1], travel_z = given.travel[2];
     int blocks = (n_frequencies + BLOCK - 1) / BLOCK;
     fv ux = LOAD(p, antenna), uy = LOAD(p, antenna + n), uz = LOAD(p, antenna + 2 * n), near = LOAD(p, antenna + 3 * n);
-#if BISTATIC
-    fv vx = LOAD(p, antenna + 4 * n), vy = LOAD(p, antenna + 5 * n), vz = LOAD(p, antenna + 6 * n);
-    fv v_near = LOAD(p, antenna + 7 * n);
-    PATHS(back);
-#endif
-    PATHS(path);
+    fv vx, vy, vz, v_near;
+    if (BISTATIC) {
+        vx = LOAD(p, antenna + 4 * n), vy = LOAD(p, antenna + 5 * n), vz = LOAD(p, antenna + 6 * n);
+        v_near = LOAD(p, antenna + 7 * n);
+    }
+    PATHS path[N_PATHS];
+    PATHS back[N_BACK];
     int first = chunk[here], end = chunk[here + 1];
     for (int start = first; start < end; start += TILE) {
         int many = min(TILE, end - start);
@@ -71,12 +80,8 @@ __kernel void current_sums(current_sums_numbers given, __global const float4 *re
             float4 y = cell[start + i];
             fv sent = longer(ux, uy, uz, near, y);
             float along = fma(travel_x, y.x, fma(travel_y, y.y, travel_z * y.z));
-#if BISTATIC
-            PATH(path, i) = sent - along;
-            PATH(back, i) = longer(vx, vy, vz, v_near, y);
-#else
-            PATH(path, i) = fma(sent, (fv)2.0f, (fv)(-along));
-#endif
+            path[PATH(i)] = BISTATIC ? sent - along : fma(sent, (fv)2.0f, (fv)(-along));
+            if (BISTATIC) back[PATH(i)] = longer(vx, vy, vz, v_near, y);
         }
         for (int b = get_global_id(2); b < blocks; b += get_global_size(2)) {
             __global float *sum = sums + 2 * (size_t)n * (here * blocks + b) * BLOCK;
@@ -86,44 +91,35 @@ __kernel void current_sums(current_sums_numbers given, __global const float4 *re
                 re[j] = start == first ? (fv)0.0f : LOAD(p, sum + 2 * n * j);
                 im[j] = start == first ? (fv)0.0f : LOAD(p, sum + 2 * n * j + n);
             }
-#if LINEAR
+            // LINEAR: frequencies are evenly spaced, and waves turn from each to the next
             int f1 = min(f0 + 1, last);
             float k0 = kappa[f0], dk = kappa[f1] - k0;
-#if BISTATIC
-            fv r0 = LOAD(p, rho + (size_t)f0 * n), dr = LOAD(p, rho + (size_t)f1 * n) - r0;
-#endif
-#endif
+            fv r0 = 0, dr = 0;
+            if (LINEAR && BISTATIC) {
+                r0 = LOAD(p, rho + (size_t)f0 * n);
+                dr = LOAD(p, rho + (size_t)f1 * n) - r0;
+            }
             for (int i = 0; i < many; i++) {
                 __global const float2 *at = current + start + i;
-                fv c, s;
-#if LINEAR
-                fv turn_c, turn_s;
-#if BISTATIC
-                wave(fma((fv)k0, PATH(path, i), r0 * PATH(back, i)), &c, &s);
-                wave(fma((fv)dk, PATH(path, i), dr * PATH(back, i)), &turn_c, &turn_s);
-#else
-                wave((fv)k0 * PATH(path, i), &c, &s);
-                wave((fv)dk * PATH(path, i), &turn_c, &turn_s);
-#endif
-#endif
+                fv c, s, turn_c, turn_s, path_out = path[PATH(i)], path_back = 0;
+                if (BISTATIC) path_back = back[PATH(i)];
+                if (LINEAR) {
+                    wave(late(k0, path_out, r0, path_back), &c, &s);
+                    wave(late(dk, path_out, dr, path_back), &turn_c, &turn_s);
+                }
 #pragma unroll
                 for (int j = 0; j < BLOCK; j++) {
                     int f = min(f0 + j, last);
                     float2 value = at[(size_t)f * given.cells];
-#if !LINEAR
-#if BISTATIC
-                    wave(fma((fv)kappa[f], PATH(path, i), LOAD(p, rho + (size_t)f * n) * PATH(back, i)), &c, &s);
-#else
-                    wave((fv)kappa[f] * PATH(path, i), &c, &s);
-#endif
-#endif
+                    fv kappa_back = BISTATIC ? LOAD(p, rho + (size_t)f * n) : (fv)0.0f;
+                    if (!LINEAR) wave(late(kappa[f], path_out, kappa_back, path_back), &c, &s);
                     re[j] = fma((fv)value.x, c, fma((fv)(-value.y), s, re[j]));
                     im[j] = fma((fv)value.x, s, fma((fv)value.y, c, im[j]));
-#if LINEAR
-                    fv turned = fma(c, turn_c, -s * turn_s);
-                    s = fma(c, turn_s, s * turn_c);
-                    c = turned;
-#endif
+                    if (LINEAR) {
+                        fv turned = fma(c, turn_c, -s * turn_s);
+                        s = fma(c, turn_s, s * turn_c);
+                        c = turned;
+                    }
                 }
             }
             for (int j = 0; j < BLOCK; j++) {

@@ -15,7 +15,7 @@
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "vec3_complex.clh"
 #include "pattern.clh"
 #include "gains.clh"
@@ -55,14 +55,12 @@ __kernel void aspect_amplitudes(aspect_amplitudes_numbers given, __global const 
     scattering S = scatter_back(normal, u, h, v, c_make(LOAD(at, roots), LOAD(at, roots + n)));
     fv twice = (fv)(2.0f * wave);
     complex_v mean = triangle_mean(twice * t_dot(u, edge_1), twice * t_dot(u, edge_2));
-#if ROUGH
     mean = rough_mean(mean, (fv)1.0f, twice * cosine, cosine, (fv)0.5f * twice_area, wave, facets + F_ROUGH * (size_t)n, at, n);
-#endif
-#if WEIGHTS
-    fv away = LOAD(at, across + 3 * (size_t)n) / (fv)c;
-    antenna_view view = antenna_view_of(u, away, u, away, axes, aspect[8]);
-    mean = c_mul(mean, weight(view, patterns, given.second, aspect[7]));
-#endif
+    if (WEIGHTS) {
+        fv away = LOAD(at, across + 3 * (size_t)n) / (fv)c;
+        antenna_view view = antenna_view_of(u, away, u, away, axes, aspect[8]);
+        mean = c_mul(mean, weight(view, patterns, given.second, aspect[7]));
+    }
     fv scale = (cosine > 0 ? fabs(factor) : (fv)0.0f) * (fv)0.5f * twice_area * (fv)aspect[6];
     complex_v sent[4] = {S.hh, S.hv, S.vh, S.vv};
     int wanted[4] = {HH, HV, VH, VV}, channel = 0;

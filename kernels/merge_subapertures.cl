@@ -17,7 +17,6 @@
 //           SPAN         vectors of a profile per work-item
 // reference: sarcl/reference/merge.py:merge
 
-#define RANGE 0
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
@@ -43,44 +42,30 @@ __kernel void shifts(shifts_numbers given, __global const float *restrict pulse,
                      __global const int *restrict parent, __global const float *restrict table,
                      __global float *restrict out) {
     size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * given.n;
-    point x = load_point(tile, k, given.n_tiles), d;
-    wv r;
-    point T = load_antenna(pulse, P_TX, g, given.n, 0);
-    wv length = w_load(pulse + P_TR * given.n, g, lo);
-#if BISTATIC
-    point R = load_antenna(pulse, P_RX, g, given.n, 0);
-    wv rx_length = w_load(pulse + P_RR * given.n, g, lo);
-#endif
-#if !FROM_CENTRE
-    point c;
-    c.x = w_load1(parents, parent[k], 3 * (size_t)given.n_parents);
-    c.y = w_load1(parents + given.n_parents, parent[k], 3 * (size_t)given.n_parents);
-    c.z = w_load1(parents + 2 * given.n_parents, parent[k], 3 * (size_t)given.n_parents);
-    x.x = w_sub(x.x, c.x);
-    x.y = w_sub(x.y, c.y);
-    x.z = w_sub(x.z, c.z);
-    T.x = w_sub(T.x, c.x);
-    T.y = w_sub(T.y, c.y);
-    T.z = w_sub(T.z, c.z);
-    length = w_sqrt(w_dot(T, T));
-#if BISTATIC
-    R.x = w_sub(R.x, c.x);
-    R.y = w_sub(R.y, c.y);
-    R.z = w_sub(R.z, c.z);
-    rx_length = w_sqrt(w_dot(R, R));
-#endif
-#endif
-    wv delta = path_difference(T, length, x, &r, &d);
-#if BISTATIC
-    wv second = path_difference(R, rx_length, x, &r, &d);
-    delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
-#endif
+    point x = load_point(tile, k, given.n_tiles), T = load_antenna(pulse, P_TX, g, given.n, 0), c, R, d;
+    wv tx_length = w_load(pulse + P_TR * given.n, g, lo), rx_length, r;
+    if (!FROM_CENTRE) {
+        c = load_point(parents, parent[k], given.n_parents);
+        x = difference_of(x, c);
+        T = difference_of(T, c);
+        tx_length = w_sqrt(w_dot(T, T));
+    }
+    wv delta = path_difference(T, tx_length, x, &r, &d);
+    if (BISTATIC) {
+        R = load_antenna(pulse, P_RX, g, given.n, 0);
+        rx_length = w_load(pulse + P_RR * given.n, g, lo);
+        if (!FROM_CENTRE) {
+            R = difference_of(R, c);
+            rx_length = w_sqrt(w_dot(R, R));
+        }
+        delta = mean_of(delta, path_difference(R, rx_length, x, &r, &d));
+    }
     wv wide_cycles = w_mul(delta, w_load(pulse + P_KAPPA * given.n, g, lo));
     wv wide_position = w_mul(delta, w_load(pulse + P_SIGMA * given.n, g, lo));
-#if FROM_CENTRE
-    wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * given.n, g, lo));
-    wide_position = w_add(wide_position, w_load(pulse + P_POSITION * given.n, g, lo));
-#endif
+    if (FROM_CENTRE) {
+        wide_cycles = w_add(wide_cycles, w_load(pulse + P_CYCLES * given.n, g, lo));
+        wide_position = w_add(wide_position, w_load(pulse + P_POSITION * given.n, g, lo));
+    }
     iv unused, base;
     fv cycles = w_split(wide_cycles, &unused);
     fv t = w_split(wide_position, &base) - (fv)(0.5f * (TAPS - 1));
@@ -147,9 +132,7 @@ __kernel void merge(merge_numbers given, __global const float *restrict source, 
                     __global const float *restrict filter, __global float *restrict out) {
     int span = get_global_id(0) * SPAN, k = given.first + get_global_id(1);
     __global const float *records = shift + get_global_id(1) * (size_t)given.n_used * N_SHIFT;
-#if !FROM_CENTRE
-    source += 2 * (size_t)(parent[k] - given.first_parent) * given.n_used * given.stride;
-#endif
+    if (!FROM_CENTRE) source += 2 * (size_t)(parent[k] - given.first_parent) * given.n_used * given.stride;
     out += (size_t)(k - given.out_first) * given.n_kept * given.out_stride * 2;
     int last = min(span + SPAN, (2 * given.out_stride + WIDTH - 1) / WIDTH);
     for (int b = 0; b < given.n_blocks; b++) {

@@ -8,12 +8,11 @@
 
 #undef VW
 #define VW 1
-#define RANGE 0
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 #include "line_group.clh"
 #include "line_schedule.clh"

@@ -29,36 +29,34 @@
 #include "doubleword.clh"
 #include "geometry.clh"
 #include "interp.clh"
+#include "tile_paths.clh"
 #include "range_phase.clh"
-#include "spread_sums.clh"
 #include "vec3_complex.clh"
 #include "pattern.clh"
 #include "gains.clh"
 #include "facet.clh"
 #include "facet_planes.clh"
 
-#if GROUPED
-#include "spread_group.clh"
-#else
-#define ITEMS 1
-#endif
-
 #define CHANNELS (NODES * (HH + HV + VH + VV))
+#include "spread_rows.clh"
+
 // Amplitudes of vector i of a tile at a pulse node, and the distance from one number of them to the next: items of a group
 // read and write neighbours.
-#if GROUPED
-#define AMPLITUDES(a, tile, i) ((a) + (tile) * (2 * CHANNELS * TILE) + (i))
-#define PLANE TILE
-#else
-#define AMPLITUDES(a, tile, i) ((a) + ((tile) * (TILE / VW) + (i)) * (2 * CHANNELS * VW))
-#define PLANE VW
-#endif
+#define AMPLITUDES(a, tile, i) \
+    ((a) + (GROUPED ? (tile) * (2 * CHANNELS * TILE) + (i) : ((tile) * (TILE / VW) + (i)) * (2 * CHANNELS * VW)))
+#define PLANE (GROUPED ? TILE : VW)
 #define FRONT 1  // bits of a facet's mark at a pulse node: seen from its front; sends something back
 #define BRIGHT 2
 
 static inline void put_channel(__global float *out, int channel, complex_v a, fv scale) {
     STORE(scale * a.re, 0, out + 2 * channel * PLANE);
     STORE(scale * a.im, 0, out + (2 * channel + 1) * PLANE);
+}
+
+// Writes the amplitude of one polarisation at one frequency; returns the channel of the next polarisation.
+static inline int put_polarisation(__global float *out, int channel, complex_v S, complex_v mean, fv scale) {
+    put_channel(out, channel, c_mul(S, mean), scale);
+    return channel + NODES;
 }
 
 typedef struct {
@@ -89,16 +87,9 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
     float3 vertical = vload3(0, up), other = vload3(1, up);
     __global const float *c = constants + (k * (size_t)given.n + q) * N_CONST;
     size_t here = (size_t)q * get_global_size(1) + get_global_id(1);
-    direction from_tx = load_direction(c, C_UX, C_LOW);
-#if BISTATIC
-    direction from_rx = load_direction(c, C_RX, C_RX_LOW);
-#elif CULL
-    direction from_rx = from_tx;
-#endif
+    direction from_tx = load_transmitter(c), from_rx = load_receiver(c);
     int unseen = as_int(c[C_STATE]) == OUTSIDE;
-#if CULL
-    unseen = unseen || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
-#endif
+    if (CULL) unseen = unseen || out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)q, reach);
     for (int i = get_global_id(0) % ITEMS; i < TILE / VW; i += ITEMS) {
         size_t at = (size_t)k * (TILE / VW) + i, node_vector = here * (TILE / VW) + i;
         __global float *out_i = AMPLITUDES(out, here, i);
@@ -108,25 +99,19 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
         triple edge_2 = load_triple(facets + (F_EDGE + 3) * (size_t)given.n_offsets, at, given.n_offsets);
         fv factor = LOAD(at, facets + F_FACTOR * (size_t)given.n_offsets);
         fv tx_range, rx_range, twice_area;
-        triple u_t = toward(from_tx, x, &tx_range), h_t, v_t;
+        triple u_t = toward(from_tx, x, &tx_range), u_r = toward(from_rx, x, &rx_range), h_t, v_t, h_r, v_r;
         polarisation(u_t, vertical, other, &h_t, &v_t);
-#if BISTATIC
-        triple u_r = toward(from_rx, x, &rx_range), h_r, v_r;
         polarisation(u_r, vertical, other, &h_r, &v_r);
-        triple u_sum = t_add(u_t, u_r), normal = facing_normal(edge_1, edge_2, factor, u_sum, &twice_area);
-        iv front = lit_share(normal, u_t, u_r) > 0;
-#else
-        triple u_sum = t_scale((fv)2.0f, u_t), u_r = u_t, normal = facing_normal(edge_1, edge_2, factor, u_sum, &twice_area);
-        iv front = t_dot(normal, u_t) > 0;
-        rx_range = tx_range;
-#endif
+        triple u_sum = BISTATIC ? t_add(u_t, u_r) : t_scale((fv)2.0f, u_t);
+        triple normal = facing_normal(edge_1, edge_2, factor, u_sum, &twice_area);
+        iv front = (BISTATIC ? lit_share(normal, u_t, u_r) : t_dot(normal, u_t)) > 0;
         fv amplitude = (front ? fabs(factor) : (fv)0.0f) * (fv)(unseen ? 0.0f : 0.5f) * twice_area, root_of_share = (fv)1.0f;
-#if PARTLY
         __global const float *part = parts + (size_t)q * (1 + 2 * NODES) * given.n_offsets;
-        fv part_share = LOAD(at, part);
-        root_of_share = sqrt(part_share);
-        amplitude = part_share > 0 ? amplitude : (fv)0.0f;
-#endif
+        if (PARTLY) {
+            fv part_share = LOAD(at, part);
+            root_of_share = sqrt(part_share);
+            amplitude = part_share > 0 ? amplitude : (fv)0.0f;
+        }
         STORE(front ? (fv)1.0f : (fv)0.0f, 0, is_front);
         STORE(fabs(amplitude), 0, is_bright);
 #pragma unroll
@@ -139,61 +124,33 @@ __kernel void facet_amplitudes(facet_amplitudes_numbers given, __global const fl
 
         fv path_1 = t_dot(u_sum, edge_1), path_2 = t_dot(u_sum, edge_2);
         scattering S;
-#if WEIGHTS
         antenna_view view = antenna_view_of(u_t, tx_range, u_r, rx_range, axes + 18 * (size_t)q, given.range);
-        complex_v gain;
-#endif
+        complex_v gain, inverse_root = c_make((fv)0.0f, (fv)0.0f), mean;
         for (int m = 0; m < NODES; m++) {
             if (m == 0 || DISPERSIVE) {
-#if METAL
-                complex_v inverse_root = c_make((fv)0.0f, (fv)0.0f);
-#else
                 __global const float *root_planes = facets + (F_M + 2 * m) * (size_t)given.n_offsets;
-                complex_v inverse_root = c_make(LOAD(at, root_planes), LOAD(at, root_planes + given.n_offsets));
-#endif
-#if BISTATIC
-                S = scatter(normal, u_t, h_t, v_t, u_r, h_r, v_r, inverse_root);
-#else
-                S = scatter_back(normal, u_t, h_t, v_t, inverse_root);
-#endif
+                if (!METAL) inverse_root = c_make(LOAD(at, root_planes), LOAD(at, root_planes + given.n_offsets));
+                if (BISTATIC) S = scatter(normal, u_t, h_t, v_t, u_r, h_r, v_r, inverse_root);
+                else S = scatter_back(normal, u_t, h_t, v_t, inverse_root);
             }
-#if PARTLY
             __global const float *part_mean = part + (1 + 2 * m) * (size_t)given.n_offsets;
-            complex_v mean = c_make(LOAD(at, part_mean), LOAD(at, part_mean + given.n_offsets));
-#else
-            complex_v mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
-#endif
-#if ROUGH
+            if (PARTLY) mean = c_make(LOAD(at, part_mean), LOAD(at, part_mean + given.n_offsets));
+            else mean = triangle_mean(path_1 * nodes[m], path_2 * nodes[m]);
             fv along_normal = t_dot(u_sum, normal), sum_length = max(sqrt(t_dot(u_sum, u_sum)), (fv)1e-6f);
             mean = rough_mean(mean, root_of_share, along_normal * nodes[m], along_normal / sum_length, (fv)0.5f * twice_area,
                               nodes[m], facets + F_ROUGH * (size_t)given.n_offsets, at, given.n_offsets);
-#endif
-#if WEIGHTS
-            if (m == 0 || VARIES) gain = weight(view, patterns, given.second, nodes[2 * NODES + m]);
-            mean = c_mul(mean, gain);
-#endif
+            if (WEIGHTS && (m == 0 || VARIES)) gain = weight(view, patterns, given.second, nodes[2 * NODES + m]);
+            if (WEIGHTS) mean = c_mul(mean, gain);
             fv scale = amplitude * nodes[NODES + m];
             int channel = m;
-#if HH
-            put_channel(out_i, channel, c_mul(S.hh, mean), scale);
-            channel += NODES;
-#endif
-#if HV
-            put_channel(out_i, channel, c_mul(S.hv, mean), scale);
-            channel += NODES;
-#endif
-#if VH
-            put_channel(out_i, channel, c_mul(S.vh, mean), scale);
-            channel += NODES;
-#endif
-#if VV
-            put_channel(out_i, channel, c_mul(S.vv, mean), scale);
-#endif
+            if (HH) channel = put_polarisation(out_i, channel, S.hh, mean, scale);
+            if (HV) channel = put_polarisation(out_i, channel, S.hv, mean, scale);
+            if (VH) channel = put_polarisation(out_i, channel, S.vh, mean, scale);
+            if (VV) channel = put_polarisation(out_i, channel, S.vv, mean, scale);
         }
     }
 }
 
-#if SHADED
 // r of the facets of vector `at`, 0 to 1.
 static inline fv level_at(__global const uchar *levels, __global const int *moment, float between, size_t at, int n_offsets) {
     __global const uchar *one = levels + (size_t)moment[0] * n_offsets + at * VW;
@@ -206,10 +163,7 @@ static inline fv level_at(__global const uchar *levels, __global const int *mome
     }
     return LOAD(0, out);
 }
-#define IS_LIT(l) (lit[l] > 0)
-#else
-#define IS_LIT(l) 1
-#endif
+#define IS_LIT(level) (!SHADED || (level) > 0)
 
 typedef struct {
     int n, n_used, n_tiles, n_offsets, first, n_here, last, flush, stride, origin;
@@ -238,49 +192,33 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                             __global const float *restrict axes, __global const float *restrict reach,
                             __global const float *restrict radius, __global const float *restrict table, __global float *rows,
                             __global int *restrict done) {
-#if GROUPED
-    __local row_window window;
-    int p = get_global_id(0) / ITEMS, item = get_local_id(0), start = -1;
-    clear_window(&window, item);
-#else
-    int p = get_global_id(0), item = 0;
-#endif
-    int split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
-    __global float *sum = rows + 6 * ((size_t)split * given.n_used + p) * CHANNELS * given.stride;
+    int p = get_global_id(0) / ITEMS, split = get_global_id(1), inside_count = 0, front_count = 0, unlit_count = 0, added = 0;
+    WINDOW_SPACE row_window window;
+    spread_rows sums = begin_rows(&window, rows_of(rows, split, given.n_used, p, given.stride), given.stride, given.origin);
     int from = pulse_nodes[2 * p], nearest_node = pulse_nodes[2 * p + 1];
     for (int k = given.first + split; k < given.first + given.n_here; k += get_global_size(1)) {
         __global const float *c = constants + (k * (size_t)given.n + p) * N_CONST;
         int state = as_int(c[C_STATE]);
         if (state == OUTSIDE) continue;
         int n_facets = k == given.n_tiles - 1 ? given.last : TILE;
-#if CULL
-        direction from_tx = load_direction(c, C_UX, C_LOW), from_rx = from_tx;
-#if BISTATIC
-        from_rx = load_direction(c, C_RX, C_RX_LOW);
-#endif
-        if (out_of_beam(from_tx, from_rx, radius[k], axes + 18 * (size_t)p, reach)) {
-            if (item == 0) unlit_count += n_facets;
+        if (CULL && out_of_beam(load_transmitter(c), load_receiver(c), radius[k], axes + 18 * (size_t)p, reach)) {
+            if (sums.item == 0) unlit_count += n_facets;
             continue;
         }
-#endif
-        for (int i = item; i < TILE / VW; i += ITEMS) {
+        for (int i = sums.item; i < TILE / VW; i += ITEMS) {
             size_t at = (size_t)k * (TILE / VW) + i, tile_at_node[PULSE_NODES];
 #pragma unroll
             for (int q = 0; q < PULSE_NODES; q++) tile_at_node[q] = ((size_t)from + q) * given.n_here + (k - given.first);
             size_t at_nearest = ((size_t)nearest_node * given.n_here + (k - given.first)) * (TILE / VW) + i;
-            offset x = load_offset(offsets, at, given.n_offsets);
-            about_centre(&x, tile, k, given.n_tiles);
+            tile_point x = load_tile_point(offsets, at, given.n_offsets, tile, k, given.n_tiles, 0);
             phase_position where = locate(c, pulse, p, given.n, x);
-            fv inside = 1;
+            fv inside = 1, level = 1;
             if (state == CROSSING) inside = keep_inside(c, &where);
-            float is_inside[VW];
+            float is_inside[VW], lit[VW];
             STORE(inside, 0, is_inside);
-#if SHADED
-            fv level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
+            if (SHADED) level = level_at(levels, moments + 2 * p, between[p], at, given.n_offsets);
             inside *= level;
-            float lit[VW];
-            STORE(level, 0, lit);
-#endif
+            if (SHADED) STORE(level, 0, lit);
             int any_mark = 0;
 #pragma unroll
             for (int l = 0; l < VW; l++) {
@@ -288,21 +226,17 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                 inside_count += counts;
                 front_count += counts && (marks[at_nearest * VW + l] & FRONT);
 #pragma unroll
-                for (int q = 0; q < PULSE_NODES; q++) any_mark |= counts && IS_LIT(l) ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
+                for (int q = 0; q < PULSE_NODES; q++)
+                    any_mark |= counts && IS_LIT(lit[l]) ? marks[(tile_at_node[q] * (TILE / VW) + i) * VW + l] : 0;
             }
-#if !GROUPED
-            if (!(any_mark & BRIGHT)) continue;
-#endif
+            if (!GROUPED && !(any_mark & BRIGHT)) continue;  // items of a group go on together
 
             fv sine, cosine, w[TAPS];
-            sincos_cycles(where.cycles, &sine, &cosine);
+            carrier(where, &sine, &cosine);
             sine *= inside;
             cosine *= inside;
             iv j;
             tap_weights(first_tap(where.t, where.base, given.stride, given.origin, &j), table, w);
-#if GROUPED
-            int tap = any_mark & BRIGHT ? given.origin + j : NOWHERE;
-#endif
             for (int channel = 0; channel < CHANNELS; channel++) {
                 complex_v a = c_make((fv)0.0f, (fv)0.0f);
 #pragma unroll
@@ -314,37 +248,15 @@ __kernel void spread_facets(spread_facets_numbers given, __global const float *r
                 }
                 // times exp(-j 2 pi cycles)
                 fv echo_re = fma(a.re, cosine, a.im * sine), echo_im = fma(a.im, cosine, -a.re * sine);
-                __global float *channel_sum = sum + 6 * (size_t)channel * given.stride;
-#if GROUPED
-                start = add_scatterers(&window, channel_sum, given.stride, start, item, tap, w, (float2)(echo_re, echo_im));
-#if CHANNELS > 1
-                // the next channel has a row of its own
-                if (start >= 0) empty_window(&window, channel_sum, given.stride, start, item);
-                start = -1;
-#endif
-#else
-                add_taps(channel_sum + 2 * given.origin, j, w, echo_re, echo_im);
-#endif
+                add_scatterers(&sums, channel, (iv)(any_mark & BRIGHT), j, w, echo_re, echo_im);
             }
         }
-#if GROUPED
-        if (++added % given.flush == 0 && start >= 0) {
-            empty_window(&window, sum, given.stride, start, item);
-            start = -1;
-        }
+        if (++added % given.flush == 0) empty_rows(&sums);
     }
-    if (start >= 0) empty_window(&window, sum, given.stride, start, item);
-    inside_count = sum_of_items(&window, item, inside_count);
-    front_count = sum_of_items(&window, item, front_count);
-#else
-        if (++added % given.flush == 0)
-            for (int channel = 0; channel < CHANNELS; channel++)
-                empty_into_total(sum + 6 * (size_t)channel * given.stride, given.stride);
-    }
-    for (int channel = 0; channel < CHANNELS; channel++)
-        empty_into_total(sum + 6 * (size_t)channel * given.stride, given.stride);
-#endif
-    if (item == 0) {
+    empty_rows(&sums);
+    inside_count = sum_of_items(&sums, inside_count);
+    front_count = sum_of_items(&sums, front_count);
+    if (sums.item == 0) {
         size_t at = (size_t)split * given.n_used + p, n_counts = (size_t)get_global_size(1) * given.n_used;
         done[at] += inside_count;
         done[n_counts + at] += front_count;

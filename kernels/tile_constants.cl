@@ -11,30 +11,87 @@
 //           SHARED  as in line_geometry.clh
 // reference: sarcl/reference/geometry.py:half_path
 
-#define ORDER 0
+#define ORDER 0  // of curvatures, which no record holds
 #include "common.clh"
 #include "doubleword.clh"
 #include "geometry.clh"
-#include "range_phase.clh"
+#include "tile_paths.clh"
 #include "line_geometry.clh"
 
-// u: the direction, in wide numbers
+// What a pulse's record of either kernel follows from.
+typedef struct {
+    point tx, rx;      // from the tile's reference point to the antennas, m
+    wv tx_range, rx_range;
+    wv delta;          // half path at the reference point less the reference range's, m
+    wv kappa, sigma;
+} pulse_path;
+
+// Paths of VW pulses, vector g of n pulses, to a tile's reference point x.
+static inline pulse_path load_path(__global const float *pulse, size_t g, int n, point x) {
+    pulse_path path;
+    size_t lo = (size_t)N_PULSE * n;
+    path.delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &path.tx_range, &path.tx);
+    if (BISTATIC) {
+        wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &path.rx_range, &path.rx);
+        path.delta = mean_of(path.delta, second);
+    }
+    return path;
+}
+
+// Records of points and of lines hold in one order, from a component `first` on: cycles, position (fraction, then the sample's
+// number), state, near and far edge of the range window, kappa, sigma. Writes all but state and window.
+static inline void put_path(__global float *records, int components, int first, __global const float *pulse, size_t g, int n,
+                            pulse_path path, int wrap) {
+    size_t lo = (size_t)N_PULSE * n;
+    iv base = 0, unused;
+    wv cycles = w_add(w_mul(path.delta, path.kappa), w_load(pulse + P_CYCLES * n, g, lo));
+    put(records, components, first, LOCAL ? (fv)0 : w_split(cycles, &unused));
+    wv position = w_add(w_mul(path.delta, path.sigma), w_load(pulse + P_POSITION * n, g, lo));
+    put(records, components, first + C_FRAC - C_CYCLES, LOCAL ? (fv)0 : w_split(position, &base));
+    if (!LOCAL && wrap) base = base % wrap;
+    put(records, components, first + C_BASE - C_CYCLES, AS_FLOAT(base));
+    put(records, components, first + C_KAPPA - C_CYCLES, w_float(path.kappa));
+    put(records, components, first + C_SIGMA - C_CYCLES, w_float(path.sigma));
+}
+
+// Writes the edges of the range window, in the same order, and returns the state of the tile in it.
+static inline iv put_window(__global float *records, int components, int first, __global const float *pulse, size_t g, int n,
+                            pulse_path path, float radius, int skip) {
+    if (LOCAL) return INSIDE;
+    size_t lo = (size_t)N_PULSE * n;
+    wv near = w_sub(w_load(pulse + P_NEAR * n, g, lo), path.delta), far = w_sub(w_load(pulse + P_FAR * n, g, lo), path.delta);
+    put(records, components, first + C_NEAR - C_CYCLES, w_float(w_mul(near, path.sigma)));
+    put(records, components, first + C_FAR - C_CYCLES, w_float(w_mul(far, path.sigma)));
+    return window_state(near, far, radius, skip);
+}
+
+// Writes the direction of an antenna at d, r off, into records of points; u: the direction, in wide numbers.
 static inline void put_direction(__global float *records, int first, int low, point d, wv r, wv *u) {
     fv R0 = w_float(r);
-    // an antenna on the reference point has no direction: any will do, R0 = 0 says so
-    wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
+    wv inverse = inverse_of(r);
     u[0] = w_mul(d.x, inverse);
     u[1] = w_mul(d.y, inverse);
     u[2] = w_mul(d.z, inverse);
 #pragma unroll
     for (int i = 0; i < 3; i++) {
         put(records, N_CONST, first + i, w_float(u[i]));
-#if N_BASE > 16 && RANGE != 3
-        put(records, N_CONST, low + i, w_low(u[i]));
-#endif
+        if (HAS_LOW) put(records, N_CONST, low + i, w_low(u[i]));
     }
     put(records, N_CONST, first + 3, R0 > 0 ? w_float(inverse) : (fv)0);
     put(records, N_CONST, first + 4, R0);
+}
+
+// Writes -kappa u in two parts: a multiple of the power of two magic/(1.5 2^23), and the rest; and ratios for RANGE 3.
+static inline void put_steep(__global float *records, wv kappa, wv sigma, const wv *u, float magic) {
+#pragma unroll
+    for (int i = 0; i < 3; i++) {
+        wv steep = w_sub(w_make((fv)0, (fv)0), w_mul(kappa, u[i]));
+        fv high = (w_float(steep) + magic) - magic;
+        put(records, N_CONST, C_STEEP + i, high);
+        put(records, N_CONST, C_STEEP_LOW + i, w_float(w_sub(steep, w_make(high, (fv)0))));
+    }
+    put(records, N_CONST, C_RATIO, w_float(w_div(sigma, kappa)));
+    put(records, N_CONST, C_METRES, w_float(w_div(w_make((fv)1, (fv)0), kappa)));
 }
 
 typedef struct {
@@ -54,76 +111,37 @@ typedef struct {
 __kernel void tile_constants(tile_constants_numbers given, __global const float *restrict pulse,
                              __global const float *restrict tile, __global const float *restrict radius,
                              __global float *restrict out) {
-    int n = given.n, skip = given.skip;
-    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x = load_point(tile, k, given.n_tiles);
+    int n = given.n;
+    size_t g = get_global_id(0), k = given.first + get_global_id(1);
+    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
     out += (get_global_id(1) * (size_t)n + g * VW) * N_CONST;
-
-    point d;
-    wv r;
-    wv delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &r, &d);
-    wv u[3];
-    put_direction(out, C_UX, C_LOW, d, r, u);
-#if BEAM
-    point to_tx = d;
-    wv tx_r = r;
-#endif
-#if BISTATIC
-    wv v[3];
-    wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &r, &d);
-    put_direction(out, C_RX, C_RX_LOW, d, r, v);
+    wv u[3], v[3];
+    put_direction(out, C_UX, C_LOW, path.tx, path.tx_range, u);
+    if (BISTATIC) {
+        put_direction(out, C_RX, C_RX_LOW, path.rx, path.rx_range, v);
 #pragma unroll
-    for (int i = 0; i < 3; i++) u[i] = w_mul(w_add(u[i], v[i]), w_make((fv)0.5f, (fv)0));
-    delta = w_mul(w_add(delta, second), w_make((fv)0.5f, (fv)0));
-#endif
-
-    iv base, unused;
-    wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
-#if LOCAL
-    put(out, N_CONST, C_CYCLES, (fv)0);
-    put(out, N_CONST, C_FRAC, (fv)0);
-    base = 0;
-#else
-    put(out, N_CONST, C_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
-    put(out, N_CONST, C_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
-    if (given.wrap) base = base % given.wrap;
-#endif
-    put(out, N_CONST, C_BASE, AS_FLOAT(base));
-    put(out, N_CONST, C_KAPPA, w_float(kappa));
-    put(out, N_CONST, C_SIGMA, w_float(sigma));
-#if RANGE == 3
-#pragma unroll
-    for (int i = 0; i < 3; i++) {
-        wv steep = w_sub(w_make((fv)0, (fv)0), w_mul(kappa, u[i]));
-        fv high = (w_float(steep) + given.magic) - given.magic;
-        put(out, N_CONST, C_STEEP + i, high);
-        put(out, N_CONST, C_STEEP_LOW + i, w_float(w_sub(steep, w_make(high, (fv)0))));
+        for (int i = 0; i < 3; i++) u[i] = mean_of(u[i], v[i]);
     }
-    put(out, N_CONST, C_RATIO, w_float(w_div(sigma, kappa)));
-    put(out, N_CONST, C_METRES, w_float(w_div(w_make((fv)1, (fv)0), kappa)));
-#elif N_BASE > 16
-    put(out, N_CONST, C_KAPPA_LOW, w_low(kappa));
-    put(out, N_CONST, C_SIGMA_LOW, w_low(sigma));
-#endif
-
-#if LOCAL
-    iv state = INSIDE;
-#else
-    wv near = w_sub(w_load(pulse + P_NEAR * n, g, lo), delta), far = w_sub(w_load(pulse + P_FAR * n, g, lo), delta);
-    put(out, N_CONST, C_NEAR, w_float(w_mul(near, sigma)));
-    put(out, N_CONST, C_FAR, w_float(w_mul(far, sigma)));
-    iv state = window_state(near, far, radius[k], skip);
-#endif
-#if BEAM
-    wv edge;
-    state = beam_state(pulse, g, n, to_tx, tx_r, radius[k], skip, state, &edge);
-    put(out, N_CONST, C_EDGE, w_float(edge));
-    point gradient = beam_gradient(pulse, g, n, to_tx, tx_r);
-    put(out, N_CONST, C_SLOPE, w_float(gradient.x));
-    put(out, N_CONST, C_SLOPE + 1, w_float(gradient.y));
-    put(out, N_CONST, C_SLOPE + 2, w_float(gradient.z));
-    put(out, N_CONST, C_COS, w_float(w_load(pulse + P_COS * n, g, lo)));
-#endif
+    path.kappa = w_load(pulse + P_KAPPA * n, g, (size_t)N_PULSE * n);
+    path.sigma = w_load(pulse + P_SIGMA * n, g, (size_t)N_PULSE * n);
+    put_path(out, N_CONST, C_CYCLES, pulse, g, n, path, given.wrap);
+    if (RANGE == 3) {
+        put_steep(out, path.kappa, path.sigma, u, given.magic);
+    } else if (HAS_LOW) {
+        put(out, N_CONST, C_KAPPA_LOW, w_low(path.kappa));
+        put(out, N_CONST, C_SIGMA_LOW, w_low(path.sigma));
+    }
+    iv state = put_window(out, N_CONST, C_CYCLES, pulse, g, n, path, radius[k], given.skip);
+    if (BEAM) {
+        wv edge;
+        state = beam_state(pulse, g, n, path.tx, path.tx_range, radius[k], given.skip, state, &edge);
+        point gradient = beam_gradient(pulse, g, n, path.tx, path.tx_range);
+        put(out, N_CONST, C_EDGE, w_float(edge));
+        put(out, N_CONST, C_SLOPE, w_float(gradient.x));
+        put(out, N_CONST, C_SLOPE + 1, w_float(gradient.y));
+        put(out, N_CONST, C_SLOPE + 2, w_float(gradient.z));
+        put(out, N_CONST, C_COS, w_float(w_load(pulse + P_COS * n, g, (size_t)N_PULSE * n)));
+    }
     put(out, N_CONST, C_STATE, AS_FLOAT(state));
 }
 
@@ -139,7 +157,7 @@ static inline point load_step(__global const float *axes, int which) {
 // Projections of the direction to an antenna on the steps of columns and rows, in wide numbers.
 static inline void project(__global float *out, int first, point d, wv r, __global const float *axes, wv *along_x, wv *along_y) {
     fv R0 = w_float(r);
-    wv inverse = w_div(w_make((fv)1, (fv)0), w_add(r, w_make(R0 > 0 ? (fv)0 : (fv)1, (fv)0)));
+    wv inverse = inverse_of(r);
     *along_x = w_mul(w_dot(d, load_step(axes, 0)), inverse);
     *along_y = w_mul(w_dot(d, load_step(axes, 1)), inverse);
     put(out, N_LINE, first, w_float(*along_x));
@@ -157,7 +175,6 @@ static inline void put_cycles(__global float *out, int component, wv cycles) {
     put(out, N_LINE, component + 1, (part - high) + w_float(lost));
 }
 
-#if SHARED
 // Writes a number in two parts: one of 12 digits, whose products with integers below 2^12 are exact, and the rest.
 static inline void put_parts(__global float *out, int component, wv value) {
     fv high = AS_FLOAT(AS_INT(w_float(value)) & (iv)0xFFFFF000);
@@ -170,7 +187,6 @@ static inline wv ratio_of(wv a, wv b, int fine) {
     b = w_add(b, w_make(w_float(b) != 0 ? (fv)0 : (fv)1, (fv)0));
     return w_mul(w_div(a, b), w_make((fv)fine, (fv)0));
 }
-#endif
 
 typedef struct {
     int n, n_tiles, first, skip, wrap, fine;
@@ -184,46 +200,24 @@ typedef struct {
 __kernel void line_constants(line_constants_numbers given, __global const float *restrict pulse,
                              __global const float *restrict tile, __global const float *restrict axes,
                              __global float *restrict out) {
-    int n = given.n, skip = given.skip, fine = given.fine;
-    float radius = given.radius;
-    size_t g = get_global_id(0), k = given.first + get_global_id(1), lo = (size_t)N_PULSE * n;
-    point x = load_point(tile, k, given.n_tiles);
+    int fine = given.fine;
+    int n = given.n;
+    size_t g = get_global_id(0), k = given.first + get_global_id(1);
+    pulse_path path = load_path(pulse, g, n, load_point(tile, k, given.n_tiles));
     out += (get_global_id(1) * (size_t)n + g * VW) * N_LINE;
-
-    point d;
-    wv r, along_x, along_y;
-    wv delta = path_difference(load_antenna(pulse, P_TX, g, n, 0), w_load(pulse + P_TR * n, g, lo), x, &r, &d);
-    project(out, L_UX, d, r, axes, &along_x, &along_y);
-#if BEAM
-    point to_tx = d;
-    wv tx_r = r;
-#endif
-#if BISTATIC
-    wv one_half = w_make((fv)0.5f, (fv)0), second_x, second_y;
-    wv second = path_difference(load_antenna(pulse, P_RX, g, n, 0), w_load(pulse + P_RR * n, g, lo), x, &r, &d);
-    project(out, L_VX, d, r, axes, &second_x, &second_y);
-    delta = w_mul(w_add(delta, second), one_half);
-    along_x = w_mul(w_add(along_x, second_x), one_half);
-    along_y = w_mul(w_add(along_y, second_y), one_half);
-#endif
-    wv zero = w_make((fv)0, (fv)0);
+    wv along_x, along_y, second_x, second_y, zero = w_make((fv)0, (fv)0);
+    project(out, L_UX, path.tx, path.tx_range, axes, &along_x, &along_y);
+    if (BISTATIC) {
+        project(out, L_VX, path.rx, path.rx_range, axes, &second_x, &second_y);
+        along_x = mean_of(along_x, second_x);
+        along_y = mean_of(along_y, second_y);
+    }
     along_x = w_sub(zero, along_x);
     along_y = w_sub(zero, along_y);
-
-    iv base, unused;
-    wv kappa = w_load(pulse + P_KAPPA * n, g, lo), sigma = w_load(pulse + P_SIGMA * n, g, lo);
-#if LOCAL
-    put(out, N_LINE, L_CYCLES, (fv)0);
-    put(out, N_LINE, L_FRAC, (fv)0);
-    base = 0;
-#else
-    put(out, N_LINE, L_CYCLES, w_split(w_add(w_mul(delta, kappa), w_load(pulse + P_CYCLES * n, g, lo)), &unused));
-    put(out, N_LINE, L_FRAC, w_split(w_add(w_mul(delta, sigma), w_load(pulse + P_POSITION * n, g, lo)), &base));
-    if (given.wrap) base = base % given.wrap;
-#endif
-    put(out, N_LINE, L_BASE, AS_FLOAT(base));
-    put(out, N_LINE, L_KAPPA, w_float(kappa));
-    put(out, N_LINE, L_SIGMA, w_float(sigma));
+    path.kappa = w_load(pulse + P_KAPPA * n, g, (size_t)N_PULSE * n);
+    path.sigma = w_load(pulse + P_SIGMA * n, g, (size_t)N_PULSE * n);
+    wv kappa = path.kappa, sigma = path.sigma;
+    put_path(out, N_LINE, L_CYCLES, pulse, g, n, path, given.wrap);
     put(out, N_LINE, L_STEP_X, w_float(w_mul(along_x, sigma)));
     put(out, N_LINE, L_STEP_Y, w_float(w_mul(along_y, sigma)));
     wv cycles_x = w_mul(along_x, kappa), cycles_y = w_mul(along_y, kappa), part = w_make((fv)(1.0f / fine), (fv)0);
@@ -231,30 +225,22 @@ __kernel void line_constants(line_constants_numbers given, __global const float 
     put_cycles(out, L_CYCLES_Y, cycles_y);
     put_cycles(out, L_FINE_X, w_mul(cycles_x, part));
     put_cycles(out, L_FINE_Y, w_mul(cycles_y, part));
-#if SHARED
-    wv fine_sigma = w_mul(sigma, part);
-    put_parts(out, L_STEP, w_mul(along_x, fine_sigma));
-    put_parts(out, L_STEP + 2, w_mul(along_y, fine_sigma));
-    put_parts(out, L_RATIO, ratio_of(along_y, along_x, fine));
-    put_parts(out, L_RATIO + 2, ratio_of(along_x, along_y, fine));
-#endif
-
-#if LOCAL
-    iv state = INSIDE;
-#else
-    wv near = w_sub(w_load(pulse + P_NEAR * n, g, lo), delta), far = w_sub(w_load(pulse + P_FAR * n, g, lo), delta);
-    put(out, N_LINE, L_NEAR, w_float(w_mul(near, sigma)));
-    put(out, N_LINE, L_FAR, w_float(w_mul(far, sigma)));
-    iv state = window_state(near, far, radius, skip);
-#endif
-#if BEAM
-    wv beam_edge;
-    state = beam_state(pulse, g, n, to_tx, tx_r, radius, skip, state, &beam_edge);
-    point gradient = beam_gradient(pulse, g, n, to_tx, tx_r);
-    put(out, N_LINE, L_EDGE, w_float(beam_edge));
-    put(out, N_LINE, L_SLOPE_X, w_float(w_dot(gradient, load_step(axes, 0))));
-    put(out, N_LINE, L_SLOPE_Y, w_float(w_dot(gradient, load_step(axes, 1))));
-    put(out, N_LINE, L_COS, w_float(w_load(pulse + P_COS * n, g, lo)));
-#endif
+    if (SHARED) {
+        wv fine_sigma = w_mul(sigma, part);
+        put_parts(out, L_STEP, w_mul(along_x, fine_sigma));
+        put_parts(out, L_STEP + 2, w_mul(along_y, fine_sigma));
+        put_parts(out, L_RATIO, ratio_of(along_y, along_x, fine));
+        put_parts(out, L_RATIO + 2, ratio_of(along_x, along_y, fine));
+    }
+    iv state = put_window(out, N_LINE, L_CYCLES, pulse, g, n, path, given.radius, given.skip);
+    if (BEAM) {
+        wv edge;
+        state = beam_state(pulse, g, n, path.tx, path.tx_range, given.radius, given.skip, state, &edge);
+        point gradient = beam_gradient(pulse, g, n, path.tx, path.tx_range);
+        put(out, N_LINE, L_EDGE, w_float(edge));
+        put(out, N_LINE, L_SLOPE_X, w_float(w_dot(gradient, load_step(axes, 0))));
+        put(out, N_LINE, L_SLOPE_Y, w_float(w_dot(gradient, load_step(axes, 1))));
+        put(out, N_LINE, L_COS, w_float(w_load(pulse + P_COS * n, g, (size_t)N_PULSE * n)));
+    }
     put(out, N_LINE, L_STATE, AS_FLOAT(state));
 }

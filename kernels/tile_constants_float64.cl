@@ -20,7 +20,6 @@ static inline void put_direction(__global double *records, int first, int length
     put(records, N_CONST, length + 1, inverse);
 }
 
-#if BEAM
 // Looks at a tile, a sphere of `radius` about a point at d = T - x, of length r, through the beams of VW pulses: moves
 // `state` on from what the range window says.
 static inline dv beam_state(__global const double *restrict pulse, size_t n, size_t p, point d, dv r, double radius, int skip,
@@ -35,7 +34,6 @@ static inline dv beam_state(__global const double *restrict pulse, size_t n, siz
     dv partly = state == INSIDE ? (dv)1 - lit : (dv)0;
     return partly > 0 ? (dv)CROSSING : state;
 }
-#endif
 
 typedef struct {
     int n, n_tiles, first, skip, wrap;
@@ -59,9 +57,7 @@ __kernel void tile_constants(tile_constants_numbers given, __global const double
     pair delta = half_path(pulse, n, p, spread, x, &R0, &u, &S0, &v);
     out += (get_global_id(1) * (size_t)n + p * VW) * N_CONST;
     put_direction(out, C_UX, C_R0, u, R0);
-#if BISTATIC
-    put_direction(out, C_RX, C_RR, v, S0);
-#endif
+    if (BISTATIC) put_direction(out, C_RX, C_RR, v, S0);
     pair kappa = make_pair(PULSE(P_KAPPA), PULSE(P_KAPPA_LOW)), sigma = make_pair(PULSE(P_SIGMA), PULSE(P_SIGMA_LOW));
     dv base, unused;
     put(out, N_CONST, C_CYCLES, pair_split(pair_mul(delta, kappa), &unused));
@@ -75,8 +71,6 @@ __kernel void tile_constants(tile_constants_numbers given, __global const double
         state = room >= reach ? (dv)INSIDE : (dv)CROSSING;
         if (skip & SKIP_WINDOW) state = room < -reach ? (dv)OUTSIDE : state;
     }
-#if BEAM
-    state = beam_state(pulse, n, p, u, R0.hi, radius[k], skip, state);
-#endif
+    if (BEAM) state = beam_state(pulse, n, p, u, R0.hi, radius[k], skip, state);
     put(out, N_CONST, C_STATE, state);
 }

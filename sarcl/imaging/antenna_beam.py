@@ -129,7 +129,7 @@ class AntennaOnDevice:
         self.macros = {**self.beam.macros(1), "WEIGHT": 3 if gain else 2}
 
     def arguments(self, start: int, stop: int) -> tuple[Any, ...]:
-        """The kernel's arguments of rows start ... stop - 1: weights, axes, patterns."""
+        """The kernel's arguments of rows start ... stop - 1: weights, patterns, axes."""
         axes = self.beam.packed_axes(np.arange(start, stop))
         weights = self.task.row_weight[start:stop].astype(np.float32)
-        return self.device.upload(weights), self.device.upload(axes), self.patterns
+        return self.device.upload(weights), self.patterns, self.device.upload(axes)

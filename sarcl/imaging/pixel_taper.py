@@ -19,6 +19,7 @@ from ._row_coverage import RowCoverage
 from .focusing_task import FocusingTask
 
 CELLS = 2**14  # of a table in float32
+WEIGHT_BUFFERS = 3  # of weights, among a kernel's arguments: any others stand in their places where there are none
 PIECE = 2**20  # pairs of a pixel and a row whose weights are added up together
 
 

@@ -17,6 +17,7 @@ from ...numerics.tile_constants import TileConstants
 from ...numerics.tiles import Tiles
 from ...opencl.device import Device
 from ...opencl.launch_numbers import launch_numbers
+from ..pixel_taper import WEIGHT_BUFFERS
 from ..tiling.lines import LineTiling
 from ..tiling.tiling import Tiling
 from . import _shared_line_plan, line_plan
@@ -80,7 +81,8 @@ class GatherKernel:
                 offset_step=0 if tiles.shared else tiles.per_tile // self.lanes, pixels=tiles.n_tiles * tiles.per_tile,
                 local_offset=offset, magic=self.magic, second=second,
             ),
-            source, self.table, pulse, constants, centers, offsets, image, on.missed, *weights, steps=used,
+            source, self.table, pulse, constants, centers, offsets, image, on.missed,
+            *(weights or WEIGHT_BUFFERS * (self.table,)), steps=used,
         )  # fmt: skip
 
 

@@ -15,7 +15,7 @@ from ...opencl.device_list import devices
 from ...opencl.launch_numbers import launch_numbers
 from ..engine import DirectEngine, RowProfiles, Skipped
 from ..focusing_task import FocusingTask
-from ..pixel_taper import TaperOnDevice
+from ..pixel_taper import WEIGHT_BUFFERS, TaperOnDevice
 from ..tiling.tiling import Tiling, download_sums
 from ._pulse_records import packed
 from .plan import CHUNK, Float64Plan
@@ -128,7 +128,8 @@ class DirectFloat64(DirectEngine):
                             "backproject_float64.cl", "backproject", stride=stride, origin=stride // 2, n=n,
                             n_used=stop - start, n_tiles=n_tiles, first=at, pixels=pixels,
                         ),
-                        block, self.table, pulse, constants, tile, where, image, missed, *weights, steps=stop - start,
+                        block, self.table, pulse, constants, tile, where, image, missed,
+                        *(weights or WEIGHT_BUFFERS * (self.table,)), steps=stop - start,
                     )  # fmt: skip
                 pipeline.step(partial(on_progress, stop))
                 clock.lap("backproject")
