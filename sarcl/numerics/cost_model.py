@@ -96,8 +96,8 @@ ECHO_POINT, ECHO_FACET = 0.02, 0.16  # per scatterer
 # and 2.5e6 pieces), a terrain of 1.6e6 pieces and 8 pulses, a car of 1440 pieces and 96 pulses.
 TILED_POINT = 0.3  # per point: order, tiles, images of the kernel
 SPREAD_POINT, SPREAD_PIECE = 0.006, 0.02  # per scatterer and pulse: what echoes of many take beside ECHO_PULSE
-CUT_PIECE = 1.6  # per piece: cutting, judging and tiling it
-LIT_SHARE = 15.0  # per piece of a rough facet: its illuminated shares at the viewpoints along the track
+CUT_PIECE, CUT_PIECE_ON_DEVICE = 1.6, 0.2  # per piece: cutting, judging and tiling it
+LOOK_AT_PIECE, LOOKS = 0.4, 30  # per piece of a rough facet and look from a pulse; looks along a track of many pulses
 # Per piece and pulse, of facets whose lit parts are computed: which parts these are, and adding them (0.25 and 0 on
 # open ground, 1.4 and 1.6 for the car)
 CLIPPED_PIECE, LIT_PIECE = 0.5, 0.5

@@ -7,7 +7,7 @@ from typing import Any
 
 import numpy as np
 
-from ..base import validation
+from ..base import boxes, validation
 from . import triangles as geometry
 from .material import resolve
 
@@ -125,21 +125,35 @@ def steepest(grid: Heights) -> float:
     return float(np.sqrt(max(square.max() for square in squares)))
 
 
+def n_facets(grid: Heights) -> int:
+    """Number of facets of a terrain: two for each cell."""
+    x, y, _ = grid
+    return 2 * (len(x) - 1) * (len(y) - 1)
+
+
+def is_overlooked(grid: Heights, bounds: np.ndarray, ends: list[np.ndarray]) -> bool:
+    """Whether lines of sight from antennas, m (n, 3) each, to a terrain and to all within bounds, m (2, 3), climb
+    more steeply than the terrain anywhere."""
+    x, y, z = grid
+    slope = steepest(grid)
+    low, high = np.minimum(bounds[0, :2], [x[0], y[0]]), np.maximum(bounds[1, :2], [x[-1], y[-1]])
+    top = max(float(bounds[1, 2]), float(z.max()))
+    for end in ends:
+        away = np.linalg.norm(np.maximum(np.abs(end[:, :2] - low), np.abs(end[:, :2] - high)), axis=1)
+        if not (end[:, 2] - top > slope * away).all():
+            return False
+    return True
+
+
 def clear_of(grid: Heights, triangles: np.ndarray, on: np.ndarray, ends: list[np.ndarray]) -> np.ndarray:
     """True (k,) for facets, m (k, 3, 3), that a terrain hides from no antenna, m (n, 3) each.
 
     Lines of sight climb more steeply than the terrain anywhere, and the facets lie `on` it (k,), or so far above it
     that it cannot rise above them between their corners.
     """
-    x, y, z = grid
-    slope, corners = steepest(grid), triangles.reshape(-1, 3)
-    low, high = np.minimum(corners.min(axis=0)[:2], [x[0], y[0]]), np.maximum(corners.max(axis=0)[:2], [x[-1], y[-1]])
-    top = max(float(corners[:, 2].max()), float(z.max()))
-    for end in ends:
-        away = np.linalg.norm(np.maximum(np.abs(end[:, :2] - low), np.abs(end[:, :2] - high)), axis=1)
-        if not (end[:, 2] - top > slope * away).all():
-            return np.zeros(len(triangles), bool)
-    out = np.array(on)
+    if not is_overlooked(grid, boxes.box(triangles.reshape(-1, 3)), ends):
+        return np.zeros(len(triangles), bool)
+    slope, out = steepest(grid), np.array(on)
     rest = np.flatnonzero(~out)
     longest = np.maximum.reduce(geometry.edges(triangles[rest]))
     heights = above(grid, triangles[rest].reshape(-1, 3)).reshape(-1, 3)

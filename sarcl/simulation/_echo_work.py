@@ -8,6 +8,8 @@ import numpy as np
 
 from ..numerics import cost_model
 from ..scattering.facet_kinds import coherent
+from ..scattering.rough_pieces import RoughPieces
+from ..scene import terrain
 from ..scene.triangles import areas
 from ._planned_echoes import PlannedEchoes
 from .scene_plan import ScenePlan, samples_shadows
@@ -47,11 +49,14 @@ class EchoWork(NamedTuple):
         request, seen = scene.request, scene.seen
         n_points = len(seen.scene.positions) if request.same else 0
         smooth, rough = pieces_of(scene)
-        cutting, lit = cost_model.CUT_PIECE * (smooth + rough), 0.0
+        on_device = RoughPieces.suits(request.device, seen.scene)
+        cutting = (cost_model.CUT_PIECE_ON_DEVICE if on_device else cost_model.CUT_PIECE) * (smooth + rough)
+        lit, n_pulses = 0.0, len(seen.antennas)
         if request.shadows:
             sampled = samples_shadows(request, seen)
-            clipped = len(seen.antennas) * (smooth if sampled else smooth + rough)
-            cutting += cost_model.CLIPPED_PIECE * clipped + cost_model.LIT_SHARE * rough * sampled
+            clipped = n_pulses * (smooth if sampled else smooth + rough)
+            looks = min(n_pulses, cost_model.LOOKS) if sampled and _shadows_may_fall(scene) else 0
+            cutting += cost_model.CLIPPED_PIECE * clipped + cost_model.LOOK_AT_PIECE * rough * looks
             lit = cost_model.LIT_PIECE * clipped
         n_polarizations, n_samples = len(request.polarizations), planned.channels.shape[-1]
         pulse = cost_model.ECHO_PULSE + cost_model.ECHO_SAMPLE * n_samples + cost_model.SPREAD_PIECE * (smooth + rough)
@@ -73,3 +78,11 @@ def pieces_of(scene: ScenePlan) -> tuple[float, float]:
     edge = np.where(is_smooth, subdivision.plan.max_edge, min(subdivision.cell, subdivision.plan.max_edge))
     pieces = np.maximum(PER_EDGE * areas(facets.triangles) / edge**2, 1.0)
     return float(pieces[is_smooth].sum()), float(pieces[~is_smooth].sum())
+
+
+def _shadows_may_fall(scene: ScenePlan) -> bool:
+    """Whether something may be hidden from an antenna: not on a terrain alone that all of them overlook."""
+    original = scene.seen.original
+    if original.heights is None or len(original.triangles) > terrain.n_facets(original.heights):
+        return True
+    return not terrain.is_overlooked(original.heights, original.bounds, scene.seen.antennas.ends)
