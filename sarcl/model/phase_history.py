@@ -272,18 +272,34 @@ class PhaseHistory:
                 f"{'tx and track are both None' if tx is None else 'tx and track are both given'}; give exactly one: "
                 "positions, m (n_rows, 3), or a Trajectory"
             )
-        made, pulse = _time_samples.spectra_of(
-            samples, kind, rate, start, carrier, bandwidth, waveform, pulse_time, sweep_rate, beat, reference_range,
-            scene_range,
-        )  # fmt: skip
+        spectra = _time_samples.spectra_of(
+            _time_samples.TimeRecord(
+                samples=samples,
+                kind=kind,
+                rate=rate,
+                start=start,
+                carrier=carrier,
+                bandwidth=bandwidth,
+                waveform=waveform,
+                pulse_time=pulse_time,
+                sweep_rate=sweep_rate,
+                beat=beat,
+                reference_range=reference_range,
+                scene_range=scene_range,
+            )
+        )
         places: dict[str, Any] = {"tx": tx, "rx": rx, **rows}
         if track is not None:
-            places = rows_of_track(track, rx, made.reference_range, rows)
-        compressed = kind != "chirped" and not (kind == "rf" and waveform is not None)
+            places = rows_of_track(track, rx, spectra.reference_range, rows)
         out = cls(
-            made.samples, made.frequency, made.step, reference_range=made.reference_range, waveform=pulse,
-            compressed=compressed, **places,
-        )  # fmt: skip
+            spectra.samples,
+            spectra.frequency,
+            spectra.step,
+            reference_range=spectra.reference_range,
+            waveform=waveform,
+            compressed=kind != "chirped" and not (kind == "rf" and waveform is not None),
+            **places,
+        )
         if track is None:
             check_orbit(out)
         return out
